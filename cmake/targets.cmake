@@ -1,0 +1,12 @@
+# darb_library(NAME DEPENDS...): static library darb_NAME from engine/NAME/*.cpp.
+function(darb_library name)
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/engine/${name}/*.cpp)
+  list(TRANSFORM ARGN PREPEND darb_ OUTPUT_VARIABLE depends)
+  if(sources)
+    add_library(darb_${name} STATIC ${sources})
+    target_link_libraries(darb_${name} PUBLIC darb_options ${depends})
+  else()
+    add_library(darb_${name} INTERFACE)
+    target_link_libraries(darb_${name} INTERFACE darb_options ${depends})
+  endif()
+endfunction()

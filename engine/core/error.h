@@ -1,0 +1,24 @@
+// Error: bad input or a device that cannot go on. Thrown anywhere, caught once in main, which
+// prints "error: WHERE: WHAT" and "  WHAT TO DO", and exits with 2.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace darb {
+
+struct Error : std::runtime_error {
+    /// where: file and record, or device and pass. what: the reason. hint: what the user can do.
+    Error(std::string where_, std::string what_, std::string hint_ = {})
+        : std::runtime_error(where_ + ": " + what_ + (hint_.empty() ? "" : "\n  " + hint_)),
+          where(std::move(where_)),
+          reason(std::move(what_)),
+          hint(std::move(hint_)) {}
+
+    std::string where;
+    std::string reason;
+    std::string hint;
+};
+
+}  // namespace darb

@@ -1,0 +1,79 @@
+#include "engine/core/files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "engine/core/error.h"
+
+namespace darb {
+
+namespace {
+
+struct Descriptor {
+    int fd = -1;
+    ~Descriptor() {
+        if (fd >= 0) ::close(fd);
+    }
+};
+
+template <class Container>
+Container read_whole(const std::filesystem::path& path) {
+    const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+    if (file.fd < 0) throw Error(path.string(), std::strerror(errno), "Check the path.");
+    Container content;
+    size_t used = 0;
+    for (;;) {
+        content.resize(used + (size_t{1} << 20) + used / 2);
+        const ssize_t got = ::read(file.fd, content.data() + used, content.size() - used);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) throw Error(path.string(), std::strerror(errno), "Check the path.");
+        if (got == 0) break;
+        used += static_cast<size_t>(got);
+    }
+    content.resize(used);
+    return content;
+}
+
+[[noreturn]] void fail_write(const std::filesystem::path& path, const std::filesystem::path& temp) {
+    const std::string reason = std::strerror(errno);
+    std::error_code ignored;
+    std::filesystem::remove(temp, ignored);
+    throw Error(path.string(), "cannot be written: " + reason,
+                "Free space or choose another folder; the previous file, if any, is intact.");
+}
+
+}  // namespace
+
+std::vector<std::byte> read_file(const std::filesystem::path& path) {
+    return read_whole<std::vector<std::byte>>(path);
+}
+
+std::string read_text_file(const std::filesystem::path& path) {
+    return read_whole<std::string>(path);
+}
+
+void write_file_atomic(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    std::filesystem::path temp = path;
+    temp += ".tmp";
+    std::error_code ignored;
+    if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), ignored);
+    Descriptor file{::open(temp.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
+    if (file.fd < 0) fail_write(path, temp);
+    for (size_t done = 0; done < bytes.size();) {
+        const ssize_t wrote = ::write(file.fd, bytes.data() + done, bytes.size() - done);
+        if (wrote < 0 && errno == EINTR) continue;
+        if (wrote < 0) fail_write(path, temp);
+        done += static_cast<size_t>(wrote);
+    }
+    if (::fsync(file.fd) != 0 && errno != EINVAL && errno != EROFS) fail_write(path, temp);
+    if (::rename(temp.c_str(), path.c_str()) != 0) fail_write(path, temp);
+}
+
+void write_file_atomic(const std::filesystem::path& path, std::string_view text) {
+    write_file_atomic(path, std::as_bytes(std::span(text.data(), text.size())));
+}
+
+}  // namespace darb

@@ -1,0 +1,22 @@
+// Files: whole reads, and writes that leave the old file or the new one, never half of one.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace darb {
+
+/// The whole file. Throws Error naming the file when it cannot be read.
+std::vector<std::byte> read_file(const std::filesystem::path& path);
+std::string read_text_file(const std::filesystem::path& path);
+
+/// Writes to PATH.tmp, syncs, renames over PATH. Makes missing folders. Throws Error naming the
+/// file and the system's reason (disk full, read-only); PATH is then as it was.
+void write_file_atomic(const std::filesystem::path& path, std::span<const std::byte> bytes);
+void write_file_atomic(const std::filesystem::path& path, std::string_view text);
+
+}  // namespace darb

@@ -1,0 +1,38 @@
+// Image<T>: row-major, interleaved channels, top row first. data[(y * width + x) * channels + c].
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/core/check.h"
+
+namespace darb {
+
+template <class T>
+struct Image {
+    int width = 0;     // px
+    int height = 0;    // px
+    int channels = 0;  // 1, 3 or 4
+    std::vector<T> data;
+
+    Image() = default;
+    Image(int width_, int height_, int channels_)
+        : width(width_),
+          height(height_),
+          channels(channels_),
+          data(static_cast<size_t>(width_) * height_ * channels_) {}
+
+    T& at(int x, int y, int c) { return data[index(x, y, c)]; }
+    const T& at(int x, int y, int c) const { return data[index(x, y, c)]; }
+    size_t index(int x, int y, int c) const {
+        DARB_CHECK(x >= 0 && x < width && y >= 0 && y < height && c >= 0 && c < channels,
+                   "({}, {}, {}) in {}x{}x{}", x, y, c, width, height, channels);
+        return (static_cast<size_t>(y) * width + x) * channels + c;
+    }
+};
+
+using ImageF = Image<float>;         // linear in [0, 1] where it holds a photo divided by 255
+using ImageU8 = Image<std::uint8_t>;
+
+}  // namespace darb

@@ -1,0 +1,73 @@
+// Buffer: a move-only owner of device memory, usable as storage, indirect and transfer buffer.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+enum class Memory {
+    device,  // fastest for shaders; host access through staging (or directly on unified memory)
+    host,    // host-visible, coherent, cached where there is such: results that the CPU reads
+};
+
+class Buffer {
+  public:
+    Buffer() = default;
+    /// Throws Error naming the buffer and its size when memory or the device's limits do not allow
+    /// it. A size of 0 is made 16 bytes, so that every binding is valid. Content is undefined.
+    Buffer(Device& device, std::string name, std::uint64_t bytes, Memory memory = Memory::device);
+    ~Buffer();
+    Buffer(Buffer&&) noexcept;
+    Buffer& operator=(Buffer&&) noexcept;
+
+    VkBuffer handle() const { return buffer_; }
+    std::uint64_t bytes() const { return bytes_; }
+    const std::string& name() const { return name_; }
+    explicit operator bool() const { return buffer_ != VK_NULL_HANDLE; }
+
+    /// The mapped memory of a Memory::host buffer. The caller orders access with fences.
+    void* mapped() const { return mapped_; }
+
+    /// Blocking copies through staging; the queue is idle afterwards. offset and size in bytes.
+    void upload(std::span<const std::byte> bytes, std::uint64_t offset = 0);
+    void download(std::span<std::byte> bytes, std::uint64_t offset = 0) const;
+
+    template <class T>
+    void upload(const std::vector<T>& values, std::uint64_t offset = 0) {
+        upload(std::as_bytes(std::span(values)), offset);
+    }
+    template <class T>
+    std::vector<T> download(std::size_t count, std::uint64_t offset = 0) const {
+        std::vector<T> values(count);
+        download(std::as_writable_bytes(std::span(values)), offset);
+        return values;
+    }
+
+  private:
+    Device* device_ = nullptr;
+    std::string name_;
+    VkBuffer buffer_ = VK_NULL_HANDLE;
+    VkDeviceMemory memory_ = VK_NULL_HANDLE;
+    void* mapped_ = nullptr;
+    std::uint64_t bytes_ = 0;
+};
+
+/// A range of a buffer, as bound to a shader. size 0 = to the end.
+struct BufferRange {
+    BufferRange(const Buffer& buffer_) : buffer(&buffer_) {}
+    BufferRange(const Buffer& buffer_, std::uint64_t offset_, std::uint64_t size_ = 0)
+        : buffer(&buffer_), offset(offset_), size(size_) {}
+    const Buffer* buffer;
+    std::uint64_t offset = 0;  // bytes; a multiple of 256
+    std::uint64_t size = 0;    // bytes
+};
+
+}  // namespace darb

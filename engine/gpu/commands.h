@@ -1,0 +1,88 @@
+// Commands: records passes one statement each, with barriers derived from what each pass reads and
+// writes, and runs them. Each pass() is a debug label and a pair of timestamps.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/device.h"
+#include "engine/gpu/pipeline.h"
+
+namespace darb {
+
+struct PassTime {
+    std::string name;
+    double ms = 0;
+};
+
+class Commands {
+  public:
+    explicit Commands(Device& device);
+    ~Commands();
+    Commands(Commands&&) noexcept;
+    Commands& operator=(Commands&&) noexcept;
+
+    /// Starts a new recording. The last submission must have been waited for.
+    void begin();
+
+    /// Everything recorded until the next pass() belongs to this name.
+    void pass(std::string_view name);
+
+    /// One dispatch. args: the pass's argument struct, whose size must equal the shader's push
+    /// constant block. buffers: set 0, binding 0.., as many as the shader declares. groups >= 1 in
+    /// each used dimension; a dimension above the device's limit is a check failure.
+    /// Memory barriers are placed here: a pass waits for the earlier writers of what it touches,
+    /// and a writer for the earlier readers. Ranges of one buffer count as the whole buffer.
+    template <class Args>
+    void dispatch(const Pipeline& pipeline, const Args& args,
+                  std::initializer_list<BufferRange> buffers, std::uint32_t groups_x,
+                  std::uint32_t groups_y = 1, std::uint32_t groups_z = 1) {
+        dispatch_bytes(pipeline, std::as_bytes(std::span(&args, 1)),
+                       std::span(buffers.begin(), buffers.size()), groups_x, groups_y, groups_z);
+    }
+    /// The same with VkDispatchIndirectCommand read from indirect at offset (bytes).
+    template <class Args>
+    void dispatch_indirect(const Pipeline& pipeline, const Args& args,
+                           std::initializer_list<BufferRange> buffers, const Buffer& indirect,
+                           std::uint64_t offset) {
+        dispatch_indirect_bytes(pipeline, std::as_bytes(std::span(&args, 1)),
+                                std::span(buffers.begin(), buffers.size()), indirect, offset);
+    }
+    void dispatch_bytes(const Pipeline&, std::span<const std::byte> args,
+                        std::span<const BufferRange> buffers, std::uint32_t groups_x,
+                        std::uint32_t groups_y, std::uint32_t groups_z);
+    void dispatch_indirect_bytes(const Pipeline&, std::span<const std::byte> args,
+                                 std::span<const BufferRange> buffers, const Buffer& indirect,
+                                 std::uint64_t offset);
+
+    void fill(const BufferRange& range, std::uint32_t word);  // size and offset multiples of 4
+    void copy(const BufferRange& from, const BufferRange& to, std::uint64_t bytes);
+
+    /// Ends the recording and gives it to the queue; host reads of Memory::host buffers are made
+    /// visible. Does not wait.
+    void submit();
+    /// Blocks (no spinning) until the last submit is done. Throws Error on a lost device.
+    void wait();
+    void submit_and_wait() {
+        submit();
+        wait();
+    }
+
+    /// After wait(): one row per pass() in order of recording, empty if timestamps are off.
+    std::vector<PassTime> pass_times() const;
+    void enable_timestamps(bool on);  // default on where the device has them
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace darb

@@ -1,0 +1,84 @@
+// Device: one Vulkan 1.3 device with one compute queue, no window system needed.
+// Everything below engine/gpu knows buffers, pipelines and commands; nothing of splats.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace darb {
+
+/// What `darb devices` prints, and what the choice is made from.
+struct DeviceInfo {
+    int index = 0;             // what --device N takes
+    std::string name;          // what --device NAME matches, case-insensitive, any part
+    std::string driver;        // name and version
+    std::string type;          // discrete, integrated, virtual, cpu, other
+    std::uint32_t api_version = 0;
+    std::uint64_t heap_bytes = 0;               // largest device-local heap
+    std::uint64_t max_storage_buffer_bytes = 0;  // maxStorageBufferRange
+    std::uint64_t max_allocation_bytes = 0;
+    std::uint32_t max_storage_buffers = 0;  // per stage
+    std::uint32_t max_workgroup_threads = 0;
+    std::uint32_t shared_memory_bytes = 0;
+    std::uint32_t max_groups_x = 0;
+    std::uint32_t subgroup_size = 0, min_subgroup_size = 0, max_subgroup_size = 0;
+    double timestamp_period_ns = 0;  // 0 where the queue has no timestamps
+    bool unified_memory = false;     // every heap is host-visible (CPU and integrated devices)
+    bool float_atomics = false;      // float32 atomic add on buffers
+    bool usable = false;
+    std::string reason;  // why it was rejected, or why it ranks where it does
+};
+
+/// Every physical device, best first; never throws for want of a device (then: empty).
+std::vector<DeviceInfo> list_devices();
+
+struct DeviceOptions {
+    std::string select;  // "" = best usable; a number = index; else part of a name
+    bool validation = false;  // core + synchronization validation; also DARB_VALIDATION=1
+    std::filesystem::path cache_folder;  // pipeline cache; "" = XDG cache folder / darb
+};
+
+class Device {
+  public:
+    /// Throws Error: no loader, no device, no usable device (each with its reason), bad --device.
+    explicit Device(const DeviceOptions& options = {});
+    ~Device();  // writes the pipeline cache
+    Device(const Device&) = delete;
+    Device& operator=(const Device&) = delete;
+
+    const DeviceInfo& info() const;
+    bool is_lavapipe() const;
+    VkInstance instance() const;
+    VkPhysicalDevice physical() const;
+    VkDevice handle() const;
+    VkQueue queue() const;
+    std::uint32_t queue_family() const;
+    VkPipelineCache pipeline_cache() const;
+
+    /// Bytes of live Buffers, and the most there ever were.
+    std::uint64_t allocated_bytes() const;
+    std::uint64_t peak_bytes() const;
+    /// A budget for all Buffers together; 0 = none. Exceeding it throws as out of memory does.
+    void set_memory_budget(std::uint64_t bytes);
+
+    /// Messages of the validation layers since the start (0 where validation is off).
+    std::uint64_t validation_message_count() const;
+
+    void wait_idle() const;
+
+    struct State;  // private to engine/gpu
+    State& state() const { return *state_; }
+
+  private:
+    std::unique_ptr<State> state_;
+};
+
+/// Throws Error naming WHAT for every result but VK_SUCCESS (out of memory, device lost, ...).
+void check_vulkan(VkResult result, const std::string& what);
+
+}  // namespace darb

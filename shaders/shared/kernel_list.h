@@ -1,0 +1,23 @@
+// The list of reconstruction kernels and footprints: ids that C++ and GLSL share.
+// The maths of each row stands once, in engine/kernels (double); GLSL gets coefficients from there.
+#ifndef DARB_KERNEL_LIST_H
+#define DARB_KERNEL_LIST_H
+
+#define KERNEL_GAUSSIAN 0
+#define KERNEL_RAISED_COSINE 1
+#define KERNEL_HALF_COSINE_SQUARED 2
+#define KERNEL_SINC 3
+#define KERNEL_INVERSE_QUADRATIC 4
+#define KERNEL_COSINE 5
+#define KERNEL_SQUARED_RAISED_COSINE 6
+#define KERNEL_INVERSE_MULTIQUADRIC 7
+#define KERNEL_PARABOLIC 8
+#define KERNEL_COUNT 9
+
+#define FOOTPRINT_PSI 0
+#define FOOTPRINT_EXACT 1
+
+#define EVALUATION_POLYNOMIAL 0
+#define EVALUATION_BUILTIN 1
+
+#endif
