@@ -6,11 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "shaders/shared/kernel_list.h"
+#include "engine/kernels/kernel_family.h"
 
 namespace darb {
-
-enum class Footprint { psi = FOOTPRINT_PSI, exact = FOOTPRINT_EXACT };
 
 struct SplatModel {
     int sh_degree = 0;             // 0..3

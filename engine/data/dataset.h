@@ -1,0 +1,69 @@
+// Dataset: photos with their cameras and the sparse points, from any of the supported sources.
+// Cameras are pinholes in the frame of engine/scene/camera.h, at the size the photos load with.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/scene/camera.h"
+
+namespace darb {
+
+/// Brown-Conrady, fisheye, ... : every camera model of COLMAP 3.8, as the source declares it.
+struct LensModel {
+    std::string model = "PINHOLE";   // COLMAP's name
+    std::vector<double> parameters;  // in COLMAP's order, px at full size
+    int width = 0, height = 0;       // px at full size
+    bool distorted() const;
+};
+
+struct View {
+    std::string name;              // as the source names it, with folders
+    std::filesystem::path photo;   // the file
+    std::filesystem::path mask;    // empty where there is none; 8-bit, 0 = ignore
+    Camera camera;                 // of the photo as load_photo returns it
+    LensModel lens;                // of the file on disk; undistorted by load_photo
+    bool is_test = false;          // held out
+};
+
+struct PointCloud {
+    std::vector<double> position;      // [P][3] world
+    std::vector<std::uint8_t> colour;  // [P][3]
+    std::size_t size() const { return colour.size() / 3; }
+};
+
+struct Dataset {
+    std::filesystem::path root;
+    std::string source;            // "COLMAP binary", "COLMAP text", "transforms.json", ...
+    std::vector<View> views;       // by name, ascending
+    PointCloud points;             // may be empty
+    bool has_alpha = false;        // some photo has an alpha channel
+    std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
+};
+
+struct DatasetOptions {
+    std::string images_folder = "images";  // COLMAP: images, images_2, ...
+    int resolution = -1;  // 1, 2, 4, 8: divisor; > 8: width in px; -1: as is, but at most 1,600 wide
+    bool hold_out = false;  // --eval: every 8th view by name from the first on is test; sources with
+                            // a test file of their own use that in either case
+    bool require_photos = true;  // false: cameras only (render)
+};
+
+/// DATASET is a COLMAP project folder (sparse/0, sparse, or the model files themselves), a folder with
+/// transforms.json or transforms_train.json, or a .json path. Throws Error naming file and record.
+Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
+
+/// The photo, RGBA with straight alpha (255 where the file has none; a mask multiplies alpha),
+/// EXIF orientation applied, undistorted, scaled to view.camera's size. Thread-safe.
+ImageU8 load_photo(const View& view);
+
+/// Loads all, on `threads` threads (0 = all cores), in the order of views.
+std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads = 0);
+
+/// scene extent of 3DGS: 1.1 x the largest distance of a camera from the mean camera centre.
+double scene_extent(const std::vector<View>& views);
+
+}  // namespace darb
