@@ -1,0 +1,86 @@
+// Argument structs of the render passes, read by C++ and GLSL alike (scalar layout).
+// N splats, V visible, K splat-tile pairs, T tiles.
+#ifndef DARB_RENDER_ARGS_H
+#define DARB_RENDER_ARGS_H
+
+#include "types.h"
+
+#define TILE_SIZE 16          // px, both ways; a blend workgroup owns one tile
+#define SPLAT_GROUP 64        // threads of the passes that run once per splat or pair
+#define MAX_GROUPS 65535u     // the portable limit of one dispatch dimension
+#define CULL_REASONS 8        // see CULL_* below
+
+// Why a splat takes no part in a frame; index into FrameStatus.culled.
+#define CULL_NEAR 0        // not in front of the near plane, or position not finite
+#define CULL_ROTATION 1    // quaternion of no direction
+#define CULL_OPACITY 2     // below the alpha cut-off everywhere
+#define CULL_COVARIANCE 3  // determinant not positive or not finite
+#define CULL_OUTSIDE 4     // touches no tile
+
+#ifdef __cplusplus
+namespace darb::gpu {
+#endif
+
+// One camera as the shaders see it. World to camera: p = rows * p_world + translation.
+struct CameraData {
+    vec3 row0;
+    vec3 row1;
+    vec3 row2;
+    vec3 translation;
+    vec3 centre;     // world
+    vec2 focal;      // px
+    vec2 principal;  // px
+    vec2 ratio_min;  // x/z and y/z are clamped to [ratio_min, ratio_max] in the Jacobian
+    vec2 ratio_max;
+    uint width;   // px
+    uint height;  // px
+    uint tiles_x;
+    uint tiles_y;
+    float near_plane;  // world units along z
+};
+
+// What one frame counts, written by the passes, read by later passes and by the host afterwards.
+struct FrameStatus {
+    uint visible;   // V
+    uint pairs;     // K as wanted, may exceed the capacity
+    uint overflow;  // 1: pairs exceeded the capacity; sticky until the host clears it
+    uint bad_gradients;  // splats whose gradient was not finite, since the host cleared it
+    uint culled[CULL_REASONS];
+};
+
+// VkDispatchIndirectCommand of the passes over V and over K.
+struct FrameGroups {
+    uint visible_x, visible_y, visible_z;
+    uint pairs_x, pairs_y, pairs_z;
+};
+
+struct ProjectArgs {
+    uint splat_count;   // N
+    uint camera_index;
+    float low_pass;     // px^2, added to the diagonal of the projected covariance
+};
+
+struct SplatArgs {      // compact, gather_counts
+    uint splat_count;   // N
+};
+
+struct PairArgs {       // frame_groups, emit, tile_ranges
+    uint pair_capacity;
+    uint tiles_x;
+    uint tile_count;
+};
+
+struct BlendArgs {
+    uint width;   // px
+    uint height;  // px
+    uint tiles_x;
+    float background_r, background_g, background_b;
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(CameraData) == 112);
+static_assert(sizeof(FrameStatus) == 48);
+static_assert(sizeof(FrameGroups) == 24);
+}  // namespace darb::gpu
+#endif
+#endif
