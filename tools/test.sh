@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# Sets up, builds and runs every check that a commit must pass; under 30 minutes on two cores.
+# Ends with "N passed, N failed" (ctest cases of all runs, plus one per other step).
+set -uo pipefail
+cd "$(dirname "$0")/.." || exit 1
+
+all_steps="setup style release unit gpu clang sanitize sync"
+usage() {
+    cat <<TEXT
+usage: tools/test.sh [full | quick | STEP...]      (default: full)
+  setup      install missing packages (tools/setup.sh)
+  style      include arrows, length caps, clang-format (tools/check_style.sh)
+  release    build with gcc, warnings are errors
+  unit       tests that need no device
+  gpu        tests of shaders, pipelines, pictures and training
+  clang      build with clang, warnings are errors, with ASan and UBSan
+  sanitize   unit tests and the quick device tests of that build
+  sync       the quick device tests under Vulkan synchronization validation
+  quick      = setup style release unit
+TEXT
+}
+
+case "${1:-full}" in
+    full) steps=$all_steps ;;
+    quick) steps="setup style release unit" ;;
+    -h | --help) usage; exit 0 ;;
+    *) steps=$* ;;
+esac
+for step in $steps; do
+    [[ " $all_steps " == *" $step "* ]] || { usage >&2; exit 2; }
+done
+
+jobs=$(nproc)
+passed=0 failed=0 failures=()
+logs=$(mktemp -d)
+trap 'rm -rf "$logs"' EXIT
+
+# Device tests start their own threads, one per core, so two at a time are plenty.
+# Cases whose name ends in _slow run in the gpu step alone.
+run_ctest() {
+    local preset=$1 log=$logs/$step
+    shift
+    ctest --test-dir "$preset" --output-on-failure --no-tests=error -j2 "$@" 2>&1 | tee "$log"
+    local status=${PIPESTATUS[0]} total bad
+    read -r bad total < <(sed -nE 's/.* ([0-9]+) tests? failed out of ([0-9]+)$/\1 \2/p' "$log")
+    if [[ -n ${total:-} ]]; then
+        passed=$((passed + total - bad)) failed=$((failed + bad))
+        [[ $status == 0 || $bad != 0 ]] || failed=$((failed + 1))
+    else
+        failed=$((failed + 1))
+    fi
+    return "$status"
+}
+
+build() { cmake --preset "$1" >"$logs/configure" 2>&1 || { cat "$logs/configure"; return 1; }
+    cmake --build --preset "$1" -j "$jobs"; }
+
+do_setup() { tools/setup.sh; }
+do_style() { tools/check_style.sh; }
+do_release() { build release; }
+do_clang() { build asan; }
+do_unit() { run_ctest build -L '^unit$'; }
+do_gpu() { run_ctest build -LE '^unit$'; }
+do_sanitize() {
+    ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
+        run_ctest build-asan -L '^(unit|shader|pipeline)$' -E '_slow(/|$)' --timeout 300
+}
+do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E '_slow(/|$)' --timeout 300; }
+
+started=$SECONDS
+for step in $steps; do
+    echo "=== $step"
+    begun=$SECONDS
+    "do_$step"
+    status=$?
+    case $step in
+        unit | gpu | sanitize | sync) ;; # counted case by case
+        *) if [[ $status == 0 ]]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi ;;
+    esac
+    [[ $status == 0 ]] || failures+=("$step")
+    echo "=== $step: $([[ $status == 0 ]] && echo ok || echo FAILED), $((SECONDS - begun)) s"
+    # Nothing that follows can run without packages or without a build.
+    [[ $status == 0 || ! " setup release " == *" $step "* ]] || break
+done
+
+[[ ${#failures[@]} == 0 ]] || echo "failed steps: ${failures[*]}"
+echo "$((SECONDS - started)) s"
+echo "$passed passed, $failed failed"
+[[ ${#failures[@]} == 0 && $failed == 0 ]]
