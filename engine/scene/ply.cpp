@@ -1,0 +1,241 @@
+#include "engine/scene/ply.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/scene/ply_table.h"
+
+namespace darb {
+
+namespace {
+
+constexpr double kRecentreBeyond = 1e4;  // float32 resolves 1e-3 there
+
+/// Column of every parameter in the vertex element.
+struct Columns {
+    std::array<int, 3> position{}, dc{}, scale{};
+    std::array<int, 4> rotation{};
+    int opacity = 0;
+    std::vector<int> rest;  // in file order: channel-major
+};
+
+int need(const PlyElement& vertex, const std::string& name, const std::string& where) {
+    const int column = vertex.find(name);
+    if (column < 0 || vertex.properties[static_cast<std::size_t>(column)].is_list)
+        throw Error(where, fmt::format("element vertex lacks the property {}", name),
+                    vertex.find("packed_position") >= 0
+                        ? "This is a compressed PLY: convert it to a plain one first."
+                        : "A splat scene is needed, not a point cloud or mesh.");
+    return column;
+}
+
+Columns find_columns(const PlyElement& vertex, const std::string& where) {
+    Columns columns;
+    for (int i = 0; i < 3; ++i) {
+        columns.position[i] = need(vertex, std::string(1, "xyz"[i]), where);
+        columns.dc[i] = need(vertex, fmt::format("f_dc_{}", i), where);
+        columns.scale[i] = need(vertex, fmt::format("scale_{}", i), where);
+    }
+    for (int i = 0; i < 4; ++i) columns.rotation[i] = need(vertex, fmt::format("rot_{}", i), where);
+    columns.opacity = need(vertex, "opacity", where);
+    for (int i = 0; vertex.find(fmt::format("f_rest_{}", i)) >= 0; ++i)
+        columns.rest.push_back(need(vertex, fmt::format("f_rest_{}", i), where));
+    const std::size_t count = columns.rest.size();
+    if (count != 0 && count != 9 && count != 24 && count != 45)
+        throw Error(
+            where,
+            fmt::format("has {} f_rest properties; SH degree 0, 1, 2, 3 has 0, 9, 24, 45", count));
+    return columns;
+}
+
+/// "Key: value" or "Key value".
+std::string_view comment_value(const PlyHeader& header, std::string_view key) {
+    for (const std::string& comment : header.comments) {
+        std::string_view text = comment;
+        if (!text.starts_with(key)) continue;
+        text.remove_prefix(key.size());
+        if (text.empty() || (text[0] != ':' && text[0] != ' ')) continue;
+        const std::size_t begin = text.find_first_not_of(": \t");
+        return begin == std::string_view::npos ? std::string_view{} : text.substr(begin);
+    }
+    return {};
+}
+
+void read_comments(const PlyHeader& header, const std::string& where, SplatModel& model) {
+    if (const std::string_view name = comment_value(header, "SplatKernel"); !name.empty()) {
+        const std::optional<int> kernel = kernel_from_name(name);
+        if (!kernel) throw Error(where, fmt::format("names the unknown SplatKernel '{}'", name));
+        model.kernel = *kernel;
+    }
+    if (const std::string_view name = comment_value(header, "SplatFootprint"); !name.empty()) {
+        const std::optional<Footprint> footprint = footprint_from_name(name);
+        if (!footprint)
+            throw Error(where, fmt::format("names the unknown SplatFootprint '{}'", name));
+        model.footprint = *footprint;
+    }
+    model.antialias = comment_value(header, "SplatRenderMode") == "mip";
+}
+
+bool all_finite(const double* values, const Columns& columns) {
+    // float32 range is what the model stores.
+    const auto good = [&](int column) { return std::isfinite(static_cast<float>(values[column])); };
+    bool finite = good(columns.opacity);
+    for (int i = 0; i < 3; ++i)
+        finite =
+            finite && good(columns.position[i]) && good(columns.dc[i]) && good(columns.scale[i]);
+    for (const int column : columns.rotation) finite = finite && good(column);
+    for (const int column : columns.rest) finite = finite && good(column);
+    return finite;
+}
+
+void store_splat(const double* values, const Columns& columns, std::size_t at, SplatModel& model) {
+    for (std::size_t i = 0; i < 3; ++i) {
+        model.sh_dc[at * 3 + i] = static_cast<float>(values[columns.dc[i]]);
+        model.log_scale[at * 3 + i] = static_cast<float>(values[columns.scale[i]]);
+    }
+    for (std::size_t i = 0; i < 4; ++i)
+        model.rotation[at * 4 + i] = static_cast<float>(values[columns.rotation[i]]);
+    model.opacity[at] = static_cast<float>(values[columns.opacity]);
+    const std::size_t rest = columns.rest.size(), per_channel = rest / 3;
+    for (std::size_t i = 0; i < rest; ++i) {
+        const std::size_t channel = i / per_channel, coefficient = i % per_channel;
+        model.sh_rest[at * rest + coefficient * 3 + channel] =
+            static_cast<float>(values[columns.rest[i]]);
+    }
+}
+
+/// Positions relative to a whole-numbered origin where any lies far out, as they are elsewhere.
+void store_positions(const std::vector<double>& positions, SplatModel& model) {
+    glm::dvec3 low(1e300), high(-1e300);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        const int axis = static_cast<int>(i % 3);
+        low[axis] = std::min(low[axis], positions[i]);
+        high[axis] = std::max(high[axis], positions[i]);
+    }
+    for (int axis = 0; axis < 3 && !positions.empty(); ++axis)
+        if (std::max(std::abs(low[axis]), std::abs(high[axis])) > kRecentreBeyond)
+            model.origin[axis] = std::round(0.5 * low[axis] + 0.5 * high[axis]);
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        model.position[i] =
+            static_cast<float>(positions[i] - model.origin[static_cast<int>(i % 3)]);
+}
+
+bool needs_double(const SplatModel& model) {
+    if (model.origin == glm::dvec3(0.0)) return false;
+    for (std::size_t i = 0; i < model.position.size(); ++i) {
+        const double value = model.origin[static_cast<int>(i % 3)] + double{model.position[i]};
+        if (static_cast<double>(static_cast<float>(value)) != value) return true;
+    }
+    return false;
+}
+
+std::string make_header(const SplatModel& model, bool double_positions) {
+    std::string text = fmt::format(
+        "ply\nformat binary_little_endian 1.0\ncomment SplatKernel: {}\ncomment SplatFootprint: "
+        "{}\n"
+        "comment SplatRenderMode: {}\nelement vertex {}\n",
+        kernel_name(model.kernel), footprint_name(model.footprint),
+        model.antialias ? "mip" : "default", model.size());
+    for (const char* name : {"x", "y", "z"})
+        text += fmt::format("property {} {}\n", double_positions ? "double" : "float", name);
+    for (const char* name : {"nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
+        text += fmt::format("property float {}\n", name);
+    for (int i = 0; i < model.rest_count(); ++i)
+        text += fmt::format("property float f_rest_{}\n", i);
+    for (const char* name :
+         {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
+        text += fmt::format("property float {}\n", name);
+    return text + "end_header\n";
+}
+
+template <class T>
+std::byte* put(std::byte* to, const T* values, std::size_t count) {
+    std::memcpy(to, values, count * sizeof(T));
+    return to + count * sizeof(T);
+}
+
+void check_shapes(const SplatModel& model) {
+    const std::size_t n = model.size();
+    DARB_CHECK(model.sh_degree >= 0 && model.sh_degree <= 3, "degree {}", model.sh_degree);
+    DARB_CHECK(model.position.size() == n * 3 && model.log_scale.size() == n * 3 &&
+                   model.rotation.size() == n * 4 && model.sh_dc.size() == n * 3 &&
+                   model.sh_rest.size() == n * static_cast<std::size_t>(model.rest_count()),
+               "N = {}, rest {}", n, model.sh_rest.size());
+}
+
+}  // namespace
+
+SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
+                     std::size_t* dropped) {
+    const PlyHeader header = parse_ply_header(file, where);
+    const PlyElement* vertex = header.find("vertex");
+    if (!vertex) throw Error(where, "has no element vertex", "A splat scene is needed.");
+    const Columns columns = find_columns(*vertex, where);
+    check_ply_size(file, header, *vertex, where);
+
+    SplatModel model;
+    model.sh_degree = static_cast<int>(std::lround(std::sqrt(columns.rest.size() / 3 + 1))) - 1;
+    read_comments(header, where, model);
+    model.resize(vertex->count);
+    std::vector<double> positions;
+    positions.reserve(vertex->count * 3);
+    std::size_t kept = 0;
+    read_ply_rows(file, header, *vertex, where, [&](std::size_t, const double* values) {
+        if (!all_finite(values, columns)) return;
+        for (const int column : columns.position) positions.push_back(values[column]);
+        store_splat(values, columns, kept++, model);
+    });
+    if (dropped) *dropped = vertex->count - kept;
+    model.resize(kept);
+    store_positions(positions, model);
+    return model;
+}
+
+SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped) {
+    return parse_ply(read_file(path), path.string(), dropped);
+}
+
+std::vector<std::byte> encode_ply(const SplatModel& model) {
+    check_shapes(model);
+    const bool doubles = needs_double(model);
+    const std::string header = make_header(model, doubles);
+    const std::size_t rest = static_cast<std::size_t>(model.rest_count()), per_channel = rest / 3;
+    const std::size_t row = 3 * (doubles ? 8 : 4) + (3 + 3 + rest + 8) * 4;
+    std::vector<std::byte> file(header.size() + model.size() * row);
+    std::byte* to = put(file.data(), header.data(), header.size());
+    std::vector<float> rest_row(rest);
+    constexpr float kNoNormal[3] = {0, 0, 0};
+    for (std::size_t n = 0; n < model.size(); ++n) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double value =
+                model.origin[static_cast<int>(i)] + double{model.position[n * 3 + i]};
+            // Adding a zero origin would turn -0 into 0.
+            const float narrow = model.origin[static_cast<int>(i)] == 0.0
+                                     ? model.position[n * 3 + i]
+                                     : static_cast<float>(value);
+            to = doubles ? put(to, &value, 1) : put(to, &narrow, 1);
+        }
+        to = put(to, kNoNormal, 3);
+        to = put(to, &model.sh_dc[n * 3], 3);
+        for (std::size_t i = 0; i < rest; ++i)
+            rest_row[i] = model.sh_rest[n * rest + (i % per_channel) * 3 + i / per_channel];
+        to = put(to, rest_row.data(), rest);
+        to = put(to, &model.opacity[n], 1);
+        to = put(to, &model.log_scale[n * 3], 3);
+        to = put(to, &model.rotation[n * 4], 4);
+    }
+    return file;
+}
+
+void write_ply(const std::filesystem::path& path, const SplatModel& model) {
+    write_file_atomic(path, encode_ply(model));
+}
+
+}  // namespace darb

@@ -1,0 +1,31 @@
+// Splat scenes as PLY, the layout of 3DGS that every viewer reads: x y z nx ny nz f_dc_0..2
+// f_rest_* (all red, then green, then blue) opacity scale_0..2 rot_0..3, and three header comments:
+// SplatKernel, SplatFootprint and SplatRenderMode (default or mip).
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+/// Reads by property name: any order, any type, SH degree 0 to 3, normals ignored, other elements
+/// skipped; ascii and binary of both byte orders. A splat with a NaN or infinite parameter is
+/// dropped; *dropped (where given) is their count. Without comments: gaussian, psi, default.
+/// Positions beyond 1e4 from 0 are stored relative to SplatModel::origin, computed in double.
+/// Throws Error naming the file, the record and the reason.
+SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped = nullptr);
+/// The same from memory; `where` stands for the file name in errors.
+SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
+                     std::size_t* dropped = nullptr);
+
+/// Little-endian float32; x y z are double where origin + position is no float32 (scenes at map
+/// coordinates). A file that was read without recentring is written back bit-equal in its values.
+void write_ply(const std::filesystem::path& path, const SplatModel& model);
+std::vector<std::byte> encode_ply(const SplatModel& model);
+
+}  // namespace darb

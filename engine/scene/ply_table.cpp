@@ -1,0 +1,302 @@
+#include "engine/scene/ply_table.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <charconv>
+#include <cstring>
+#include <optional>
+
+#include "engine/core/error.h"
+
+namespace darb {
+
+static_assert(std::endian::native == std::endian::little);
+
+namespace {
+
+constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
+constexpr const char* kCopyAgain = "Export or copy the file again.";
+
+std::size_t type_size(PlyType type) {
+    switch (type) {
+        case PlyType::int8:
+        case PlyType::uint8:
+            return 1;
+        case PlyType::int16:
+        case PlyType::uint16:
+            return 2;
+        case PlyType::int32:
+        case PlyType::uint32:
+        case PlyType::float32:
+            return 4;
+        case PlyType::float64:
+            return 8;
+    }
+    return 0;
+}
+
+std::optional<PlyType> type_from_name(std::string_view name) {
+    if (name == "char" || name == "int8") return PlyType::int8;
+    if (name == "uchar" || name == "uint8") return PlyType::uint8;
+    if (name == "short" || name == "int16") return PlyType::int16;
+    if (name == "ushort" || name == "uint16") return PlyType::uint16;
+    if (name == "int" || name == "int32") return PlyType::int32;
+    if (name == "uint" || name == "uint32") return PlyType::uint32;
+    if (name == "float" || name == "float32") return PlyType::float32;
+    if (name == "double" || name == "float64") return PlyType::float64;
+    return std::nullopt;
+}
+
+template <class T>
+double load(const std::byte* from, bool swap) {
+    std::byte bytes[sizeof(T)];
+    for (std::size_t i = 0; i < sizeof(T); ++i) bytes[i] = from[swap ? sizeof(T) - 1 - i : i];
+    T value;
+    std::memcpy(&value, bytes, sizeof(T));
+    return static_cast<double>(value);
+}
+
+double load_value(const std::byte* from, PlyType type, bool swap) {
+    switch (type) {
+        case PlyType::int8:
+            return load<std::int8_t>(from, swap);
+        case PlyType::uint8:
+            return load<std::uint8_t>(from, swap);
+        case PlyType::int16:
+            return load<std::int16_t>(from, swap);
+        case PlyType::uint16:
+            return load<std::uint16_t>(from, swap);
+        case PlyType::int32:
+            return load<std::int32_t>(from, swap);
+        case PlyType::uint32:
+            return load<std::uint32_t>(from, swap);
+        case PlyType::float32:
+            return load<float>(from, swap);
+        case PlyType::float64:
+            return load<double>(from, swap);
+    }
+    return 0;
+}
+
+std::vector<std::string_view> split_words(std::string_view line) {
+    std::vector<std::string_view> words;
+    for (std::size_t at = 0; at < line.size();) {
+        const std::size_t begin = line.find_first_not_of(" \t\r", at);
+        if (begin == std::string_view::npos) break;
+        const std::size_t end = std::min(line.find_first_of(" \t\r", begin), line.size());
+        words.push_back(line.substr(begin, end - begin));
+        at = end;
+    }
+    return words;
+}
+
+std::uint64_t parse_count(std::string_view word, const std::string& where, std::string_view line) {
+    std::uint64_t count = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
+    if (error != std::errc{} || end != word.data() + word.size())
+        throw Error(where, fmt::format("header line '{}' has no valid count", line), kCopyAgain);
+    return count;
+}
+
+PlyType parse_type(std::string_view word, const std::string& where) {
+    const std::optional<PlyType> type = type_from_name(word);
+    if (!type) throw Error(where, fmt::format("header names the unknown type '{}'", word));
+    return *type;
+}
+
+void parse_format(const std::vector<std::string_view>& words, PlyHeader& header,
+                  const std::string& where) {
+    const std::string_view name = words.size() > 1 ? words[1] : "";
+    if (name == "ascii")
+        header.format = PlyFormat::ascii;
+    else if (name == "binary_little_endian")
+        header.format = PlyFormat::little_endian;
+    else if (name == "binary_big_endian")
+        header.format = PlyFormat::big_endian;
+    else
+        throw Error(where, fmt::format("header has the unknown format '{}'", name));
+}
+
+PlyProperty parse_property(const std::vector<std::string_view>& words, const std::string& where,
+                           std::string_view line) {
+    PlyProperty property;
+    property.is_list = words.size() == 5 && words[1] == "list";
+    if (!property.is_list && words.size() != 3)
+        throw Error(where, fmt::format("header line '{}' is no property", line), kCopyAgain);
+    property.name = words.back();
+    property.type = parse_type(words[words.size() - 2], where);
+    if (property.is_list) property.count_type = parse_type(words[2], where);
+    return property;
+}
+
+void parse_header_line(std::string_view line, PlyHeader& header, const std::string& where) {
+    const std::vector<std::string_view> words = split_words(line);
+    if (words.empty() || words[0] == "obj_info") return;
+    if (words[0] == "comment") {
+        const std::size_t begin = line.find("comment") + 7;
+        const std::size_t text = line.find_first_not_of(" \t", begin);
+        const std::size_t last = line.find_last_not_of(" \t\r");
+        header.comments.emplace_back(text == std::string_view::npos || last < text
+                                         ? ""
+                                         : line.substr(text, last + 1 - text));
+    } else if (words[0] == "format") {
+        parse_format(words, header, where);
+    } else if (words[0] == "element" && words.size() == 3) {
+        header.elements.push_back({std::string(words[1]), parse_count(words[2], where, line), {}});
+    } else if (words[0] == "property" && !header.elements.empty()) {
+        header.elements.back().properties.push_back(parse_property(words, where, line));
+    } else {
+        throw Error(where, fmt::format("header line '{}' is not understood", line), kCopyAgain);
+    }
+}
+
+/// Smallest size of a row; lists count with their length field only (binary) or one word (ascii).
+std::uint64_t least_row_bytes(const PlyElement& element, PlyFormat format) {
+    if (format == PlyFormat::ascii) return 2 * element.properties.size();
+    std::uint64_t bytes = 0;
+    for (const PlyProperty& property : element.properties)
+        bytes += type_size(property.is_list ? property.count_type : property.type);
+    return bytes;
+}
+
+/// Walks the data part, one row at a time.
+class RowReader {
+  public:
+    RowReader(std::span<const std::byte> file, const PlyHeader& header, const std::string& where)
+        : file_(file), at_(header.data_begin), format_(header.format), where_(where) {}
+
+    void read(const PlyElement& element, std::size_t row, double* values) {
+        for (const PlyProperty& property : element.properties) {
+            *values = next(element, row, property.is_list ? property.count_type : property.type);
+            if (property.is_list) {
+                skip_list(element, row, property, *values);
+                *values = 0;
+            }
+            ++values;
+        }
+    }
+
+  private:
+    [[noreturn]] void fail(const PlyElement& element, std::size_t row, const char* reason) const {
+        throw Error(
+            where_,
+            fmt::format("element {}, row {} of {}: {}", element.name, row, element.count, reason),
+            kCopyAgain);
+    }
+
+    double next(const PlyElement& element, std::size_t row, PlyType type) {
+        if (format_ == PlyFormat::ascii) return next_word(element, row);
+        const std::size_t size = type_size(type);
+        if (file_.size() - at_ < size) fail(element, row, "the file ends here");
+        const double value = load_value(file_.data() + at_, type, format_ == PlyFormat::big_endian);
+        at_ += size;
+        return value;
+    }
+
+    double next_word(const PlyElement& element, std::size_t row) {
+        const char* text = reinterpret_cast<const char*>(file_.data());
+        const auto is_space = [](char c) {
+            return c == ' ' || c == '\n' || c == '\r' || c == '\t';
+        };
+        while (at_ < file_.size() && is_space(text[at_])) ++at_;
+        if (at_ == file_.size()) fail(element, row, "the file ends here");
+        if (text[at_] == '+') ++at_;
+        double value = 0;
+        const auto [end, error] = std::from_chars(text + at_, text + file_.size(), value);
+        // Out of range is a denormal or an overflow: 0 is right for one, the finite test for both.
+        if (error == std::errc::invalid_argument) fail(element, row, "not a number");
+        at_ = static_cast<std::size_t>(end - text);
+        if (at_ < file_.size() && !is_space(text[at_])) fail(element, row, "not a number");
+        return value;
+    }
+
+    void skip_list(const PlyElement& element, std::size_t row, const PlyProperty& property,
+                   double length) {
+        if (!(length >= 0)) fail(element, row, "a list has a negative length");
+        const std::size_t size = format_ == PlyFormat::ascii ? 1 : type_size(property.type);
+        if (length > static_cast<double>((file_.size() - at_) / size))
+            fail(element, row, "a list is longer than the file");
+        if (format_ != PlyFormat::ascii) {
+            at_ += static_cast<std::size_t>(length) * size;
+            return;
+        }
+        for (auto left = static_cast<std::size_t>(length); left > 0; --left)
+            next_word(element, row);
+    }
+
+    std::span<const std::byte> file_;
+    std::size_t at_;
+    PlyFormat format_;
+    const std::string& where_;
+};
+
+}  // namespace
+
+int PlyElement::find(std::string_view property) const {
+    for (std::size_t i = 0; i < properties.size(); ++i)
+        if (properties[i].name == property) return static_cast<int>(i);
+    return -1;
+}
+
+const PlyElement* PlyHeader::find(std::string_view element) const {
+    for (const PlyElement& candidate : elements)
+        if (candidate.name == element) return &candidate;
+    return nullptr;
+}
+
+PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& where) {
+    const std::string_view text(reinterpret_cast<const char*>(file.data()),
+                                std::min(file.size(), kMaxHeaderBytes));
+    if (!text.starts_with("ply\n") && !text.starts_with("ply\r"))
+        throw Error(where, "is no PLY file: it does not begin with 'ply'", "Check the path.");
+    PlyHeader header;
+    for (std::size_t begin = text.find('\n') + 1;;) {
+        const std::size_t end = text.find('\n', begin);
+        if (begin == 0 || end == std::string_view::npos)
+            throw Error(where, "the header has no end_header line", kCopyAgain);
+        std::string_view line = text.substr(begin, end - begin);
+        if (line.ends_with('\r')) line.remove_suffix(1);
+        begin = end + 1;
+        if (line == "end_header") {
+            header.data_begin = begin;
+            return header;
+        }
+        parse_header_line(line, header, where);
+    }
+}
+
+void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
+                    const PlyElement& element, const std::string& where) {
+    std::uint64_t left = file.size() - header.data_begin;
+    for (const PlyElement& candidate : header.elements) {
+        const std::uint64_t row = least_row_bytes(candidate, header.format);
+        // The last ascii row may lack its line break.
+        const std::uint64_t slack = header.format == PlyFormat::ascii ? 1 : 0;
+        if (candidate.count > 0 && (row == 0 || candidate.count > (left + slack) / row))
+            throw Error(where,
+                        fmt::format("declares {} rows of element {} of at least {} bytes each, but "
+                                    "holds {} bytes for them",
+                                    candidate.count, candidate.name, row, left),
+                        "The file is cut off or damaged: export or copy it again.");
+        left -= std::min(left, candidate.count * row);
+        if (&candidate == &element) return;
+    }
+}
+
+void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
+                   const PlyElement& element, const std::string& where, const PlyRow& row) {
+    check_ply_size(file, header, element, where);
+    RowReader reader(file, header, where);
+    for (const PlyElement& candidate : header.elements) {
+        std::vector<double> values(candidate.properties.size());
+        const bool wanted = &candidate == &element;
+        for (std::size_t i = 0; i < candidate.count; ++i) {
+            reader.read(candidate, i, values.data());
+            if (wanted) row(i, values.data());
+        }
+        if (wanted) return;
+    }
+}
+
+}  // namespace darb

@@ -1,0 +1,55 @@
+// PLY container: header, and the rows of one element as doubles. ascii and binary of both byte
+// orders. Splat files (ply.h) and point clouds (engine/data/point_cloud_ply.h) are read with it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace darb {
+
+enum class PlyFormat { ascii, little_endian, big_endian };
+enum class PlyType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+
+struct PlyProperty {
+    std::string name;
+    PlyType type = PlyType::float32;
+    bool is_list = false;
+    PlyType count_type = PlyType::uint8;  // of a list
+};
+
+struct PlyElement {
+    std::string name;
+    std::uint64_t count = 0;
+    std::vector<PlyProperty> properties;
+    /// Column of the property, -1 where there is none of that name.
+    int find(std::string_view property) const;
+};
+
+struct PlyHeader {
+    PlyFormat format = PlyFormat::little_endian;
+    std::vector<std::string> comments;  // without the word "comment"
+    std::vector<PlyElement> elements;
+    std::size_t data_begin = 0;  // byte after end_header's line
+    const PlyElement* find(std::string_view element) const;
+};
+
+/// Throws Error(where, ...) when the header is malformed.
+PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& where);
+
+/// Throws Error when the file is too short for the counts its header declares up to and with
+/// `element`; call it before allocating.
+void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
+                    const PlyElement& element, const std::string& where);
+
+/// Calls row(i, values) for i = 0 .. count-1 of the element; values[c] is column c (0 for lists).
+/// Elements before it are skipped. Throws Error naming the row where the file ends or is no number.
+using PlyRow = std::function<void(std::size_t row, const double* values)>;
+void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
+                   const PlyElement& element, const std::string& where, const PlyRow& row);
+
+}  // namespace darb
