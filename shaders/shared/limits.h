@@ -14,4 +14,7 @@
 #define LOW_PASS_DEFAULT 0.3      // px^2
 #define NEAR_DEFAULT 0.2          // world units
 
+#define JACOBIAN_MARGIN 0.3       // the Jacobian is clamped to the image plus this share of W/(2 fx)
+#define TILE_SIZE 16              // px, both ways; a blend workgroup owns one tile
+
 #endif

@@ -3,9 +3,9 @@
 #ifndef DARB_RENDER_ARGS_H
 #define DARB_RENDER_ARGS_H
 
+#include "limits.h"
 #include "types.h"
 
-#define TILE_SIZE 16          // px, both ways; a blend workgroup owns one tile
 #define SPLAT_GROUP 64        // threads of the passes that run once per splat or pair
 #define MAX_GROUPS 65535u     // the portable limit of one dispatch dimension
 #define CULL_REASONS 8        // see CULL_* below
@@ -16,6 +16,7 @@
 #define CULL_OPACITY 2     // below the alpha cut-off everywhere
 #define CULL_COVARIANCE 3  // determinant not positive or not finite
 #define CULL_OUTSIDE 4     // touches no tile
+#define CULL_COLOUR 5      // colour not finite
 
 #ifdef __cplusplus
 namespace darb::gpu {

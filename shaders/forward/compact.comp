@@ -1,0 +1,28 @@
+// Gathers the visible splats: their depth as a sortable key and their index, in file order.
+// Place: after the scan of the visible flags. Work: one thread a splat. Shared memory: none.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/limits.h"
+#include "shared/render_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 64;
+
+#include "lib/linear_id.glsl"
+
+layout(push_constant, scalar) uniform Push { SplatArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Visible { uint visible[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer VisibleOffset { uint visible_offset[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer DepthKey { uint depth_key[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer DepthOrder { uint depth_order[]; };
+
+void main() {
+    const uint i = linear_id();
+    if (i >= args.splat_count || visible[i] == 0u) return;
+    const uint slot = visible_offset[i];
+    depth_key[slot] = floatBitsToUint(splat_bound[i].z);  // positive floats sort as their bits
+    depth_order[slot] = i;
+}

@@ -1,0 +1,42 @@
+// Sizes the dispatches over visible splats and over pairs, and notes an overflow of the pair buffers.
+// One: after the scan of the flags (STAGE 0), one after the scan of the counts (STAGE 1).
+// Work: one thread. Shared memory: none.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/limits.h"
+#include "shared/render_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 1;
+
+layout(constant_id = 1) const int STAGE = 0;
+
+layout(push_constant, scalar) uniform Push { PairArgs args; };
+layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
+layout(set = 0, binding = 1, scalar) buffer Groups { FrameGroups groups; };
+layout(set = 0, binding = 2, scalar) writeonly buffer PairsInUse { uint pairs_in_use; };
+
+uvec2 split_groups(uint count) {
+    const uint n = max((count + uint(SPLAT_GROUP) - 1u) / uint(SPLAT_GROUP), 1u);
+    const uint y = (n + MAX_GROUPS - 1u) / MAX_GROUPS;
+    return uvec2((n + y - 1u) / y, y);
+}
+
+void main() {
+    if (STAGE == 0) {
+        const uvec2 n = split_groups(status.visible);
+        groups.visible_x = n.x;
+        groups.visible_y = n.y;
+        groups.visible_z = 1u;
+    } else {
+        const uint in_use = min(status.pairs, args.pair_capacity);
+        if (status.pairs > args.pair_capacity) status.overflow = 1u;
+        const uvec2 n = split_groups(in_use);
+        groups.pairs_x = n.x;
+        groups.pairs_y = n.y;
+        groups.pairs_z = 1u;
+        pairs_in_use = in_use;
+    }
+}

@@ -1,0 +1,138 @@
+// Projects every splat: camera space, Cholesky factor of the projected covariance, colour from SH, reach and
+// the tiles that it touches. Place: first pass of a frame. Source: KERNELS sections 4 to 6; EWA splatting.
+// Work: one thread a splat. Shared memory: none. Reads parameters; writes the projected splat and its cover.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/limits.h"
+#include "shared/render_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 64;
+layout(constant_id = 1) const int SH_DEGREE = 0;   // degree in use
+layout(constant_id = 2) const int SH_STORED = 0;   // degree of the buffer's layout
+
+#include "kernels/kernel.glsl"
+#include "lib/linear_id.glsl"
+#include "lib/sh.glsl"
+#include "lib/covariance.glsl"
+#include "lib/tile.glsl"
+
+layout(push_constant, scalar) uniform Push { ProjectArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Position { vec3 position[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer LogScale { vec3 log_scale[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Rotation { vec4 rotation[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Opacity { float opacity_logit[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer ShDc { vec3 sh_dc[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer ShRest { float sh_rest[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer SplatShape { vec4 splat_shape[]; };  // mean, l11, l21
+layout(set = 0, binding = 8, scalar) writeonly buffer SplatLight { vec4 splat_light[]; };  // rgb, opacity
+layout(set = 0, binding = 9, scalar) writeonly buffer SplatBound { vec4 splat_bound[]; };  // l22, reach, depth, 0
+layout(set = 0, binding = 10, scalar) writeonly buffer Cover { uvec4 cover[]; };
+layout(set = 0, binding = 11, scalar) writeonly buffer PairCount { uint pair_count[]; };
+layout(set = 0, binding = 12, scalar) writeonly buffer Visible { uint visible[]; };
+layout(set = 0, binding = 13, scalar) buffer Status { FrameStatus status; };
+
+vec3 splat_colour(uint i, vec3 direction) {
+    vec3 colour = 0.5 + SH_C0 * sh_dc[i];
+    if (SH_DEGREE > 0) {
+        float basis[SH_REST_MAX];
+        sh_basis(direction, basis);
+        const int used = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
+        const uint stride = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
+        for (int k = 0; k < used; ++k) {
+            const uint o = i * stride + uint(k) * 3u;
+            colour += basis[k] * vec3(sh_rest[o], sh_rest[o + 1u], sh_rest[o + 2u]);
+        }
+    }
+    return mix(colour, vec3(0.0), lessThan(colour, vec3(0.0)));  // keeps NaN, which max may drop
+}
+
+// The number of tiles; the cover is empty when the ellipse misses the image.
+uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCover c) {
+    const vec2 half_extent = sqrt(reach * vec2(f.a, f.c)) * 1.001 + 0.01;
+    const vec2 tiles = vec2(camera.tiles_x, camera.tiles_y);
+    const vec2 low = clamp(floor((mean - half_extent) / float(TILE_SIZE)), vec2(0.0), tiles);
+    const vec2 high = clamp(floor((mean + half_extent) / float(TILE_SIZE)) + 1.0, vec2(0.0), tiles);
+    c = TileCover(uvec2(low), uvec2(max(high - low, 0.0)), uvec2(0));
+    if (c.extent.x == 0u || c.extent.y == 0u) return 0u;
+    const uvec2 size = cell_size(c.extent);
+    uint count = 0u;
+    for (uint y = 0u; y * size.y < c.extent.y; ++y) {
+        for (uint x = 0u; x * size.x < c.extent.x; ++x) {
+            const uvec2 first = uvec2(x, y) * size;
+            const uvec2 last = min(first + size, c.extent);
+            const vec2 corner_low = vec2((c.origin + first) * TILE_SIZE) + 0.5;
+            const vec2 corner_high = vec2((c.origin + last) * TILE_SIZE) - 0.5;
+            if (!reaches(smallest_q(mean, f.l11, f.l21, f.l22, corner_low, corner_high), reach)) continue;
+            const uint bit = y * 8u + x;
+            if (bit < 32u) c.bits.x |= 1u << bit; else c.bits.y |= 1u << (bit - 32u);
+            count += (last.x - first.x) * (last.y - first.y);
+        }
+    }
+    return count;
+}
+
+// 0 pairs and the reason, or the number of pairs.
+uint project(uint i, out int reason) {
+    const CameraData camera = cameras[args.camera_index];
+    const vec3 p_world = position[i];
+    const vec3 p = to_camera(camera, p_world) + camera.translation;
+    reason = CULL_NEAR;
+    if (!(p.z > camera.near_plane && p.z < 1e30) || !(abs(p.x) + abs(p.y) < 1e30)) return 0u;
+
+    vec4 unit;
+    float norm;
+    reason = CULL_ROTATION;
+    if (!normalise_rotation(rotation[i], unit, norm)) return 0u;
+
+    reason = CULL_OPACITY;
+    const float logit = opacity_logit[i];
+    const float opacity =
+        1.0 / (1.0 + exp(-clamp(logit, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT)));
+    const float reach = kernel_reach(opacity);
+    if (!(reach > 0.0) || isnan(logit)) return 0u;
+
+    reason = CULL_COVARIANCE;
+    const vec3 raw_scale = log_scale[i];
+    const vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
+                   sqrt(kernel_covariance_scale());
+    vec3 j0, j1;
+    vec2 ratio;
+    jacobian_rows(camera, p, j0, j1, ratio);
+    const mat3 axes = rotation_matrix(unit);
+    const vec3 r1 = (to_world(camera, j0) * axes) * s;
+    const vec3 r2 = (to_world(camera, j1) * axes) * s;
+    const Factor f = cholesky_factor(r1, r2, args.low_pass);
+    if (!(f.determinant > DETERMINANT_MIN && f.determinant < DETERMINANT_MAX) ||
+        any(isnan(raw_scale)))
+        return 0u;
+
+    reason = CULL_OUTSIDE;
+    const vec2 mean = camera.focal * (p.xy / p.z) + camera.principal;
+    TileCover c;
+    const uint count = find_cover(camera, mean, f, reach, c);
+    if (count == 0u) return 0u;
+
+    reason = CULL_COLOUR;
+    const vec3 colour = splat_colour(i, normalize(p_world - camera.centre));
+    if (!all(lessThan(colour, vec3(1e30)))) return 0u;
+
+    splat_shape[i] = vec4(mean, f.l11, f.l21);
+    splat_light[i] = vec4(colour, opacity);
+    splat_bound[i] = vec4(f.l22, reach, p.z, 0.0);
+    cover[i] = pack_cover(c);
+    return count;
+}
+
+void main() {
+    const uint i = linear_id();
+    if (i >= args.splat_count) return;
+    int reason;
+    const uint count = project(i, reason);
+    pair_count[i] = count;
+    visible[i] = count > 0u ? 1u : 0u;
+    if (count == 0u) atomicAdd(status.culled[reason], 1u);
+}

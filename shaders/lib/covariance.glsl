@@ -1,0 +1,56 @@
+// From a splat's parameters and a camera to the projected Cholesky factor, with its derivatives' ingredients.
+// KERNELS: M = sqrt(scale) J W R diag(s), S' = M M^T + low_pass I, q = (l11 dx + l21 dy)^2 + (l22 dy)^2.
+
+// Rotation matrix of a unit quaternion (w, x, y, z); column k is the splat's axis k in the world.
+mat3 rotation_matrix(vec4 q) {
+    const float w = q.x, x = q.y, y = q.z, z = q.w;
+    return mat3(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+                2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+                2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
+}
+
+// q / |q| without overflow or underflow for any norm that is not rejected.
+// Returns false for a quaternion of no direction or not finite.
+bool normalise_rotation(vec4 q, out vec4 unit, out float norm) {
+    const vec4 a = abs(q);
+    const float largest = max(max(a.x, a.y), max(a.z, a.w));
+    const vec4 scaled = q / largest;
+    const float length_scaled = sqrt(dot(scaled, scaled));
+    unit = scaled / length_scaled;
+    norm = largest * length_scaled;
+    return norm * norm > ROTATION_MIN_SQUARE && largest < 1e30;
+}
+
+// Rows j0, j1 of the projection's Jacobian at camera-space p; ratio = clamped (x/z, y/z).
+void jacobian_rows(CameraData camera, vec3 p, out vec3 j0, out vec3 j1, out vec2 ratio) {
+    ratio = clamp(p.xy / p.z, camera.ratio_min, camera.ratio_max);
+    j0 = vec3(camera.focal.x / p.z, 0.0, -camera.focal.x * ratio.x / p.z);
+    j1 = vec3(0.0, camera.focal.y / p.z, -camera.focal.y * ratio.y / p.z);
+}
+
+vec3 to_camera(CameraData camera, vec3 v) {
+    return vec3(dot(camera.row0, v), dot(camera.row1, v), dot(camera.row2, v));
+}
+vec3 to_world(CameraData camera, vec3 v) {
+    return camera.row0 * v.x + camera.row1 * v.y + camera.row2 * v.z;
+}
+
+struct Factor {
+    float l11, l21, l22;
+    float a, c;           // the diagonal of S'
+    float determinant;
+};
+
+// r1, r2: rows of M. The determinant in product form has no cancellation.
+Factor cholesky_factor(vec3 r1, vec3 r2, float low_pass) {
+    Factor f;
+    const float n1 = dot(r1, r1), n2 = dot(r2, r2), b = dot(r1, r2);
+    const vec3 across = cross(r1, r2);
+    f.a = n1 + low_pass;
+    f.c = n2 + low_pass;
+    f.determinant = dot(across, across) + low_pass * (n1 + n2) + low_pass * low_pass;
+    f.l11 = sqrt(f.c / f.determinant);
+    f.l22 = inversesqrt(f.c);
+    f.l21 = -b * f.l22 * inversesqrt(f.determinant);
+    return f;
+}
