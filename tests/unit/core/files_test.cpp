@@ -1,0 +1,154 @@
+// Reading and atomic writing, with the failures that a long run meets: full disk, read-only disk.
+#include "engine/core/files.h"
+
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "engine/core/error.h"
+
+namespace darb {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Files : public testing::Test {
+  protected:
+    void SetUp() override {
+        std::string name = (fs::temp_directory_path() / "darb_files_XXXXXX").string();
+        ASSERT_NE(::mkdtemp(name.data()), nullptr);
+        folder = name;
+    }
+    void TearDown() override {
+        if (mounted) ::umount2(folder.c_str(), MNT_DETACH);
+        std::error_code ignored;
+        fs::permissions(folder, fs::perms::owner_all, ignored);
+        fs::remove_all(folder, ignored);
+    }
+    /// A tmpfs over the folder; false where that is not allowed (no root, a tight container).
+    bool mount_tmpfs(const char* options, unsigned long flags = 0) {
+        mounted = ::mount("tmpfs", folder.c_str(), "tmpfs", flags, options) == 0;
+        return mounted;
+    }
+    std::size_t file_count() const {
+        return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
+    }
+
+    fs::path folder;
+    bool mounted = false;
+};
+
+/// The text of the Error that f throws; a failure and "" where it throws none.
+template <class Function>
+std::string error_text(Function f) {
+    try {
+        f();
+    } catch (const Error& error) {
+        return error.what();
+    }
+    ADD_FAILURE() << "no Error was thrown";
+    return {};
+}
+
+void expect_contains(const std::string& text, const std::string& part) {
+    EXPECT_NE(text.find(part), std::string::npos) << "'" << part << "' is not in: " << text;
+}
+
+TEST_F(Files, Write_then_read_gives_the_same_bytes_for_every_size) {
+    for (const std::size_t size : {0u, 1u, 4096u, (1u << 20) - 1, 1u << 20, 5'000'001u}) {
+        std::vector<std::byte> bytes(size);
+        for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(i * 31 + i / 251);
+        write_file_atomic(folder / "x.bin", bytes);
+        EXPECT_EQ(read_file(folder / "x.bin"), bytes) << size << " bytes";
+    }
+    EXPECT_EQ(file_count(), 1u) << "a temporary file was left";
+}
+
+TEST_F(Files, Write_of_text_reads_back_with_its_zero_bytes) {
+    const std::string text("a\0b\r\n", 5);
+    write_file_atomic(folder / "x.txt", text);
+    EXPECT_EQ(read_text_file(folder / "x.txt"), text);
+}
+
+TEST_F(Files, Write_replaces_a_longer_file_and_makes_missing_folders) {
+    const fs::path path = folder / "a" / "b" / "x.txt";
+    write_file_atomic(path, "a long first version");
+    write_file_atomic(path, "short");
+    EXPECT_EQ(read_text_file(path), "short");
+}
+
+TEST_F(Files, Read_of_a_missing_file_names_it_and_the_reason) {
+    const fs::path path = folder / "missing.ply";
+    const std::string text = error_text([&] { read_file(path); });
+    expect_contains(text, path.string());
+    expect_contains(text, "No such file");
+}
+
+TEST_F(Files, Read_of_a_folder_is_an_error) {
+    expect_contains(error_text([&] { read_text_file(folder); }), "directory");
+}
+
+TEST_F(Files, Read_of_a_file_without_known_size_reads_to_the_end) {
+    EXPECT_FALSE(read_text_file("/proc/self/status").empty());
+}
+
+TEST_F(Files, Write_below_a_file_names_the_path) {
+    write_file_atomic(folder / "file", "content");
+    const fs::path path = folder / "file" / "x.txt";
+    expect_contains(error_text([&] { write_file_atomic(path, "text"); }), path.string());
+    EXPECT_EQ(read_text_file(folder / "file"), "content");
+}
+
+TEST_F(Files, Write_over_a_folder_is_an_error_that_leaves_the_folder) {
+    fs::create_directories(folder / "x" / "inner");
+    expect_contains(error_text([&] { write_file_atomic(folder / "x", "text"); }), "cannot be");
+    EXPECT_TRUE(fs::is_directory(folder / "x" / "inner"));
+    EXPECT_EQ(file_count(), 1u) << "a temporary file was left";
+}
+
+// A file size limit stops write() half way, as a full disk does, and needs no root.
+TEST_F(Files, Write_that_fails_half_way_leaves_the_old_file_and_no_other) {
+    write_file_atomic(folder / "x.bin", "old");
+    rlimit before{};
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+    rlimit small = before;
+    small.rlim_cur = 100'000;
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+    const std::string big(1'000'000, 'x');
+    const std::string text = error_text([&] { write_file_atomic(folder / "x.bin", big); });
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    std::signal(SIGXFSZ, handler);
+
+    expect_contains(text, (folder / "x.bin").string());
+    expect_contains(text, "File too large");
+    EXPECT_EQ(read_text_file(folder / "x.bin"), "old");
+    EXPECT_EQ(file_count(), 1u) << "a temporary file was left";
+}
+
+TEST_F(Files, Write_on_a_full_disk_says_so_and_leaves_the_old_file) {
+    if (!mount_tmpfs("size=64k")) GTEST_SKIP() << "mounting a small tmpfs needs root";
+    write_file_atomic(folder / "x.bin", "old");
+    const std::string big(1'000'000, 'x');
+    const std::string text = error_text([&] { write_file_atomic(folder / "x.bin", big); });
+    expect_contains(text, "No space left");
+    EXPECT_EQ(read_text_file(folder / "x.bin"), "old");
+    EXPECT_EQ(file_count(), 1u) << "a temporary file was left";
+}
+
+TEST_F(Files, Write_on_a_read_only_disk_names_file_and_reason) {
+    const bool root = ::geteuid() == 0;  // root may write where the mode forbids it
+    if (root && !mount_tmpfs("size=64k", MS_RDONLY)) GTEST_SKIP() << "mounting is not allowed";
+    if (!root) fs::permissions(folder, fs::perms::owner_read | fs::perms::owner_exec);
+    const fs::path path = folder / "x.bin";
+    const std::string text = error_text([&] { write_file_atomic(path, "text"); });
+    expect_contains(text, path.string());
+    expect_contains(text, root ? "Read-only file system" : "Permission denied");
+    EXPECT_EQ(file_count(), 0u);
+}
+
+}  // namespace
+}  // namespace darb
