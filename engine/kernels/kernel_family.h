@@ -29,7 +29,8 @@ double kernel_value(int kernel, Footprint footprint, double q);
 /// d kernel_value / dq; 0 beyond the support.
 double kernel_slope(int kernel, Footprint footprint, double q);
 
-/// The smallest q at and beyond which opacity * value < cutoff; 0 when opacity < cutoff; at most R^2.
+/// The smallest q at and beyond which opacity * value < cutoff; 0 when opacity < cutoff; at most
+/// R^2.
 double kernel_reach(int kernel, Footprint footprint, double opacity, double cutoff);
 
 /// Ratio of the projected second moment to the 2x2 block of the 3D covariance (paper's psi).
@@ -37,8 +38,8 @@ double kernel_psi(int kernel);
 /// What multiplies the 2x2 covariance: kernel_psi for Footprint::psi, 1 for exact.
 double covariance_scale(int kernel, Footprint footprint);
 
-/// Inverse of the cumulative radial density r^2 w(r^2) of the 3D kernel: u in [0,1) -> r (in units of
-/// the standard deviation parameter). Splits draw children's offsets from it; gaussian: chi_3.
+/// Inverse of the cumulative radial density r^2 w(r^2) of the 3D kernel: u in [0,1) -> r (in units
+/// of the standard deviation parameter). Splits draw children's offsets from it; gaussian: chi_3.
 double kernel_radius_quantile(int kernel, double u);
 
 }  // namespace darb

@@ -1,0 +1,153 @@
+// Everything that follows from a kernel's row. The exact footprint, with v = u (1 - s^2):
+//   A(q) = 2 integral_0^sqrt(R^2-q) f(q + z^2) dz = 2 R sqrt(u) integral_0^1 f(R^2 (1 - v)) ds,
+// and f = v^m g(v) with g analytic gives A = 2 R u^(m+1/2) integral (1 - s^2)^m g(v) ds: the
+// integral is analytic in u, so a Chebyshev series holds it to rounding.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "engine/core/check.h"
+#include "engine/kernels/kernel_profile.h"
+#include "engine/kernels/quadrature.h"
+
+namespace darb {
+namespace {
+
+constexpr int kNodes = 64;          // enough for a pole at q = -1 with support 9
+constexpr double kStep = 1e-200;    // of the complex-step derivative
+constexpr double kGaussRadius = 9;  // exp(-40) of the mass is beyond
+
+double profile_value(const KernelProfile& row, double q) {
+    return row.profile({q, 0}).real();
+}
+
+double footprint_integral(const KernelProfile& row, double u) {
+    double sum = 0;
+    for (const auto [s, weight] : even_quadrature()) {
+        // v is recomputed from the rounded q, so that f and v^m belong to the same point.
+        const double q = row.support * (1 - u * (1 - s * s));
+        const double v = 1 - q / row.support;
+        sum += weight * std::pow(1 - s * s, row.edge_order) * profile_value(row, q) /
+               std::pow(v, row.edge_order);
+    }
+    return sum;
+}
+
+}  // namespace
+
+ChebyshevSeries::ChebyshevSeries(const std::vector<double>& samples)
+    : coefficients_(samples.size()) {
+    const double n = static_cast<double>(samples.size());
+    double largest = 0;
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+        double sum = 0;
+        for (std::size_t j = 0; j < samples.size(); ++j)
+            sum += samples[j] * std::cos(std::numbers::pi * static_cast<double>(k) *
+                                         (static_cast<double>(j) + 0.5) / n);
+        coefficients_[k] = sum * (k == 0 ? 1 : 2) / n;
+        largest = std::max(largest, std::abs(coefficients_[k]));
+    }
+    while (coefficients_.size() > 1 && std::abs(coefficients_.back()) < 2e-16 * largest)
+        coefficients_.pop_back();
+}
+
+void ChebyshevSeries::evaluate(double u, double& value, double& derivative) const {
+    const double x = 2 * u - 1;
+    double b1 = 0, b2 = 0, d1 = 0, d2 = 0;  // Clenshaw, and its derivative by x
+    for (std::size_t k = coefficients_.size() - 1; k > 0; --k) {
+        const double d0 = 2 * b1 + 2 * x * d1 - d2;
+        const double b0 = coefficients_[k] + 2 * x * b1 - b2;
+        d2 = d1;
+        d1 = d0;
+        b2 = b1;
+        b1 = b0;
+    }
+    value = coefficients_[0] + x * b1 - b2;
+    derivative = 2 * (b1 + x * d1 - d2);
+}
+
+DerivedKernel::DerivedKernel(const KernelProfile& row) : row_(row) {
+    DARB_CHECK(row.edge_order >= 0 && row.support > 0, "kernel {}", row.name);
+    const bool compact = std::isfinite(row.support);
+    DARB_CHECK(compact == (row.form != KERNEL_FORM_GAUSSIAN), "kernel {}", row.name);
+    radius_ = compact ? std::sqrt(row.support) : kGaussRadius;
+    radial_mass_ = radial_moment(radius_, 2);
+    if (!compact) return;  // a Gaussian is its own footprint
+    psi_ = radial_moment(radius_, 4) / radial_mass_ / 3;
+    const double centre = footprint_integral(row, 1);
+    std::vector<double> samples(kNodes);
+    for (int j = 0; j < kNodes; ++j)
+        samples[static_cast<std::size_t>(j)] =
+            footprint_integral(row, (1 + std::cos(std::numbers::pi * (j + 0.5) / kNodes)) / 2) /
+            centre;
+    footprint_ = ChebyshevSeries(samples);
+}
+
+double DerivedKernel::radial_moment(double radius, int power) const {
+    double sum = 0;
+    for (const auto [x, weight] : even_quadrature()) {
+        const double r = radius * x;
+        sum += weight * std::pow(r, power) * profile_value(row_, r * r);
+    }
+    return sum * radius;
+}
+
+void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) const {
+    u = 1 - q / row_.support;
+    footprint_.evaluate(u, p, dp);
+}
+
+double DerivedKernel::value(Footprint footprint, double q) const {
+    if (q >= row_.support) return 0;
+    if (footprint == Footprint::psi || row_.form == KERNEL_FORM_GAUSSIAN)
+        return profile_value(row_, q);
+    double u, p, dp;
+    footprint_parts(q, u, p, dp);
+    return std::pow(u, row_.edge_order) * std::sqrt(u) * p;
+}
+
+double DerivedKernel::slope(Footprint footprint, double q) const {
+    if (q >= row_.support) return 0;
+    if (footprint == Footprint::psi || row_.form == KERNEL_FORM_GAUSSIAN)
+        return row_.profile({q, kStep}).imag() / kStep;
+    double u, p, dp;
+    footprint_parts(q, u, p, dp);
+    if (u <= 0) return 0;
+    const double power = std::pow(u, row_.edge_order) / std::sqrt(u);
+    return -power * ((row_.edge_order + 0.5) * p + u * dp) / row_.support;
+}
+
+double DerivedKernel::reach(Footprint footprint, double opacity, double cutoff) const {
+    if (!(opacity >= cutoff)) return 0;
+    double low = 0, high = 1;
+    while (high < row_.support && opacity * value(footprint, high) >= cutoff) high *= 2;
+    high = std::min(high, row_.support);
+    // The answer keeps opacity * value(high) < cutoff; 80 halvings reach neighbouring doubles.
+    for (int step = 0; step < 80; ++step) {
+        const double middle = (low + high) / 2;
+        (opacity * value(footprint, middle) >= cutoff ? low : high) = middle;
+    }
+    return high;
+}
+
+double DerivedKernel::covariance_scale(Footprint footprint) const {
+    return footprint == Footprint::psi ? psi_ : 1;
+}
+
+double DerivedKernel::radius_quantile(double u) const {
+    DARB_CHECK(u >= 0 && u < 1, "u = {}", u);
+    const double target = u * radial_mass_;
+    double low = 0, high = radius_, r = radius_ * std::cbrt(u) / 2;
+    // Newton, kept inside the bracket; the density r^2 w is positive inside the ball.
+    for (int step = 0; step < 60 && high - low > 4e-16 * radius_; ++step) {
+        const double excess = radial_moment(r, 2) - target;
+        (excess < 0 ? low : high) = r;
+        const double next = r - excess / (r * r * profile_value(row_, r * r));
+        if (std::abs(next - r) < 1e-15 * radius_) break;
+        r = next > low && next < high ? next : (low + high) / 2;
+    }
+    return r;
+}
+
+}  // namespace darb

@@ -1,0 +1,74 @@
+// One row per kernel: its name, its profile in double, its support and the order of its edge.
+// Everything else (slope, reach, psi, exact footprint, radial density, shader coefficients) is
+// derived from the row by DerivedKernel and kernel_coefficients.
+#pragma once
+
+#include <complex>
+#include <string_view>
+#include <vector>
+
+#include "engine/kernels/kernel_family.h"
+#include "shaders/shared/kernel_forms.h"
+
+namespace darb {
+
+/// The profile as a function of complex q, so that its derivative is exact: slope(q) is
+/// Im profile(q + ih) / h with h far below rounding. It must be analytic on a neighbourhood of
+/// [0, support], accurate to a few ulp relative to its value, 1 at q = 0 and falling on the
+/// support.
+using Profile = std::complex<double> (*)(std::complex<double> q);
+
+struct KernelProfile {
+    std::string_view name;
+    double support;  // R^2 in q; infinity only with KERNEL_FORM_GAUSSIAN
+    int edge_order;  // of the zero at the edge in u = 1 - q/R^2: 0 jump, 1 kink, 2 double zero, ...
+    int form;  // KERNEL_FORM_*: the arithmetic of the shaders; COMPACT unless w has poles near
+    Profile profile;
+};
+
+/// The rows, indexed by KERNEL_*.
+const KernelProfile& kernel_profile(int kernel);
+
+/// A polynomial on [0, 1] in the Chebyshev basis.
+class ChebyshevSeries {
+  public:
+    ChebyshevSeries() = default;
+    /// Interpolates samples[j] = f((1 + cos(pi (j + 1/2) / n)) / 2); drops a negligible tail.
+    explicit ChebyshevSeries(const std::vector<double>& samples);
+    /// value and derivative at u in [0, 1].
+    void evaluate(double u, double& value, double& derivative) const;
+
+  private:
+    std::vector<double> coefficients_;
+};
+
+/// A row with all that follows from it. Building costs about a millisecond; value and slope about
+/// 0.1 us, reach and radius_quantile about 10 us.
+class DerivedKernel {
+  public:
+    explicit DerivedKernel(const KernelProfile& row);
+
+    const KernelProfile& row() const { return row_; }
+    double psi() const { return psi_; }
+    /// See kernel_family.h for the five below.
+    double value(Footprint footprint, double q) const;
+    double slope(Footprint footprint, double q) const;
+    double reach(Footprint footprint, double opacity, double cutoff) const;
+    double covariance_scale(Footprint footprint) const;
+    double radius_quantile(double u) const;
+
+  private:
+    void footprint_parts(double q, double& u, double& p, double& dp) const;
+    double radial_moment(double radius, int power) const;
+
+    KernelProfile row_;
+    double radius_ = 0;  // R, or where the Gaussian is below rounding
+    double psi_ = 1;
+    double radial_mass_ = 1;     // integral of r^2 w(r^2) over the ball
+    ChebyshevSeries footprint_;  // A(q) / (A(0) u^(edge_order + 1/2)), in u
+};
+
+/// The shared instance for KERNEL_*; built at first use, thread-safe.
+const DerivedKernel& derived_kernel(int kernel);
+
+}  // namespace darb
