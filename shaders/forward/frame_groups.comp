@@ -16,7 +16,8 @@ layout(constant_id = 1) const int STAGE = 0;
 layout(push_constant, scalar) uniform Push { PairArgs args; };
 layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 1, scalar) buffer Groups { FrameGroups groups; };
-layout(set = 0, binding = 2, scalar) writeonly buffer PairsInUse { uint pairs_in_use; };
+layout(set = 0, binding = 2, scalar) readonly buffer Total { uint total; };  // of the scan
+layout(set = 0, binding = 3, scalar) writeonly buffer InUse { uint in_use; };  // what later passes handle
 
 uvec2 split_groups(uint count) {
     const uint n = max((count + uint(SPLAT_GROUP) - 1u) / uint(SPLAT_GROUP), 1u);
@@ -26,17 +27,20 @@ uvec2 split_groups(uint count) {
 
 void main() {
     if (STAGE == 0) {
-        const uvec2 n = split_groups(status.visible);
+        status.visible = total;
+        in_use = total;
+        const uvec2 n = split_groups(total);
         groups.visible_x = n.x;
         groups.visible_y = n.y;
         groups.visible_z = 1u;
     } else {
-        const uint in_use = min(status.pairs, args.pair_capacity);
-        if (status.pairs > args.pair_capacity) status.overflow = 1u;
-        const uvec2 n = split_groups(in_use);
+        const uint stored = min(total, args.pair_capacity);
+        status.pairs = total;
+        if (total > args.pair_capacity) status.overflow = 1u;
+        in_use = stored;
+        const uvec2 n = split_groups(stored);
         groups.pairs_x = n.x;
         groups.pairs_y = n.y;
         groups.pairs_z = 1u;
-        pairs_in_use = in_use;
     }
 }

@@ -1,0 +1,132 @@
+// Sums a splat's partials over its tiles, takes them back through the projection to its parameters and does
+// the Adam step there (UPDATE = 1), or stores the gradients in the moments' place (UPDATE = 0).
+// Place: last pass of an iteration. Source: KERNELS section 4; Adam as in TRAINING section 1.
+// Work: one thread a splat, all N of them: Adam is dense, an unseen splat's moments decay and move it.
+// Shared memory: none. Does nothing when the frame overflowed its pair buffers: the host repeats it.
+// A splat whose gradient is not finite is counted and left as it is for this step.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/limits.h"
+#include "shared/optim_args.h"
+#include "shared/render_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 64;
+layout(constant_id = 1) const int SH_DEGREE = 0;
+layout(constant_id = 2) const int SH_STORED = 0;
+layout(constant_id = 3) const int UPDATE = 1;
+
+layout(push_constant, scalar) uniform Push { ProjectBackwardArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
+layout(set = 0, binding = 1, scalar) buffer Position { float position[]; };
+layout(set = 0, binding = 2, scalar) buffer LogScale { float log_scale[]; };
+layout(set = 0, binding = 3, scalar) buffer Rotation { vec4 rotation[]; };
+layout(set = 0, binding = 4, scalar) buffer Opacity { float opacity_logit[]; };
+layout(set = 0, binding = 5, scalar) buffer ShDc { float sh_dc[]; };
+layout(set = 0, binding = 6, scalar) buffer ShRest { float sh_rest[]; };
+layout(set = 0, binding = 7, scalar) buffer MPosition { vec2 m_position[]; };
+layout(set = 0, binding = 8, scalar) buffer MScale { vec2 m_scale[]; };
+layout(set = 0, binding = 9, scalar) buffer MRotation { vec2 m_rotation[]; };
+layout(set = 0, binding = 10, scalar) buffer MOpacity { vec2 m_opacity[]; };
+layout(set = 0, binding = 11, scalar) buffer MShDc { vec2 m_dc[]; };
+layout(set = 0, binding = 12, scalar) buffer MShRest { vec2 m_rest[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer PairCount { uint pair_count[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer PairBegin { uint pair_begin[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer PartialA { vec4 partial_a[]; };
+layout(set = 0, binding = 16, scalar) readonly buffer PartialB { vec4 partial_b[]; };
+layout(set = 0, binding = 17, scalar) readonly buffer PartialC { vec4 partial_c[]; };
+layout(set = 0, binding = 18, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
+layout(set = 0, binding = 19, scalar) buffer Status { FrameStatus status; };
+
+const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
+const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
+
+#include "kernels/kernel.glsl"
+#include "lib/covariance.glsl"
+#include "lib/linear_id.glsl"
+#include "lib/sh.glsl"
+#include "optim/adam.glsl"
+#include "backward/project_gradient.glsl"
+
+Partial sum_partials(uint i) {
+    Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
+    const uint begin = pair_begin[i], end = begin + pair_count[i];
+    for (uint block = begin; block < end; block += 32768u) {  // some drivers end loops at 65,535
+        for (uint e = block; e < min(block + 32768u, end); ++e) {
+            const vec2 b = partial_b[e].xy;
+            sums.a += partial_a[e];
+            sums.b += b.x;
+            sums.d_opacity += b.y;
+            sums.d_colour += partial_c[e].rgb;
+        }
+    }
+    return sums;
+}
+
+bool finite(SplatGradient g) {
+    const vec3 all_parts = abs(g.position) + abs(g.log_scale) + abs(g.rotation.xyz) + abs(g.colour) +
+                           vec3(abs(g.rotation.w) + abs(g.opacity_logit) + abs(g.mean.x) + abs(g.mean.y));
+    return all_parts.x + all_parts.y + all_parts.z < 1e30;
+}
+
+void update_rest(uint i, SplatGradient g) {
+    float basis[SH_REST_MAX];
+    sh_basis(g.direction, basis);
+    for (int k = 0; k < SH_USED; ++k) {
+        for (uint c = 0u; c < 3u; ++c) {
+            const uint at = i * SH_STRIDE + uint(k) * 3u + c;
+            vec2 m = m_rest[at];
+            sh_rest[at] = adam_step(sh_rest[at], m, basis[k] * g.colour[c], args.rate_rest);
+            m_rest[at] = m;
+        }
+    }
+}
+
+void update_splat(uint i, SplatGradient g) {
+    for (uint c = 0u; c < 3u; ++c) {
+        const uint at = 3u * i + c;
+        vec2 m = m_position[at];
+        position[at] = adam_step(position[at], m, g.position[c], args.rate_position);
+        m_position[at] = m;
+        m = m_scale[at];
+        log_scale[at] = adam_step(log_scale[at], m, g.log_scale[c], args.rate_scale);
+        m_scale[at] = m;
+        m = m_dc[at];
+        sh_dc[at] = adam_step(sh_dc[at], m, SH_C0 * g.colour[c], args.rate_dc);
+        m_dc[at] = m;
+    }
+    vec4 q = rotation[i];
+    for (uint c = 0u; c < 4u; ++c) {
+        vec2 m = m_rotation[4u * i + c];
+        q[c] = adam_step(q[c], m, g.rotation[c], args.rate_rotation);
+        m_rotation[4u * i + c] = m;
+    }
+    rotation[i] = q;
+    vec2 m = m_opacity[i];
+    opacity_logit[i] = adam_step(opacity_logit[i], m, g.opacity_logit, args.rate_opacity);
+    m_opacity[i] = m;
+    if (SH_DEGREE > 0) update_rest(i, g);
+}
+
+void main() {
+    const uint i = linear_id();
+    if (i >= args.splat_count || status.overflow != 0u) return;
+    SplatGradient g;
+    g.position = g.log_scale = g.colour = g.direction = vec3(0.0);
+    g.rotation = vec4(0.0);
+    g.opacity_logit = 0.0;
+    g.mean = vec2(0.0);
+    if (pair_count[i] > 0u) {
+        const CameraData camera = cameras[args.camera_index];
+        g = project_gradient(camera, i, sum_partials(i));
+        if (!finite(g)) {
+            atomicAdd(status.bad_gradients, 1u);
+            return;
+        }
+        const vec2 ndc = g.mean * 0.5 * vec2(camera.width, camera.height);
+        gradient_sum[i] += vec2(length(ndc), 1.0);
+    }
+    update_splat(i, g);
+}

@@ -1,0 +1,124 @@
+// From the summed partials of one splat to the gradients of its parameters: the exact derivative of project.comp.
+// Source: KERNELS section 4. Needs camera data, covariance.glsl, sh.glsl and the parameter buffers.
+
+struct SplatGradient {
+    vec3 position, log_scale;
+    vec4 rotation;
+    float opacity_logit;
+    vec3 colour;          // of the unclamped SH sum
+    vec3 direction;       // unit, camera to splat: the SH basis is evaluated there
+    vec2 mean;            // px
+};
+
+struct Partial {
+    vec4 a;               // sums over pixels of G x, G x dx, G x dy, G dy; G = opacity dL/dalpha dw/dq
+    float b;              // G dy dy
+    float d_opacity;
+    vec3 d_colour;
+};
+
+// dL/d(r1), dL/d(r2), the rows of M, and dL/dmean.
+void factor_gradient(Factor f, Partial p, vec3 r1, vec3 r2, out vec3 d_r1, out vec3 d_r2, out vec2 d_mean) {
+    const float l11 = f.l11, l21 = f.l21, l22 = f.l22;
+    d_mean = 2.0 * vec2(l11 * p.a.x, l21 * p.a.x + l22 * l22 * p.a.w);
+    const float d_l11 = 2.0 * p.a.y, d_l21 = 2.0 * p.a.z, d_l22 = 2.0 * l22 * p.b;
+    const float d_a = -0.5 * l11 * l11 * (l11 * d_l11 + l21 * d_l21);
+    const float d_b = -l11 * (l11 * l21 * d_l11 + (l21 * l21 + l22 * l22) * d_l21);
+    const float d_c = -0.5 * (l11 * l21 * l21 * d_l11 + l21 * (2.0 * l22 * l22 + l21 * l21) * d_l21 +
+                              l22 * l22 * l22 * d_l22);
+    d_r1 = 2.0 * d_a * r1 + d_b * r2;
+    d_r2 = 2.0 * d_c * r2 + d_b * r1;
+}
+
+// dL/dq of a unit quaternion from dL/d(columns of its matrix).
+vec4 quaternion_gradient(vec4 q, mat3 d) {
+    const float w = q.x, x = q.y, y = q.z, z = q.w;
+    return 2.0 *
+           vec4(x * (d[1][2] - d[2][1]) + y * (d[2][0] - d[0][2]) + z * (d[0][1] - d[1][0]),
+                y * (d[1][0] + d[0][1]) + z * (d[2][0] + d[0][2]) + w * (d[1][2] - d[2][1]) -
+                    2.0 * x * (d[1][1] + d[2][2]),
+                x * (d[1][0] + d[0][1]) + z * (d[2][1] + d[1][2]) + w * (d[2][0] - d[0][2]) -
+                    2.0 * y * (d[0][0] + d[2][2]),
+                x * (d[2][0] + d[0][2]) + y * (d[2][1] + d[1][2]) + w * (d[0][1] - d[1][0]) -
+                    2.0 * z * (d[0][0] + d[1][1]));
+}
+
+// One row of the Jacobian, (f/z, ., -f ratio/z): its share of dL/d(coordinate) and dL/dz.
+// d: gradients of the row's first and last entry.
+vec2 jacobian_row_gradient(float focal, float coordinate, float z, float ratio, vec2 limits, vec2 d) {
+    const float inverse = 1.0 / z;
+    float d_z = focal * inverse * inverse * (ratio * d.y - d.x);
+    float d_coordinate = 0.0;
+    const float free_ratio = coordinate * inverse;
+    if (free_ratio > limits.x && free_ratio < limits.y) {
+        const float d_ratio = -focal * inverse * d.y;
+        d_coordinate = d_ratio * inverse;
+        d_z -= d_ratio * free_ratio * inverse;
+    }
+    return vec2(d_coordinate, d_z);
+}
+
+vec3 outside_is_zero(vec3 gradient, vec3 value, float limit) {
+    return mix(vec3(0.0), gradient, lessThanEqual(abs(value), vec3(limit)));
+}
+
+SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
+    SplatGradient g;
+    const vec3 world = vec3(position[3 * i], position[3 * i + 1], position[3 * i + 2]);
+    const vec3 p = to_camera(camera, world) + camera.translation;
+    const vec3 raw_scale = vec3(log_scale[3 * i], log_scale[3 * i + 1], log_scale[3 * i + 2]);
+    const vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
+                   sqrt(kernel_covariance_scale());
+    vec4 unit;
+    float norm;
+    normalise_rotation(rotation[i], unit, norm);
+    vec3 j0, j1;
+    vec2 ratio;
+    jacobian_rows(camera, p, j0, j1, ratio);
+    const mat3 axes = rotation_matrix(unit);
+    const vec3 t0 = to_world(camera, j0), t1 = to_world(camera, j1);
+    const vec3 r1 = (t0 * axes) * s, r2 = (t1 * axes) * s;
+    vec3 d_r1, d_r2;
+    factor_gradient(cholesky_factor(r1, r2, args.low_pass), sums, r1, r2, d_r1, d_r2, g.mean);
+
+    g.log_scale = outside_is_zero(d_r1 * r1 + d_r2 * r2, raw_scale, LOG_SCALE_LIMIT);
+    const vec3 e1 = d_r1 * s, e2 = d_r2 * s;
+    const mat3 d_axes = mat3(e1.x * t0 + e2.x * t1, e1.y * t0 + e2.y * t1, e1.z * t0 + e2.z * t1);
+    const vec4 d_unit = quaternion_gradient(unit, d_axes);
+    g.rotation = (d_unit - unit * dot(unit, d_unit)) / norm;
+
+    const vec3 d_j0 = to_camera(camera, axes * e1), d_j1 = to_camera(camera, axes * e2);
+    const vec2 from_x = jacobian_row_gradient(camera.focal.x, p.x, p.z, ratio.x,
+                                              vec2(camera.ratio_min.x, camera.ratio_max.x), d_j0.xz);
+    const vec2 from_y = jacobian_row_gradient(camera.focal.y, p.y, p.z, ratio.y,
+                                              vec2(camera.ratio_min.y, camera.ratio_max.y), d_j1.yz);
+    const vec2 m = g.mean * camera.focal / p.z;
+    const vec3 d_p = vec3(from_x.x + m.x, from_y.x + m.y,
+                          from_x.y + from_y.y - dot(m, p.xy) / p.z);
+    g.position = to_world(camera, d_p);
+
+    const float logit = opacity_logit[i];
+    const float o = 1.0 / (1.0 + exp(-logit)), rest = 1.0 / (1.0 + exp(logit));
+    g.opacity_logit = abs(logit) <= OPACITY_LOGIT_LIMIT ? sums.d_opacity * o * rest : 0.0;
+
+    const vec3 to_splat = world - camera.centre;
+    const float range = length(to_splat);
+    g.direction = to_splat / range;
+    vec3 colour = 0.5 + SH_C0 * vec3(sh_dc[3 * i], sh_dc[3 * i + 1], sh_dc[3 * i + 2]);
+    float basis[SH_REST_MAX], along[SH_REST_MAX];
+    sh_basis(g.direction, basis);
+    for (int k = 0; k < SH_USED; ++k) {
+        const uint at = i * SH_STRIDE + uint(k) * 3u;
+        colour += basis[k] * vec3(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]);
+    }
+    g.colour = mix(sums.d_colour, vec3(0.0), lessThan(colour, vec3(0.0)));
+    if (SH_DEGREE > 0) {
+        for (int k = 0; k < SH_USED; ++k) {
+            const uint at = i * SH_STRIDE + uint(k) * 3u;
+            along[k] = dot(g.colour, vec3(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]));
+        }
+        const vec3 d = sh_direction_gradient(g.direction, along);
+        g.position += (d - g.direction * dot(g.direction, d)) / range;
+    }
+    return g;
+}

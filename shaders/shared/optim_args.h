@@ -1,0 +1,52 @@
+// Arguments of the projection backward with its fused Adam step, and of density control.
+#ifndef DARB_OPTIM_ARGS_H
+#define DARB_OPTIM_ARGS_H
+
+#include "types.h"
+
+#ifdef __cplusplus
+namespace darb::gpu {
+#endif
+
+struct ProjectBackwardArgs {
+    uint splat_count;   // N
+    uint camera_index;
+    float low_pass;     // px^2
+    // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
+    float rate_position, rate_scale, rate_rotation, rate_opacity, rate_dc, rate_rest;
+    float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
+};
+
+// What density control does with a splat; see densify_decide.comp.
+#define DENSIFY_KEEP 0
+#define DENSIFY_CLONE 1
+#define DENSIFY_SPLIT 2
+#define DENSIFY_PRUNE 3
+#define DENSIFY_ACTIONS 4
+
+struct DensifyArgs {
+    uint splat_count;       // N before
+    uint growth_limit;      // no clone or split beyond this count; 0xFFFFFFFF = none
+    float gradient_threshold;  // NDC units, on the mean over the frames that saw the splat
+    float clone_split_scale;   // world: largest standard deviation below clones, above splits
+    float prune_opacity;       // below it a splat goes
+    float prune_scale;         // world: above it a splat goes; <= 0: off
+    uint seed;                 // of the split offsets, differs at each call
+};
+
+struct GatherArgs {
+    uint out_count;         // splats after
+    uint stride;            // floats per splat of this attribute
+    uint clear_new;         // 1: zero for new splats (moments), 0: copy
+};
+
+struct ResetOpacityArgs {
+    uint splat_count;
+    float logit_max;
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(ProjectBackwardArgs) == 40);
+}  // namespace darb::gpu
+#endif
+#endif
