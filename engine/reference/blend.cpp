@@ -1,0 +1,190 @@
+#include "engine/reference/blend.h"
+
+#include <algorithm>
+#include <span>
+
+namespace darb::reference {
+namespace {
+
+// One splat as a pixel meets it.
+template <class T>
+struct Sample {
+    T dx = 0, dy = 0;  // mean - pixel centre, px
+    T u = 0, v = 0;    // whitened offset; q = u^2 + v^2
+    T q = 0;
+    T weight = 0;  // w(q)
+    T alpha = 0;
+    bool clamped = false;  // alpha is ALPHA_MAX
+};
+
+/// False where the splat is skipped.
+template <class T>
+bool sample_splat(const ProjectedSplat<T>& s, T x, T y, const KernelTable& kernel, T cutoff,
+                  Sample<T>& sample) {
+    sample.dx = s.mean_px.x - x;
+    sample.dy = s.mean_px.y - y;
+    sample.u = s.l11 * sample.dx + s.l21 * sample.dy;
+    sample.v = s.l22 * sample.dy;
+    sample.q = sample.u * sample.u + sample.v * sample.v;
+    // Saves the kernel where the answer is plain; the band leaves the decision to alpha.
+    if (!(sample.q < s.reach * T(1.001) + T(1e-3))) {
+        return false;
+    }
+    sample.weight = static_cast<T>(kernel.value(static_cast<double>(sample.q)));
+    const T unclamped = s.opacity * sample.weight;
+    sample.clamped = unclamped > T(ALPHA_MAX);
+    sample.alpha = sample.clamped ? T(ALPHA_MAX) : unclamped;
+    return sample.alpha >= cutoff && sample.alpha > 0;
+}
+
+template <class T>
+std::vector<ProjectedSplat<T>> gather(const TileLists& lists, size_t tile,
+                                      const std::vector<ProjectedSplat<T>>& splats) {
+    std::vector<ProjectedSplat<T>> list;
+    for (std::uint32_t k = lists.begin[tile]; k < lists.begin[tile + 1]; ++k) {
+        list.push_back(splats[lists.splats[k]]);
+    }
+    return list;
+}
+
+/// Calls visit(x, y) for the pixels of a tile, row by row.
+template <class Visit>
+void for_each_pixel(const TileLists& lists, size_t tile, int width, int height,
+                    const Visit& visit) {
+    const int x0 = static_cast<int>(tile % lists.tiles_x) * kTileSize;
+    const int y0 = static_cast<int>(tile / lists.tiles_x) * kTileSize;
+    for (int y = y0; y < std::min(y0 + kTileSize, height); ++y) {
+        for (int x = x0; x < std::min(x0 + kTileSize, width); ++x) {
+            visit(x, y);
+        }
+    }
+}
+
+/// Calls blend(k, sample, T before) for each splat that the pixel blends; returns the final T.
+template <class T, class Blend>
+T walk_pixel(std::span<const ProjectedSplat<T>> list, int x, int y, const KernelTable& kernel,
+             const RenderSettings& settings, const Blend& blend) {
+    const T cutoff = T(settings.alpha_cutoff), stop = T(settings.transmittance_stop);
+    T transmittance = 1;
+    Sample<T> sample;
+    for (size_t k = 0; k < list.size(); ++k) {
+        if (!sample_splat(list[k], T(x) + T(0.5), T(y) + T(0.5), kernel, cutoff, sample)) {
+            continue;
+        }
+        const T next = transmittance * (1 - sample.alpha);
+        if (next < stop) {
+            break;
+        }
+        blend(k, sample, transmittance);
+        transmittance = next;
+    }
+    return transmittance;
+}
+
+template <class T>
+void add_sample_gradient(const ProjectedSplat<T>& s, const Sample<T>& sample, T d_alpha,
+                         const KernelTable& kernel, ProjectedGradient<T>& out) {
+    if (sample.clamped) {
+        return;
+    }
+    out.d_opacity += d_alpha * sample.weight;
+    const T slope = static_cast<T>(kernel.slope(static_cast<double>(sample.q)));
+    const T d_u = d_alpha * s.opacity * slope * 2 * sample.u;
+    const T d_v = d_alpha * s.opacity * slope * 2 * sample.v;
+    out.d_l11 += d_u * sample.dx;
+    out.d_l21 += d_u * sample.dy;
+    out.d_l22 += d_v * sample.dy;
+    out.d_mean_px += Vec2<T>(d_u * s.l11, d_u * s.l21 + d_v * s.l22);
+}
+
+template <class T>
+struct Blended {
+    size_t entry;  // in the tile's list
+    Sample<T> sample;
+    T before;  // transmittance in front of the splat
+};
+
+template <class T>
+Vec3<T> background_of(const RenderSettings& settings) {
+    return {T(settings.background[0]), T(settings.background[1]), T(settings.background[2])};
+}
+
+/// Back to front over what a pixel blended. `behind` is the colour behind the splat and `open` the
+/// transmittance behind it, both as seen through nothing: no division by 1 - alpha anywhere.
+template <class T>
+void pixel_backward(std::span<const ProjectedSplat<T>> list, std::span<const Blended<T>> blended,
+                    const Vec3<T>& d_colour, T d_alpha_out, const Vec3<T>& background,
+                    const KernelTable& kernel, ProjectedGradient<T>* pairs) {
+    Vec3<T> behind = background;
+    T open = 1;
+    for (size_t i = blended.size(); i-- > 0;) {
+        const Blended<T>& b = blended[i];
+        const ProjectedSplat<T>& s = list[b.entry];
+        const T alpha = b.sample.alpha;
+        const T d_alpha = b.before * (glm::dot(d_colour, s.colour - behind) + d_alpha_out * open);
+        pairs[b.entry].d_colour += d_colour * (b.before * alpha);
+        add_sample_gradient(s, b.sample, d_alpha, kernel, pairs[b.entry]);
+        behind = alpha * s.colour + (1 - alpha) * behind;
+        open *= 1 - alpha;
+    }
+}
+
+}  // namespace
+
+template <class T>
+void blend_tile(const TileLists& lists, size_t tile, const std::vector<ProjectedSplat<T>>& splats,
+                const KernelTable& kernel, const RenderSettings& settings, BlendImages<T>& images) {
+    const std::vector<ProjectedSplat<T>> list = gather(lists, tile, splats);
+    const Vec3<T> background = background_of<T>(settings);
+    const auto blend_pixel = [&](int x, int y) {
+        Vec3<T> colour(0);
+        std::int32_t count = 0;
+        const T transmittance = walk_pixel<T>(list, x, y, kernel, settings,
+                                              [&](size_t k, const Sample<T>& sample, T before) {
+                                                  colour += before * sample.alpha * list[k].colour;
+                                                  ++count;
+                                              });
+        colour += transmittance * background;
+        for (int c = 0; c < 3; ++c) {
+            images.colour.at(x, y, c) = colour[c];
+        }
+        images.transmittance.at(x, y, 0) = transmittance;
+        images.contributions.at(x, y, 0) = count;
+    };
+    for_each_pixel(lists, tile, images.colour.width, images.colour.height, blend_pixel);
+}
+
+template <class T>
+Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
+                            const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
+                            const RenderSettings& settings, const Image<T>& d_colour,
+                            const Image<T>& d_alpha, ProjectedGradient<T>* pairs) {
+    const std::vector<ProjectedSplat<T>> list = gather(lists, tile, splats);
+    const Vec3<T> background = background_of<T>(settings);
+    std::vector<Blended<T>> blended;
+    Vec3<T> d_background(0);
+    const auto pixel = [&](int x, int y) {
+        blended.clear();
+        const T transmittance = walk_pixel<T>(list, x, y, kernel, settings,
+                                              [&](size_t k, const Sample<T>& sample, T before) {
+                                                  blended.push_back({k, sample, before});
+                                              });
+        const Vec3<T> d_pixel(d_colour.at(x, y, 0), d_colour.at(x, y, 1), d_colour.at(x, y, 2));
+        const T d_out = d_alpha.data.empty() ? T(0) : d_alpha.at(x, y, 0);
+        d_background += d_pixel * transmittance;
+        pixel_backward<T>(list, blended, d_pixel, d_out, background, kernel, pairs);
+    };
+    for_each_pixel(lists, tile, d_colour.width, d_colour.height, pixel);
+    return d_background;
+}
+
+#define DARB_INSTANTIATE(T)                                                                   \
+    template void blend_tile(const TileLists&, size_t, const std::vector<ProjectedSplat<T>>&, \
+                             const KernelTable&, const RenderSettings&, BlendImages<T>&);     \
+    template Vec3<T> blend_tile_backward(                                                     \
+        const TileLists&, size_t, const std::vector<ProjectedSplat<T>>&, const KernelTable&,  \
+        const RenderSettings&, const Image<T>&, const Image<T>&, ProjectedGradient<T>*);
+DARB_INSTANTIATE(double)
+DARB_INSTANTIATE(float)
+
+}  // namespace darb::reference

@@ -1,0 +1,32 @@
+// Blending of one tile, front to back, and its gradient, back to front.
+// Per pixel: alpha = min(0.99, opacity w(q)), skipped below the cut-off; C += T alpha colour;
+// T *= 1 - alpha; stop before T would fall below the stop; at the end C += T background.
+#pragma once
+
+#include "engine/core/image.h"
+#include "engine/reference/projection.h"
+#include "engine/reference/tiles.h"
+
+namespace darb::reference {
+
+template <class T>
+struct BlendImages {
+    Image<T> colour;                    // [H][W][3], not clamped
+    Image<T> transmittance;             // [H][W][1], T after the last splat
+    Image<std::int32_t> contributions;  // [H][W][1], splats that were blended
+};
+
+template <class T>
+void blend_tile(const TileLists& lists, size_t tile, const std::vector<ProjectedSplat<T>>& splats,
+                const KernelTable& kernel, const RenderSettings& settings, BlendImages<T>& images);
+
+/// d_colour [H][W][3] is dL/d(image); d_alpha [H][W][1] or empty is dL/d(1 - T).
+/// Writes one gradient per entry of the tile's list into pairs[0 .. length), and returns
+/// dL/d(background) of this tile's pixels.
+template <class T>
+Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
+                            const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
+                            const RenderSettings& settings, const Image<T>& d_colour,
+                            const Image<T>& d_alpha, ProjectedGradient<T>* pairs);
+
+}  // namespace darb::reference

@@ -1,0 +1,138 @@
+#include "engine/reference/kernel_table.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <numbers>
+
+#include "engine/core/check.h"
+
+namespace darb::reference {
+namespace {
+
+// The nearest singularity is that of the inverse quadratic, q = -1, at s = 1.054: with 64 pieces
+// the Bernstein ellipse of the last piece has rho = 16, and 16^-12 = 4e-15.
+constexpr int kPieces = 64;
+constexpr int kTerms = 12;
+
+/// Monomial coefficients, in t in [-1, 1], of the interpolant through kTerms Chebyshev nodes.
+template <class Function>
+std::array<double, kTerms> fit_piece(const Function& f, double low, double high) {
+    std::array<double, kTerms> samples;
+    std::array<double, kTerms> chebyshev{};
+    for (int i = 0; i < kTerms; ++i) {
+        const double angle = std::numbers::pi * (i + 0.5) / kTerms;
+        samples[i] = f(0.5 * (low + high) + 0.5 * (high - low) * std::cos(angle));
+        for (int k = 0; k < kTerms; ++k) {
+            chebyshev[k] += (k == 0 ? 1.0 : 2.0) / kTerms * samples[i] * std::cos(k * angle);
+        }
+    }
+    // T_0 = 1, T_1 = t, T_{k+1} = 2 t T_k - T_{k-1}, as rows of monomials.
+    std::array<double, kTerms> previous{}, current{}, result{};
+    previous[0] = 1;
+    current[1] = 1;
+    result[0] = chebyshev[0];
+    for (int k = 1; k < kTerms; ++k) {
+        std::array<double, kTerms> next{};
+        for (int j = 0; j < kTerms; ++j) {
+            result[j] += chebyshev[k] * current[j];
+            next[j] = (j > 0 ? 2 * current[j - 1] : 0.0) - previous[j];
+        }
+        previous = current;
+        current = next;
+    }
+    return result;
+}
+
+template <class Function>
+std::vector<double> fit(const Function& f) {
+    std::vector<double> table;
+    for (int piece = 0; piece < kPieces; ++piece) {
+        const auto terms = fit_piece(f, double(piece) / kPieces, double(piece + 1) / kPieces);
+        table.insert(table.end(), terms.begin(), terms.end());
+    }
+    return table;
+}
+
+}  // namespace
+
+KernelTable::KernelTable(int kernel, Footprint footprint)
+    : kernel_(kernel),
+      exact_(footprint == Footprint::exact),
+      support_(kernel_support(kernel)),
+      covariance_scale_(darb::covariance_scale(kernel, footprint)) {
+    if (!std::isfinite(support_)) {
+        return;
+    }
+    const auto q_of = [this](double x) {
+        return exact_ ? support_ * (1 - x) * (1 + x) : support_ * x;
+    };
+    value_table_ = fit([&](double x) { return kernel_value(kernel, footprint, q_of(x)); });
+    slope_table_ = fit(
+        [&](double x) { return (exact_ ? x : 1.0) * kernel_slope(kernel, footprint, q_of(x)); });
+}
+
+double KernelTable::evaluate(const std::vector<double>& table, double x) const {
+    const double scaled = x * kPieces;
+    const int piece = std::min(static_cast<int>(scaled), kPieces - 1);
+    const double t = 2 * (scaled - piece) - 1;
+    const double* terms = table.data() + piece * kTerms;
+    double sum = terms[kTerms - 1];
+    for (int k = kTerms - 2; k >= 0; --k) {
+        sum = sum * t + terms[k];
+    }
+    return sum;
+}
+
+double KernelTable::value(double q) const {
+    if (value_table_.empty()) {
+        return std::exp(-0.5 * q);
+    }
+    const double t = q / support_;
+    return t < 1 ? evaluate(value_table_, exact_ ? std::sqrt(1 - t) : t) : 0.0;
+}
+
+double KernelTable::slope(double q) const {
+    if (slope_table_.empty()) {
+        return -0.5 * std::exp(-0.5 * q);
+    }
+    const double t = q / support_;
+    if (!(t < 1)) {
+        return 0.0;
+    }
+    const double s = std::sqrt(1 - t);
+    return exact_ ? evaluate(slope_table_, s) / s : evaluate(slope_table_, t);
+}
+
+double KernelTable::reach(double opacity, double cutoff) const {
+    if (!(opacity >= cutoff)) {
+        return 0.0;
+    }
+    if (value_table_.empty()) {
+        return -2 * std::log(cutoff / opacity);
+    }
+    double low = 0, high = support_;
+    while (high - low > 1e-14 * support_) {
+        const double middle = 0.5 * (low + high);
+        (opacity * value(middle) < cutoff ? high : low) = middle;
+    }
+    return high;
+}
+
+const KernelTable& kernel_table(int kernel, Footprint footprint) {
+    DARB_CHECK(kernel >= 0 && kernel < KERNEL_COUNT, "kernel = {}", kernel);
+    struct Slot {
+        std::once_flag once;
+        std::unique_ptr<const KernelTable> table;
+    };
+    // A cache of constants, so no state: each entry is built once and never changes.
+    static std::array<Slot, KERNEL_COUNT * 2> slots;
+    Slot& slot = slots[kernel * 2 + (footprint == Footprint::exact ? 1 : 0)];
+    std::call_once(slot.once,
+                   [&] { slot.table = std::make_unique<const KernelTable>(kernel, footprint); });
+    return *slot.table;
+}
+
+}  // namespace darb::reference

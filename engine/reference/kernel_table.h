@@ -1,0 +1,38 @@
+// KernelTable: value and slope of one kernel and footprint, fast enough for the inner loop. The
+// Gaussian is called as it is; the others are tabled once from engine/kernels as piecewise
+// Chebyshev interpolants: in q for the kernels themselves, and in s = sqrt(1 - q / R^2) for the
+// exact footprints, which are analytic in it up to their edge.
+#pragma once
+
+#include <vector>
+
+#include "engine/kernels/kernel_family.h"
+
+namespace darb::reference {
+
+class KernelTable {
+  public:
+    KernelTable(int kernel, Footprint footprint);
+
+    /// As kernel_value and kernel_slope, to 1e-12 absolute; q >= 0.
+    double value(double q) const;
+    double slope(double q) const;
+    /// As kernel_reach, to 1e-13 of the support; by bisection of value.
+    double reach(double opacity, double cutoff) const;
+    double covariance_scale() const { return covariance_scale_; }
+
+  private:
+    double evaluate(const std::vector<double>& table, double x) const;
+
+    int kernel_;
+    bool exact_;      // tabled in s, else in q / R^2
+    double support_;  // R^2
+    double covariance_scale_;
+    std::vector<double> value_table_;  // [kPieces][kTerms] monomials in [-1, 1]; empty: gaussian
+    std::vector<double> slope_table_;  // of the slope; of slope * s, finite at the edge, if exact_
+};
+
+/// The table of a kernel and footprint, built on first use and kept; safe from several threads.
+const KernelTable& kernel_table(int kernel, Footprint footprint);
+
+}  // namespace darb::reference

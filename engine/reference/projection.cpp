@@ -1,0 +1,266 @@
+#include "engine/reference/projection.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/check.h"
+#include "engine/reference/projection_terms.h"
+#include "engine/reference/sh.h"
+
+namespace darb::reference {
+namespace {
+
+template <class T>
+bool inside(T value, double limit) {
+    return value > T(-limit) && value < T(limit);
+}
+
+template <class T>
+T sigmoid_of_clamped(T logit) {
+    const T limit = T(OPACITY_LOGIT_LIMIT);
+    return 1 / (1 + std::exp(-std::clamp(logit, -limit, limit)));
+}
+
+/// What blurring by the low-pass takes from the peak; 1 where the model does not antialias.
+template <class T>
+T antialias_factor(const Splats<T>& splats, const CovarianceTerms<T>& terms) {
+    return splats.antialias ? std::sqrt(terms.det_sharp / terms.det) : T(1);
+}
+
+template <class T>
+struct ViewTerms {
+    Vec3<T> direction{0};  // from the camera centre to the splat, unit length
+    T distance = 0;        // world units
+};
+
+template <class T>
+ViewTerms<T> view_terms(const T* position, const Camera& camera) {
+    const Vec3<T> ray = Vec3<T>(position[0], position[1], position[2]) - Vec3<T>(camera.centre());
+    const T distance = glm::length(ray);
+    return {ray / distance, distance};
+}
+
+template <class T>
+int active_degree(const Splats<T>& splats, const RenderSettings& settings) {
+    return std::min(splats.sh_degree, settings.sh_degree);
+}
+
+template <class T>
+Vec3<T> colour_of(const Splats<T>& splats, size_t index, int degree, const Vec3<T>& direction) {
+    const ShBasis<T> basis = sh_basis(degree, direction);
+    const T* dc = &splats.sh_dc[index * 3];
+    const T* rest = splats.sh_rest.data() + index * splats.rest_count();
+    Vec3<T> colour(T(0.5));
+    for (int c = 0; c < 3; ++c) {
+        colour[c] += basis[0] * dc[c];
+        for (int k = 1; k < (degree + 1) * (degree + 1); ++k) {
+            colour[c] += basis[k] * rest[(k - 1) * 3 + c];
+        }
+        colour[c] = std::max(T(0), colour[c]);
+    }
+    return colour;
+}
+
+/// dL/d(A, B, C) of S' = [[A, B], [B, C]] from the factor of its inverse, l11 = sqrt(C / det),
+/// l21 = -B / sqrt(C det), l22 = 1 / sqrt(C).
+template <class T>
+Vec3<T> factor_backward(const ProjectedSplat<T>& p, const ProjectedGradient<T>& g) {
+    const T conic_xx = p.l11 * p.l11;  // det S'^-1 = conic_xx conic_yy - ... = (l11 l22)^2
+    const T d_a = T(-0.5) * p.l11 * conic_xx * g.d_l11 - T(0.5) * conic_xx * p.l21 * g.d_l21;
+    const T d_b = -conic_xx * p.l21 * g.d_l11 - p.l11 * (p.l21 * p.l21 + p.l22 * p.l22) * g.d_l21;
+    const T d_c = T(-0.5) * p.l11 * p.l21 * p.l21 * g.d_l11 -
+                  p.l21 * (p.l22 * p.l22 + T(0.5) * p.l21 * p.l21) * g.d_l21 -
+                  T(0.5) * p.l22 * p.l22 * p.l22 * g.d_l22;
+    return {d_a, d_b, d_c};
+}
+
+template <class T>
+struct RowGradients {
+    Vec3<T> d_r1{0}, d_r2{0};
+};
+
+/// dL/d(rows of M): through the factor, and through the antialiasing factor of the opacity.
+template <class T>
+RowGradients<T> row_gradients(const Splats<T>& splats, const CovarianceTerms<T>& terms,
+                              const ProjectedSplat<T>& splat,
+                              const ProjectedGradient<T>& gradient) {
+    Vec3<T> d_cov = factor_backward(splat, gradient);
+    RowGradients<T> d;
+    if (splats.antialias && terms.det_sharp > 0) {
+        // opacity = sigmoid |n| / sqrt(det), n = r1 x r2; det = A C - B^2.
+        const Vec3<T> n = glm::cross(terms.r1, terms.r2);
+        const Vec3<T> d_n = gradient.d_opacity * splat.opacity / terms.det_sharp * n;
+        d.d_r1 = glm::cross(terms.r2, d_n);
+        d.d_r2 = glm::cross(d_n, terms.r1);
+        const T d_det = T(-0.5) * gradient.d_opacity * splat.opacity / terms.det;
+        d_cov += d_det * Vec3<T>(splat.cov_yy, -2 * splat.cov_xy, splat.cov_xx);
+    }
+    d.d_r1 += 2 * d_cov[0] * terms.r1 + d_cov[1] * terms.r2;
+    d.d_r2 += 2 * d_cov[2] * terms.r2 + d_cov[1] * terms.r1;
+    return d;
+}
+
+/// dL/d(mean in the camera) through the entries of the Jacobian, clamp included.
+template <class T>
+Vec3<T> jacobian_backward(const Vec3<T>& mean, const CovarianceTerms<T>& terms,
+                          const Camera& camera, const Vec3<T>& d_j1, const Vec3<T>& d_j2) {
+    const T fx = T(camera.fx), fy = T(camera.fy), z = mean.z;
+    Vec3<T> d(0);
+    d.z = -(d_j1.x * fx + d_j2.y * fy) / (z * z) +
+          (d_j1.z * fx * terms.ratio.x + d_j2.z * fy * terms.ratio.y) / (z * z);
+    if (terms.ratio.x_inside) {
+        const T d_ratio = -d_j1.z * fx / z;
+        d.x += d_ratio / z;
+        d.z -= d_ratio * mean.x / (z * z);
+    }
+    if (terms.ratio.y_inside) {
+        const T d_ratio = -d_j2.z * fy / z;
+        d.y += d_ratio / z;
+        d.z -= d_ratio * mean.y / (z * z);
+    }
+    return d;
+}
+
+/// Writes dL/d(sh_dc, sh_rest), returns dL/d(position) through the view direction.
+template <class T>
+Vec3<T> colour_backward(const Splats<T>& splats, size_t index, int degree, const ViewTerms<T>& view,
+                        const ProjectedSplat<T>& splat, const ProjectedGradient<T>& gradient,
+                        SplatGradients<T>& out) {
+    const ShBasis<T> basis = sh_basis(degree, view.direction);
+    const ShBasisGradient<T> basis_gradient = sh_basis_gradient(degree, view.direction);
+    const T* rest = splats.sh_rest.data() + index * splats.rest_count();
+    T* d_rest = out.sh_rest.data() + index * splats.rest_count();
+    Vec3<T> d_direction(0);
+    for (int c = 0; c < 3; ++c) {
+        const T d_colour = splat.colour[c] > 0 ? gradient.d_colour[c] : T(0);
+        out.sh_dc[index * 3 + c] = basis[0] * d_colour;
+        for (int k = 1; k < (degree + 1) * (degree + 1); ++k) {
+            d_rest[(k - 1) * 3 + c] = basis[k] * d_colour;
+            d_direction += d_colour * rest[(k - 1) * 3 + c] * basis_gradient[k];
+        }
+    }
+    return (d_direction - view.direction * glm::dot(view.direction, d_direction)) / view.distance;
+}
+
+}  // namespace
+
+std::string_view cull_name(Cull cull) {
+    constexpr std::string_view kNames[kCullCount] = {"none",    "near_plane", "rotation",
+                                                     "opacity", "covariance", "outside"};
+    return kNames[static_cast<int>(cull)];
+}
+
+template <class T>
+void SplatGradients<T>::resize_like(const Splats<T>& splats) {
+    position.resize(splats.position.size());
+    log_scale.resize(splats.log_scale.size());
+    rotation.resize(splats.rotation.size());
+    opacity.resize(splats.opacity.size());
+    sh_dc.resize(splats.sh_dc.size());
+    sh_rest.resize(splats.sh_rest.size());
+}
+
+template <class T>
+ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
+                          const RenderSettings& settings, const KernelTable& kernel) {
+    DARB_CHECK(index < splats.size(), "index = {}, N = {}", index, splats.size());
+    ProjectedSplat<T> p;
+    const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
+    if (!(mean.z > T(settings.near_z)) || !std::isfinite(mean.x + mean.y + mean.z)) {
+        p.cull = Cull::near_plane;
+        return p;
+    }
+    const RotationTerms<T> rotation = rotation_terms(&splats.rotation[index * 4]);
+    if (!(rotation.norm * rotation.norm >= T(ROTATION_MIN_SQUARE)) ||
+        !std::isfinite(rotation.norm)) {
+        p.cull = Cull::rotation;
+        return p;
+    }
+    const CovarianceTerms<T> terms =
+        covariance_terms(mean, rotation, &splats.log_scale[index * 3], camera, settings.low_pass,
+                         kernel.covariance_scale());
+    p.opacity = sigmoid_of_clamped(splats.opacity[index]) * antialias_factor(splats, terms);
+    if (!(p.opacity >= T(settings.alpha_cutoff))) {
+        p.cull = Cull::opacity;
+        return p;
+    }
+    if (!(terms.det > T(DETERMINANT_MIN)) || !(terms.det < T(DETERMINANT_MAX))) {
+        p.cull = Cull::covariance;
+        return p;
+    }
+    p.mean_px = {T(camera.fx) * mean.x / mean.z + T(camera.cx),
+                 T(camera.fy) * mean.y / mean.z + T(camera.cy)};
+    p.depth = mean.z;
+    p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
+    p.cov_xy = glm::dot(terms.r1, terms.r2);
+    p.cov_yy = glm::dot(terms.r2, terms.r2) + T(settings.low_pass);
+    p.l11 = std::sqrt(p.cov_yy / terms.det);
+    p.l21 = -p.cov_xy / (std::sqrt(p.cov_yy) * std::sqrt(terms.det));
+    p.l22 = 1 / std::sqrt(p.cov_yy);
+    p.reach = T(kernel.reach(static_cast<double>(p.opacity), settings.alpha_cutoff));
+    const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
+    p.colour = colour_of(splats, index, active_degree(splats, settings), view.direction);
+    return p;
+}
+
+template <class T>
+void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
+                      const RenderSettings& settings, const KernelTable& kernel,
+                      const ProjectedSplat<T>& splat, const ProjectedGradient<T>& gradient,
+                      SplatGradients<T>& out) {
+    if (splat.cull != Cull::none) {
+        return;
+    }
+    const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
+    const RotationTerms<T> rotation = rotation_terms(&splats.rotation[index * 4]);
+    const CovarianceTerms<T> terms =
+        covariance_terms(mean, rotation, &splats.log_scale[index * 3], camera, settings.low_pass,
+                         kernel.covariance_scale());
+    const Mat3<T> view_matrix = view_rotation<T>(camera);
+
+    // r1 = root (k1 R) diag(scale), r2 alike.
+    const RowGradients<T> d_rows = row_gradients(splats, terms, splat, gradient);
+    const Vec3<T> e1 = terms.root * d_rows.d_r1, e2 = terms.root * d_rows.d_r2;
+    const Vec3<T> d_scale = (terms.k1 * rotation.matrix) * e1 + (terms.k2 * rotation.matrix) * e2;
+    const Mat3<T> d_matrix = glm::outerProduct(terms.k1, e1 * terms.scale) +
+                             glm::outerProduct(terms.k2, e2 * terms.scale);
+    const Vec4<T> d_rotation = rotation_backward(rotation, d_matrix);
+    const Vec3<T> d_j1 = view_matrix * (rotation.matrix * (e1 * terms.scale));
+    const Vec3<T> d_j2 = view_matrix * (rotation.matrix * (e2 * terms.scale));
+
+    Vec3<T> d_mean = jacobian_backward(mean, terms, camera, d_j1, d_j2);
+    const Vec2<T> d_px = gradient.d_mean_px;
+    const T fx = T(camera.fx), fy = T(camera.fy);
+    d_mean += Vec3<T>(d_px.x * fx / mean.z, d_px.y * fy / mean.z,
+                      -(d_px.x * fx * mean.x + d_px.y * fy * mean.y) / (mean.z * mean.z));
+    const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
+    const Vec3<T> d_position =
+        d_mean * view_matrix +
+        colour_backward(splats, index, active_degree(splats, settings), view, splat, gradient, out);
+
+    for (int c = 0; c < 3; ++c) {
+        const bool free = inside(splats.log_scale[index * 3 + c], LOG_SCALE_LIMIT);
+        out.position[index * 3 + c] = d_position[c];
+        out.log_scale[index * 3 + c] = free ? d_scale[c] * terms.scale[c] : T(0);
+    }
+    for (int c = 0; c < 4; ++c) {
+        out.rotation[index * 4 + c] = d_rotation[c];
+    }
+    const T sigmoid = sigmoid_of_clamped(splats.opacity[index]);
+    out.opacity[index] =
+        inside(splats.opacity[index], OPACITY_LOGIT_LIMIT)
+            ? gradient.d_opacity * antialias_factor(splats, terms) * sigmoid * (1 - sigmoid)
+            : T(0);
+}
+
+#define DARB_INSTANTIATE(T)                                                                        \
+    template struct SplatGradients<T>;                                                             \
+    template ProjectedSplat<T> project(const Splats<T>&, size_t, const Camera&,                    \
+                                       const RenderSettings&, const KernelTable&);                 \
+    template void project_backward(const Splats<T>&, size_t, const Camera&, const RenderSettings&, \
+                                   const KernelTable&, const ProjectedSplat<T>&,                   \
+                                   const ProjectedGradient<T>&, SplatGradients<T>&);
+DARB_INSTANTIATE(double)
+DARB_INSTANTIATE(float)
+
+}  // namespace darb::reference

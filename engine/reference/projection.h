@@ -1,0 +1,63 @@
+// Projection of one splat to the image plane, values and hand-derived gradients.
+// Mean: pinhole. Covariance: S' = M M^T + low_pass I with M = sqrt(scale) J W R diag(s) (the EWA
+// approximation of Zwicker et al. 2001), kept as the Cholesky factor of its inverse.
+#pragma once
+
+#include <string_view>
+
+#include "engine/reference/kernel_table.h"
+#include "engine/reference/splats.h"
+#include "engine/scene/camera.h"
+
+namespace darb::reference {
+
+/// Why a splat takes no part, in the order of the tests. The numbers are those of CULL_* + 1.
+enum class Cull { none, near_plane, rotation, opacity, covariance, outside };
+constexpr int kCullCount = 6;
+std::string_view cull_name(Cull cull);
+
+template <class T>
+struct ProjectedSplat {
+    Cull cull = Cull::none;
+    Vec2<T> mean_px{0};                    // px, pixel centres at +0.5
+    T depth = 0;                           // camera z, world units
+    T cov_xx = 0, cov_xy = 0, cov_yy = 0;  // S', px^2
+    // q = (l11 dx + l21 dy)^2 + (l22 dy)^2 with (dx, dy) = mean_px - pixel centre; 1/px
+    T l11 = 0, l21 = 0, l22 = 0;
+    T opacity = 0;      // (0, 1), with the antialiasing factor where the model asks for it
+    T reach = 0;        // q from which alpha is below the cut-off
+    Vec3<T> colour{0};  // >= 0
+};
+
+/// dL/d(each rendered quantity of a splat); zero for culled splats.
+template <class T>
+struct ProjectedGradient {
+    Vec2<T> d_mean_px{0};  // 1/px
+    T d_l11 = 0, d_l21 = 0, d_l22 = 0;
+    T d_opacity = 0;
+    Vec3<T> d_colour{0};
+};
+
+/// dL/d(parameter), same shapes as Splats.
+template <class T>
+struct SplatGradients {
+    std::vector<T> position, log_scale, rotation, opacity, sh_dc, sh_rest;
+
+    void resize_like(const Splats<T>& splats);
+};
+
+/// Everything but `outside`, which takes the tiles. Index in [0, N). A culled splat has its cull
+/// set and the rest unspecified.
+template <class T>
+ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
+                          const RenderSettings& settings, const KernelTable& kernel);
+
+/// Writes the gradients of splat `index` into `out` (sized like the splats); `splat` is what
+/// project returned. Does nothing for culled splats.
+template <class T>
+void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
+                      const RenderSettings& settings, const KernelTable& kernel,
+                      const ProjectedSplat<T>& splat, const ProjectedGradient<T>& gradient,
+                      SplatGradients<T>& out);
+
+}  // namespace darb::reference

@@ -1,0 +1,103 @@
+#include "engine/reference/projection_terms.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace darb::reference {
+
+template <class T>
+RotationTerms<T> rotation_terms(const T* q) {
+    RotationTerms<T> terms;
+    terms.norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    terms.unit = Vec4<T>(q[0], q[1], q[2], q[3]) / terms.norm;
+    const T w = terms.w(), x = terms.x(), y = terms.y(), z = terms.z();
+    // Columns: images of the splat's axes.
+    terms.matrix[0] = {1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)};
+    terms.matrix[1] = {2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)};
+    terms.matrix[2] = {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)};
+    return terms;
+}
+
+template <class T>
+Vec4<T> rotation_backward(const RotationTerms<T>& terms, const Mat3<T>& d) {
+    const T w = terms.w(), x = terms.x(), y = terms.y(), z = terms.z();
+    // d[column][row]. Sum over the entries of matrix in which each component stands.
+    const T d_w = 2 * (z * (d[0][1] - d[1][0]) + y * (d[2][0] - d[0][2]) + x * (d[1][2] - d[2][1]));
+    const T d_x = 2 * (y * (d[0][1] + d[1][0]) + z * (d[0][2] + d[2][0]) + w * (d[1][2] - d[2][1]) -
+                       2 * x * (d[1][1] + d[2][2]));
+    const T d_y = 2 * (x * (d[0][1] + d[1][0]) + z * (d[1][2] + d[2][1]) + w * (d[2][0] - d[0][2]) -
+                       2 * y * (d[0][0] + d[2][2]));
+    const T d_z = 2 * (x * (d[0][2] + d[2][0]) + y * (d[1][2] + d[2][1]) + w * (d[0][1] - d[1][0]) -
+                       2 * z * (d[0][0] + d[1][1]));
+    const Vec4<T> d_unit(d_w, d_x, d_y, d_z);
+    return (d_unit - terms.unit * glm::dot(terms.unit, d_unit)) / terms.norm;
+}
+
+template <class T>
+RatioTerms<T> ratio_terms(const Vec3<T>& mean_camera, const Camera& camera) {
+    const double margin_x = kJacobianMargin * camera.width / (2 * camera.fx);
+    const double margin_y = kJacobianMargin * camera.height / (2 * camera.fy);
+    const T min_x = T(-camera.cx / camera.fx - margin_x);
+    const T max_x = T((camera.width - camera.cx) / camera.fx + margin_x);
+    const T min_y = T(-camera.cy / camera.fy - margin_y);
+    const T max_y = T((camera.height - camera.cy) / camera.fy + margin_y);
+    const T x = mean_camera.x / mean_camera.z;
+    const T y = mean_camera.y / mean_camera.z;
+    return {std::clamp(x, min_x, max_x), std::clamp(y, min_y, max_y), x >= min_x && x <= max_x,
+            y >= min_y && y <= max_y};
+}
+
+template <class T>
+T clamped_scale(T log_scale) {
+    return std::exp(std::clamp(log_scale, T(-LOG_SCALE_LIMIT), T(LOG_SCALE_LIMIT)));
+}
+
+template <class T>
+Mat3<T> view_rotation(const Camera& camera) {
+    return Mat3<T>(camera.rotation);
+}
+
+template <class T>
+Vec3<T> mean_in_camera(const T* position, const Camera& camera) {
+    return view_rotation<T>(camera) * Vec3<T>(position[0], position[1], position[2]) +
+           Vec3<T>(camera.translation);
+}
+
+template <class T>
+CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
+                                    const T* log_scale, const Camera& camera, double low_pass,
+                                    double covariance_scale) {
+    CovarianceTerms<T> c;
+    c.ratio = ratio_terms(mean_camera, camera);
+    const T fx = T(camera.fx), fy = T(camera.fy), z = mean_camera.z;
+    c.j1 = {fx / z, 0, -fx * c.ratio.x / z};
+    c.j2 = {0, fy / z, -fy * c.ratio.y / z};
+    const Mat3<T> view = view_rotation<T>(camera);
+    c.k1 = c.j1 * view;
+    c.k2 = c.j2 * view;
+    c.scale = {clamped_scale(log_scale[0]), clamped_scale(log_scale[1]),
+               clamped_scale(log_scale[2])};
+    c.root = T(std::sqrt(covariance_scale));
+    c.r1 = c.root * (c.k1 * rotation.matrix) * c.scale;
+    c.r2 = c.root * (c.k2 * rotation.matrix) * c.scale;
+    const Vec3<T> cross = glm::cross(c.r1, c.r2);
+    const T h = T(low_pass);
+    c.det_sharp = glm::dot(cross, cross);
+    // det(M M^T + h I) without the cancellation of A C - B^2 (Lagrange's identity).
+    c.det = c.det_sharp + h * (glm::dot(c.r1, c.r1) + glm::dot(c.r2, c.r2)) + h * h;
+    return c;
+}
+
+#define DARB_INSTANTIATE(T)                                                               \
+    template RotationTerms<T> rotation_terms(const T*);                                   \
+    template Vec4<T> rotation_backward(const RotationTerms<T>&, const Mat3<T>&);          \
+    template RatioTerms<T> ratio_terms(const Vec3<T>&, const Camera&);                    \
+    template T clamped_scale(T);                                                          \
+    template Mat3<T> view_rotation(const Camera&);                                        \
+    template Vec3<T> mean_in_camera(const T*, const Camera&);                             \
+    template CovarianceTerms<T> covariance_terms(const Vec3<T>&, const RotationTerms<T>&, \
+                                                 const T*, const Camera&, double, double);
+DARB_INSTANTIATE(double)
+DARB_INSTANTIATE(float)
+
+}  // namespace darb::reference

@@ -1,0 +1,127 @@
+#include "engine/reference/render.h"
+
+#include <cmath>
+
+#include "engine/core/check.h"
+#include "engine/reference/parallel.h"
+
+namespace darb::reference {
+namespace {
+
+constexpr size_t kSplatsPerBlock = 1024;
+
+/// body(i) for every splat, in blocks over the threads.
+template <class Body>
+void for_each_splat(size_t count, int threads, const Body& body) {
+    parallel_for((count + kSplatsPerBlock - 1) / kSplatsPerBlock, threads, [&](size_t block) {
+        const size_t end = std::min(count, (block + 1) * kSplatsPerBlock);
+        for (size_t i = block * kSplatsPerBlock; i < end; ++i) {
+            body(i);
+        }
+    });
+}
+
+template <class T>
+void check_shapes(const Splats<T>& splats, const Camera& camera) {
+    const size_t n = splats.size();
+    DARB_CHECK(splats.position.size() == n * 3 && splats.log_scale.size() == n * 3 &&
+                   splats.rotation.size() == n * 4 && splats.sh_dc.size() == n * 3 &&
+                   splats.sh_rest.size() == n * splats.rest_count(),
+               "N = {}", n);
+    DARB_CHECK(camera.width > 0 && camera.height > 0, "{}x{}", camera.width, camera.height);
+}
+
+template <class T>
+void add(ProjectedGradient<T>& sum, const ProjectedGradient<T>& term) {
+    sum.d_mean_px += term.d_mean_px;
+    sum.d_l11 += term.d_l11;
+    sum.d_l21 += term.d_l21;
+    sum.d_l22 += term.d_l22;
+    sum.d_opacity += term.d_opacity;
+    sum.d_colour += term.d_colour;
+}
+
+}  // namespace
+
+template <class T>
+BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
+                            const RenderSettings& settings) {
+    check_shapes(splats, camera);
+    const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
+    BasicRenderResult<T> result;
+    result.projected.resize(splats.size());
+    for_each_splat(splats.size(), settings.threads, [&](size_t i) {
+        result.projected[i] = project(splats, i, camera, settings, kernel);
+    });
+    result.tiles = make_tile_lists(camera.width, camera.height, result.projected);
+    for (const ProjectedSplat<T>& splat : result.projected) {
+        ++result.culled[static_cast<size_t>(splat.cull)];
+    }
+    result.images = {Image<T>(camera.width, camera.height, 3),
+                     Image<T>(camera.width, camera.height, 1),
+                     Image<std::int32_t>(camera.width, camera.height, 1)};
+    parallel_for(result.tiles.tile_count(), settings.threads, [&](size_t tile) {
+        blend_tile(result.tiles, tile, result.projected, kernel, settings, result.images);
+    });
+    return result;
+}
+
+template <class T>
+BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
+                           const RenderSettings& settings, const BasicRenderResult<T>& result,
+                           const Image<T>& d_image, const Image<T>& d_alpha) {
+    check_shapes(splats, camera);
+    DARB_CHECK(d_image.width == camera.width && d_image.height == camera.height &&
+                   d_image.channels == 3 && result.projected.size() == splats.size(),
+               "{}x{}x{}", d_image.width, d_image.height, d_image.channels);
+    const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
+    const TileLists& tiles = result.tiles;
+    // Every pair has a slot of its own and the sums run in list order, so that the result does not
+    // depend on the threads.
+    std::vector<ProjectedGradient<T>> pairs(tiles.pair_count());
+    std::vector<Vec3<T>> d_background(tiles.tile_count());
+    parallel_for(tiles.tile_count(), settings.threads, [&](size_t tile) {
+        d_background[tile] =
+            blend_tile_backward(tiles, tile, result.projected, kernel, settings, d_image, d_alpha,
+                                pairs.data() + tiles.begin[tile]);
+    });
+
+    BasicGradients<T> gradients;
+    gradients.projected.resize(splats.size());
+    gradients.mean_gradient_ndc.resize(splats.size());
+    gradients.splats.resize_like(splats);
+    for (size_t k = 0; k < pairs.size(); ++k) {
+        add(gradients.projected[tiles.splats[k]], pairs[k]);
+    }
+    for (const Vec3<T>& d : d_background) {
+        gradients.background += d;
+    }
+    const T half_width = T(0.5) * T(camera.width), half_height = T(0.5) * T(camera.height);
+    for_each_splat(splats.size(), settings.threads, [&](size_t i) {
+        const Vec2<T> d = gradients.projected[i].d_mean_px;
+        gradients.mean_gradient_ndc[i] = std::hypot(d.x * half_width, d.y * half_height);
+        project_backward(splats, i, camera, settings, kernel, result.projected[i],
+                         gradients.projected[i], gradients.splats);
+    });
+    return gradients;
+}
+
+RenderResult render(const SplatModel& model, const Camera& camera, const RenderSettings& settings) {
+    return render(make_splats<double>(model), camera, settings);
+}
+
+Gradients backward(const SplatModel& model, const Camera& camera, const RenderSettings& settings,
+                   const RenderResult& result, const Image<double>& d_image,
+                   const Image<double>& d_alpha) {
+    return backward(make_splats<double>(model), camera, settings, result, d_image, d_alpha);
+}
+
+#define DARB_INSTANTIATE(T)                                                                       \
+    template BasicRenderResult<T> render(const Splats<T>&, const Camera&, const RenderSettings&); \
+    template BasicGradients<T> backward(const Splats<T>&, const Camera&, const RenderSettings&,   \
+                                        const BasicRenderResult<T>&, const Image<T>&,             \
+                                        const Image<T>&);
+DARB_INSTANTIATE(double)
+DARB_INSTANTIATE(float)
+
+}  // namespace darb::reference

@@ -1,0 +1,52 @@
+// The whole walk in one call each way: project, list, blend; and back to every parameter.
+// Cost: 150,000 splats at 1280x720 take about two seconds on two cores.
+#pragma once
+
+#include <array>
+
+#include "engine/reference/blend.h"
+
+namespace darb::reference {
+
+/// What a render leaves for comparison and for the backward walk. Splat arrays are in model order.
+template <class T>
+struct BasicRenderResult {
+    BlendImages<T> images;
+    std::vector<ProjectedSplat<T>> projected;  // [N]
+    TileLists tiles;
+    std::array<size_t, kCullCount> culled{};  // splats by Cull; culled[0] is the visible count
+
+    size_t visible_count() const { return culled[0]; }
+};
+
+template <class T>
+struct BasicGradients {
+    SplatGradients<T> splats;                     // as the model's arrays
+    std::vector<ProjectedGradient<T>> projected;  // [N]
+    /// [N] |dL/d(mean)| in NDC units, sqrt((d_x W/2)^2 + (d_y H/2)^2); 0 for culled splats.
+    std::vector<T> mean_gradient_ndc;
+    Vec3<T> background{0};
+};
+
+using RenderResult = BasicRenderResult<double>;
+using Gradients = BasicGradients<double>;
+
+/// Kernel, footprint, degree and antialiasing come from the splats. Legal for N = 0.
+template <class T>
+BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
+                            const RenderSettings& settings);
+
+/// `result` is render's for the same splats, camera and settings. d_image [H][W][3] is dL/d(image);
+/// d_alpha [H][W][1], or empty for none, is dL/d(1 - transmittance).
+template <class T>
+BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
+                           const RenderSettings& settings, const BasicRenderResult<T>& result,
+                           const Image<T>& d_image, const Image<T>& d_alpha = {});
+
+/// The same in double from the float parameters of a model.
+RenderResult render(const SplatModel& model, const Camera& camera, const RenderSettings& settings);
+Gradients backward(const SplatModel& model, const Camera& camera, const RenderSettings& settings,
+                   const RenderResult& result, const Image<double>& d_image,
+                   const Image<double>& d_alpha = {});
+
+}  // namespace darb::reference
