@@ -21,12 +21,13 @@ struct LensModel {
 };
 
 struct View {
-    std::string name;              // as the source names it, with folders
-    std::filesystem::path photo;   // the file
-    std::filesystem::path mask;    // empty where there is none; 8-bit, 0 = ignore
-    Camera camera;                 // of the photo as load_photo returns it
-    LensModel lens;                // of the file on disk; undistorted by load_photo
-    bool is_test = false;          // held out
+    std::string name;             // as the source names it, with folders
+    std::filesystem::path photo;  // the file
+    std::filesystem::path mask;   // empty where there is none; 8-bit, 0 = ignore
+    Camera camera;                // of the photo as load_photo returns it
+    LensModel lens;               // of the file on disk, turned by orientation; see load_photo
+    bool is_test = false;         // held out
+    int orientation = 1;          // EXIF number that load_photo applies, 1 = as stored
 };
 
 struct PointCloud {
@@ -37,27 +38,36 @@ struct PointCloud {
 
 struct Dataset {
     std::filesystem::path root;
-    std::string source;            // "COLMAP binary", "COLMAP text", "transforms.json", ...
-    std::vector<View> views;       // by name, ascending
-    PointCloud points;             // may be empty
-    bool has_alpha = false;        // some photo has an alpha channel
+    std::string source;              // "COLMAP binary", "COLMAP text", "transforms.json", ...
+    std::vector<View> views;         // by name, ascending
+    PointCloud points;               // may be empty
+    bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
 };
 
 struct DatasetOptions {
     std::string images_folder = "images";  // COLMAP: images, images_2, ...
-    int resolution = -1;  // 1, 2, 4, 8: divisor; > 8: width in px; -1: as is, but at most 1,600 wide
-    bool hold_out = false;  // --eval: every 8th view by name from the first on is test; sources with
-                            // a test file of their own use that in either case
+    int resolution =
+        -1;  // 1, 2, 4, 8: divisor; > 8: width in px; -1: as is, but at most 1,600 wide
+    bool hold_out = false;  // --eval: every 8th view by name from the first on is test; sources
+                            // with a test file of their own use that in either case
     bool require_photos = true;  // false: cameras only (render)
 };
 
-/// DATASET is a COLMAP project folder (sparse/0, sparse, or the model files themselves), a folder with
-/// transforms.json or transforms_train.json, or a .json path. Throws Error naming file and record.
+/// DATASET is a COLMAP project folder (sparse/0, sparse, or the model files themselves), a folder
+/// with transforms.json or transforms_train.json, or a .json path. Throws Error naming file and
+/// record.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo, RGBA with straight alpha (255 where the file has none; a mask multiplies alpha),
-/// EXIF orientation applied, undistorted, scaled to view.camera's size. Thread-safe.
+/// turned by view.orientation, undistorted, box filtered to view.camera's size. Thread-safe.
+///
+/// EXIF: the declared camera decides. Cameras are calibrated on pixels; where the declared width
+/// and height are those of the stored pixels, these stay as they are (COLMAP 3.8 and most trainers
+/// ignore EXIF); where they are those of the turned photo, or none are declared, the photo is
+/// turned. Undistortion: the pinhole keeps the focal lengths and covers the largest rectangle of
+/// the frame without gaps, at most 60 degrees to each side; pixels no photo pixel maps to have
+/// alpha 0.
 ImageU8 load_photo(const View& view);
 
 /// Loads all, on `threads` threads (0 = all cores), in the order of views.

@@ -1,0 +1,37 @@
+// PNG and JPEG files: size and orientation without decoding, whole images, PNG out.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "engine/core/image.h"
+
+namespace darb {
+
+struct ImageInfo {
+    int width = 0;        // px, as stored
+    int height = 0;       // px, as stored
+    int channels = 0;     // 1 to 4, as stored
+    int orientation = 1;  // EXIF, 1 to 8
+};
+
+constexpr int kExifOrientation = 0;  // turn as the file's EXIF says
+
+/// Reads the head of the file only. Throws Error naming the file where it is no PNG or JPEG.
+ImageInfo read_image_info(const std::filesystem::path& path);
+
+/// 1, 3 or 4 channels, 8 bits (16-bit PNGs lose their low byte; grey with alpha becomes RGBA),
+/// turned by `orientation`, 1 to 8. Throws Error naming the file. Thread-safe.
+ImageU8 read_image(const std::filesystem::path& path, int orientation = kExifOrientation);
+ImageU8 decode_image(std::span<const std::byte> file, const std::string& where,
+                     int orientation = kExifOrientation);
+
+/// The image turned and mirrored as EXIF number 1 to 8 asks for; 5 to 8 swap width and height.
+ImageU8 orient_image(const ImageU8& image, int orientation);
+
+/// 1, 3 or 4 channels; through write_file_atomic, so makes missing folders.
+void write_png(const std::filesystem::path& path, const ImageU8& image);
+
+}  // namespace darb

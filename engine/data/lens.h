@@ -1,0 +1,62 @@
+// Lens: the camera models of COLMAP 3.8 as one function of a ray and its inverse.
+// Every model is a pinhole after a distortion of the plane z = 1,
+//   w' = w (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6)
+//        + tangential (p1, p2) + thin prism (s1, s2),   r = |w|,
+// with w the ray itself or, for the fisheye models, the ray at distance theta; FOV has its own
+// form. Source: COLMAP 3.8, src/base/camera_models.h; Weng et al. 1992; Devernay and Faugeras 2001.
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+constexpr int kLensModelCount = 11;
+/// COLMAP's name of a model id, 0 to 10; empty for other ids.
+std::string_view lens_model_name(int id);
+/// -1 for an unknown name.
+int lens_parameter_count(std::string_view model);
+
+/// Throws Error where the model is unknown, the parameter count is wrong, a parameter is not
+/// finite, a focal length is not positive, or the size is not between 1 and 100,000 px.
+void check_lens(const LensModel& lens, const std::string& where);
+
+/// The lens of the same photo scaled to width x height.
+LensModel scale_lens(const LensModel& lens, int width, int height);
+
+class Lens {
+  public:
+    explicit Lens(const LensModel& model);  // checked by check_lens
+
+    /// ray: x/z, y/z of a point before the camera. Returns px. For rays beyond the fold of the
+    /// distortion (where it stops being one to one) see valid.
+    glm::dvec2 project(glm::dvec2 ray) const;
+    /// The inverse, by damped Newton; nothing where it does not converge to 1e-9 on this side of
+    /// the fold, or the ray is 90 degrees or more off the axis.
+    std::optional<glm::dvec2> unproject(glm::dvec2 pixel) const;
+    bool valid(glm::dvec2 ray) const;
+
+    glm::dvec2 focal{1.0}, principal{0.0};  // px
+
+  private:
+    enum class Front { plane, equidistant, fov };
+    struct Distorted {
+        glm::dvec2 value;
+        glm::dmat2 jacobian;  // column major: [c][r] = d value_r / d w_c
+    };
+    Distorted distort(glm::dvec2 w) const;
+    double find_fold() const;
+
+    Front front_ = Front::plane;
+    std::array<double, 4> k_{};
+    std::array<double, 3> d_{};
+    double p1_ = 0, p2_ = 0, s1_ = 0, s2_ = 0, omega_ = 0;
+    double fold_ = 0;  // largest |w| up to which distort is one to one
+};
+
+}  // namespace darb

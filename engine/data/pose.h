@@ -1,0 +1,23 @@
+// Poses as files state them, checked on the way in.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <string>
+
+namespace darb {
+
+/// w x y z, of any norm above 1e-6, to a rotation matrix. Throws Error(where, ...) where the
+/// quaternion is zero or not finite.
+glm::dmat3 rotation_from_quaternion(glm::dvec4 wxyz, const std::string& where);
+
+/// The rotation nearest to `matrix`. Throws Error where an entry is not finite, the matrix is not
+/// orthonormal to 1e-3, or mirrors.
+glm::dmat3 checked_rotation(const glm::dmat3& matrix, const std::string& where);
+
+/// w x y z of a rotation matrix, unit norm, w >= 0.
+glm::dvec4 quaternion_from_rotation(const glm::dmat3& rotation);
+
+/// Throws Error where the vector is not finite.
+void check_position(glm::dvec3 position, const std::string& where);
+
+}  // namespace darb
