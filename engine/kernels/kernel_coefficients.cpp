@@ -1,0 +1,171 @@
+#include "engine/kernels/kernel_coefficients.h"
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <numbers>
+#include <tuple>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "engine/kernels/minimax.h"
+
+namespace darb {
+namespace {
+
+constexpr int kNodes = 64;
+constexpr double kFullAccuracy = 6e-8;  // one rounding of float32 at 1
+constexpr double kSlopeShare = 0.25;    // a slope error counts this much of a value error
+
+/// Chebyshev nodes of (from, to).
+std::vector<double> nodes(double from, double to) {
+    std::vector<double> x(kNodes);
+    for (int j = 0; j < kNodes; ++j)
+        x[static_cast<std::size_t>(j)] =
+            from + (to - from) * (1 - std::cos(std::numbers::pi * (j + 0.5) / kNodes)) / 2;
+    return x;
+}
+
+/// scale * {x^first, ..., x^degree}
+std::vector<double> powers(double x, int first, int degree, double scale = 1) {
+    std::vector<double> row;
+    for (int k = first; k <= degree; ++k) row.push_back(scale * std::pow(x, k));
+    return row;
+}
+
+/// Rounded to float, because the shaders have floats: errors are then measured with them.
+void take(KernelCoefficients& k, int first, const std::vector<double>& c) {
+    for (std::size_t i = 0; i < c.size(); ++i)
+        k.c[static_cast<std::size_t>(first) + i] = static_cast<float>(c[i]);
+}
+
+/// u^a P(x), P = 1 + c1 x + ...: both w and dw/dx are fitted, the slope weakened where a < 1 makes
+/// it infinite.
+void fit_compact(const DerivedKernel& kernel, Footprint footprint, KernelCoefficients& k) {
+    const double a = 0.5 * k.half_power;
+    LinearRows rows;
+    for (const double x : nodes(0, 1)) {
+        const double t = k.squared ? std::sqrt(x) : x, q = k.support * t, u = 1 - x;
+        const double power = std::pow(u, a), lower = a > 0 ? a * std::pow(u, a - 1) : 0;
+        rows.add(powers(x, 1, k.degree, power), kernel.value(footprint, q) - power);
+        const double share = kSlopeShare * (a < 1 ? std::pow(u, 1 - a) : 1);
+        const double slope = kernel.slope(footprint, q) * k.support / (k.squared ? 2 * t : 1);
+        std::vector<double> row;
+        for (int i = 1; i <= k.degree; ++i)
+            row.push_back(share * (power * i * std::pow(x, i - 1) - lower * std::pow(x, i)));
+        rows.add(std::move(row), share * (slope + lower));
+    }
+    k.c[0] = 1;
+    take(k, 1, minimax_fit(rows, {}));
+}
+
+/// 2^f on [-1/2, 1/2], relative error, with P(0) = 1 and P(1/2) = 2 P(-1/2): no jump from one
+/// octave to the next, so that the computed value falls as q grows.
+void fit_gaussian(KernelCoefficients& k) {
+    LinearRows rows, exact;
+    for (const double f : nodes(-0.5, 0.5)) {
+        const double scale = std::exp2(-f);
+        rows.add(powers(f, 1, k.degree, scale), 1 - scale);
+    }
+    std::vector<double> seam = powers(0.5, 1, k.degree);
+    const std::vector<double> other = powers(-0.5, 1, k.degree, 2);
+    for (std::size_t i = 0; i < seam.size(); ++i) seam[i] -= other[i];
+    exact.add(std::move(seam), 1);
+    k.c[0] = 1;
+    take(k, 1, minimax_fit(rows, exact));
+}
+
+/// The exact footprints of evaluate_quadric, with value(0) = 1.
+void fit_quadric(const DerivedKernel& kernel, KernelCoefficients& k) {
+    const bool quadratic = k.half_power == 2;
+    const double least = 1 / std::sqrt(1 + k.support);  // x at q = 0
+    const auto argument = [&](double x) { return quadratic ? x : 1 / x - 2; };
+    const auto factor = [&](double x) {
+        const double u = 1 - ((1 + k.support) * x * x - 1) / k.support;
+        return std::sqrt(quadratic ? u / (x * x) : u / (x * (1 + x)));
+    };
+    LinearRows rows, exact;
+    for (const double x : nodes(least, 1)) {
+        const double q = (1 + k.support) * x * x - 1;
+        rows.add(powers(argument(x), 0, k.degree, factor(x)), kernel.value(Footprint::exact, q));
+    }
+    exact.add(powers(argument(least), 0, k.degree, factor(least)), 1);
+    take(k, 0, minimax_fit(rows, exact));
+}
+
+/// Largest errors in double on points between the nodes, edge and centre included.
+void measure(const DerivedKernel& kernel, Footprint footprint, KernelCoefficients& k) {
+    constexpr int kSamples = 1000;
+    const bool gaussian = k.form == KERNEL_FORM_GAUSSIAN;
+    const double end = gaussian ? 16 : k.support;
+    for (int i = 0; i < kSamples; ++i) {
+        const double q = end * i / kSamples;
+        double w, slope;
+        evaluate(k, q, w, slope);
+        const double truth = kernel.value(footprint, q);
+        k.value_error = std::max(k.value_error, std::abs(w - truth) / (gaussian ? truth : 1));
+        k.slope_error = std::max(k.slope_error, std::abs(slope - kernel.slope(footprint, q)) *
+                                                    (gaussian ? 1 : k.support));
+    }
+}
+
+KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint, int degree,
+                               bool squared) {
+    const KernelProfile& row = kernel.row();
+    KernelCoefficients k;
+    k.form = row.form;
+    k.degree = degree;
+    k.support = row.support;
+    if (std::isfinite(row.support)) {
+        float inverse = static_cast<float>(1 / row.support);
+        if (inverse * row.support < 1)
+            inverse = std::nextafter(inverse, std::numeric_limits<float>::infinity());
+        k.inverse_support = inverse;
+    }
+    if (row.form == KERNEL_FORM_COMPACT) {
+        k.half_power = 2 * row.edge_order + (footprint == Footprint::exact ? 1 : 0);
+        k.squared = squared;
+        fit_compact(kernel, footprint, k);
+    } else if (row.form == KERNEL_FORM_GAUSSIAN) {
+        fit_gaussian(k);
+    } else {
+        // w(3) = 4^-e
+        k.half_power = static_cast<int>(std::lround(-std::log2(kernel.value(Footprint::psi, 3))));
+        k.line_integral = footprint == Footprint::exact;
+        if (k.line_integral) fit_quadric(kernel, k);
+    }
+    measure(kernel, footprint, k);
+    return k;
+}
+
+/// The better of x = t and x = t^2; kernels of d^4 (cosines of q) gain two degrees by the latter.
+KernelCoefficients fit_degree(const DerivedKernel& kernel, Footprint footprint, int degree) {
+    KernelCoefficients plain = fit_literal(kernel, footprint, degree, false);
+    if (plain.form != KERNEL_FORM_COMPACT || footprint == Footprint::exact) return plain;
+    KernelCoefficients squared = fit_literal(kernel, footprint, degree, true);
+    return squared.value_error < 0.5 * plain.value_error ? squared : plain;
+}
+
+}  // namespace
+
+KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree) {
+    DARB_CHECK(degree >= kLeastDegree && degree <= kFullDegree, "degree = {}", degree);
+    if (degree < kFullDegree) return fit_degree(kernel, footprint, degree);
+    for (int d = kLeastDegree; d < KERNEL_MAX_DEGREE; ++d) {
+        KernelCoefficients k = fit_degree(kernel, footprint, d);
+        if (k.value_error < kFullAccuracy) return k;
+    }
+    return fit_degree(kernel, footprint, KERNEL_MAX_DEGREE);
+}
+
+const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, int degree) {
+    static std::mutex mutex;
+    static std::map<std::tuple<int, Footprint, int>, KernelCoefficients> known;
+    const std::scoped_lock lock(mutex);
+    const auto key = std::tuple(kernel, footprint, degree);
+    if (const auto found = known.find(key); found != known.end()) return found->second;
+    return known[key] = fit_coefficients(derived_kernel(kernel), footprint, degree);
+}
+
+}  // namespace darb

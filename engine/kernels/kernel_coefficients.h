@@ -1,0 +1,123 @@
+// The short polynomials that the shaders evaluate in float32, fitted in double to DerivedKernel.
+// evaluate() is the CPU twin of shaders/kernels/*.glsl, in float or double.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/kernels/kernel_profile.h"
+
+namespace darb {
+
+/// Degrees that can be asked for. kFullDegree means full accuracy: the shortest polynomial, at most
+/// KERNEL_MAX_DEGREE, whose error is below float32 rounding. The others are taken literally.
+constexpr int kFullDegree = 5, kLeastDegree = 2;
+
+struct KernelCoefficients {
+    int form = KERNEL_FORM_COMPACT;
+    int degree = 0;
+    int half_power = 0;          // compact: 2a of u^a; quadric: 2e of (1+q)^-e, 1 or 2
+    bool squared = false;        // x = t^2 rather than t; compact only
+    bool line_integral = false;  // the exact footprint; quadric only
+    double support = 0;          // R^2
+    double inverse_support = 0;  // 1/R^2 as the shaders have it: rounded up to float, so that the
+                                 // edge q = R^2 gives u <= 0 with fused and unfused arithmetic
+    std::array<double, KERNEL_MAX_DEGREE + 1> c{};  // of the polynomial, rising powers
+    double value_error = 0;  // largest, of the fit in double; gaussian: relative
+    double slope_error = 0;  // largest error of dw/dt (gaussian: dw/dq), t = q/R^2
+};
+
+/// degree: kLeastDegree..kFullDegree. value(0) is 1 and the edge of the kernels that fall to zero
+/// is exactly zero at every degree. Costs milliseconds; kernel_coefficients keeps its results.
+KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree);
+const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, int degree);
+
+/// w and dw/dq as the shaders compute them with EVALUATION_POLYNOMIAL.
+template <class Real>
+void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope);
+
+/// P and dP/dx by Horner.
+template <class Real>
+void evaluate_polynomial(const KernelCoefficients& k, Real x, Real& p, Real& dp) {
+    p = static_cast<Real>(k.c[static_cast<std::size_t>(k.degree)]);
+    dp = 0;
+    for (int i = k.degree - 1; i >= 0; --i) {
+        dp = dp * x + p;
+        p = p * x + static_cast<Real>(k.c[static_cast<std::size_t>(i)]);
+    }
+}
+
+template <class Real>
+void evaluate_compact(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
+    const Real t = q * static_cast<Real>(k.inverse_support);
+    const Real x = k.squared ? t * t : t;
+    const Real dx = k.squared ? 2 * t * static_cast<Real>(k.inverse_support)
+                              : static_cast<Real>(k.inverse_support);
+    const Real u = std::max(1 - x, Real(0));
+    Real lower = u > 0 ? Real(1) : Real(0);  // u^(a-1), or u^0 for a = 0
+    if (k.half_power == 1) lower = u > 0 ? 1 / std::sqrt(u) : Real(0);
+    if (k.half_power >= 2 && k.half_power % 2 == 1) lower *= std::sqrt(u);
+    for (int power = 4; power <= k.half_power; power += 2) lower *= u;
+    Real p, dp;
+    evaluate_polynomial(k, x, p, dp);
+    w = std::max(k.half_power == 0 ? lower * p : lower * u * p, Real(0));
+    slope = k.half_power == 0 ? lower * dp * dx
+                              : lower * (u * dp - Real(0.5) * Real(k.half_power) * p) * dx;
+}
+
+template <class Real>
+void evaluate_gaussian(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
+    const Real y = std::max(q * Real(-0.72134752044448170368), Real(-126));  // -log2(e)/2
+    const Real n = std::nearbyint(y);
+    Real p, dp;
+    evaluate_polynomial(k, y - n, p, dp);
+    w = std::ldexp(p, static_cast<int>(n));
+    slope = Real(-0.5) * w;
+}
+
+template <class Real>
+void evaluate_quadric(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
+    const Real support = static_cast<Real>(k.support);
+    const bool inside = q < support, quadratic = k.half_power == 2;
+    const Real v = 1 + q;
+    if (!k.line_integral) {
+        w = quadratic ? 1 / v : 1 / std::sqrt(v);
+        slope = quadratic ? -w * w : Real(-0.5) * w * w * w;
+    } else {
+        // x = sqrt(v/(1+R^2)), r = 1/x. Inverse quadratic: r acos x = r sqrt(u) P(x). Multiquadric:
+        // acosh r = sqrt(h) P(r - 2), h = u r/(1+x), which is (r - 1) (1+R^2)/R^2 without
+        // cancellation. The nearest singularity of P is at x or r = -1.
+        const Real scale = static_cast<Real>(1 / (1 + k.support));
+        const Real inverse_support = static_cast<Real>(k.inverse_support);
+        const Real r = 1 / std::sqrt(v * scale), x = v * scale * r;
+        const Real u = inside ? (support - q) * inverse_support : Real(1);
+        const Real dx = Real(0.5) * scale * r, dr = -dx * r * r;  // by q
+        Real p, dp;
+        evaluate_polynomial(k, quadratic ? x : r - 2, p, dp);
+        if (quadratic) {
+            const Real root = std::sqrt(u);
+            w = r * root * p;
+            slope = root * (dr * p + r * dp * dx) - Real(0.5) * inverse_support * r * p / root;
+        } else {
+            const Real root = std::sqrt(u * r / (1 + x));
+            w = root * p;
+            slope = dr * (root * dp + Real(0.5) * p * (1 + inverse_support) / root);
+        }
+    }
+    w = inside ? w : Real(0);
+    slope = inside ? slope : Real(0);
+}
+
+template <class Real>
+void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
+    if (k.form == KERNEL_FORM_COMPACT) {
+        evaluate_compact(k, q, w, slope);
+    } else if (k.form == KERNEL_FORM_GAUSSIAN) {
+        evaluate_gaussian(k, q, w, slope);
+    } else {
+        evaluate_quadric(k, q, w, slope);
+    }
+}
+
+}  // namespace darb

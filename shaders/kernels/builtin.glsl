@@ -1,0 +1,54 @@
+// The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected at
+// d = 0. For comparison of cost and accuracy; Vulkan leaves sin and cos 2^-11 of error. Only kernels that have
+// such a formula: others, and the exact footprints of the compact ones, keep their polynomial.
+bool builtin_exists() {
+    return KERNEL == KERNEL_GAUSSIAN ||
+           (FOOTPRINT == FOOTPRINT_PSI &&
+            (KERNEL == KERNEL_RAISED_COSINE || KERNEL == KERNEL_HALF_COSINE_SQUARED ||
+             KERNEL == KERNEL_SINC || KERNEL == KERNEL_COSINE ||
+             KERNEL == KERNEL_SQUARED_RAISED_COSINE));
+}
+
+const float PI = 3.14159265;
+const float LEAST_DISTANCE = 1e-6;  // keeps sin(kd)/d at its limit k at the centre
+
+// sin(x)/x and its derivative by x^2, whose closed form cancels near 0.
+void sinc_slope(float x, out float w, out float slope) {
+    const float s = x * x;
+    w = sin(x) / x;
+    slope = s < 0.25 ? -1.0 / 6.0 + s * (1.0 / 60.0 - s * (1.0 / 1680.0))
+                     : (cos(x) - w) / (2.0 * s);
+}
+
+void builtin_value_slope(float q, out float w, out float slope) {
+    if (KERNEL == KERNEL_GAUSSIAN) {
+        w = exp(-0.5 * q);
+        slope = -0.5 * w;
+        return;
+    }
+    const float d = sqrt(max(q, LEAST_DISTANCE * LEAST_DISTANCE));
+    if (KERNEL == KERNEL_RAISED_COSINE) {
+        const float k = PI / 2.5;
+        w = 0.5 + 0.5 * cos(k * d);
+        slope = -0.25 * k * sin(k * d) / d;
+    } else if (KERNEL == KERNEL_HALF_COSINE_SQUARED) {
+        const float k = PI / 18.0;
+        w = cos(k * q);
+        slope = -k * sin(k * q);
+    } else if (KERNEL == KERNEL_SINC) {
+        const float k = PI / 3.0;
+        sinc_slope(k * d, w, slope);
+        slope *= k * k;
+    } else if (KERNEL == KERNEL_COSINE) {
+        const float k = PI / 6.0;
+        w = cos(k * d);
+        slope = -0.5 * k * sin(k * d) / d;
+    } else {
+        const float k = PI / 9.0;
+        w = 0.5 + 0.5 * cos(k * q);
+        slope = -0.5 * k * sin(k * q);
+    }
+    const bool inside = q < KERNEL_SUPPORT;
+    w = inside ? max(w, 0.0) : 0.0;
+    slope = inside ? slope : 0.0;
+}

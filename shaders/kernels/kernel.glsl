@@ -1,0 +1,90 @@
+// The kernel contract of all shaders: w and dw/dq as functions of q = d^2, and how far they reach. Which
+// kernel runs is a set of specialization constants (engine/render/kernel_constants.h sets them), so that after
+// constant folding one kernel's arithmetic is left. The constants alone, unset, are the Gaussian by exp().
+// Accuracy: multiplications and additions only where Vulkan promises correct rounding; see KernelCoefficients.
+// The including shader enables GL_GOOGLE_include_directive.
+#ifndef DARB_KERNEL_GLSL
+#define DARB_KERNEL_GLSL
+
+#include "shared/kernel_forms.h"
+#include "shared/kernel_list.h"
+#include "shared/limits.h"
+
+layout(constant_id = 100) const int KERNEL = KERNEL_GAUSSIAN;
+layout(constant_id = 101) const int FOOTPRINT = FOOTPRINT_PSI;
+layout(constant_id = 102) const int EVALUATION = EVALUATION_BUILTIN;
+layout(constant_id = 103) const int KERNEL_FORM = KERNEL_FORM_GAUSSIAN;
+layout(constant_id = 104) const int KERNEL_DEGREE = 0;
+layout(constant_id = 105) const int KERNEL_HALF_POWER = 0;        // 2a of u^a, 2e of (1+q)^-e
+layout(constant_id = 106) const int KERNEL_SQUARED_VARIABLE = 0;  // x = t^2 rather than t = q/R^2
+layout(constant_id = 107) const float KERNEL_SUPPORT = 3e38;      // R^2
+layout(constant_id = 108) const float KERNEL_INVERSE_SUPPORT = 0.0;  // rounded up: u <= 0 at the edge
+layout(constant_id = 109) const float COVARIANCE_SCALE = 1.0;        // psi, or 1
+layout(constant_id = 110) const float ALPHA_CUTOFF = ALPHA_CUTOFF_DEFAULT;
+layout(constant_id = 111) const float KERNEL_REACH_MARGIN = 1e-5;  // relative, of w in kernel_reach
+layout(constant_id = 120) const float KERNEL_C0 = 1.0;  // of P, rising powers
+layout(constant_id = 121) const float KERNEL_C1 = 0.0;
+layout(constant_id = 122) const float KERNEL_C2 = 0.0;
+layout(constant_id = 123) const float KERNEL_C3 = 0.0;
+layout(constant_id = 124) const float KERNEL_C4 = 0.0;
+layout(constant_id = 125) const float KERNEL_C5 = 0.0;
+layout(constant_id = 126) const float KERNEL_C6 = 0.0;
+layout(constant_id = 127) const float KERNEL_C7 = 0.0;
+layout(constant_id = 128) const float KERNEL_C8 = 0.0;
+
+#include "kernels/polynomial.glsl"
+
+#include "kernels/builtin.glsl"
+#include "kernels/compact.glsl"
+#include "kernels/gaussian.glsl"
+#include "kernels/quadric.glsl"
+
+// w and its derivative by q, for q >= 0; both 0 at and after the support's edge, w never negative. The slope is
+// the derivative of the w computed here.
+void kernel_value_slope(float q, out float w, out float slope) {
+    if (EVALUATION == EVALUATION_BUILTIN && builtin_exists()) {
+        builtin_value_slope(q, w, slope);
+    } else if (KERNEL_FORM == KERNEL_FORM_COMPACT) {
+        compact_value_slope(q, w, slope);
+    } else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
+        gaussian_value_slope(q, w, slope);
+    } else {
+        quadric_value_slope(q, w, slope);
+    }
+}
+
+float kernel_value(float q) {
+    float w, slope;
+    kernel_value_slope(q, w, slope);
+    return w;
+}
+
+// The q beyond which opacity * w < ALPHA_CUTOFF, rounded outwards, at most R^2; 0 below the cut-off. Once per
+// splat: closed forms where there are, else halvings of [0, R^2] on the falling w that is computed.
+float kernel_reach(float opacity) {
+    if (!(opacity >= ALPHA_CUTOFF)) return 0.0;
+    const float least = ALPHA_CUTOFF * (1.0 - KERNEL_REACH_MARGIN) / opacity;
+    float q;
+    if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
+        q = -2.0 * log(least);
+    } else if (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI) {
+        q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
+    } else {
+        float low = 0.0, high = KERNEL_SUPPORT;
+        for (int step = 0; step < 24; ++step) {
+            const float middle = 0.5 * (low + high);
+            const bool inside = kernel_value(middle) >= least;
+            low = inside ? middle : low;
+            high = inside ? high : middle;
+        }
+        q = high;
+    }
+    return min(q * (1.0 + 1e-5), KERNEL_SUPPORT);
+}
+
+// What multiplies the projected 2x2 covariance before the low-pass.
+float kernel_covariance_scale() {
+    return COVARIANCE_SCALE;
+}
+
+#endif

@@ -1,0 +1,21 @@
+// Arguments of shaders/kernels/kernel_probe.comp, read by C++ and GLSL.
+#ifndef DARB_KERNEL_PROBE_ARGS_H
+#define DARB_KERNEL_PROBE_ARGS_H
+
+#include "types.h"
+
+#define KERNEL_PROBE_GROUP 64
+
+#ifdef __cplusplus
+namespace darb::gpu {
+#endif
+
+struct KernelProbeArgs {
+    uint count;  // entries
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(KernelProbeArgs) == 4);
+}  // namespace darb::gpu
+#endif
+#endif
