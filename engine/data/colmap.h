@@ -1,0 +1,54 @@
+// COLMAP models, binary and text, as the files state them. Format: colmap.github.io/format.html.
+// Every function throws Error(where and record, reason) and allocates nothing that the file's own
+// size does not back.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+struct ColmapImage {
+    std::uint32_t id = 0;
+    std::uint32_t camera_id = 0;
+    std::string name;
+    glm::dmat3 rotation{1.0};  // world to camera
+    glm::dvec3 translation{0.0};
+};
+
+using ColmapCameras = std::map<std::uint32_t, LensModel>;
+
+struct ColmapModel {
+    bool binary = true;
+    ColmapCameras cameras;
+    std::vector<ColmapImage> images;  // in file order
+    PointCloud points;                // empty where the model has no points3D file
+    std::size_t dropped_points = 0;   // NaN or infinite
+};
+
+ColmapCameras parse_colmap_cameras(std::span<const std::byte> file, const std::string& where);
+std::vector<ColmapImage> parse_colmap_images(std::span<const std::byte> file,
+                                             const std::string& where);
+PointCloud parse_colmap_points(std::span<const std::byte> file, const std::string& where,
+                               std::size_t& dropped);
+
+ColmapCameras parse_colmap_cameras_text(std::string_view file, const std::string& where);
+std::vector<ColmapImage> parse_colmap_images_text(std::string_view file, const std::string& where);
+PointCloud parse_colmap_points_text(std::string_view file, const std::string& where,
+                                    std::size_t& dropped);
+
+/// Whether the folder holds cameras and images, .bin or .txt.
+bool is_colmap_model(const std::filesystem::path& folder);
+
+/// Binary where both are there. Every image's camera exists and there is at least one image.
+ColmapModel read_colmap(const std::filesystem::path& folder);
+
+}  // namespace darb

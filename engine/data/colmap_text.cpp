@@ -1,0 +1,129 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "engine/core/error.h"
+#include "engine/data/colmap.h"
+#include "engine/data/lens.h"
+#include "engine/data/pose.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::string_view kSpace = " \t\r";
+
+/// The lines of a text file, by number from 1.
+class Lines {
+  public:
+    Lines(std::string_view text, const std::string& where) : text_(text), where_(where) {}
+
+    bool next() {
+        if (at_ >= text_.size()) return false;
+        const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+        line_ = text_.substr(at_, end - at_);
+        at_ = end + 1;
+        ++number_;
+        return true;
+    }
+    /// The next line that is neither empty nor a comment.
+    bool next_record() {
+        while (next()) {
+            const std::size_t begin = line_.find_first_not_of(kSpace);
+            if (begin != std::string_view::npos && line_[begin] != '#') return true;
+        }
+        return false;
+    }
+    std::string where() const { return fmt::format("{}, line {}", where_, number_); }
+
+    std::string_view word(const char* what) {
+        const std::size_t begin = line_.find_first_not_of(kSpace);
+        if (begin == std::string_view::npos)
+            throw Error(where(), fmt::format("the line ends before {}", what),
+                        "The file is cut off or damaged: copy or export it again.");
+        const std::size_t end = std::min(line_.find_first_of(kSpace, begin), line_.size());
+        const std::string_view found = line_.substr(begin, end - begin);
+        line_.remove_prefix(end);
+        return found;
+    }
+    template <class T>
+    T number(const char* what) {
+        const std::string_view text = word(what);
+        T value{};
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error != std::errc{} || end != text.data() + text.size())
+            throw Error(where(), fmt::format("'{}' is no valid {}", text, what),
+                        "Export the model again.");
+        return value;
+    }
+    /// What is left of the line, trimmed.
+    std::string_view rest() const {
+        const std::size_t begin = line_.find_first_not_of(kSpace);
+        if (begin == std::string_view::npos) return {};
+        return line_.substr(begin, line_.find_last_not_of(kSpace) + 1 - begin);
+    }
+
+  private:
+    std::string_view text_, line_;
+    std::size_t at_ = 0, number_ = 0;
+    const std::string& where_;
+};
+
+}  // namespace
+
+ColmapCameras parse_colmap_cameras_text(std::string_view file, const std::string& where) {
+    ColmapCameras cameras;
+    for (Lines lines(file, where); lines.next_record();) {
+        const auto id = lines.number<std::uint32_t>("camera id");
+        LensModel lens;
+        lens.model = lines.word("the camera model");
+        lens.width = lines.number<int>("width");
+        lens.height = lines.number<int>("height");
+        while (!lines.rest().empty()) lens.parameters.push_back(lines.number<double>("parameter"));
+        check_lens(lens, lines.where());
+        cameras[id] = std::move(lens);
+    }
+    return cameras;
+}
+
+std::vector<ColmapImage> parse_colmap_images_text(std::string_view file, const std::string& where) {
+    std::vector<ColmapImage> images;
+    for (Lines lines(file, where); lines.next_record();) {
+        ColmapImage image;
+        image.id = lines.number<std::uint32_t>("image id");
+        glm::dvec4 wxyz;
+        for (int k = 0; k < 4; ++k) wxyz[k] = lines.number<double>("quaternion");
+        for (int k = 0; k < 3; ++k) image.translation[k] = lines.number<double>("translation");
+        image.camera_id = lines.number<std::uint32_t>("camera id");
+        image.name = lines.rest();
+        if (image.name.empty()) throw Error(lines.where(), "the image has no name");
+        image.rotation = rotation_from_quaternion(wxyz, lines.where());
+        check_position(image.translation, lines.where());
+        images.push_back(std::move(image));
+        lines.next();  // its observations, which may be an empty line
+    }
+    return images;
+}
+
+PointCloud parse_colmap_points_text(std::string_view file, const std::string& where,
+                                    std::size_t& dropped) {
+    PointCloud points;
+    dropped = 0;
+    for (Lines lines(file, where); lines.next_record();) {
+        lines.number<std::uint64_t>("point id");
+        double position[3];
+        for (double& value : position) value = lines.number<double>("coordinate");
+        std::uint8_t colour[3];
+        for (std::uint8_t& value : colour) value = lines.number<std::uint8_t>("colour");
+        if (!std::isfinite(position[0] + position[1] + position[2])) {
+            ++dropped;
+            continue;
+        }
+        points.position.insert(points.position.end(), position, position + 3);
+        points.colour.insert(points.colour.end(), colour, colour + 3);
+    }
+    return points;
+}
+
+}  // namespace darb

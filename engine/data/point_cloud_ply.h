@@ -1,0 +1,19 @@
+// Point clouds as PLY: x y z and red green blue, as points3D.ply and nerfstudio's sparse_pc.ply.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+/// Without colours: mid grey. Float colours are in [0, 1]. Points with NaN or infinity are dropped,
+/// `dropped` is their count. Throws Error naming file and record.
+PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const std::string& where,
+                                 std::size_t& dropped);
+PointCloud read_point_cloud_ply(const std::filesystem::path& path, std::size_t& dropped);
+
+}  // namespace darb
