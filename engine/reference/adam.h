@@ -1,0 +1,24 @@
+// Adam (Kingma and Ba 2015) as PyTorch computes it, dense: every parameter moves every step.
+#pragma once
+
+#include <span>
+
+namespace darb::reference {
+
+struct AdamSettings {
+    double beta1 = 0.9;
+    double beta2 = 0.999;
+    double epsilon = 1e-15;
+};
+
+/// One step on n parameters, all spans of length n. step counts from 1 and is that of the whole
+/// run. v = 0 with a zero gradient moves nothing.
+template <class T>
+void adam_step(std::span<T> parameter, std::span<const T> gradient, std::span<T> moment1,
+               std::span<T> moment2, double learning_rate, int step,
+               const AdamSettings& settings = {});
+
+/// Log-linear decay from first to last over `steps`; step in [0, steps], constant beyond.
+double decayed_learning_rate(double first, double last, int step, int steps);
+
+}  // namespace darb::reference
