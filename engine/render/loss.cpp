@@ -1,0 +1,91 @@
+#include "engine/render/loss.h"
+
+#include <algorithm>
+#include <bit>
+#include <thread>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kStripWidth = 64;  // px read by a strip, of which 44 are its own
+constexpr int kMinRows = 16;     // px; a strip reads 20 rows more than it owns
+
+int ceil_divide(int a, int b) {
+    return (a + b - 1) / b;
+}
+
+int cluster_lanes(const Device& device) {
+    const std::uint32_t smallest = device.info().min_subgroup_size;
+    if (smallest < 4) {
+        throw Error(device.info().name, "its subgroups have fewer than 4 lanes",
+                    "training needs subgroup shuffles; choose another device with --device");
+    }
+    return static_cast<int>(std::min(32u, std::bit_floor(smallest)));
+}
+
+}  // namespace
+
+Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& options)
+    : max_width_(max_width), max_height_(max_height), lanes_(cluster_lanes(device)) {
+    DARB_CHECK(max_width > 0 && max_height > 0, "{} x {}", max_width, max_height);
+    const DeviceInfo& info = device.info();
+    columns_ = kStripWidth / lanes_;
+    if (device.is_lavapipe()) {
+        threads_ = static_cast<int>(info.subgroup_size);
+        wanted_works_ = 4 * static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    } else {
+        threads_ = static_cast<int>(std::max(64u, info.max_subgroup_size));
+        wanted_works_ = 4096;
+    }
+    const SpecConstants constants = {{"THREADS", threads_},
+                                     {"LANES", lanes_},
+                                     {"COLUMNS", columns_},
+                                     {"USE_MASK", options.use_mask ? 1 : 0}};
+    loss_ = Pipeline(device, "loss", constants);
+    sum_ = Pipeline(device, "loss_sum", {}, false);
+    // The most strips that any size up to the largest can be cut into.
+    const int strips = ceil_divide(max_width, kStripWidth - 2 * LOSS_HALO);
+    const std::uint64_t works = std::uint64_t{3} * strips * ceil_divide(max_height, kMinRows);
+    partial_ = Buffer(device, "loss.partial", works * sizeof(glm::vec4));
+}
+
+gpu::LossArgs Loss::arguments(int width, int height) const {
+    gpu::LossArgs args{};
+    args.width = width;
+    args.height = height;
+    const int strips = ceil_divide(width, kStripWidth - 2 * LOSS_HALO);
+    int rows = height;
+    while (rows > kMinRows && 3 * strips * ceil_divide(height, rows) < wanted_works_) {
+        rows = std::max(kMinRows, ceil_divide(rows, 2));
+    }
+    args.rows = rows;
+    args.strips = strips;
+    args.works = 3 * strips * ceil_divide(height, rows);
+    return args;
+}
+
+void Loss::record(Commands& commands, const BufferRange& image, const BufferRange& ground_truth,
+                  const BufferRange& d_image, const BufferRange& results,
+                  std::uint32_t result_index, int width, int height, glm::vec3 background,
+                  float lambda) {
+    DARB_CHECK(width > 0 && width <= max_width_ && height > 0 && height <= max_height_,
+               "{} x {}, made for {} x {}", width, height, max_width_, max_height_);
+    const float scale = 1.0f / (3.0f * static_cast<float>(width) * static_cast<float>(height));
+    gpu::LossArgs args = arguments(width, height);
+    args.l1_scale = (1.0f - lambda) * scale;
+    args.ssim_scale = -lambda * scale;
+    args.background_r = background.r;
+    args.background_g = background.g;
+    args.background_b = background.b;
+    commands.pass("loss");
+    commands.dispatch(loss_, args, {image, ground_truth, d_image, partial_},
+                      ceil_divide(static_cast<int>(args.works), threads_ / lanes_));
+    const gpu::LossSumArgs sum_args{args.works, result_index, scale};
+    commands.dispatch(sum_, sum_args, {partial_, results}, 1);
+}
+
+}  // namespace darb

@@ -1,0 +1,54 @@
+// Loss: (1 - lambda) L1 + lambda (1 - SSIM) of a rendered image against a photo, and its gradient,
+// in one pass over the image (shaders/loss/loss.comp) and one over a few hundred partial sums.
+// Source: 3DGS equation 7; window 11, sigma 1.5, zero padding, C1 1e-4, C2 9e-4, means over 3 H W.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
+#include "engine/gpu/device.h"
+#include "engine/gpu/pipeline.h"
+#include "shaders/shared/loss_args.h"
+
+namespace darb {
+
+struct LossOptions {
+    // false: the photo is y = rgb * alpha + background * (1 - alpha).
+    // true: alpha is a mask. Where it is below 128, both images count as 0 (as the zero padding
+    // around the image does), the gradient is 0 and L1 and squared error are left out of the sums;
+    // means still divide by 3 H W.
+    bool use_mask = false;
+};
+
+class Loss {
+  public:
+    /// For images up to max_width x max_height px. Throws Error where the device's subgroups have
+    /// fewer than 4 lanes.
+    Loss(Device& device, int max_width, int max_height, const LossOptions& options = {});
+
+    /// image [3][H][W] float, ground_truth [H][W] R | G << 8 | B << 16 | A << 24 with straight
+    /// alpha, d_image [3][H][W] float: dL/dimage, every pixel is written. results: LossResult[], of
+    /// which result_index is written. Two dispatches under the pass "loss". Where x = y the
+    /// gradient of L1 is 0. Bit-equal from run to run on one device.
+    void record(Commands& commands, const BufferRange& image, const BufferRange& ground_truth,
+                const BufferRange& d_image, const BufferRange& results, std::uint32_t result_index,
+                int width, int height, glm::vec3 background, float lambda = 0.2f);
+
+    /// The loss itself, from the result of record().
+    static double value(const gpu::LossResult& result, double lambda = 0.2) {
+        return (1 - lambda) * result.l1 + lambda * (1 - result.ssim);
+    }
+
+  private:
+    gpu::LossArgs arguments(int width, int height) const;
+
+    int max_width_, max_height_;
+    int lanes_, columns_, threads_;
+    int wanted_works_;  // strips that keep the device busy
+    Pipeline loss_, sum_;
+    Buffer partial_;
+};
+
+}  // namespace darb

@@ -1,0 +1,137 @@
+// (1 - lambda) L1 + lambda (1 - SSIM) and its gradient, forward and backward in one walk. Place: after blend.
+// Source: 3DGS equation 7; SSIM of Wang et al. 2004, 11x11 Gaussian window of sigma 1.5, zero padding.
+// With a = x + y, b = x - y (x rendered, y photo) SSIM needs four blurred maps: a, b, a^2, b^2; its gradient
+// needs three: of dS/dmean, dS/dE[a^2], dS/dE[b^2].
+// Work: LANES neighbouring lanes own a strip of LANES * COLUMNS columns of one channel and walk down its rows;
+// each lane keeps COLUMNS columns of the last 11 rows in registers and gets the 5 columns beside its own from
+// its neighbours. LOSS_HALO columns and rows on each side are computed twice: no intermediate image, no
+// shared memory, no barrier. Reads image, photo; writes d_image and a partial sum for each strip.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+
+#include "shared/loss_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 8;
+layout(constant_id = 1) const int LANES = 8;    // a power of two, at most the subgroup size
+layout(constant_id = 2) const int COLUMNS = 8;  // LANES * COLUMNS > 2 * LOSS_HALO
+layout(constant_id = 3) const int USE_MASK = 0;  // 1: alpha < 128 makes x = y = 0; else alpha blends y
+
+layout(push_constant, scalar) uniform Push { LossArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer ImageIn { float image[]; };  // [3][H][W]
+layout(set = 0, binding = 1, scalar) readonly buffer PhotoIn { uint photo[]; };   // [H][W] R G B A
+layout(set = 0, binding = 2, scalar) writeonly buffer GradientOut { float d_image[]; };  // [3][H][W]
+layout(set = 0, binding = 3, scalar) writeonly buffer PartialOut { vec4 partial[]; };    // [works]
+
+#include "loss/window.glsl"
+
+struct Strip {
+    int channel;
+    int first, last;  // rows [first, last) are this strip's
+    int left;         // column of this lane's slot 0
+    int slot;         // of this lane's slot 0 in the strip
+};
+
+Strip strip_of(uint work, int lane) {
+    const int index = int(work / 3u), across = int(args.strips);
+    Strip s;
+    s.channel = int(work % 3u);
+    s.first = index / across * int(args.rows);
+    s.last = min(s.first + int(args.rows), int(args.height));
+    s.slot = lane * COLUMNS;
+    s.left = index % across * (LANES * COLUMNS - 2 * LOSS_HALO) - LOSS_HALO + s.slot;
+    return s;
+}
+
+bool in_image(int x, int y) {
+    return x >= 0 && x < int(args.width) && y >= 0 && y < int(args.height);
+}
+
+// Columns that this strip alone owns.
+bool owns(Strip s, int k) {
+    return s.slot + k >= LOSS_HALO && s.slot + k < LANES * COLUMNS - LOSS_HALO;
+}
+
+// (a, b) of one pixel, 0 outside the image.
+vec2 sum_and_difference(Strip s, int k, int row, float background) {
+    const bool inside = in_image(s.left + k, row);
+    const uint at = inside ? uint(row) * args.width + uint(s.left + k) : 0u;
+    const float x = image[uint(s.channel) * args.width * args.height + at];
+    const uint rgba = photo[at];
+    float y = float(bitfieldExtract(rgba, s.channel * 8, 8)) * (1.0 / 255.0);
+    bool counts = inside;
+    if (USE_MASK == 0) {
+        y = mix(background, y, float(rgba >> 24) * (1.0 / 255.0));
+    } else {
+        counts = inside && rgba >= 0x80000000u;
+    }
+    return counts ? vec2(x + y, x - y) : vec2(0.0);
+}
+
+void main() {
+    const uint clusters = gl_SubgroupSize / uint(LANES);
+    const uint work = (gl_WorkGroupID.x * gl_NumSubgroups + gl_SubgroupID) * clusters +
+                      gl_SubgroupInvocationID / uint(LANES);
+    if (work >= args.works) return;
+    const Strip s = strip_of(work, int(gl_SubgroupInvocationID) & (LANES - 1));
+    const vec3 colour = vec3(args.background_r, args.background_g, args.background_b);
+    const float background = colour[s.channel];
+
+    float a[11][COLUMNS], b[11][COLUMNS], past[3][10][COLUMNS];
+    [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
+        [[unroll]] for (int j = 0; j < 11; ++j) a[j][k] = b[j][k] = 0.0;
+        [[unroll]] for (int j = 0; j < 10; ++j) past[0][j][k] = past[1][j][k] = past[2][j][k] = 0.0;
+    }
+    vec4 sums = vec4(0.0);
+    for (int row = s.first - LOSS_HALO; row < s.last + LOSS_HALO; ++row) {
+        float mean_a[COLUMNS], mean_b[COLUMNS], mean_aa[COLUMNS], mean_bb[COLUMNS];
+        [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
+            [[unroll]] for (int j = 0; j < 10; ++j) {
+                a[j][k] = a[j + 1][k];
+                b[j][k] = b[j + 1][k];
+            }
+            const vec2 ab = sum_and_difference(s, k, row, background);
+            a[10][k] = ab.x;
+            b[10][k] = ab.y;
+            blur_down(a, k, mean_a[k], mean_aa[k]);
+            blur_down(b, k, mean_b[k], mean_bb[k]);
+        }
+        blur_across(mean_a);
+        blur_across(mean_b);
+        blur_across(mean_aa);
+        blur_across(mean_bb);
+        float d_mean[COLUMNS], d_aa[COLUMNS], d_bb[COLUMNS];
+        [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
+            const bool inside = in_image(s.left + k, row - 5);
+            vec3 d;
+            const float value = ssim(mean_a[k], mean_b[k], mean_aa[k], mean_bb[k], d);
+            d_mean[k] = inside ? d.x : 0.0;
+            d_aa[k] = inside ? d.y : 0.0;
+            d_bb[k] = inside ? d.z : 0.0;
+            const bool mine = inside && owns(s, k) && row - 5 >= s.first && row - 5 < s.last;
+            sums.y += mine ? value : 0.0;
+        }
+        blur_across(d_mean);
+        blur_across(d_aa);
+        blur_across(d_bb);
+        const int out_row = row - LOSS_HALO;
+        [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
+            const float g = step_down(past[0], k, d_mean[k]) + a[0][k] * step_down(past[1], k, d_aa[k]) +
+                            b[0][k] * step_down(past[2], k, d_bb[k]);
+            if (owns(s, k) && out_row >= s.first && s.left + k < int(args.width)) {
+                const uint at = uint(out_row) * args.width + uint(s.left + k);
+                const bool counts = USE_MASK == 0 || photo[at] >= 0x80000000u;
+                const float x = 0.5 * (a[0][k] + b[0][k]);
+                const float error = b[0][k] + clamp(x, 0.0, 1.0) - x;
+                sums += counts ? vec4(abs(b[0][k]), 0.0, error * error, 1.0) : vec4(0.0);
+                d_image[uint(s.channel) * args.width * args.height + at] =
+                    counts ? args.l1_scale * sign(b[0][k]) + args.ssim_scale * g : 0.0;
+            }
+        }
+    }
+    for (uint other = uint(LANES) / 2u; other > 0u; other /= 2u) sums += subgroupShuffleXor(sums, other);
+    if (s.slot == 0) partial[work] = sums;
+}
