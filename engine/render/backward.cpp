@@ -1,0 +1,114 @@
+#include "engine/render/backward.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/check.h"
+#include "engine/render/groups.h"
+#include "engine/render/kernel_constants.h"
+
+namespace darb {
+
+AdamStep adam_step(const AdamStep& rates, int t) {
+    const double correction1 = 1.0 - std::pow(0.9, t);
+    const double correction2 = 1.0 - std::pow(0.999, t);
+    const auto scaled = [&](float rate) { return static_cast<float>(rate / correction1); };
+    return {scaled(rates.position),
+            scaled(rates.scale),
+            scaled(rates.rotation),
+            scaled(rates.opacity),
+            scaled(rates.sh_dc),
+            scaled(rates.sh_rest),
+            static_cast<float>(1.0 / std::sqrt(correction2))};
+}
+
+Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
+    : device_(&device), options_(options), result_(result), shape_(blend_shape(device)) {
+    SpecConstants blend = kernel_constants(options.kernel, options.footprint, options.evaluation,
+                                           options.polynomial_degree, options.alpha_cutoff);
+    blend["THREADS"] = static_cast<std::int32_t>(shape_.threads);
+    blend["SUBGROUPS"] = static_cast<std::int32_t>(shape_.subgroups);
+    blend_ = Pipeline(device, "blend_backward", blend);
+}
+
+Pipeline& Backward::project_pipeline(int sh_degree) {
+    const auto found = project_.find(sh_degree);
+    if (found != project_.end()) return found->second;
+    SpecConstants constants =
+        kernel_constants(options_.kernel, options_.footprint, options_.evaluation,
+                         options_.polynomial_degree, options_.alpha_cutoff);
+    constants["THREADS"] = SPLAT_GROUP;
+    constants["SH_DEGREE"] = sh_degree;
+    constants["SH_STORED"] = options_.sh_stored;
+    constants["UPDATE"] = result_ == BackwardResult::update ? 1 : 0;
+    return project_.emplace(sh_degree, Pipeline(*device_, "project_backward", constants))
+        .first->second;
+}
+
+void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
+    if (splats > splat_capacity_ || splat_capacity_ == 0) {
+        splat_capacity_ = std::max(splats, 1024u);
+        gradient_sum_ = Buffer(*device_, "gradient sum", std::uint64_t(splat_capacity_) * 8);
+        gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
+    }
+    if (pairs > pair_capacity_ || pair_capacity_ == 0) {
+        const std::uint64_t k = pair_capacity_ = std::max(pairs, 1024u);
+        partial_a_ = Buffer(*device_, "pair partials a", k * 16);
+        partial_b_ = Buffer(*device_, "pair partials b", k * 8);
+        partial_c_ = Buffer(*device_, "pair partials c", k * 16);
+    }
+}
+
+void Backward::record(Commands& commands, const Forward& forward, GpuSplats& splats,
+                      const Buffer& d_image, const Buffer& cameras, std::uint32_t camera_index,
+                      const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
+                      const AdamStep& step) {
+    DARB_CHECK(splats.has_moments() && forward.options().store_for_backward, "set up for training");
+    commands.pass("blend backward");
+    const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x,
+                               background.r, background.g, background.b};
+    commands.dispatch(
+        blend_, blend,
+        {forward.tile_range(), forward.pair_order(), forward.pair_splat(), forward.splat_shape(),
+         forward.splat_light(), forward.splat_bound(), d_image, forward.final_transmittance(),
+         forward.last_pair(), partial_a_, partial_b_, partial_c_},
+        data.tiles_x, data.tiles_y);
+
+    if (splats.count() == 0) return;
+    commands.pass("project backward");
+    const gpu::ProjectBackwardArgs args{splats.count(),
+                                        camera_index,
+                                        static_cast<float>(LOW_PASS_DEFAULT),
+                                        step.position,
+                                        step.scale,
+                                        step.rotation,
+                                        step.opacity,
+                                        step.sh_dc,
+                                        step.sh_rest,
+                                        step.inverse_sqrt_correction2};
+    const Groups g = groups_for(splats.count());
+    commands.dispatch(project_pipeline(sh_degree), args,
+                      {cameras,
+                       splats.parameters(kPosition),
+                       splats.parameters(kLogScale),
+                       splats.parameters(kRotation),
+                       splats.parameters(kOpacity),
+                       splats.parameters(kShDc),
+                       splats.parameters(kShRest),
+                       splats.moments(kPosition),
+                       splats.moments(kLogScale),
+                       splats.moments(kRotation),
+                       splats.moments(kOpacity),
+                       splats.moments(kShDc),
+                       splats.moments(kShRest),
+                       forward.pair_count(),
+                       forward.pair_begin(),
+                       partial_a_,
+                       partial_b_,
+                       partial_c_,
+                       gradient_sum_,
+                       forward.status()},
+                      g.x, g.y);
+}
+
+}  // namespace darb

@@ -1,0 +1,54 @@
+// Backward: from dL/dimage to the splats' parameters, recorded after Forward::record of the same
+// frame. blend_backward -> project_backward, which ends in the Adam step or in stored gradients.
+#pragma once
+
+#include <map>
+
+#include "engine/render/forward.h"
+#include "shaders/shared/optim_args.h"
+
+namespace darb {
+
+/// Rates of one step, per attribute; rates already divided by 1 - beta1^t.
+struct AdamStep {
+    float position = 0, scale = 0, rotation = 0, opacity = 0, sh_dc = 0, sh_rest = 0;
+    float inverse_sqrt_correction2 = 1;
+};
+/// rates: plain learning rates; t: the number of this step, from 1.
+AdamStep adam_step(const AdamStep& rates, int t);
+
+enum class BackwardResult {
+    update,          // Adam
+    store_gradient,  // gradients in the first moments' place; parameters untouched
+};
+
+class Backward {
+  public:
+    Backward(Device& device, const ForwardOptions& options, BackwardResult result);
+
+    void reserve(std::uint32_t splats, std::uint32_t pairs);
+
+    /// d_image: float [3][H][W]. splats must have moments.
+    void record(Commands& commands, const Forward& forward, GpuSplats& splats,
+                const Buffer& d_image, const Buffer& cameras, std::uint32_t camera_index,
+                const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
+                const AdamStep& step);
+
+    /// [N][2]: sum of |dL/dmean| in NDC units and the number of frames that saw the splat.
+    Buffer& gradient_sum() { return gradient_sum_; }
+    void clear_gradient_sum(Commands& commands) { commands.fill(gradient_sum_, 0); }
+
+  private:
+    Pipeline& project_pipeline(int sh_degree);
+
+    Device* device_;
+    ForwardOptions options_;
+    BackwardResult result_;
+    BlendShape shape_;
+    Pipeline blend_;
+    std::map<int, Pipeline> project_;
+    std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0;
+    Buffer partial_a_, partial_b_, partial_c_, gradient_sum_;
+};
+
+}  // namespace darb

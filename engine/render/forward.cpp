@@ -1,0 +1,247 @@
+#include "engine/render/forward.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/render/groups.h"
+#include "engine/render/kernel_constants.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::uint32_t kMinCapacity = 1024;
+
+std::uint32_t tiles(std::uint32_t pixels) {
+    return (pixels + TILE_SIZE - 1) / TILE_SIZE;
+}
+
+int bits_for(std::uint32_t count) {
+    return std::max(1, static_cast<int>(std::bit_width(count > 0 ? count - 1 : 0)));
+}
+
+}  // namespace
+
+gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, float near_plane) {
+    gpu::CameraData d{};
+    const glm::dmat3 rows = glm::transpose(camera.rotation);  // glm columns of the transpose = rows
+    d.row0 = glm::vec3(rows[0]);
+    d.row1 = glm::vec3(rows[1]);
+    d.row2 = glm::vec3(rows[2]);
+    d.translation = glm::vec3(camera.rotation * origin + camera.translation);
+    d.centre = glm::vec3(camera.centre() - origin);
+    d.focal = glm::vec2(camera.fx, camera.fy);
+    d.principal = glm::vec2(camera.cx, camera.cy);
+    const glm::dvec2 margin =
+        JACOBIAN_MARGIN * 0.5 * glm::dvec2(camera.width / camera.fx, camera.height / camera.fy);
+    const glm::dvec2 low(-camera.cx / camera.fx, -camera.cy / camera.fy);
+    const glm::dvec2 high((camera.width - camera.cx) / camera.fx,
+                          (camera.height - camera.cy) / camera.fy);
+    d.ratio_min = glm::vec2(low - margin);
+    d.ratio_max = glm::vec2(high + margin);
+    d.width = static_cast<std::uint32_t>(camera.width);
+    d.height = static_cast<std::uint32_t>(camera.height);
+    d.tiles_x = tiles(d.width);
+    d.tiles_y = tiles(d.height);
+    d.near_plane = near_plane;
+    return d;
+}
+
+Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& cameras) {
+    Buffer buffer(device, "cameras", cameras.size() * sizeof(gpu::CameraData));
+    if (!cameras.empty()) buffer.upload(cameras);
+    return buffer;
+}
+
+BlendShape blend_shape(const Device& device) {
+    BlendShape shape;
+    const std::uint32_t subgroup = std::max(device.info().subgroup_size, 1u);
+    // A CPU wants its 8 lanes busy with 8 pixels each; a GPU wants a thread a pixel.
+    shape.threads = device.is_lavapipe() ? std::max(32u, subgroup) : 256u;
+    shape.subgroups = std::max(shape.threads / subgroup, 1u);
+    return shape;
+}
+
+Forward::Forward(Device& device, const ForwardOptions& options)
+    : device_(&device), options_(options), shape_(blend_shape(device)) {
+    const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
+    const auto with = [](SpecConstants constants, std::string name, SpecValue value) {
+        constants[std::move(name)] = value;
+        return constants;
+    };
+    compact_ = Pipeline(device, "compact", per_item);
+    gather_counts_ = Pipeline(device, "gather_counts", per_item);
+    groups_visible_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 0}}, false);
+    groups_pairs_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 1}}, false);
+    emit_ = Pipeline(device, "emit", per_item);
+    tile_ranges_ = Pipeline(device, "tile_ranges", per_item);
+    SpecConstants blend = kernel_constants(options.kernel, options.footprint, options.evaluation,
+                                           options.polynomial_degree, options.alpha_cutoff);
+    blend["MIN_TRANSMITTANCE"] = options.transmittance_stop;
+    blend["STORE_FOR_BACKWARD"] = options.store_for_backward ? 1 : 0;
+    blend_ = Pipeline(device, "blend",
+                      with(blend, "THREADS", static_cast<std::int32_t>(shape_.threads)));
+
+    status_ = Buffer(device, "frame status", sizeof(gpu::FrameStatus));
+    groups_ = Buffer(device, "frame groups", sizeof(gpu::FrameGroups));
+    splat_total_ = Buffer(device, "splat total", 4);
+    visible_total_ = Buffer(device, "visible total", 4);
+    visible_in_use_ = Buffer(device, "visible in use", 4);
+    pairs_total_ = Buffer(device, "pairs total", 4);
+    pairs_in_use_ = Buffer(device, "pairs in use", 4);
+    clear_status();
+}
+
+Pipeline& Forward::project_pipeline(int sh_degree) {
+    const auto found = project_.find(sh_degree);
+    if (found != project_.end()) return found->second;
+    SpecConstants constants =
+        kernel_constants(options_.kernel, options_.footprint, options_.evaluation,
+                         options_.polynomial_degree, options_.alpha_cutoff);
+    constants["THREADS"] = SPLAT_GROUP;
+    constants["SH_DEGREE"] = sh_degree;
+    constants["SH_STORED"] = options_.sh_stored;
+    return project_.emplace(sh_degree, Pipeline(*device_, "project", constants)).first->second;
+}
+
+std::uint32_t Forward::max_pairs(const Device& device) {
+    // The widest entry per pair is the backward pass's partial, a vec4.
+    return static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(device.info().max_storage_buffer_bytes / 16, 1u << 30));
+}
+
+void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height) {
+    Device& d = *device_;
+    const std::uint64_t pixels = std::uint64_t(width) * height;
+    const std::uint32_t tile_count = tiles(width) * tiles(height);
+    if (splats > splat_capacity_ || splat_capacity_ == 0) {
+        const std::uint64_t n = splat_capacity_ = std::max(splats, kMinCapacity);
+        splat_shape_ = Buffer(d, "splat shape", n * 16);
+        splat_light_ = Buffer(d, "splat light", n * 16);
+        splat_bound_ = Buffer(d, "splat bound", n * 16);
+        cover_ = Buffer(d, "tile cover", n * 16);
+        for (auto [buffer, name] : {std::pair{&pair_count_, "pair count"},
+                                    {&visible_, "visible"},
+                                    {&visible_offset_, "visible offset"},
+                                    {&depth_key_, "depth key"},
+                                    {&depth_order_, "depth order"},
+                                    {&pair_count_sorted_, "pair count by depth"},
+                                    {&pair_offset_, "pair offset"},
+                                    {&pair_begin_, "pair begin"}})
+            *buffer = Buffer(d, name, n * 4);
+        scan_.emplace(d, splat_capacity_);
+        depth_sort_.emplace(d, splat_capacity_);
+    }
+    if (pairs > pair_capacity_ || pair_capacity_ == 0) {
+        if (pairs > max_pairs(d))
+            throw Error("splat-tile pairs",
+                        fmt::format("a frame needs {} pairs, this device's buffers hold {}", pairs,
+                                    max_pairs(d)),
+                        "Lower the resolution (-r) or the number of splats (--cap_max).");
+        const std::uint64_t k = pair_capacity_ = std::max(pairs, kMinCapacity);
+        pair_tile_ = Buffer(d, "pair tile", k * 4);
+        pair_splat_ = Buffer(d, "pair splat", k * 4);
+        pair_order_ = Buffer(d, "pair order", k * 4);
+        tile_sort_.emplace(d, pair_capacity_);
+    }
+    if (tile_count > tile_capacity_) {
+        tile_capacity_ = tile_count;
+        tile_range_ = Buffer(d, "tile range", std::uint64_t(tile_count) * 8);
+    }
+    if (pixels > pixel_capacity_) {
+        pixel_capacity_ = pixels;
+        image_ = Buffer(d, "image", pixels * 12);
+        const std::uint64_t stored = options_.store_for_backward ? pixels * 4 : 4;
+        final_transmittance_ = Buffer(d, "final transmittance", stored);
+        last_pair_ = Buffer(d, "last pair", stored);
+    }
+}
+
+void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& cameras,
+                     std::uint32_t camera_index, const gpu::CameraData& data, int sh_degree,
+                     const glm::vec3& background) {
+    const std::uint32_t n = splats.count();
+    DARB_CHECK(n <= splat_capacity_ && std::uint64_t(data.width) * data.height <= pixel_capacity_,
+               "{} splats of {}, {} x {} px", n, splat_capacity_, data.width, data.height);
+    commands.pass("project");
+    commands.fill(
+        BufferRange(status_, offsetof(gpu::FrameStatus, culled), sizeof(gpu::FrameStatus::culled)),
+        0);
+    if (n > 0) {
+        const gpu::ProjectArgs args{n, camera_index, static_cast<float>(LOW_PASS_DEFAULT)};
+        const Groups g = groups_for(n);
+        commands.dispatch(project_pipeline(sh_degree), args,
+                          {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
+                           splats.parameters(kRotation), splats.parameters(kOpacity),
+                           splats.parameters(kShDc), splats.parameters(kShRest), splat_shape_,
+                           splat_light_, splat_bound_, cover_, pair_count_, visible_, status_},
+                          g.x, g.y);
+    }
+    record_depth_order(commands, n);
+    record_pairs(commands, data, n);
+
+    commands.pass("blend");
+    const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x,
+                               background.r, background.g, background.b};
+    commands.dispatch(blend_, blend,
+                      {tile_range_, pair_order(), pair_splat_, splat_shape_, splat_light_,
+                       splat_bound_, image_, final_transmittance_, last_pair_},
+                      data.tiles_x, data.tiles_y);
+}
+
+void Forward::record_depth_order(Commands& commands, std::uint32_t n) {
+    const gpu::SplatArgs args{n};
+    const gpu::PairArgs pair_args{pair_capacity_, 0, 0};
+    const Groups g = groups_for(n);
+    commands.pass("compact");
+    commands.fill(splat_total_, n);
+    scan_->record(commands, visible_, visible_offset_, splat_total_, 0, visible_total_);
+    commands.dispatch(groups_visible_, pair_args,
+                      {status_, groups_, visible_total_, visible_in_use_}, 1);
+    commands.dispatch(compact_, args,
+                      {visible_, visible_offset_, splat_bound_, depth_key_, depth_order_}, g.x,
+                      g.y);
+    commands.pass("depth sort");
+    depth_sort_->record(commands, depth_key_, depth_order_, visible_in_use_, 0, 32);
+}
+
+void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t n) {
+    const std::uint32_t tile_count = data.tiles_x * data.tiles_y;
+    const gpu::PairArgs args{pair_capacity_, data.tiles_x, tile_count};
+    commands.pass("emit");
+    commands.dispatch_indirect(gather_counts_, gpu::SplatArgs{n},
+                               {status_, depth_order_, pair_count_, pair_count_sorted_}, groups_,
+                               offsetof(gpu::FrameGroups, visible_x));
+    scan_->record(commands, pair_count_sorted_, pair_offset_, visible_in_use_, 0, pairs_total_);
+    commands.dispatch(groups_pairs_, args, {status_, groups_, pairs_total_, pairs_in_use_}, 1);
+    commands.dispatch_indirect(
+        emit_, args,
+        {status_, depth_order_, pair_offset_, cover_, pair_tile_, pair_splat_, pair_begin_},
+        groups_, offsetof(gpu::FrameGroups, visible_x));
+
+    commands.pass("tile sort");
+    tile_sort_->record(commands, pair_tile_, pair_order_, pairs_in_use_, 0, bits_for(tile_count),
+                       true);
+
+    commands.pass("tile ranges");
+    commands.fill(tile_range_, 0);
+    commands.dispatch_indirect(tile_ranges_, args, {pairs_in_use_, pair_tile_, tile_range_},
+                               groups_, offsetof(gpu::FrameGroups, pairs_x));
+}
+
+const Buffer& Forward::pair_order() const {
+    return pair_order_;
+}
+
+gpu::FrameStatus Forward::read_status() const {
+    return status_.download<gpu::FrameStatus>(1)[0];
+}
+
+void Forward::clear_status() {
+    status_.upload(std::vector<gpu::FrameStatus>(1));
+}
+
+}  // namespace darb

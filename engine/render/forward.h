@@ -1,0 +1,108 @@
+// Forward: the walk from splats to an image, recorded top to bottom in one function:
+// project -> scan -> compact -> depth sort -> scan -> emit -> tile sort -> ranges -> blend.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
+#include "engine/gpu/pipeline.h"
+#include "engine/render/gpu_splats.h"
+#include "engine/render/radix_sort.h"
+#include "engine/render/scan.h"
+#include "engine/scene/camera.h"
+#include "shaders/shared/limits.h"
+#include "shaders/shared/render_args.h"
+
+namespace darb {
+
+/// What is fixed at pipeline creation, each a specialization constant.
+struct ForwardOptions {
+    int kernel = KERNEL_GAUSSIAN;
+    Footprint footprint = Footprint::psi;
+    int evaluation = EVALUATION_POLYNOMIAL;
+    int polynomial_degree = 5;
+    float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
+    float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
+    int sh_stored = 0;  // degree of the buffers
+    bool store_for_backward = false;
+};
+
+/// A camera as the shaders read it. origin: SplatModel::origin, taken out of the pose in double.
+gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin,
+                            float near_plane = static_cast<float>(NEAR_DEFAULT));
+
+/// Cameras in a device buffer, in the order given.
+Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& cameras);
+
+/// How the blend passes deal a tile's 256 pixels on this device.
+struct BlendShape {
+    std::uint32_t threads = 32;
+    std::uint32_t subgroups = 4;
+};
+BlendShape blend_shape(const Device& device);
+
+class Forward {
+  public:
+    Forward(Device& device, const ForwardOptions& options);
+
+    /// Makes the buffers fit: never shrinks. The queue must be idle.
+    void reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height);
+    std::uint32_t pair_capacity() const { return pair_capacity_; }
+    /// The most pairs that this device's buffer bindings allow.
+    static std::uint32_t max_pairs(const Device& device);
+
+    /// One frame of camera `camera_index` of `cameras` (data: the same on the host), colours up to
+    /// sh_degree. Needs reserve() for the splats and the size.
+    void record(Commands& commands, const GpuSplats& splats, const Buffer& cameras,
+                std::uint32_t camera_index, const gpu::CameraData& data, int sh_degree,
+                const glm::vec3& background);
+
+    /// Outputs of the last recorded frame.
+    const Buffer& image() const { return image_; }    // float [3][H][W], not clamped
+    const Buffer& status() const { return status_; }  // gpu::FrameStatus
+    gpu::FrameStatus read_status() const;
+    /// Overflow and bad-gradient counters to zero. The queue must be idle.
+    void clear_status();
+
+    // For the backward pass.
+    const ForwardOptions& options() const { return options_; }
+    const Buffer& splat_shape() const { return splat_shape_; }
+    const Buffer& splat_light() const { return splat_light_; }
+    const Buffer& splat_bound() const { return splat_bound_; }
+    const Buffer& pair_count() const { return pair_count_; }
+    const Buffer& pair_begin() const { return pair_begin_; }
+    const Buffer& pair_splat() const { return pair_splat_; }
+    const Buffer& pair_order() const;
+    const Buffer& tile_range() const { return tile_range_; }
+    const Buffer& final_transmittance() const { return final_transmittance_; }
+    const Buffer& last_pair() const { return last_pair_; }
+
+  private:
+    Pipeline& project_pipeline(int sh_degree);
+    void record_depth_order(Commands& commands, std::uint32_t splat_count);
+    void record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t splat_count);
+
+    Device* device_;
+    ForwardOptions options_;
+    BlendShape shape_;
+    std::map<int, Pipeline> project_;  // by SH degree in use
+    Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_, blend_;
+    std::optional<Scan> scan_;
+    std::optional<RadixSort> depth_sort_, tile_sort_;
+    std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0, tile_capacity_ = 0;
+    std::uint64_t pixel_capacity_ = 0;
+
+    Buffer status_, groups_, splat_total_, visible_total_, visible_in_use_, pairs_total_,
+        pairs_in_use_;
+    Buffer splat_shape_, splat_light_, splat_bound_, cover_, pair_count_, visible_, visible_offset_;
+    Buffer depth_key_, depth_order_, pair_count_sorted_, pair_offset_, pair_begin_;
+    Buffer pair_tile_, pair_splat_, pair_order_, tile_range_;
+    Buffer image_, final_transmittance_, last_pair_;
+};
+
+}  // namespace darb

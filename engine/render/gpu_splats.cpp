@@ -1,0 +1,78 @@
+#include "engine/render/gpu_splats.h"
+
+#include <algorithm>
+#include <string>
+
+#include "engine/core/check.h"
+
+namespace darb {
+
+namespace {
+constexpr const char* kNames[kAttributeCount] = {"position", "log_scale", "rotation",
+                                                 "opacity",  "sh_dc",     "sh_rest"};
+}
+
+const char* attribute_name(int attribute) {
+    return kNames[attribute];
+}
+
+std::vector<float>& attribute_values(SplatModel& model, int attribute) {
+    switch (attribute) {
+        case kPosition:
+            return model.position;
+        case kLogScale:
+            return model.log_scale;
+        case kRotation:
+            return model.rotation;
+        case kOpacity:
+            return model.opacity;
+        case kShDc:
+            return model.sh_dc;
+        default:
+            return model.sh_rest;
+    }
+}
+
+const std::vector<float>& attribute_values(const SplatModel& model, int attribute) {
+    return attribute_values(const_cast<SplatModel&>(model), attribute);
+}
+
+GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments)
+    : count_(static_cast<std::uint32_t>(model.size())) {
+    header_.sh_degree = model.sh_degree;
+    header_.kernel = model.kernel;
+    header_.footprint = model.footprint;
+    header_.antialias = model.antialias;
+    header_.origin = model.origin;
+    strides_ = {3, 3, 4, 1, 3, static_cast<std::uint32_t>(model.rest_count())};
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float>& values = attribute_values(model, a);
+        DARB_CHECK(values.size() == size_t{count_} * strides_[a], "{}: {} values, {} splats of {}",
+                   kNames[a], values.size(), count_, strides_[a]);
+        const std::uint64_t bytes = values.size() * sizeof(float);
+        parameters_[a] = Buffer(device, kNames[a], bytes);
+        if (bytes > 0) parameters_[a].upload(values);
+        if (!with_moments) continue;
+        moments_[a] = Buffer(device, std::string("moments of ") + kNames[a], 2 * bytes);
+        if (bytes > 0) moments_[a].upload(std::vector<float>(2 * values.size(), 0.0f));
+    }
+}
+
+SplatModel GpuSplats::download() const {
+    SplatModel model = header_;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const size_t floats = size_t{count_} * strides_[a];
+        if (floats > 0) attribute_values(model, a) = parameters_[a].download<float>(floats);
+    }
+    return model;
+}
+
+std::uint32_t GpuSplats::max_count(const Device& device, int sh_degree, bool with_moments) {
+    SplatModel header;
+    header.sh_degree = sh_degree;
+    const std::uint64_t floats = std::max(4, header.rest_count()) * (with_moments ? 2 : 1);
+    const std::uint64_t most = device.info().max_storage_buffer_bytes / (floats * sizeof(float));
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(most, 1u << 30));
+}
+
+}  // namespace darb

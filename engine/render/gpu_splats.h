@@ -1,0 +1,57 @@
+// GpuSplats: the parameters of N splats in device memory, one buffer an attribute, in SplatModel's
+// layout; with the optimiser's moments beside them where they are trained.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "engine/gpu/buffer.h"
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+enum Attribute { kPosition, kLogScale, kRotation, kOpacity, kShDc, kShRest, kAttributeCount };
+
+class GpuSplats {
+  public:
+    GpuSplats() = default;
+    /// Uploads the model. with_moments adds two floats for each parameter, set to zero.
+    GpuSplats(Device& device, const SplatModel& model, bool with_moments);
+
+    /// Everything back to the host; kernel, footprint, origin and degree as given at the start.
+    SplatModel download() const;
+
+    std::uint32_t count() const { return count_; }
+    int sh_degree() const { return header_.sh_degree; }
+    int kernel() const { return header_.kernel; }
+    Footprint footprint() const { return header_.footprint; }
+    const glm::dvec3& origin() const { return header_.origin; }
+    bool has_moments() const { return static_cast<bool>(moments_[0]); }
+
+    /// Floats per splat of an attribute (0 for kShRest at degree 0).
+    std::uint32_t stride(int attribute) const { return strides_[attribute]; }
+    Buffer& parameters(int attribute) { return parameters_[attribute]; }
+    const Buffer& parameters(int attribute) const { return parameters_[attribute]; }
+    Buffer& moments(int attribute) { return moments_[attribute]; }
+    const Buffer& moments(int attribute) const { return moments_[attribute]; }
+
+    /// After an attribute's buffers were replaced by ones of another count (density control).
+    void set_count(std::uint32_t count) { count_ = count; }
+
+    /// The most splats that one buffer binding of this device allows.
+    static std::uint32_t max_count(const Device& device, int sh_degree, bool with_moments);
+
+  private:
+    SplatModel header_;  // no splats, only what is not per splat
+    std::uint32_t count_ = 0;
+    std::array<std::uint32_t, kAttributeCount> strides_{};
+    std::array<Buffer, kAttributeCount> parameters_;
+    std::array<Buffer, kAttributeCount> moments_;  // [N][stride][2]: first, second
+};
+
+/// The host array of an attribute.
+std::vector<float>& attribute_values(SplatModel& model, int attribute);
+const std::vector<float>& attribute_values(const SplatModel& model, int attribute);
+const char* attribute_name(int attribute);
+
+}  // namespace darb

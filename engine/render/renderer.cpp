@@ -1,0 +1,52 @@
+#include "engine/render/renderer.h"
+
+namespace darb {
+
+namespace {
+
+ForwardOptions options_for(const SplatModel& model, ForwardOptions options) {
+    options.kernel = model.kernel;
+    options.footprint = model.footprint;
+    options.sh_stored = model.sh_degree;
+    return options;
+}
+
+}  // namespace
+
+ImageF planes_to_image(const std::vector<float>& planes, int width, int height) {
+    ImageF image(width, height, 3);
+    const size_t plane = size_t(width) * height;
+    for (size_t p = 0; p < plane; ++p)
+        for (size_t c = 0; c < 3; ++c) image.data[p * 3 + c] = planes[c * plane + p];
+    return image;
+}
+
+Renderer::Renderer(Device& device, const SplatModel& model, ForwardOptions options)
+    : device_(&device),
+      splats_(device, model, false),
+      forward_(device, options_for(model, options)),
+      commands_(device) {}
+
+ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int sh_degree,
+                        float near_plane) {
+    const gpu::CameraData data = camera_data(camera, splats_.origin(), near_plane);
+    const Buffer cameras = upload_cameras(*device_, {data});
+    const int degree =
+        sh_degree < 0 ? splats_.sh_degree() : std::min(sh_degree, splats_.sh_degree());
+    std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
+    for (;;) {
+        forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
+        commands_.begin();
+        forward_.record(commands_, splats_, cameras, 0, data, degree, background);
+        commands_.submit_and_wait();
+        status_ = forward_.read_status();
+        if (status_.overflow == 0) break;
+        pairs = status_.pairs + status_.pairs / 4;
+        forward_.clear_status();
+    }
+    pass_times_ = commands_.pass_times();
+    const size_t floats = size_t(camera.width) * camera.height * 3;
+    return planes_to_image(forward_.image().download<float>(floats), camera.width, camera.height);
+}
+
+}  // namespace darb

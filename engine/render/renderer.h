@@ -1,0 +1,35 @@
+// Renderer: one model on one device, pictures of it for any camera.
+#pragma once
+
+#include "engine/core/image.h"
+#include "engine/render/forward.h"
+
+namespace darb {
+
+class Renderer {
+  public:
+    /// Uploads the model. options.kernel, footprint and sh_stored are taken from it.
+    Renderer(Device& device, const SplatModel& model, ForwardOptions options = {});
+
+    /// RGB, not clamped. sh_degree -1: all of the model's. Grows its buffers and repeats the frame
+    /// when it has more splat-tile pairs than before.
+    ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
+                  int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
+
+    /// Of the last render.
+    gpu::FrameStatus status() const { return status_; }
+    const std::vector<PassTime>& pass_times() const { return pass_times_; }
+
+  private:
+    Device* device_;
+    GpuSplats splats_;
+    Forward forward_;
+    Commands commands_;
+    gpu::FrameStatus status_{};
+    std::vector<PassTime> pass_times_;
+};
+
+/// float [3][H][W] planes to an interleaved image.
+ImageF planes_to_image(const std::vector<float>& planes, int width, int height);
+
+}  // namespace darb

@@ -1,0 +1,111 @@
+#include "trainer/densify/density_control.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/check.h"
+#include "engine/render/groups.h"
+
+namespace darb {
+
+namespace {
+constexpr int kQuantiles = 256;
+}
+
+DensityControl::DensityControl(Device& device, int kernel) : device_(&device), commands_(device) {
+    const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
+    decide_ = Pipeline(device, "densify_decide", threads);
+    sources_ = Pipeline(device, "densify_sources", threads);
+    gather_ = Pipeline(device, "gather_attribute", threads);
+    split_ =
+        Pipeline(device, "densify_split", {{"THREADS", SPLAT_GROUP}, {"QUANTILES", kQuantiles}});
+    reset_ = Pipeline(device, "reset_opacity", threads);
+    std::vector<float> quantiles(kQuantiles);
+    for (int k = 0; k < kQuantiles; ++k)
+        quantiles[k] = static_cast<float>(kernel_radius_quantile(kernel, (k + 0.5) / kQuantiles));
+    quantile_ = Buffer(device, "radius quantiles", kQuantiles * sizeof(float));
+    quantile_.upload(quantiles);
+}
+
+DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
+                                  gpu::DensifyArgs args) {
+    const std::uint32_t n = args.splat_count = splats.count();
+    DensityResult result{n, n, 0, 0};
+    if (n == 0) return result;
+    const std::uint64_t bytes = std::uint64_t(n) * 4;
+    Device& d = *device_;
+    Buffer keep(d, "densify keep", bytes), grow(d, "densify grow", bytes),
+        action(d, "densify action", bytes);
+    Buffer keep_offset(d, "keep offset", bytes), grow_offset(d, "grow offset", bytes);
+    Buffer count(d, "densify count", 4), keep_total(d, "keep total", 4),
+        grow_total(d, "grow total", 4);
+    Buffer sources(d, "densify sources", bytes * 4);  // at most twice as many, two words each
+    Scan scan(d, n);
+    const Groups g = groups_for(n);
+    commands_.begin();
+    commands_.pass("densify");
+    commands_.fill(count, n);
+    commands_.dispatch(decide_, args,
+                       {splats.parameters(kLogScale), splats.parameters(kOpacity), gradient_sum,
+                        keep, grow, action},
+                       g.x, g.y);
+    scan.record(commands_, keep, keep_offset, count, 0, keep_total);
+    scan.record(commands_, grow, grow_offset, count, 0, grow_total);
+    commands_.dispatch(sources_, args, {action, keep_offset, grow_offset, keep_total, sources}, g.x,
+                       g.y);
+    commands_.submit_and_wait();
+
+    const std::uint32_t kept = keep_total.download<std::uint32_t>(1)[0];
+    const std::uint32_t room = args.growth_limit - std::min(args.growth_limit, n);
+    result.grown = std::min(grow_total.download<std::uint32_t>(1)[0], room);
+    result.pruned = n - kept;
+    result.after = kept + result.grown;
+    if (result.pruned == 0 && result.grown == 0) return result;
+
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::uint32_t stride = splats.stride(a);
+        if (stride == 0) continue;
+        gather(sources, result.after, stride, false, splats.parameters(a));
+        if (splats.has_moments())
+            gather(sources, result.after, stride * 2, true, splats.moments(a));
+    }
+    splats.set_count(result.after);
+    args.splat_count = result.after;
+    const Groups after = groups_for(result.after);
+    commands_.begin();
+    commands_.pass("split");
+    commands_.dispatch(split_, args,
+                       {sources, splats.parameters(kPosition), splats.parameters(kLogScale),
+                        splats.parameters(kRotation), quantile_},
+                       after.x, after.y);
+    commands_.submit_and_wait();
+    return result;
+}
+
+void DensityControl::gather(const Buffer& sources, std::uint32_t count, std::uint32_t stride,
+                            bool clear_new, Buffer& buffer) {
+    const std::uint64_t floats = std::uint64_t(count) * stride;
+    Buffer next(*device_, buffer.name(), floats * sizeof(float));
+    if (count > 0) {
+        const Groups g = groups_for(floats);
+        commands_.begin();
+        commands_.pass("gather");
+        commands_.dispatch(gather_, gpu::GatherArgs{count, stride, clear_new ? 1u : 0u},
+                           {sources, buffer, next}, g.x, g.y);
+        commands_.submit_and_wait();
+    }
+    buffer = std::move(next);
+}
+
+void DensityControl::reset_opacity(GpuSplats& splats, float opacity) {
+    if (splats.count() == 0) return;
+    const Groups g = groups_for(splats.count());
+    const auto logit = static_cast<float>(std::log(opacity / (1.0 - opacity)));
+    commands_.begin();
+    commands_.pass("reset opacity");
+    commands_.dispatch(reset_, gpu::ResetOpacityArgs{splats.count(), logit},
+                       {splats.parameters(kOpacity), splats.moments(kOpacity)}, g.x, g.y);
+    commands_.submit_and_wait();
+}
+
+}  // namespace darb

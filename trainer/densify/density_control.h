@@ -1,0 +1,42 @@
+// Density control `adc` on the device: clone, split and prune between iterations, and the opacity
+// reset. Source: 3DGS section 5 with graphdeco's schedule; split offsets come from the kernel's own
+// density.
+#pragma once
+
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
+#include "engine/gpu/pipeline.h"
+#include "engine/render/gpu_splats.h"
+#include "engine/render/scan.h"
+#include "shaders/shared/optim_args.h"
+
+namespace darb {
+
+struct DensityResult {
+    std::uint32_t before = 0, after = 0;
+    std::uint32_t pruned = 0, grown = 0;
+};
+
+class DensityControl {
+  public:
+    DensityControl(Device& device, int kernel);
+
+    /// One round. gradient_sum: [N][2] of Backward. The queue must be idle. args.splat_count is set
+    /// here. New buffers replace the old ones one attribute at a time, so the peak is one attribute
+    /// above the total.
+    DensityResult run(GpuSplats& splats, const Buffer& gradient_sum, gpu::DensifyArgs args);
+
+    /// Every opacity down to at most `opacity`, its moments to zero.
+    void reset_opacity(GpuSplats& splats, float opacity);
+
+  private:
+    void gather(const Buffer& sources, std::uint32_t count, std::uint32_t stride, bool clear_new,
+                Buffer& buffer);
+
+    Device* device_;
+    Commands commands_;
+    Pipeline decide_, sources_, gather_, split_, reset_;
+    Buffer quantile_;
+};
+
+}  // namespace darb

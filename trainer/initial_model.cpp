@@ -1,0 +1,140 @@
+#include "trainer/initial_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <nanoflann.hpp>
+
+#include "engine/core/rng.h"
+
+namespace darb {
+
+namespace {
+
+constexpr double kShC0 = 0.28209479177387814;
+constexpr double kMinDistance2 = 1e-7;
+constexpr double kRecentreBeyond = 1e4;  // float32 keeps a millimetre up to there
+
+struct CloudView {
+    const std::vector<double>& position;
+    size_t kdtree_get_point_count() const { return position.size() / 3; }
+    double kdtree_get_pt(size_t i, size_t axis) const { return position[3 * i + axis]; }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+        return false;
+    }
+};
+
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, CloudView>,
+                                                 CloudView, 3>;
+
+struct Region {
+    glm::dvec3 centre;
+    glm::dvec3 half;
+};
+
+// Least squares point of the optical axes: sum (I - d d^T) x = sum (I - d d^T) c.
+Region region_in_view(const std::vector<View>& views) {
+    glm::dmat3 normal(0.0);
+    glm::dvec3 right(0.0), low(1e300), high(-1e300);
+    for (const View& v : views) {
+        const glm::dvec3 c = v.camera.centre();
+        const glm::dvec3 axis = glm::transpose(v.camera.rotation)[2];
+        const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(axis, axis);
+        normal += across;
+        right += across * c;
+        low = glm::min(low, c);
+        high = glm::max(high, c);
+    }
+    const double scale = static_cast<double>(views.size());
+    if (std::abs(glm::determinant(normal)) > 1e-3 * scale * scale * scale) {
+        const glm::dvec3 focus = glm::inverse(normal) * right;
+        double half = 0.0;
+        for (const View& v : views) {
+            const double view_half =
+                0.5 * std::min(v.camera.width / v.camera.fx, v.camera.height / v.camera.fy);
+            half += glm::length(v.camera.centre() - focus) * view_half;
+        }
+        return {focus, glm::dvec3(half / scale)};
+    }
+    return {0.5 * (low + high), glm::max(0.5 * (high - low), glm::dvec3(1e-3))};
+}
+
+PointCloud random_points(const Dataset& dataset, const TrainOptions& options) {
+    std::uint64_t pixels = 0;
+    for (const View& v : dataset.views)
+        if (!v.is_test) pixels += std::uint64_t(v.camera.width) * v.camera.height;
+    const std::uint64_t wanted = options.random_points
+                                     ? options.random_points
+                                     : std::clamp<std::uint64_t>(pixels / 32, 1'000, 100'000);
+    const Region region = region_in_view(dataset.views);
+    Pcg32 random(options.seed, 1);
+    PointCloud cloud;
+    for (std::uint64_t i = 0; i < wanted; ++i)
+        for (int a = 0; a < 3; ++a) {
+            cloud.position.push_back(region.centre[a] + region.half[a] * random.uniform(-1.0, 1.0));
+            cloud.colour.push_back(static_cast<std::uint8_t>(random.below(256)));
+        }
+    return cloud;
+}
+
+glm::dvec3 choose_origin(const PointCloud& points) {
+    glm::dvec3 sum(0.0), largest(0.0);
+    for (size_t i = 0; i < points.size(); ++i) {
+        const glm::dvec3 p(points.position[3 * i], points.position[3 * i + 1],
+                           points.position[3 * i + 2]);
+        sum += p;
+        largest = glm::max(largest, glm::abs(p));
+    }
+    const double extent = std::max({largest.x, largest.y, largest.z});
+    return extent > kRecentreBeyond ? sum / double(points.size()) : glm::dvec3(0.0);
+}
+
+}  // namespace
+
+std::vector<double> neighbour_distance2(const std::vector<double>& position) {
+    const CloudView view{position};
+    const size_t count = view.kdtree_get_point_count();
+    std::vector<double> result(count, kMinDistance2);
+    if (count < 2) return result;
+    Tree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+    tree.buildIndex();
+    const size_t wanted = std::min<size_t>(4, count);  // the point itself comes first
+    for (size_t i = 0; i < count; ++i) {
+        size_t index[4];
+        double distance2[4];
+        const size_t found = tree.knnSearch(&position[3 * i], wanted, index, distance2);
+        double sum = 0.0;
+        for (size_t k = 1; k < found; ++k) sum += distance2[k];
+        result[i] = std::max(kMinDistance2, sum / static_cast<double>(found - 1));
+    }
+    return result;
+}
+
+SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
+    const PointCloud drawn =
+        dataset.points.size() == 0 ? random_points(dataset, options) : PointCloud{};
+    const PointCloud& points = dataset.points.size() == 0 ? drawn : dataset.points;
+    const std::vector<double> distance2 = neighbour_distance2(points.position);
+    SplatModel model;
+    model.sh_degree = options.sh_degree;
+    model.kernel = options.kernel;
+    model.footprint = options.footprint;
+    model.origin = choose_origin(points);
+    model.resize(std::min<size_t>(points.size(), options.max_splats));
+    const auto logit =
+        static_cast<float>(std::log(options.initial_opacity / (1.0 - options.initial_opacity)));
+    for (size_t i = 0; i < model.size(); ++i) {
+        model.rotation[4 * i] = 1.0f;
+        model.opacity[i] = logit;
+        for (int a = 0; a < 3; ++a) {
+            const size_t at = 3 * i + a;
+            model.position[at] = static_cast<float>(points.position[at] - model.origin[a]);
+            model.log_scale[at] = static_cast<float>(0.5 * std::log(distance2[i]));
+            model.sh_dc[at] = static_cast<float>((points.colour[at] / 255.0 - 0.5) / kShC0);
+        }
+    }
+    return model;
+}
+
+}  // namespace darb

@@ -1,0 +1,22 @@
+// The splats that training starts from: one at each point of the cloud, or random ones where the
+// cameras look.
+#pragma once
+
+#include "engine/data/dataset.h"
+#include "engine/scene/splat_model.h"
+#include "trainer/options.h"
+
+namespace darb {
+
+/// Scale: root mean square distance to the 3 nearest neighbours, squared distance at least 1e-7;
+/// rotation identity; opacity options.initial_opacity; colour of the point. Without points: random
+/// colours and positions in the cube around the point that the optical axes come closest to, as
+/// wide as the photos show there, or in the box of the cameras where the axes are parallel. The
+/// model's origin is set where coordinates are large.
+SplatModel initial_model(const Dataset& dataset, const TrainOptions& options);
+
+/// Mean squared distance of each point to its 3 nearest neighbours (fewer where there are fewer),
+/// at least 1e-7. position: [P][3]. O(P log P).
+std::vector<double> neighbour_distance2(const std::vector<double>& position);
+
+}  // namespace darb

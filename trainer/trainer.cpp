@@ -1,0 +1,270 @@
+#include "trainer/trainer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/core/rng.h"
+#include "engine/render/renderer.h"
+
+namespace darb {
+
+namespace {
+
+ForwardOptions forward_options(const TrainOptions& options) {
+    ForwardOptions f;
+    f.kernel = options.kernel;
+    f.footprint = options.footprint;
+    f.evaluation = options.evaluation;
+    f.sh_stored = options.sh_degree;
+    f.store_for_backward = true;
+    return f;
+}
+
+int largest(const Dataset& dataset, int Camera::*side) {
+    int most = 1;
+    for (const View& v : dataset.views) most = std::max(most, v.camera.*side);
+    return most;
+}
+
+}  // namespace
+
+Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
+                 const SplatModel& start, const TrainOptions& options)
+    : device_(&device),
+      options_(options),
+      dataset_(&dataset),
+      background_(options.white_background ? 1.0f : 0.0f),
+      extent_(scene_extent(dataset.views)),
+      splats_(device, start, true),
+      forward_(device, forward_options(options)),
+      backward_(device, forward_options(options), BackwardResult::update),
+      loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height)),
+      density_(device, options.kernel),
+      flights_{Flight{Commands(device),
+                      Buffer(device, "loss result", sizeof(gpu::LossResult), Memory::host),
+                      Buffer(device, "status result", sizeof(gpu::FrameStatus), Memory::host), 0},
+               Flight{Commands(device),
+                      Buffer(device, "loss result", sizeof(gpu::LossResult), Memory::host),
+                      Buffer(device, "status result", sizeof(gpu::FrameStatus), Memory::host), 0}} {
+    DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
+               dataset.views.size());
+    std::uint64_t pixels = 1;
+    for (size_t i = 0; i < dataset.views.size(); ++i) {
+        const View& view = dataset.views[i];
+        camera_data_.push_back(camera_data(view.camera, splats_.origin()));
+        photos_.emplace_back();
+        if (view.is_test) continue;
+        train_views_.push_back(static_cast<int>(i));
+        const std::uint64_t count = std::uint64_t(view.camera.width) * view.camera.height;
+        DARB_CHECK(photos[i].channels == 4 && photos[i].data.size() == count * 4, "{}", view.name);
+        photos_.back() = Buffer(device, "photo " + view.name, count * 4);
+        photos_.back().upload(std::as_bytes(std::span(photos[i].data)));
+        pixels = std::max(pixels, count);
+    }
+    if (train_views_.empty())
+        throw Error(dataset.root.string(), "no photo is left to train on",
+                    "Every view is held out; train without --eval or add photos.");
+    cameras_ = upload_cameras(device, camera_data_);
+    d_image_ = Buffer(device, "d_image", pixels * 12);
+}
+
+int Trainer::sh_degree() const {
+    return std::min(options_.sh_degree, iteration_ / std::max(options_.sh_interval, 1));
+}
+
+int Trainer::view_for(int iteration) {
+    const int count = static_cast<int>(train_views_.size());
+    const int epoch = (iteration - 1) / count;
+    if (epoch != order_epoch_) {
+        order_ = train_views_;
+        Pcg32 random(options_.seed, 1000 + static_cast<std::uint64_t>(epoch));
+        for (int i = count - 1; i > 0; --i) std::swap(order_[i], order_[random.below(i + 1)]);
+        order_epoch_ = epoch;
+    }
+    return order_[(iteration - 1) % count];
+}
+
+AdamStep Trainer::rates(int iteration) const {
+    const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
+    const double position = std::exp((1 - t) * std::log(options_.position_lr_init) +
+                                     t * std::log(options_.position_lr_final));
+    AdamStep step;
+    step.position = static_cast<float>(position * extent_);
+    step.scale = options_.scale_lr;
+    step.rotation = options_.rotation_lr;
+    step.opacity = options_.opacity_lr;
+    step.sh_dc = options_.sh_dc_lr;
+    step.sh_rest = options_.sh_rest_lr;
+    return adam_step(step, iteration);
+}
+
+void Trainer::step() {
+    launch(++iteration_);
+    finish(flights_[(iteration_ + 1) & 1]);
+    density_control(iteration_);
+}
+
+void Trainer::drain() {
+    finish(flights_[(iteration_ + 1) & 1]);
+    finish(flights_[iteration_ & 1]);
+}
+
+void Trainer::launch(int iteration) {
+    Flight& flight = flights_[iteration & 1];
+    DARB_CHECK(flight.iteration == 0, "iteration {} is still in flight", flight.iteration);
+    const int view = view_for(iteration);
+    const gpu::CameraData& data = camera_data_[view];
+    const int width = static_cast<int>(data.width), height = static_cast<int>(data.height);
+    const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
+    forward_.reserve(splats_.count(), pairs, width, height);
+    backward_.reserve(splats_.count(), forward_.pair_capacity());
+
+    flight.iteration = iteration;
+    Commands& commands = flight.commands;
+    const int degree = std::min(options_.sh_degree, iteration / std::max(options_.sh_interval, 1));
+    commands.begin();
+    forward_.record(commands, splats_, cameras_, static_cast<std::uint32_t>(view), data, degree,
+                    background_);
+    loss_.record(commands, forward_.image(), photos_[view], d_image_, flight.loss, 0, width, height,
+                 background_, options_.lambda_dssim);
+    backward_.record(commands, forward_, splats_, d_image_, cameras_,
+                     static_cast<std::uint32_t>(view), data, degree, background_, rates(iteration));
+    commands.copy(forward_.status(), flight.status, sizeof(gpu::FrameStatus));
+    commands.submit();
+}
+
+void Trainer::finish(Flight& flight) {
+    if (flight.iteration == 0) return;
+    flight.commands.wait();
+    const int iteration = std::exchange(flight.iteration, 0);
+    gpu::FrameStatus status;
+    gpu::LossResult loss;
+    std::memcpy(&status, flight.status.mapped(), sizeof status);
+    std::memcpy(&loss, flight.loss.mapped(), sizeof loss);
+    if (status.overflow != 0) return redo_from(iteration, status.pairs);
+
+    for (size_t r = 0; r < counters_.culled.size(); ++r) counters_.culled[r] += status.culled[r];
+    counters_.bad_gradients =
+        std::max<std::uint64_t>(counters_.bad_gradients, status.bad_gradients);
+    for (const PassTime& pass : flight.commands.pass_times()) {
+        const auto known = std::find_if(pass_totals_.begin(), pass_totals_.end(),
+                                        [&](const PassTotal& p) { return p.name == pass.name; });
+        if (known == pass_totals_.end())
+            pass_totals_.push_back({pass.name, pass.ms});
+        else
+            known->ms += pass.ms;
+    }
+    ++timed_iterations_;
+    if (!on_result) return;
+    const double mse = std::max(double(loss.mse), 1e-12);
+    on_result({iteration, Loss::value(loss, options_.lambda_dssim), -10.0 * std::log10(mse),
+               splats_.count(), status.visible, status.pairs});
+}
+
+// The overflow flag is sticky: whatever was submitted after this iteration changed nothing either.
+void Trainer::redo_from(int iteration, std::uint32_t pairs) {
+    for (Flight& flight : flights_)
+        if (std::exchange(flight.iteration, 0) != 0) flight.commands.wait();
+    forward_.reserve(splats_.count(), pairs + pairs / 2, 1, 1);
+    forward_.clear_status();
+    const int last = iteration_;
+    counters_.redone_iterations += static_cast<std::uint64_t>(last - iteration + 1);
+    for (int i = iteration; i <= last; ++i) {
+        launch(i);
+        finish(flights_[i & 1]);
+    }
+}
+
+std::uint32_t Trainer::growth_limit() const {
+    return std::min(options_.max_splats, GpuSplats::max_count(*device_, options_.sh_degree, true));
+}
+
+void Trainer::density_control(int iteration) {
+    if (iteration >= options_.densify_end()) return;
+    const bool refine =
+        iteration > options_.densify_from && iteration % options_.densify_interval == 0;
+    const bool reset = iteration % options_.opacity_reset_interval == 0 ||
+                       (options_.white_background && iteration == options_.densify_from);
+    if (!refine && !reset) return;
+    drain();
+    if (refine) {
+        gpu::DensifyArgs args{};
+        args.growth_limit = growth_limit();
+        args.gradient_threshold = options_.densify_grad_threshold;
+        args.clone_split_scale = static_cast<float>(options_.clone_split_extent * extent_);
+        args.prune_opacity = options_.prune_opacity;
+        args.prune_scale = iteration > options_.opacity_reset_interval
+                               ? static_cast<float>(options_.prune_extent * extent_)
+                               : 0.0f;
+        args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
+        const DensityResult result = density_.run(splats_, backward_.gradient_sum(), args);
+        counters_.cloned_or_split += result.grown;
+        counters_.pruned += result.pruned;
+        backward_.reserve(splats_.count(), 0);
+        Commands& commands = flights_[0].commands;
+        commands.begin();
+        backward_.clear_gradient_sum(commands);
+        commands.submit_and_wait();
+    }
+    if (reset) density_.reset_opacity(splats_, options_.opacity_reset_to);
+}
+
+SplatModel Trainer::model() {
+    drain();
+    return splats_.download();
+}
+
+ImageF Trainer::render(const Camera& camera) {
+    drain();
+    const gpu::CameraData data = camera_data(camera, splats_.origin());
+    const Buffer cameras = upload_cameras(*device_, {data});
+    Commands& commands = flights_[0].commands;
+    std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
+    for (;;) {
+        forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
+        commands.begin();
+        forward_.record(commands, splats_, cameras, 0, data, sh_degree(), background_);
+        commands.submit_and_wait();
+        const gpu::FrameStatus status = forward_.read_status();
+        if (status.overflow == 0) break;
+        pairs = status.pairs + status.pairs / 2;
+        forward_.clear_status();
+    }
+    return planes_to_image(
+        forward_.image().download<float>(size_t(camera.width) * camera.height * 3), camera.width,
+        camera.height);
+}
+
+Trainer::State Trainer::state() {
+    State s;
+    s.model = model();
+    s.iteration = iteration_;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const size_t floats = size_t{splats_.count()} * splats_.stride(a) * 2;
+        s.moments.push_back(floats ? splats_.moments(a).download<float>(floats)
+                                   : std::vector<float>{});
+    }
+    s.gradient_sum = backward_.gradient_sum()
+                         ? backward_.gradient_sum().download<float>(size_t{splats_.count()} * 2)
+                         : std::vector<float>(size_t{splats_.count()} * 2);
+    s.counters = counters_;
+    return s;
+}
+
+void Trainer::restore(const State& s) {
+    drain();
+    splats_ = GpuSplats(*device_, s.model, true);
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (!s.moments[a].empty()) splats_.moments(a).upload(s.moments[a]);
+    backward_.reserve(splats_.count(), 0);
+    if (!s.gradient_sum.empty()) backward_.gradient_sum().upload(s.gradient_sum);
+    iteration_ = s.iteration;
+    counters_ = s.counters;
+}
+
+}  // namespace darb

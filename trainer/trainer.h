@@ -1,0 +1,127 @@
+// Trainer: one training run on one device, free of globals. step() records an iteration (forward,
+// loss, backward with Adam) and submits it while the one before still runs; the host reads an
+// iteration's result after the next is on its way, so nothing waits inside. An iteration whose
+// pairs did not fit changes nothing: the buffers grow and it is done again.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/data/dataset.h"
+#include "engine/render/backward.h"
+#include "engine/render/forward.h"
+#include "engine/render/loss.h"
+#include "trainer/densify/density_control.h"
+#include "trainer/options.h"
+
+namespace darb {
+
+/// What one finished iteration tells.
+struct IterationResult {
+    int iteration = 0;  // from 1
+    double loss = 0;
+    double psnr_db = 0;  // of the training view
+    std::uint32_t splats = 0, visible = 0, pairs = 0;
+};
+
+/// Counts over the whole run.
+struct TrainCounters {
+    std::uint64_t redone_iterations = 0;
+    std::uint64_t bad_gradients = 0;
+    std::uint64_t cloned_or_split = 0, pruned = 0;
+    std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason
+};
+
+/// Milliseconds of a pass, summed over `iterations`.
+struct PassTotal {
+    std::string name;
+    double ms = 0;
+};
+
+class Trainer {
+  public:
+    /// photos: as load_photos gives them, in the order of dataset.views. The dataset must outlive
+    /// the trainer. scene_extent in world units.
+    Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
+            const SplatModel& start, const TrainOptions& options);
+
+    /// Runs iteration `iteration() + 1` and what density control has to do after it. Results of
+    /// finished iterations go to on_result, in order, at the latest at drain().
+    void step();
+    void drain();
+
+    /// Iterations finished or under way.
+    int iteration() const { return iteration_; }
+    std::uint32_t splat_count() const { return splats_.count(); }
+    int sh_degree() const;  // in use at the current iteration
+    SplatModel model();     // drains
+
+    /// A picture of the current splats, RGB not clamped. Drains.
+    ImageF render(const Camera& camera);
+    glm::vec3 background() const { return background_; }
+
+    std::function<void(const IterationResult&)> on_result;
+
+    const TrainCounters& counters() const { return counters_; }
+    std::vector<PassTotal> pass_totals() const { return pass_totals_; }
+    std::uint64_t timed_iterations() const { return timed_iterations_; }
+    double extent() const { return extent_; }
+
+    /// The state beside the model that a checkpoint holds. moments: [attribute][2 N stride].
+    struct State {
+        int iteration = 0;
+        SplatModel model;
+        std::vector<std::vector<float>> moments;
+        std::vector<float> gradient_sum;  // [N][2]
+        TrainCounters counters;
+    };
+    State state();  // drains
+    void restore(const State& state);
+
+  private:
+    struct Flight {
+        Commands commands;
+        Buffer loss;        // gpu::LossResult, host
+        Buffer status;      // gpu::FrameStatus, host
+        int iteration = 0;  // 0: empty
+    };
+    int view_for(int iteration);
+    void launch(int iteration);
+    void finish(Flight& flight);
+    void redo_from(int iteration, std::uint32_t pairs);
+    void density_control(int iteration);
+    std::uint32_t growth_limit() const;
+    AdamStep rates(int iteration) const;
+
+    Device* device_;
+    TrainOptions options_;
+    const Dataset* dataset_;
+    glm::vec3 background_;
+    double extent_;
+    std::vector<int> train_views_;
+    std::vector<int> order_;  // of train_views_ in this epoch
+    int order_epoch_ = -1;
+
+    GpuSplats splats_;
+    Forward forward_;
+    Backward backward_;
+    Loss loss_;
+    DensityControl density_;
+    std::vector<gpu::CameraData> camera_data_;
+    Buffer cameras_;
+    std::vector<Buffer> photos_;  // [view]: uint [H][W], R in the low byte; empty for test views
+    Buffer d_image_;
+    std::array<Flight, 2> flights_;
+    int iteration_ = 0;
+    TrainCounters counters_;
+    std::vector<PassTotal> pass_totals_;
+    std::uint64_t timed_iterations_ = 0;
+};
+
+}  // namespace darb
