@@ -56,8 +56,12 @@ class Buffer {
     std::string name_;
     VkBuffer buffer_ = VK_NULL_HANDLE;
     VkDeviceMemory memory_ = VK_NULL_HANDLE;
-    void* mapped_ = nullptr;
+    void* mapped_ = nullptr;  // Memory::host
+    void* direct_ = nullptr;  // either kind where the host may copy without staging
     std::uint64_t bytes_ = 0;
+    std::uint64_t allocated_ = 0;  // bytes charged to the device
+
+    void release() noexcept;
 };
 
 /// A range of a buffer, as bound to a shader. size 0 = to the end.

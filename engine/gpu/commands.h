@@ -23,6 +23,9 @@ struct PassTime {
     double ms = 0;
 };
 
+/// For shaders without a push constant block.
+struct NoArgs {};
+
 class Commands {
   public:
     explicit Commands(Device& device);

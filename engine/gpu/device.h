@@ -1,5 +1,7 @@
 // Device: one Vulkan 1.3 device with one compute queue, no window system needed.
-// Everything below engine/gpu knows buffers, pipelines and commands; nothing of splats.
+// Environment: DARB_VALIDATION=1 turns the validation layers on; DARB_FAULT injects faults for
+// tests (engine/gpu/faults.h). Everything below engine/gpu knows buffers, pipelines and commands;
+// nothing of splats.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -14,12 +16,12 @@ namespace darb {
 
 /// What `darb devices` prints, and what the choice is made from.
 struct DeviceInfo {
-    int index = 0;             // what --device N takes
-    std::string name;          // what --device NAME matches, case-insensitive, any part
-    std::string driver;        // name and version
-    std::string type;          // discrete, integrated, virtual, cpu, other
+    int index = 0;       // what --device N takes
+    std::string name;    // what --device NAME matches, case-insensitive, any part
+    std::string driver;  // name and version
+    std::string type;    // discrete, integrated, virtual, cpu, other
     std::uint32_t api_version = 0;
-    std::uint64_t heap_bytes = 0;               // largest device-local heap
+    std::uint64_t heap_bytes = 0;                // largest device-local heap
     std::uint64_t max_storage_buffer_bytes = 0;  // maxStorageBufferRange
     std::uint64_t max_allocation_bytes = 0;
     std::uint32_t max_storage_buffers = 0;  // per stage
@@ -37,10 +39,19 @@ struct DeviceInfo {
 /// Every physical device, best first; never throws for want of a device (then: empty).
 std::vector<DeviceInfo> list_devices();
 
+/// Position in devices of what --device SELECT means: "" = best usable, all digits = index, else
+/// part of a name (the best usable match). Throws Error: none, none usable, no match, not usable.
+std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::string& select);
+
 struct DeviceOptions {
-    std::string select;  // "" = best usable; a number = index; else part of a name
+    std::string select;       // "" = best usable; a number = index; else part of a name
     bool validation = false;  // core + synchronization validation; also DARB_VALIDATION=1
     std::filesystem::path cache_folder;  // pipeline cache; "" = XDG cache folder / darb
+    /// For a window: surface extensions of the instance, VK_KHR_swapchain of the device. A name
+    /// that is not offered is an Error. The queue does graphics too wherever the device has such a
+    /// queue.
+    std::vector<std::string> instance_extensions;
+    std::vector<std::string> device_extensions;
 };
 
 class Device {
@@ -58,6 +69,7 @@ class Device {
     VkDevice handle() const;
     VkQueue queue() const;
     std::uint32_t queue_family() const;
+    bool queue_has_graphics() const;
     VkPipelineCache pipeline_cache() const;
 
     /// Bytes of live Buffers, and the most there ever were.

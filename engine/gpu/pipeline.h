@@ -23,9 +23,11 @@ class Pipeline {
   public:
     Pipeline() = default;
     /// shader: a name of the embedded table. Compiled here, or at first dispatch on lavapipe.
-    /// require_full_subgroups asks the driver for subgroups without idle lanes.
+    /// require_full_subgroups asks the driver for subgroups without idle lanes; where the workgroup
+    /// is no multiple of the device's subgroup size, a smaller size is asked for if there is one.
+    /// subgroup_size: 0 = the device's own choice; else one between its minimum and maximum.
     Pipeline(Device& device, std::string_view shader, const SpecConstants& constants = {},
-             bool require_full_subgroups = true);
+             bool require_full_subgroups = true, std::uint32_t subgroup_size = 0);
     ~Pipeline();
     Pipeline(Pipeline&&) noexcept;
     Pipeline& operator=(Pipeline&&) noexcept;
@@ -43,6 +45,9 @@ class Pipeline {
         bool writes = true;
     };
     const std::vector<Binding>& bindings() const { return bindings_; }
+    /// Whether the shader has a specialization constant of this name.
+    bool declares(std::string_view constant) const;
+    std::uint32_t threads_x() const { return threads_x_; }  // workgroup size, after specialization
 
   private:
     Device* device_ = nullptr;
@@ -51,7 +56,11 @@ class Pipeline {
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
     VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
     std::uint32_t push_constant_bytes_ = 0;
+    std::uint32_t threads_x_ = 0;
     std::vector<Binding> bindings_;
+    std::vector<std::string> constant_names_;
+
+    void release() noexcept;
 };
 
 }  // namespace darb

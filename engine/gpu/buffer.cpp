@@ -1,0 +1,220 @@
+#include "engine/gpu/buffer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/gpu/device_state.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::uint64_t kStagingBytes = 32 << 20;  // long copies go in pieces of this size
+
+constexpr VkMemoryPropertyFlags kDeviceLocal = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
+constexpr VkMemoryPropertyFlags kMappable =
+    VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+constexpr VkMemoryPropertyFlags kCached = VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+
+// The first memory type that has the earliest of the wanted sets of flags.
+int find_memory_type(const VkPhysicalDeviceMemoryProperties& memory, std::uint32_t allowed,
+                     std::initializer_list<VkMemoryPropertyFlags> wanted) {
+    for (const VkMemoryPropertyFlags flags : wanted)
+        for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
+            if ((allowed >> i & 1) && (memory.memoryTypes[i].propertyFlags & flags) == flags)
+                return static_cast<int>(i);
+    return -1;
+}
+
+int choose_memory_type(const Device::State& state, std::uint32_t allowed, Memory kind) {
+    if (kind == Memory::host)
+        return find_memory_type(state.memory, allowed, {kMappable | kCached, kMappable});
+    if (state.info.unified_memory)
+        return find_memory_type(state.memory, allowed,
+                                {kDeviceLocal | kMappable | kCached, kDeviceLocal, 0});
+    return find_memory_type(state.memory, allowed, {kDeviceLocal, 0});
+}
+
+std::string describe(const std::string& name, std::uint64_t bytes) {
+    return fmt::format("buffer \"{}\" ({:.1f} MiB)", name, static_cast<double>(bytes) / (1 << 20));
+}
+
+VkBuffer create_handle(const Device::State& state, std::uint64_t bytes, const std::string& what) {
+    VkBufferCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+    info.size = bytes;
+    info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT |
+                 VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
+    VkBuffer buffer = VK_NULL_HANDLE;
+    check_vulkan(vkCreateBuffer(state.device, &info, nullptr, &buffer), what);
+    return buffer;
+}
+
+void check_limits(const Device::State& state, const std::string& name, std::uint64_t bytes,
+                  const std::string& what) {
+    const std::uint64_t limit = std::min(state.max_buffer_bytes, state.info.max_allocation_bytes);
+    if (bytes > limit)
+        throw Error(what,
+                    fmt::format("{} allows at most {} MiB a buffer", state.info.name, limit >> 20),
+                    "Use smaller images or fewer splats, or choose another device (darb devices).");
+    const std::uint64_t budget = state.budget, in_use = state.allocated;
+    if (budget != 0 && in_use + bytes > budget)
+        throw Error(what,
+                    fmt::format("out of device memory: {:.1f} MiB are in use of a budget of {:.1f}",
+                                static_cast<double>(in_use) / (1 << 20),
+                                static_cast<double>(budget) / (1 << 20)),
+                    "Raise the memory budget, or use smaller images or fewer splats.");
+    if (state.faults.fails_allocation(name)) check_vulkan(VK_ERROR_OUT_OF_DEVICE_MEMORY, what);
+}
+
+}  // namespace
+
+Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kind)
+    : device_(&device), name_(std::move(name)), bytes_(bytes == 0 ? 16 : bytes) {
+    Device::State& state = device.state();
+    const std::string what = describe(name_, bytes_);
+    // Copies and fills work on words.
+    const std::uint64_t whole_words = (bytes_ + 3) / 4 * 4;
+    check_limits(state, name_, whole_words, what);
+    try {
+        buffer_ = create_handle(state, whole_words, what);
+        VkMemoryRequirements needs{};
+        vkGetBufferMemoryRequirements(state.device, buffer_, &needs);
+        const int type = choose_memory_type(state, needs.memoryTypeBits, kind);
+        DARB_CHECK(type >= 0, "{}: no memory type in {:#x}", what, needs.memoryTypeBits);
+        VkMemoryAllocateInfo info{};
+        info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+        info.allocationSize = needs.size;
+        info.memoryTypeIndex = static_cast<std::uint32_t>(type);
+        check_vulkan(vkAllocateMemory(state.device, &info, nullptr, &memory_), what);
+        check_vulkan(vkBindBufferMemory(state.device, buffer_, memory_, 0), what);
+        const VkMemoryPropertyFlags flags = state.memory.memoryTypes[type].propertyFlags;
+        if (kind == Memory::host || (flags & (kMappable | kCached)) == (kMappable | kCached))
+            check_vulkan(vkMapMemory(state.device, memory_, 0, VK_WHOLE_SIZE, 0, &direct_), what);
+        if (kind == Memory::host) mapped_ = direct_;
+    } catch (...) {
+        release();
+        throw;
+    }
+    allocated_ = whole_words;
+    const std::uint64_t now = state.allocated += allocated_;
+    if (now > state.peak) state.peak = now;
+    state.set_name(VK_OBJECT_TYPE_BUFFER, reinterpret_cast<std::uint64_t>(buffer_), name_);
+}
+
+void Buffer::release() noexcept {
+    if (device_ == nullptr) return;
+    Device::State& state = device_->state();
+    vkDestroyBuffer(state.device, buffer_, nullptr);
+    vkFreeMemory(state.device, memory_, nullptr);
+    state.allocated -= allocated_;
+    buffer_ = VK_NULL_HANDLE;
+    memory_ = VK_NULL_HANDLE;
+    mapped_ = direct_ = nullptr;
+    bytes_ = allocated_ = 0;
+    device_ = nullptr;
+}
+
+Buffer::~Buffer() {
+    release();
+}
+
+Buffer::Buffer(Buffer&& other) noexcept {
+    *this = std::move(other);
+}
+
+Buffer& Buffer::operator=(Buffer&& other) noexcept {
+    if (this == &other) return *this;
+    release();
+    device_ = std::exchange(other.device_, nullptr);
+    name_ = std::move(other.name_);
+    buffer_ = std::exchange(other.buffer_, VK_NULL_HANDLE);
+    memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
+    mapped_ = std::exchange(other.mapped_, nullptr);
+    direct_ = std::exchange(other.direct_, nullptr);
+    bytes_ = std::exchange(other.bytes_, 0);
+    allocated_ = std::exchange(other.allocated_, 0);
+    return *this;
+}
+
+void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
+    DARB_CHECK(offset + source.size() <= bytes_, "{}: {} + {} of {}", name_, offset, source.size(),
+               bytes_);
+    if (source.empty()) return;
+    Device::State& state = device_->state();
+    check_vulkan(state.wait_idle(), "upload to " + describe(name_, source.size()));
+    if (direct_ != nullptr) {
+        std::memcpy(static_cast<std::byte*>(direct_) + offset, source.data(), source.size());
+        return;
+    }
+    const Buffer staging(*device_, "staging", std::min(kStagingBytes, source.size()), Memory::host);
+    for (std::uint64_t done = 0; done < source.size(); done += kStagingBytes) {
+        const std::uint64_t piece = std::min(kStagingBytes, source.size() - done);
+        std::memcpy(staging.direct_, source.data() + done, piece);
+        state.copy_now(staging.buffer_, 0, buffer_, offset + done, piece, "upload to " + name_);
+    }
+}
+
+void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
+    DARB_CHECK(offset + target.size() <= bytes_, "{}: {} + {} of {}", name_, offset, target.size(),
+               bytes_);
+    if (target.empty()) return;
+    Device::State& state = device_->state();
+    check_vulkan(state.wait_idle(), "download of " + describe(name_, target.size()));
+    if (direct_ != nullptr) {
+        std::memcpy(target.data(), static_cast<const std::byte*>(direct_) + offset, target.size());
+        return;
+    }
+    const Buffer staging(*device_, "staging", std::min(kStagingBytes, target.size()), Memory::host);
+    for (std::uint64_t done = 0; done < target.size(); done += kStagingBytes) {
+        const std::uint64_t piece = std::min(kStagingBytes, target.size() - done);
+        state.copy_now(buffer_, offset + done, staging.buffer_, 0, piece, "download of " + name_);
+        std::memcpy(target.data() + done, staging.direct_, piece);
+    }
+}
+
+void Device::State::copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer to,
+                             std::uint64_t to_offset, std::uint64_t bytes,
+                             const std::string& what) {
+    if (copy_pool == VK_NULL_HANDLE) {
+        VkCommandPoolCreateInfo pool_info{};
+        pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+        pool_info.queueFamilyIndex = queue_family;
+        check_vulkan(vkCreateCommandPool(device, &pool_info, nullptr, &copy_pool), what);
+        VkCommandBufferAllocateInfo allocate{};
+        allocate.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+        allocate.commandPool = copy_pool;
+        allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+        allocate.commandBufferCount = 1;
+        check_vulkan(vkAllocateCommandBuffers(device, &allocate, &copy_commands), what);
+    }
+    check_vulkan(vkResetCommandPool(device, copy_pool, 0), what);
+    VkCommandBufferBeginInfo begin{};
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    check_vulkan(vkBeginCommandBuffer(copy_commands, &begin), what);
+    const VkBufferCopy region{from_offset, to_offset, bytes};
+    vkCmdCopyBuffer(copy_commands, from, to, 1, &region);
+    VkMemoryBarrier2 barrier{};
+    barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2;
+    barrier.srcStageMask = VK_PIPELINE_STAGE_2_COPY_BIT;
+    barrier.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    barrier.dstStageMask = VK_PIPELINE_STAGE_2_HOST_BIT;
+    barrier.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
+    VkDependencyInfo dependency{};
+    dependency.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
+    dependency.memoryBarrierCount = 1;
+    dependency.pMemoryBarriers = &barrier;
+    vkCmdPipelineBarrier2(copy_commands, &dependency);
+    check_vulkan(vkEndCommandBuffer(copy_commands), what);
+    check_vulkan(submit(copy_commands, VK_NULL_HANDLE), what);
+    check_vulkan(wait_idle(), what);
+}
+
+}  // namespace darb

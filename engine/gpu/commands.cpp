@@ -1,0 +1,336 @@
+#include "engine/gpu/commands.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/gpu/barriers.h"
+#include "engine/gpu/device_state.h"
+#include "engine/gpu/timestamps.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::uint32_t kSetsPerPool = 256;
+constexpr std::uint32_t kBindingsPerPool = 8 * kSetsPerPool;
+
+constexpr VkPipelineStageFlags2 kCompute = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+// Not CLEAR and COPY: validation layers before 1.3.250 take a fill for a copy.
+constexpr VkPipelineStageFlags2 kTransfer = VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
+
+}  // namespace
+
+struct Commands::State {
+    explicit State(Device& device_) : device(device_), timestamps(device_.handle()) {}
+    ~State();
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+
+    Device& device;
+    VkCommandPool pool = VK_NULL_HANDLE;
+    VkCommandBuffer commands = VK_NULL_HANDLE;
+    VkFence fence = VK_NULL_HANDLE;
+    std::vector<VkDescriptorPool> descriptor_pools;
+    std::size_t current_pool = 0;
+    BarrierTracker barriers;
+    Timestamps timestamps;
+    bool timed = false;
+    bool recording = false;
+    bool in_flight = false;
+    std::vector<std::string> passes;
+
+    void create();
+    VkDescriptorSet allocate_set(const Pipeline& pipeline);
+    void bind(const Pipeline& pipeline, std::span<const std::byte> args,
+              std::span<const BufferRange> buffers);
+    void place_barriers();
+    void finish_pass();
+    std::string here() const { return passes.empty() ? "pass" : "pass \"" + passes.back() + "\""; }
+    std::string all_passes() const;
+};
+
+Commands::State::~State() {
+    VkDevice handle = device.handle();
+    if (in_flight) vkWaitForFences(handle, 1, &fence, VK_TRUE, UINT64_MAX);
+    for (VkDescriptorPool p : descriptor_pools) vkDestroyDescriptorPool(handle, p, nullptr);
+    vkDestroyFence(handle, fence, nullptr);
+    vkDestroyCommandPool(handle, pool, nullptr);
+}
+
+void Commands::State::create() {
+    VkCommandPoolCreateInfo pool_info{};
+    pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+    pool_info.flags = VK_COMMAND_POOL_CREATE_TRANSIENT_BIT;
+    pool_info.queueFamilyIndex = device.queue_family();
+    check_vulkan(vkCreateCommandPool(device.handle(), &pool_info, nullptr, &pool), "command pool");
+    VkCommandBufferAllocateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+    info.commandPool = pool;
+    info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    info.commandBufferCount = 1;
+    check_vulkan(vkAllocateCommandBuffers(device.handle(), &info, &commands), "command buffer");
+    VkFenceCreateInfo fence_info{};
+    fence_info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+    check_vulkan(vkCreateFence(device.handle(), &fence_info, nullptr, &fence), "fence");
+    timed = device.info().timestamp_period_ns > 0;
+}
+
+VkDescriptorSet Commands::State::allocate_set(const Pipeline& pipeline) {
+    const VkDescriptorSetLayout layout = pipeline.set_layout();
+    VkDescriptorSetAllocateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+    info.descriptorSetCount = 1;
+    info.pSetLayouts = &layout;
+    for (;; ++current_pool) {
+        const bool fresh = current_pool == descriptor_pools.size();
+        if (fresh) {
+            const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, kBindingsPerPool};
+            VkDescriptorPoolCreateInfo pool_info{};
+            pool_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+            pool_info.maxSets = kSetsPerPool;
+            pool_info.poolSizeCount = 1;
+            pool_info.pPoolSizes = &size;
+            VkDescriptorPool handle = VK_NULL_HANDLE;
+            check_vulkan(vkCreateDescriptorPool(device.handle(), &pool_info, nullptr, &handle),
+                         "descriptor pool");
+            descriptor_pools.push_back(handle);
+        }
+        info.descriptorPool = descriptor_pools[current_pool];
+        VkDescriptorSet set = VK_NULL_HANDLE;
+        const VkResult result = vkAllocateDescriptorSets(device.handle(), &info, &set);
+        if (result == VK_SUCCESS) return set;
+        const bool full =
+            result == VK_ERROR_OUT_OF_POOL_MEMORY || result == VK_ERROR_FRAGMENTED_POOL;
+        if (!full || fresh) check_vulkan(result, here() + ", descriptors");
+    }
+}
+
+void Commands::State::bind(const Pipeline& pipeline, std::span<const std::byte> args,
+                           std::span<const BufferRange> buffers) {
+    const std::size_t count = pipeline.bindings().size();
+    const std::uint32_t push_bytes = pipeline.push_constant_bytes();
+    DARB_CHECK(recording, "{}: begin() first", pipeline.name());
+    DARB_CHECK(buffers.size() == count, "{} binds {} buffers, declares {}", pipeline.name(),
+               buffers.size(), count);
+    DARB_CHECK(args.size() == push_bytes || (push_bytes == 0 && args.size() == 1),
+               "{} is given {} bytes of arguments, declares {}", pipeline.name(), args.size(),
+               push_bytes);
+    const VkDescriptorSet set = allocate_set(pipeline);
+    std::vector<VkDescriptorBufferInfo> infos(count);
+    std::vector<VkWriteDescriptorSet> writes(count);
+    const std::uint64_t limit = device.info().max_storage_buffer_bytes;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const BufferRange& range = buffers[i];
+        DARB_CHECK(*range.buffer, "{} binding {} has no buffer", pipeline.name(), i);
+        const std::uint64_t bytes = range.buffer->bytes();
+        DARB_CHECK(
+            range.offset < bytes && range.offset + range.size <= bytes && range.offset % 256 == 0,
+            "{}, \"{}\": {} + {} of {}", pipeline.name(), range.buffer->name(), range.offset,
+            range.size, bytes);
+        infos[i] = {range.buffer->handle(), range.offset,
+                    range.size != 0 ? range.size : bytes - range.offset};
+        if (infos[i].range > limit)
+            throw Error(here(),
+                        fmt::format("buffer \"{}\" is bound with {} MiB, {} allows {} MiB",
+                                    range.buffer->name(), infos[i].range >> 20, device.info().name,
+                                    limit >> 20),
+                        "Use smaller images or fewer splats, or choose another device "
+                        "(darb devices).");
+        writes[i] = {};
+        writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+        writes[i].dstSet = set;
+        writes[i].dstBinding = i;
+        writes[i].descriptorCount = 1;
+        writes[i].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+        writes[i].pBufferInfo = &infos[i];
+        const Pipeline::Binding& access = pipeline.bindings()[i];
+        barriers.use({range.buffer->handle(), kCompute,
+                      access.reads ? VK_ACCESS_2_SHADER_STORAGE_READ_BIT : VkAccessFlags2{},
+                      access.writes ? VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT : VkAccessFlags2{}});
+    }
+    vkUpdateDescriptorSets(device.handle(), static_cast<std::uint32_t>(count), writes.data(), 0,
+                           nullptr);
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.handle());
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout(), 0, 1, &set,
+                            0, nullptr);
+    if (push_bytes > 0)
+        vkCmdPushConstants(commands, pipeline.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes,
+                           args.data());
+}
+
+void Commands::State::place_barriers() {
+    const std::vector<VkBufferMemoryBarrier2>& needed = barriers.resolve();
+    if (needed.empty()) return;
+    VkDependencyInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
+    info.bufferMemoryBarrierCount = static_cast<std::uint32_t>(needed.size());
+    info.pBufferMemoryBarriers = needed.data();
+    vkCmdPipelineBarrier2(commands, &info);
+}
+
+void Commands::State::finish_pass() {
+    if (!passes.empty() && device.state().instance.debug().end_label != nullptr)
+        device.state().instance.debug().end_label(commands);
+    if (timed && !passes.empty()) timestamps.write(commands);
+}
+
+std::string Commands::State::all_passes() const {
+    if (passes.empty()) return "submission";
+    if (passes.size() == 1) return here();
+    return fmt::format("passes \"{}\" to \"{}\"", passes.front(), passes.back());
+}
+
+Commands::Commands(Device& device) : state_(std::make_unique<State>(device)) {
+    state_->create();
+}
+Commands::~Commands() = default;
+Commands::Commands(Commands&&) noexcept = default;
+Commands& Commands::operator=(Commands&&) noexcept = default;
+
+void Commands::begin() {
+    State& s = *state_;
+    DARB_CHECK(!s.in_flight, "wait() before begin()");
+    check_vulkan(vkResetCommandPool(s.device.handle(), s.pool, 0), "command pool");
+    for (VkDescriptorPool pool : s.descriptor_pools)
+        vkResetDescriptorPool(s.device.handle(), pool, 0);
+    s.current_pool = 0;
+    s.passes.clear();
+    s.timestamps.restart();
+    s.barriers.clear();
+    VkCommandBufferBeginInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+    check_vulkan(vkBeginCommandBuffer(s.commands, &info), "command buffer");
+    s.recording = true;
+
+    // Everything that earlier submissions to this queue wrote, whoever recorded them.
+    VkMemoryBarrier2 barrier{};
+    barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2;
+    barrier.srcStageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
+    barrier.srcAccessMask = VK_ACCESS_2_MEMORY_WRITE_BIT;
+    barrier.dstStageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
+    barrier.dstAccessMask = VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT;
+    VkDependencyInfo dependency{};
+    dependency.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
+    dependency.memoryBarrierCount = 1;
+    dependency.pMemoryBarriers = &barrier;
+    vkCmdPipelineBarrier2(s.commands, &dependency);
+}
+
+void Commands::pass(std::string_view name) {
+    State& s = *state_;
+    DARB_CHECK(s.recording, "pass {}: begin() first", name);
+    if (s.timed && s.passes.empty()) s.timestamps.write(s.commands);
+    s.finish_pass();
+    s.passes.emplace_back(name);
+    const DebugUtils& debug = s.device.state().instance.debug();
+    if (debug.begin_label == nullptr) return;
+    VkDebugUtilsLabelEXT label{};
+    label.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_LABEL_EXT;
+    label.pLabelName = s.passes.back().c_str();
+    debug.begin_label(s.commands, &label);
+}
+
+void Commands::dispatch_bytes(const Pipeline& pipeline, std::span<const std::byte> args,
+                              std::span<const BufferRange> buffers, std::uint32_t groups_x,
+                              std::uint32_t groups_y, std::uint32_t groups_z) {
+    State& s = *state_;
+    const std::uint32_t* limit = s.device.state().limits.maxComputeWorkGroupCount;
+    DARB_CHECK(groups_x >= 1 && groups_y >= 1 && groups_z >= 1 && groups_x <= limit[0] &&
+                   groups_y <= limit[1] && groups_z <= limit[2],
+               "{}: {} x {} x {} groups", pipeline.name(), groups_x, groups_y, groups_z);
+    s.bind(pipeline, args, buffers);
+    s.place_barriers();
+    vkCmdDispatch(s.commands, groups_x, groups_y, groups_z);
+}
+
+void Commands::dispatch_indirect_bytes(const Pipeline& pipeline, std::span<const std::byte> args,
+                                       std::span<const BufferRange> buffers, const Buffer& indirect,
+                                       std::uint64_t offset) {
+    State& s = *state_;
+    DARB_CHECK(offset % 4 == 0 && offset + sizeof(VkDispatchIndirectCommand) <= indirect.bytes(),
+               "{}: offset {} in {}", pipeline.name(), offset, indirect.bytes());
+    s.bind(pipeline, args, buffers);
+    s.barriers.use({indirect.handle(), VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT,
+                    VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT, 0});
+    s.place_barriers();
+    vkCmdDispatchIndirect(s.commands, indirect.handle(), offset);
+}
+
+void Commands::fill(const BufferRange& range, std::uint32_t word) {
+    State& s = *state_;
+    const std::uint64_t bytes = range.buffer->bytes();
+    const std::uint64_t size = range.size != 0 ? range.size : (bytes - range.offset) / 4 * 4;
+    DARB_CHECK(
+        s.recording && range.offset % 4 == 0 && size % 4 == 0 && range.offset + size <= bytes,
+        "\"{}\": {} + {} of {}", range.buffer->name(), range.offset, size, bytes);
+    if (size == 0) return;
+    s.barriers.use({range.buffer->handle(), kTransfer, 0, VK_ACCESS_2_TRANSFER_WRITE_BIT});
+    s.place_barriers();
+    vkCmdFillBuffer(s.commands, range.buffer->handle(), range.offset, size, word);
+}
+
+void Commands::copy(const BufferRange& from, const BufferRange& to, std::uint64_t bytes) {
+    State& s = *state_;
+    DARB_CHECK(s.recording && from.offset + bytes <= from.buffer->bytes() &&
+                   to.offset + bytes <= to.buffer->bytes(),
+               "\"{}\" to \"{}\", {} bytes", from.buffer->name(), to.buffer->name(), bytes);
+    if (bytes == 0) return;
+    s.barriers.use({from.buffer->handle(), kTransfer, VK_ACCESS_2_TRANSFER_READ_BIT, 0});
+    s.barriers.use({to.buffer->handle(), kTransfer, 0, VK_ACCESS_2_TRANSFER_WRITE_BIT});
+    s.place_barriers();
+    const VkBufferCopy region{from.offset, to.offset, bytes};
+    vkCmdCopyBuffer(s.commands, from.buffer->handle(), to.buffer->handle(), 1, &region);
+}
+
+void Commands::submit() {
+    State& s = *state_;
+    DARB_CHECK(s.recording, "begin() first");
+    s.finish_pass();
+    const std::vector<VkBufferMemoryBarrier2> to_host = s.barriers.to_host();
+    if (!to_host.empty()) {
+        VkDependencyInfo info{};
+        info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
+        info.bufferMemoryBarrierCount = static_cast<std::uint32_t>(to_host.size());
+        info.pBufferMemoryBarriers = to_host.data();
+        vkCmdPipelineBarrier2(s.commands, &info);
+    }
+    s.recording = false;
+    check_vulkan(vkEndCommandBuffer(s.commands), s.all_passes());
+    check_vulkan(vkResetFences(s.device.handle(), 1, &s.fence), s.all_passes());
+    check_vulkan(s.device.state().submit(s.commands, s.fence), s.all_passes());
+    s.in_flight = true;
+}
+
+void Commands::wait() {
+    State& s = *state_;
+    if (!s.in_flight) return;
+    const VkResult result = vkWaitForFences(s.device.handle(), 1, &s.fence, VK_TRUE, UINT64_MAX);
+    s.in_flight = false;
+    check_vulkan(result, s.all_passes());
+}
+
+std::vector<PassTime> Commands::pass_times() const {
+    const State& s = *state_;
+    DARB_CHECK(!s.in_flight && !s.recording, "wait() first");
+    std::vector<PassTime> times;
+    if (!s.timed) return times;
+    const std::vector<std::uint64_t> ticks = s.timestamps.read();
+    const std::uint32_t bits = s.device.state().timestamp_bits;
+    const std::uint64_t mask = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
+    for (std::size_t i = 0; i < s.passes.size(); ++i) {
+        const double elapsed = static_cast<double>((ticks[i + 1] - ticks[i]) & mask);
+        times.push_back({s.passes[i], elapsed * s.device.info().timestamp_period_ns * 1e-6});
+    }
+    return times;
+}
+
+void Commands::enable_timestamps(bool on) {
+    DARB_CHECK(!state_->recording, "between recordings only");
+    state_->timed = on && state_->device.info().timestamp_period_ns > 0;
+}
+
+}  // namespace darb

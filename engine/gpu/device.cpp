@@ -1,0 +1,268 @@
+#include "engine/gpu/device.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/gpu/device_state.h"
+
+namespace darb {
+
+namespace {
+
+bool validation_from_environment() {
+    const char* value = std::getenv("DARB_VALIDATION");
+    return value != nullptr && *value != '\0' && std::strcmp(value, "0") != 0;
+}
+
+// Features in the chain that vkCreateDevice and the query share.
+struct Features {
+    VkPhysicalDeviceFeatures2 core{};
+    VkPhysicalDeviceVulkan11Features v11{};
+    VkPhysicalDeviceVulkan12Features v12{};
+    VkPhysicalDeviceVulkan13Features v13{};
+    VkPhysicalDeviceShaderAtomicFloatFeaturesEXT atomics{};
+
+    explicit Features(bool with_atomics) {
+        core.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
+        v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
+        v12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
+        v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES;
+        atomics.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT;
+        core.pNext = &v11;
+        v11.pNext = &v12;
+        v12.pNext = &v13;
+        if (with_atomics) v13.pNext = &atomics;
+    }
+    Features(const Features&) = delete;
+    Features& operator=(const Features&) = delete;
+
+    // Only what shaders may use: everything else stays off (robust access would cost time).
+    void keep_wanted_of(const Features& offered) {
+        core.features.shaderInt64 = offered.core.features.shaderInt64;
+        core.features.shaderFloat64 = offered.core.features.shaderFloat64;
+        core.features.shaderInt16 = offered.core.features.shaderInt16;
+        v11.storageBuffer16BitAccess = offered.v11.storageBuffer16BitAccess;
+        v12.storageBuffer8BitAccess = offered.v12.storageBuffer8BitAccess;
+        v12.shaderInt8 = offered.v12.shaderInt8;
+        v12.shaderFloat16 = offered.v12.shaderFloat16;
+        v12.bufferDeviceAddress = offered.v12.bufferDeviceAddress;
+        v12.vulkanMemoryModel = offered.v12.vulkanMemoryModel;
+        v12.vulkanMemoryModelDeviceScope = offered.v12.vulkanMemoryModelDeviceScope;
+        v12.scalarBlockLayout = VK_TRUE;
+        v13.maintenance4 = VK_TRUE;
+        v13.synchronization2 = VK_TRUE;
+        v13.subgroupSizeControl = VK_TRUE;
+        v13.computeFullSubgroups = VK_TRUE;
+        atomics.shaderBufferFloat32Atomics = offered.atomics.shaderBufferFloat32Atomics;
+        atomics.shaderBufferFloat32AtomicAdd = offered.atomics.shaderBufferFloat32AtomicAdd;
+        atomics.shaderSharedFloat32Atomics = offered.atomics.shaderSharedFloat32Atomics;
+        atomics.shaderSharedFloat32AtomicAdd = offered.atomics.shaderSharedFloat32AtomicAdd;
+    }
+};
+
+ListedDevice choose(const Instance& instance, const std::string& select) {
+    std::vector<ListedDevice> all = list_devices(instance);
+    std::vector<DeviceInfo> infos;
+    for (const ListedDevice& device : all) infos.push_back(device.info);
+    return all[choose_device(infos, select)];
+}
+
+std::string hex(std::span<const std::uint8_t> bytes) {
+    std::string text;
+    for (const std::uint8_t byte : bytes) text += fmt::format("{:02x}", byte);
+    return text;
+}
+
+}  // namespace
+
+Device::State::State(const DeviceOptions& options, bool validation)
+    : instance(validation, options.instance_extensions) {
+    if (const char* text = std::getenv("DARB_FAULT")) faults = parse_faults(text);
+    const ListedDevice chosen = choose(instance, options.select);
+    physical = chosen.handle;
+    info = chosen.info;
+    lavapipe = info.driver.starts_with("llvmpipe");
+    vkGetPhysicalDeviceMemoryProperties(physical, &memory);
+    try {
+        create_device(options);
+        create_cache(options);
+    } catch (...) {
+        release();
+        throw;
+    }
+}
+
+void Device::State::create_device(const DeviceOptions& options) {
+    VkPhysicalDeviceMaintenance4Properties maintenance{};
+    maintenance.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES;
+    VkPhysicalDeviceProperties2 properties{};
+    properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+    properties.pNext = &maintenance;
+    vkGetPhysicalDeviceProperties2(physical, &properties);
+    limits = properties.properties.limits;
+    max_buffer_bytes = maintenance.maxBufferSize;
+
+    queue_family = static_cast<std::uint32_t>(compute_queue_family(physical));
+    std::uint32_t count = 0;
+    vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
+    std::vector<VkQueueFamilyProperties> families(count);
+    vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
+    timestamp_bits = families[queue_family].timestampValidBits;
+    queue_graphics = (families[queue_family].queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
+
+    Features offered(info.float_atomics), wanted(info.float_atomics);
+    vkGetPhysicalDeviceFeatures2(physical, &offered.core);
+    wanted.keep_wanted_of(offered);
+    std::vector<const char*> extensions;
+    for (const std::string& name : options.device_extensions) extensions.push_back(name.c_str());
+    if (info.float_atomics) extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
+
+    const float priority = 1;
+    VkDeviceQueueCreateInfo queue_info{};
+    queue_info.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
+    queue_info.queueFamilyIndex = queue_family;
+    queue_info.queueCount = 1;
+    queue_info.pQueuePriorities = &priority;
+    VkDeviceCreateInfo device_info{};
+    device_info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
+    device_info.pNext = &wanted.core;
+    device_info.queueCreateInfoCount = 1;
+    device_info.pQueueCreateInfos = &queue_info;
+    device_info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
+    device_info.ppEnabledExtensionNames = extensions.data();
+    check_vulkan(vkCreateDevice(physical, &device_info, nullptr, &device), info.name);
+    vkGetDeviceQueue(device, queue_family, 0, &queue);
+}
+
+void Device::State::create_cache(const DeviceOptions& options) {
+    const std::filesystem::path folder =
+        options.cache_folder.empty() ? default_cache_folder() : options.cache_folder;
+    VkPhysicalDeviceIDProperties id{};
+    id.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES;
+    VkPhysicalDeviceProperties2 properties{};
+    properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+    properties.pNext = &id;
+    vkGetPhysicalDeviceProperties2(physical, &properties);
+    std::vector<std::byte> data;
+    if (!folder.empty()) {
+        cache_file = folder / fmt::format("pipelines-{}-{:08x}.bin", hex(id.deviceUUID),
+                                          properties.properties.driverVersion);
+        data = load_pipeline_cache(cache_file);
+    }
+    loaded_cache_bytes = data.size();
+    VkPipelineCacheCreateInfo cache_info{};
+    cache_info.sType = VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO;
+    cache_info.initialDataSize = data.size();
+    cache_info.pInitialData = data.data();
+    check_vulkan(vkCreatePipelineCache(device, &cache_info, nullptr, &cache), "pipeline cache");
+}
+
+Device::State::~State() {
+    if (device != VK_NULL_HANDLE) wait_idle();
+    std::size_t bytes = 0;
+    if (!cache_file.empty() &&
+        vkGetPipelineCacheData(device, cache, &bytes, nullptr) == VK_SUCCESS &&
+        bytes > sizeof(VkPipelineCacheHeaderVersionOne) && bytes != loaded_cache_bytes) {
+        std::vector<std::byte> data(bytes);
+        if (vkGetPipelineCacheData(device, cache, &bytes, data.data()) == VK_SUCCESS)
+            save_pipeline_cache(cache_file, std::span(data).first(bytes));
+    }
+    release();
+}
+
+void Device::State::release() noexcept {
+    if (device == VK_NULL_HANDLE) return;
+    vkDestroyCommandPool(device, copy_pool, nullptr);
+    vkDestroyPipelineCache(device, cache, nullptr);
+    vkDestroyDevice(device, nullptr);
+    device = VK_NULL_HANDLE;
+}
+
+void Device::State::set_name(VkObjectType type, std::uint64_t handle,
+                             const std::string& name) const {
+    if (instance.debug().set_name == nullptr) return;
+    VkDebugUtilsObjectNameInfoEXT name_info{};
+    name_info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_OBJECT_NAME_INFO_EXT;
+    name_info.objectType = type;
+    name_info.objectHandle = handle;
+    name_info.pObjectName = name.c_str();
+    instance.debug().set_name(device, &name_info);
+}
+
+VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence) {
+    if (faults.fails_submit(++submits)) return VK_ERROR_DEVICE_LOST;
+    VkCommandBufferSubmitInfo buffer_info{};
+    buffer_info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO;
+    buffer_info.commandBuffer = commands;
+    VkSubmitInfo2 submit_info{};
+    submit_info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO_2;
+    submit_info.commandBufferInfoCount = 1;
+    submit_info.pCommandBufferInfos = &buffer_info;
+    const std::lock_guard lock(queue_mutex);
+    return vkQueueSubmit2(queue, 1, &submit_info, fence);
+}
+
+VkResult Device::State::wait_idle() {
+    const std::lock_guard lock(queue_mutex);
+    return vkQueueWaitIdle(queue);
+}
+
+Device::Device(const DeviceOptions& options)
+    : state_(
+          std::make_unique<State>(options, options.validation || validation_from_environment())) {}
+
+Device::~Device() {
+    if (state_ && state_->allocated != 0)
+        fmt::print(stderr, "darb: {} bytes of buffers outlive their device\n",
+                   state_->allocated.load());
+}
+
+const DeviceInfo& Device::info() const {
+    return state_->info;
+}
+bool Device::is_lavapipe() const {
+    return state_->lavapipe;
+}
+VkInstance Device::instance() const {
+    return state_->instance.handle();
+}
+VkPhysicalDevice Device::physical() const {
+    return state_->physical;
+}
+VkDevice Device::handle() const {
+    return state_->device;
+}
+VkQueue Device::queue() const {
+    return state_->queue;
+}
+std::uint32_t Device::queue_family() const {
+    return state_->queue_family;
+}
+bool Device::queue_has_graphics() const {
+    return state_->queue_graphics;
+}
+VkPipelineCache Device::pipeline_cache() const {
+    return state_->cache;
+}
+std::uint64_t Device::allocated_bytes() const {
+    return state_->allocated;
+}
+std::uint64_t Device::peak_bytes() const {
+    return state_->peak;
+}
+void Device::set_memory_budget(std::uint64_t bytes) {
+    state_->budget = bytes;
+}
+std::uint64_t Device::validation_message_count() const {
+    return state_->instance.message_count();
+}
+void Device::wait_idle() const {
+    check_vulkan(state_->wait_idle(), state_->info.name);
+}
+
+}  // namespace darb

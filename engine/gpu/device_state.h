@@ -1,0 +1,80 @@
+// What Buffer, Pipeline and Commands share of a Device. Private to engine/gpu.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <span>
+#include <string>
+
+#include "engine/gpu/device.h"
+#include "engine/gpu/faults.h"
+#include "engine/gpu/instance.h"
+
+namespace darb {
+
+/// One physical device, as listed.
+struct ListedDevice {
+    VkPhysicalDevice handle = VK_NULL_HANDLE;
+    DeviceInfo info;
+};
+
+/// Best first, indices set.
+std::vector<ListedDevice> list_devices(const Instance& instance);
+
+/// The queue family that does compute, with graphics too if there is one; -1 = none.
+int compute_queue_family(VkPhysicalDevice device);
+
+/// The bytes of a pipeline cache file, or nothing where it is missing, broken or of another device.
+std::vector<std::byte> load_pipeline_cache(const std::filesystem::path& file);
+/// Errors are ignored: a cache that cannot be written only costs time.
+void save_pipeline_cache(const std::filesystem::path& file, std::span<const std::byte> data);
+
+struct Device::State {
+    explicit State(const DeviceOptions& options, bool validation);
+    ~State();
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+
+    Instance instance;
+    Faults faults;
+    DeviceInfo info;
+    bool lavapipe = false;
+    VkPhysicalDevice physical = VK_NULL_HANDLE;
+    VkPhysicalDeviceMemoryProperties memory{};
+    VkPhysicalDeviceLimits limits{};
+    std::uint64_t max_buffer_bytes = 0;
+    std::uint32_t timestamp_bits = 0;
+    std::uint32_t queue_family = 0;
+    bool queue_graphics = false;
+    VkDevice device = VK_NULL_HANDLE;
+    VkQueue queue = VK_NULL_HANDLE;
+    std::mutex queue_mutex;  // queues are externally synchronised
+    std::filesystem::path cache_file;
+    std::size_t loaded_cache_bytes = 0;
+    VkPipelineCache cache = VK_NULL_HANDLE;
+
+    std::atomic<std::uint64_t> allocated{0}, peak{0}, budget{0}, submits{0};
+
+    /// Where staging copies run; made at the first use.
+    VkCommandPool copy_pool = VK_NULL_HANDLE;
+    VkCommandBuffer copy_commands = VK_NULL_HANDLE;
+
+    void set_name(VkObjectType type, std::uint64_t handle, const std::string& name) const;
+    /// One submit under the mutex, with the fault injection.
+    VkResult submit(VkCommandBuffer commands, VkFence fence);
+    VkResult wait_idle();
+    /// Records one copy, runs it and waits.
+    void copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer to, std::uint64_t to_offset,
+                  std::uint64_t bytes, const std::string& what);
+
+  private:
+    void create_device(const DeviceOptions& options);
+    void create_cache(const DeviceOptions& options);
+    void release() noexcept;
+};
+
+}  // namespace darb

@@ -1,0 +1,45 @@
+#include "engine/gpu/faults.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "engine/core/error.h"
+
+namespace darb {
+
+namespace {
+
+void parse_one(std::string_view text, Faults& faults) {
+    constexpr std::string_view kOom = "oom:", kLost = "lost:";
+    if (text.starts_with(kOom) && text.size() > kOom.size()) {
+        faults.out_of_memory.emplace_back(text.substr(kOom.size()));
+        return;
+    }
+    if (text.starts_with(kLost)) {
+        const std::string_view number = text.substr(kLost.size());
+        const auto [end, error] =
+            std::from_chars(number.data(), number.data() + number.size(), faults.lost_at_submit);
+        const bool whole = end == number.data() + number.size();
+        if (error == std::errc() && whole && faults.lost_at_submit > 0) return;
+    }
+    throw Error("DARB_FAULT", "\"" + std::string(text) + "\" is no fault",
+                "Write oom:BUFFER or lost:N, separated by commas, or unset it.");
+}
+
+}  // namespace
+
+bool Faults::fails_allocation(std::string_view buffer) const {
+    return std::find(out_of_memory.begin(), out_of_memory.end(), buffer) != out_of_memory.end();
+}
+
+Faults parse_faults(std::string_view text) {
+    Faults faults;
+    while (!text.empty()) {
+        const size_t comma = std::min(text.find(','), text.size());
+        parse_one(text.substr(0, comma), faults);
+        text.remove_prefix(std::min(comma + 1, text.size()));
+    }
+    return faults;
+}
+
+}  // namespace darb

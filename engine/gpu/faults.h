@@ -1,0 +1,26 @@
+// Faults injected for tests through the environment variable DARB_FAULT, a comma-separated list:
+//   oom:NAME   creating the buffer NAME fails as if the device were out of memory
+//   lost:N     the N-th submit of the device (from 1) and all later ones report a lost device
+// Unset in normal use. Read once per Device; a text that is neither is an Error.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace darb {
+
+struct Faults {
+    std::vector<std::string> out_of_memory;  // buffer names
+    std::uint64_t lost_at_submit = 0;        // 0 = never
+
+    bool fails_allocation(std::string_view buffer) const;
+    bool fails_submit(std::uint64_t submit) const {
+        return lost_at_submit != 0 && submit >= lost_at_submit;
+    }
+};
+
+Faults parse_faults(std::string_view text);
+
+}  // namespace darb

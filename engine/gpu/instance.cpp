@@ -1,0 +1,163 @@
+#include "engine/gpu/instance.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "engine/core/error.h"
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+namespace {
+
+constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
+
+std::vector<VkExtensionProperties> offered_extensions(const char* layer) {
+    std::uint32_t count = 0;
+    vkEnumerateInstanceExtensionProperties(layer, &count, nullptr);
+    std::vector<VkExtensionProperties> all(count);
+    vkEnumerateInstanceExtensionProperties(layer, &count, all.data());
+    all.resize(count);
+    return all;
+}
+
+bool contains(const std::vector<VkExtensionProperties>& all, const std::string& name) {
+    return std::any_of(all.begin(), all.end(),
+                       [&](const VkExtensionProperties& e) { return name == e.extensionName; });
+}
+
+bool validation_installed() {
+    std::uint32_t count = 0;
+    vkEnumerateInstanceLayerProperties(&count, nullptr);
+    std::vector<VkLayerProperties> all(count);
+    vkEnumerateInstanceLayerProperties(&count, all.data());
+    return std::any_of(all.begin(), all.end(), [](const VkLayerProperties& layer) {
+        return std::strcmp(layer.layerName, kValidationLayer) == 0;
+    });
+}
+
+VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
+                                          VkDebugUtilsMessageTypeFlagsEXT,
+                                          const VkDebugUtilsMessengerCallbackDataEXT* data,
+                                          void* user) {
+    static_cast<std::atomic<std::uint64_t>*>(user)->fetch_add(1);
+    std::fprintf(stderr, "vulkan validation: %s\n", data->pMessage);
+    return VK_FALSE;
+}
+
+VkDebugUtilsMessengerCreateInfoEXT messenger_info(std::atomic<std::uint64_t>* counter) {
+    VkDebugUtilsMessengerCreateInfoEXT info{};
+    info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
+    info.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT |
+                           VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+    // Not GENERAL: the loader reports broken drivers of other vendors there.
+    info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+    info.pfnUserCallback = on_message;
+    info.pUserData = counter;
+    return info;
+}
+
+// The key of Mesa's shader cache leaves out lavapipe's vector width: a cache filled at one width
+// gives wrong sums at another (seen on Mesa 22.3), so each width gets its own folder.
+void separate_mesa_caches() {
+    if (std::getenv("MESA_SHADER_CACHE_DIR") != nullptr) return;
+    const std::filesystem::path root = default_cache_folder();
+    if (root.empty()) return;
+    const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");
+    const std::filesystem::path folder =
+        root / ("mesa-width-" + std::string(width != nullptr ? width : "default"));
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (!error) ::setenv("MESA_SHADER_CACHE_DIR", folder.c_str(), 0);
+}
+
+}  // namespace
+
+std::filesystem::path default_cache_folder() {
+    if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg != nullptr && *xdg != '\0')
+        return std::filesystem::path(xdg) / "darb";
+    if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+        return std::filesystem::path(home) / ".cache" / "darb";
+    return {};
+}
+
+Instance::Instance(bool validation, const std::vector<std::string>& extensions)
+    : messages_(std::make_unique<std::atomic<std::uint64_t>>(0)) {
+    separate_mesa_caches();
+    if (validation && !validation_installed())
+        throw Error("Vulkan validation", std::string(kValidationLayer) + " is not installed",
+                    "Install vulkan-validationlayers, or run without validation.");
+
+    const std::vector<VkExtensionProperties> offered = offered_extensions(nullptr);
+    std::vector<const char*> names;
+    for (const std::string& name : extensions) {
+        if (!contains(offered, name))
+            throw Error("Vulkan instance", "no extension " + name,
+                        "Run without a window, or install a driver with window support.");
+        names.push_back(name.c_str());
+    }
+    const bool debug = contains(offered, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+    if (debug) names.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+    if (validation) names.push_back(VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME);
+
+    VkApplicationInfo application{};
+    application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+    application.pApplicationName = "darb";
+    application.apiVersion = VK_API_VERSION_1_3;
+
+    const VkValidationFeatureEnableEXT synchronization =
+        VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
+    VkValidationFeaturesEXT features{};
+    features.sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT;
+    features.enabledValidationFeatureCount = 1;
+    features.pEnabledValidationFeatures = &synchronization;
+
+    VkInstanceCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+    info.pApplicationInfo = &application;
+    info.enabledExtensionCount = static_cast<std::uint32_t>(names.size());
+    info.ppEnabledExtensionNames = names.data();
+    if (validation) {
+        info.pNext = &features;
+        info.enabledLayerCount = 1;
+        info.ppEnabledLayerNames = &kValidationLayer;
+    }
+    check_vulkan(vkCreateInstance(&info, nullptr, &instance_), "Vulkan instance");
+    if (!debug) return;
+
+    const auto load = [&](const char* name) { return vkGetInstanceProcAddr(instance_, name); };
+    debug_.set_name =
+        reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(load("vkSetDebugUtilsObjectNameEXT"));
+    debug_.begin_label =
+        reinterpret_cast<PFN_vkCmdBeginDebugUtilsLabelEXT>(load("vkCmdBeginDebugUtilsLabelEXT"));
+    debug_.end_label =
+        reinterpret_cast<PFN_vkCmdEndDebugUtilsLabelEXT>(load("vkCmdEndDebugUtilsLabelEXT"));
+    if (!validation) return;
+    const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
+        load("vkCreateDebugUtilsMessengerEXT"));
+    const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(messages_.get());
+    if (create != nullptr) create(instance_, &messenger, nullptr, &messenger_);
+}
+
+Instance::~Instance() {
+    if (messenger_ != VK_NULL_HANDLE) {
+        const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
+            vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"));
+        destroy(instance_, messenger_, nullptr);
+    }
+    if (instance_ != VK_NULL_HANDLE) vkDestroyInstance(instance_, nullptr);
+}
+
+std::vector<VkPhysicalDevice> Instance::physical_devices() const {
+    std::uint32_t count = 0;
+    check_vulkan(vkEnumeratePhysicalDevices(instance_, &count, nullptr), "listing devices");
+    std::vector<VkPhysicalDevice> all(count);
+    const VkResult result = vkEnumeratePhysicalDevices(instance_, &count, all.data());
+    if (result != VK_INCOMPLETE) check_vulkan(result, "listing devices");
+    all.resize(count);
+    return all;
+}
+
+}  // namespace darb

@@ -1,0 +1,31 @@
+// Timestamps: query pools that grow with the number of passes of a recording. Private to
+// engine/gpu.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace darb {
+
+class Timestamps {
+  public:
+    explicit Timestamps(VkDevice device) : device_(device) {}
+    ~Timestamps();
+    Timestamps(const Timestamps&) = delete;
+    Timestamps& operator=(const Timestamps&) = delete;
+
+    void restart() { count_ = 0; }
+    /// Writes a timestamp once all earlier commands are done.
+    void write(VkCommandBuffer commands);
+    /// The ticks of all timestamps since restart(); the recording must have run.
+    std::vector<std::uint64_t> read() const;
+
+  private:
+    VkDevice device_;
+    std::vector<VkQueryPool> pools_;
+    std::uint32_t count_ = 0;
+};
+
+}  // namespace darb

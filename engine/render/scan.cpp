@@ -1,0 +1,85 @@
+#include "engine/render/scan.h"
+
+#include <algorithm>
+
+#include "engine/core/check.h"
+#include "shaders/shared/scan_args.h"
+
+namespace darb {
+
+namespace {
+
+// Elements of one chunk. More mean fewer chunk sums for the one workgroup at the top, less mean
+// more parallel work; with 65,535 groups of at least 4 teams the scan holds over 67 M elements.
+constexpr std::uint32_t kChunk = 256;
+constexpr std::uint32_t kThreads = 128, kThreadsLavapipe = 32;
+constexpr std::uint32_t kTopThreads = 256, kTopThreadsLavapipe = 32;
+
+std::uint32_t team_threads(const Device& device, const Scan::Strategy& strategy) {
+    if (strategy.team_is_thread) return 1;
+    return strategy.subgroup_size != 0 ? strategy.subgroup_size : device.info().subgroup_size;
+}
+
+SpecConstants constants(const Device& device, const Scan::Strategy& strategy) {
+    const bool lavapipe = device.is_lavapipe();
+    return {{"THREADS", static_cast<std::int32_t>(lavapipe ? kThreadsLavapipe : kThreads)},
+            {"CHUNK", static_cast<std::int32_t>(kChunk)},
+            {"TEAM_IS_THREAD", strategy.team_is_thread ? 1 : 0}};
+}
+
+SpecConstants top_constants(const Device& device) {
+    const std::uint32_t threads = device.is_lavapipe() ? kTopThreadsLavapipe : kTopThreads;
+    return {{"THREADS", static_cast<std::int32_t>(threads)}};
+}
+
+}  // namespace
+
+Scan::Strategy Scan::best_strategy(const Device& device) {
+    return {device.is_lavapipe(), 0};
+}
+
+Scan::Scan(Device& device, std::uint32_t capacity)
+    : Scan(device, capacity, best_strategy(device)) {}
+
+Scan::Scan(Device& device, std::uint32_t capacity, const Strategy& strategy)
+    : capacity_(capacity),
+      prepare_(device, "scan_prepare"),
+      reduce_(device, "scan_reduce", constants(device, strategy), true, strategy.subgroup_size),
+      top_(device, "scan_top", top_constants(device), true, strategy.subgroup_size),
+      apply_(device, "scan_apply", constants(device, strategy), true, strategy.subgroup_size),
+      plan_(device, "scan plan", sizeof(gpu::ScanPlan)),
+      chunk_sums_(device, "scan chunk sums",
+                  (std::uint64_t{capacity} + kChunk - 1) / kChunk * sizeof(std::uint32_t)) {
+    DARB_CHECK(capacity > 0);
+    teams_per_group_ = std::max(reduce_.threads_x() / team_threads(device, strategy), 1U);
+    const std::uint64_t elements_per_group = std::uint64_t{kChunk} * teams_per_group_;
+    DARB_CHECK(capacity / elements_per_group < device.info().max_groups_x, "capacity {}", capacity);
+}
+
+void Scan::prepare(Commands& commands, const Buffer& count_buffer, std::uint64_t count_offset) {
+    DARB_CHECK(count_offset % 4 == 0 && count_offset + 4 <= count_buffer.bytes());
+    const gpu::ScanPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4), kChunk,
+                                    teams_per_group_};
+    commands.dispatch(prepare_, args, {count_buffer, plan_}, 1);
+}
+
+void Scan::run(Commands& commands, const Buffer& counts, const Buffer& offsets,
+               const BufferRange& total) {
+    const std::uint64_t bytes = std::uint64_t{capacity_} * sizeof(std::uint32_t);
+    DARB_CHECK(counts.bytes() >= bytes && offsets.bytes() >= bytes, "{} and {} bytes, capacity {}",
+               counts.bytes(), offsets.bytes(), capacity_);
+    DARB_CHECK(total.offset % 4 == 0 && total.offset + 4 <= total.buffer->bytes());
+    const gpu::ScanTopArgs top_args{static_cast<std::uint32_t>(total.offset / 4)};
+    commands.dispatch_indirect(reduce_, NoArgs{}, {plan_, counts, chunk_sums_}, plan_, 0);
+    commands.dispatch(top_, top_args, {plan_, chunk_sums_, *total.buffer}, 1);
+    commands.dispatch_indirect(apply_, NoArgs{}, {plan_, counts, chunk_sums_, offsets}, plan_, 0);
+}
+
+void Scan::record(Commands& commands, const Buffer& counts, const Buffer& offsets,
+                  const Buffer& count_buffer, std::uint64_t count_offset,
+                  const BufferRange& total) {
+    prepare(commands, count_buffer, count_offset);
+    run(commands, counts, offsets, total);
+}
+
+}  // namespace darb

@@ -1,0 +1,50 @@
+// Scan: exclusive prefix sum of uint32 on the device, reduce-then-scan in four dispatches
+// (prepare, reduce, top, apply; after Merrill and Grimshaw 2009). No forward progress between
+// workgroups and no subgroup size is assumed, and the result never depends on timing.
+#pragma once
+
+#include <cstdint>
+
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
+#include "engine/gpu/pipeline.h"
+
+namespace darb {
+
+class Scan {
+  public:
+    struct Strategy {
+        bool team_is_thread = false;      // else a subgroup; see shaders/sort/scan_team.glsl
+        std::uint32_t subgroup_size = 0;  // 0 = the device's own
+    };
+    static Strategy best_strategy(const Device& device);
+
+    /// capacity: the most elements, > 0. Owns one word of scratch memory per chunk of elements.
+    Scan(Device& device, std::uint32_t capacity);
+    Scan(Device& device, std::uint32_t capacity, const Strategy& strategy);
+
+    std::uint32_t capacity() const { return capacity_; }
+
+    /// offsets[i] = counts[0] + ... + counts[i - 1] for i < n, modulo 2^32, with n the word of
+    /// count_buffer at count_offset (bytes, a multiple of 4), at most the capacity; n = 0 is legal.
+    /// The sum of all n goes to the word of total at its offset (a multiple of 4). counts and
+    /// offsets hold [capacity] words and may be the same buffer. Everything belongs to the current
+    /// pass() of commands.
+    void record(Commands& commands, const Buffer& counts, const Buffer& offsets,
+                const Buffer& count_buffer, std::uint64_t count_offset, const BufferRange& total);
+
+    /// The same in two parts, for several scans of one n: prepare once, then run as often as
+    /// needed.
+    void prepare(Commands& commands, const Buffer& count_buffer, std::uint64_t count_offset);
+    void run(Commands& commands, const Buffer& counts, const Buffer& offsets,
+             const BufferRange& total);
+
+  private:
+    std::uint32_t capacity_;
+    std::uint32_t teams_per_group_;
+    Pipeline prepare_, reduce_, top_, apply_;
+    Buffer plan_;
+    Buffer chunk_sums_;
+};
+
+}  // namespace darb

@@ -1,0 +1,46 @@
+// Scan, step 4 of 4: offsets of every element from the offset of its chunk. One team
+// (scan_team.glsl) a chunk, no shared memory.
+// Reads counts [n], chunk_offsets [chunks]; writes offsets [n].
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#include "shaders/shared/scan_args.h"
+#include "shaders/sort/scan_team.glsl"
+
+layout(set = 0, binding = 0, scalar) readonly buffer Plan { ScanPlan plan; };
+layout(set = 0, binding = 1, scalar) readonly buffer Counts { uint counts[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer ChunkOffsets { uint chunk_offsets[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer Offsets { uint offsets[]; };
+
+void scan_by_thread(uint begin, uint end, uint prefix) {
+    for (uint i = begin; i < end; ++i) {
+        const uint value = counts[i];
+        offsets[i] = prefix;
+        prefix += value;
+    }
+}
+
+// All lanes stay in the loop, for the scan needs them; those past the end add 0.
+void scan_by_subgroup(uint begin, uint end, uint prefix) {
+    for (uint row = begin; row < end; row += gl_SubgroupSize) {
+        const uint i = row + gl_SubgroupInvocationID;
+        const uint value = i < end ? counts[i] : 0;
+        const uint exclusive = subgroupExclusiveAdd(value);
+        if (i < end) offsets[i] = prefix + exclusive;
+        prefix += subgroupBroadcast(exclusive + value, gl_SubgroupSize - 1);
+    }
+}
+
+void main() {
+    const uint n = plan.count, chunks = plan.chunks;
+    for (uint chunk = first_team(); chunk < chunks; chunk += team_count()) {
+        const uint begin = chunk * CHUNK, end = begin + min(CHUNK, n - begin);
+        const uint prefix = chunk_offsets[chunk];
+        if (TEAM_IS_THREAD)
+            scan_by_thread(begin, end, prefix);
+        else
+            scan_by_subgroup(begin, end, prefix);
+    }
+}

@@ -1,0 +1,233 @@
+// Commands and Pipeline: fills, copies, dispatches, barriers under validation, timestamps.
+#include "engine/gpu/commands.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/core/error.h"
+#include "engine/gpu/barriers.h"
+#include "engine/gpu/shader_table.h"
+#include "engine/gpu/spirv_reflect.h"
+#include "shaders/shared/scan_args.h"
+
+namespace darb {
+namespace {
+
+constexpr VkPipelineStageFlags2 kCompute = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+constexpr VkAccessFlags2 kRead = VK_ACCESS_2_SHADER_STORAGE_READ_BIT;
+constexpr VkAccessFlags2 kWrite = VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
+
+VkBuffer fake_buffer(std::uintptr_t id) {
+    return reinterpret_cast<VkBuffer>(id);
+}
+
+std::size_t barriers_of(BarrierTracker& tracker, std::uintptr_t id, VkAccessFlags2 read,
+                        VkAccessFlags2 write) {
+    tracker.use({fake_buffer(id), kCompute, read, write});
+    return tracker.resolve().size();
+}
+
+TEST(BarrierTracker, read_after_write_waits_once_and_write_waits_for_readers) {
+    BarrierTracker tracker;
+    EXPECT_EQ(barriers_of(tracker, 1, 0, kWrite), 0U) << "first write";
+    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 1U) << "read after write";
+    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 0U) << "second read";
+    EXPECT_EQ(barriers_of(tracker, 2, kRead, 0), 0U) << "another buffer";
+    EXPECT_EQ(barriers_of(tracker, 1, 0, kWrite), 1U) << "write after read";
+    EXPECT_EQ(barriers_of(tracker, 1, kRead, kWrite), 1U) << "write after write";
+    tracker.clear();
+    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 0U) << "after clear";
+}
+
+TEST(BarrierTracker, reader_in_another_stage_waits_too) {
+    BarrierTracker tracker;
+    barriers_of(tracker, 1, 0, kWrite);
+    barriers_of(tracker, 1, kRead, 0);
+    tracker.use({fake_buffer(1), VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT,
+                 VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT, 0});
+    const auto& barriers = tracker.resolve();
+    ASSERT_EQ(barriers.size(), 1U);
+    EXPECT_EQ(barriers[0].srcAccessMask, kWrite);
+    EXPECT_EQ(barriers[0].dstAccessMask, VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT);
+}
+
+TEST(BarrierTracker, uses_of_one_buffer_in_one_pass_are_one) {
+    BarrierTracker tracker;
+    tracker.use({fake_buffer(1), kCompute, kRead, 0});
+    tracker.use({fake_buffer(1), kCompute, 0, kWrite});
+    EXPECT_TRUE(tracker.resolve().empty());
+    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 1U);
+}
+
+ShaderInterface interface_of(std::string_view name) {
+    for (const ShaderBinary& shader : shader_table())
+        if (shader.name == name) return reflect_spirv(shader.words, name);
+    ADD_FAILURE() << "no shader " << name;
+    return {};
+}
+
+TEST(ReflectSpirv, scan_apply_has_its_bindings_and_constants) {
+    const ShaderInterface shader = interface_of("scan_apply");
+    ASSERT_EQ(shader.bindings.size(), 4U);
+    for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_EQ(shader.bindings[i].binding, i);
+        EXPECT_TRUE(shader.bindings[i].storage_buffer);
+        EXPECT_EQ(shader.bindings[i].reads, i < 3) << i;
+        EXPECT_EQ(shader.bindings[i].writes, i == 3) << i;
+    }
+    ASSERT_EQ(shader.constants.size(), 3U);
+    EXPECT_EQ(shader.constants[0].name, "THREADS");
+    EXPECT_EQ(shader.constants[0].default_bits, 32U);
+    EXPECT_EQ(shader.constants[2].name, "TEAM_IS_THREAD");
+    EXPECT_EQ(shader.constants[2].type, ShaderInterface::ScalarType::boolean);
+    EXPECT_EQ(shader.local_size_spec_id[0], 0);
+    EXPECT_EQ(shader.push_constant_bytes, 0U);
+}
+
+TEST(ReflectSpirv, every_shader_of_the_table_is_readable) {
+    for (const ShaderBinary& shader : shader_table()) {
+        const ShaderInterface shader_interface = reflect_spirv(shader.words, shader.name);
+        EXPECT_LE(shader_interface.push_constant_bytes, 128U) << shader.name;
+        EXPECT_GE(shader_interface.bindings.size(), 1U) << shader.name;
+    }
+    EXPECT_EQ(interface_of("scan_prepare").push_constant_bytes, sizeof(gpu::ScanPrepareArgs));
+}
+
+TEST(Pipeline, spec_constants_are_set_by_name) {
+    Device device;
+    const Pipeline pipeline(device, "scan_top", {{"THREADS", 64}, {"NOT_THERE", 1.5F}});
+    EXPECT_EQ(pipeline.threads_x(), 64U);
+    EXPECT_TRUE(pipeline.declares("THREADS"));
+    EXPECT_FALSE(pipeline.declares("NOT_THERE"));
+}
+
+TEST(PipelineDeathTest, unknown_shader_aborts_with_its_name) {
+    GTEST_FLAG_SET(death_test_style, "threadsafe");
+    Device device;
+    EXPECT_DEATH(Pipeline(device, "no_such_shader"), "no_such_shader");
+}
+
+TEST(CommandsDeathTest, wrong_buffers_or_arguments_abort) {
+    GTEST_FLAG_SET(death_test_style, "threadsafe");
+    Device device;
+    const Pipeline pipeline(device, "scan_prepare");
+    const Buffer buffer(device, "buffer", 64);
+    Commands commands(device);
+    commands.begin();
+    EXPECT_DEATH(commands.dispatch(pipeline, gpu::ScanPrepareArgs{}, {buffer}, 1), "binds 1");
+    EXPECT_DEATH(commands.dispatch(pipeline, NoArgs{}, {buffer, buffer}, 1), "given 1 bytes");
+    EXPECT_DEATH(commands.dispatch(pipeline, gpu::ScanPrepareArgs{}, {buffer, buffer}, 0),
+                 "0 x 1 x 1 groups");
+}
+
+TEST(Commands, dispatch_reads_what_a_fill_wrote) {
+    Device device;
+    const Pipeline pipeline(device, "scan_prepare");
+    const Buffer count(device, "count", 8), plan(device, "plan", sizeof(gpu::ScanPlan));
+    Commands commands(device);
+    for (std::uint32_t round = 1; round < 4; ++round) {
+        commands.begin();
+        commands.pass("fill");
+        commands.fill(count, 1000 * round);
+        commands.pass("prepare");
+        commands.dispatch(pipeline, gpu::ScanPrepareArgs{2500, 1, 256, 2}, {count, plan}, 1);
+        commands.submit_and_wait();
+        const auto got = plan.download<gpu::ScanPlan>(1)[0];
+        const std::uint32_t expected = std::min(1000 * round, 2500U);
+        EXPECT_EQ(got.count, expected);
+        EXPECT_EQ(got.chunks, (expected + 255) / 256);
+        EXPECT_EQ(got.groups_x, (got.chunks + 1) / 2);
+    }
+}
+
+TEST(Commands, pass_times_have_a_row_per_pass_in_order) {
+    Device device;
+    const Buffer buffer(device, "buffer", 1 << 20);
+    Commands commands(device);
+    commands.begin();
+    for (int i = 0; i < 300; ++i) {  // more than one query pool
+        commands.pass("pass " + std::to_string(i));
+        commands.fill(buffer, static_cast<std::uint32_t>(i));
+    }
+    commands.submit_and_wait();
+    const std::vector<PassTime> times = commands.pass_times();
+    if (device.info().timestamp_period_ns == 0) GTEST_SKIP() << "no timestamps on this queue";
+    ASSERT_EQ(times.size(), 300U);
+    EXPECT_EQ(times[299].name, "pass 299");
+    for (const PassTime& time : times) {
+        EXPECT_GE(time.ms, 0) << time.name;
+        EXPECT_LT(time.ms, 1000) << time.name;
+    }
+}
+
+TEST(Commands, copies_and_fills_in_a_chain_are_ordered_and_validation_is_silent) {
+    DeviceOptions options;
+    options.validation = true;
+    std::unique_ptr<Device> device;
+    try {
+        device = std::make_unique<Device>(options);
+    } catch (const Error& error) {
+        GTEST_SKIP() << error.what();
+    }
+    const Pipeline pipeline(*device, "scan_prepare");
+    const Buffer a(*device, "a", 4096), b(*device, "b", 4096), plan(*device, "plan", 32);
+    const Buffer result(*device, "result", 4096, Memory::host);
+    Commands commands(*device);
+    for (int round = 0; round < 2; ++round) {
+        commands.begin();
+        commands.pass("chain");
+        commands.fill(a, 1);
+        commands.copy(a, b, 4096);                   // read after write
+        commands.fill(a, 2);                         // write after read
+        commands.fill(BufferRange(a, 512, 512), 3);  // write after write
+        commands.copy(a, BufferRange(b, 256), 1024);
+        const gpu::ScanPrepareArgs args{100, 0, 10, 1};
+        commands.dispatch(pipeline, args, {b, plan}, 1);
+        commands.dispatch_indirect(pipeline, args, {b, BufferRange(a, 2048)}, plan, 0);
+        commands.fill(plan, 0);
+        commands.copy(b, result, 4096);
+        commands.submit_and_wait();
+    }
+    const auto* words = static_cast<const std::uint32_t*>(result.mapped());
+    EXPECT_EQ(words[0], 1U);
+    EXPECT_EQ(words[64], 2U);
+    EXPECT_EQ(words[64 + 128], 3U);
+    EXPECT_EQ(words[1023], 1U);
+    EXPECT_EQ(device->validation_message_count(), 0U);
+}
+
+TEST(Commands, many_dispatches_grow_the_descriptor_pools) {
+    Device device;
+    const Pipeline pipeline(device, "scan_prepare");
+    const Buffer count(device, "count", 16), plan(device, "plan", 32);
+    Commands commands(device);
+    for (int round = 0; round < 2; ++round) {
+        commands.begin();
+        commands.fill(count, 7);
+        for (int i = 0; i < 600; ++i)
+            commands.dispatch(pipeline, gpu::ScanPrepareArgs{9, 0, 1, 1}, {count, plan}, 1);
+        commands.submit_and_wait();
+    }
+    EXPECT_EQ(plan.download<gpu::ScanPlan>(1)[0].count, 7U);
+}
+
+TEST(Commands, binding_more_than_the_device_allows_is_an_error) {
+    Device device;
+    if (device.info().max_storage_buffer_bytes > (std::uint64_t{1} << 28)) GTEST_SKIP();
+    const std::uint64_t bytes = device.info().max_storage_buffer_bytes + 4096;
+    const Buffer large(device, "large", bytes), plan(device, "plan", 32);
+    const Pipeline pipeline(device, "scan_prepare");
+    Commands commands(device);
+    commands.begin();
+    commands.pass("prepare");
+    const gpu::ScanPrepareArgs args{9, 0, 1, 1};
+    try {
+        commands.dispatch(pipeline, args, {large, plan}, 1);
+        FAIL() << "no error";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.where, "pass \"prepare\"");
+        EXPECT_NE(error.reason.find("\"large\""), std::string::npos) << error.reason;
+    }
+}
+
+}  // namespace
+}  // namespace darb

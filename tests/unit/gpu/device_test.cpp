@@ -1,0 +1,194 @@
+// Device: listing, selection, buffers, budgets and injected faults.
+#include "engine/gpu/device.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "engine/core/error.h"
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
+#include "engine/gpu/faults.h"
+
+namespace darb {
+namespace {
+
+DeviceInfo fake(int index, std::string name, bool usable) {
+    DeviceInfo info;
+    info.index = index;
+    info.name = std::move(name);
+    info.usable = usable;
+    info.reason = usable ? "discrete device" : "rejected: Vulkan 1.1, needs 1.3";
+    return info;
+}
+
+const std::vector<DeviceInfo> kFakes = {fake(0, "GeForce RTX 4090", true),
+                                        fake(1, "llvmpipe (LLVM 15)", true),
+                                        fake(2, "Old Radeon", false)};
+
+std::string error_of(auto&& action) try {
+    action();
+    return "no error";
+} catch (const Error& error) {
+    return error.what();
+}
+
+struct Environment {
+    explicit Environment(const char* fault) { ::setenv("DARB_FAULT", fault, 1); }
+    ~Environment() { ::unsetenv("DARB_FAULT"); }
+};
+
+TEST(ChooseDevice, nothing_asked_takes_the_first) {
+    EXPECT_EQ(choose_device(kFakes, ""), 0U);
+}
+
+TEST(ChooseDevice, part_of_name_matches_in_any_case) {
+    EXPECT_EQ(choose_device(kFakes, "LLVMpipe"), 1U);
+    EXPECT_EQ(choose_device(kFakes, "1"), 1U);
+}
+
+TEST(ChooseDevice, index_out_of_range_is_an_error_with_the_count) {
+    EXPECT_NE(error_of([] { choose_device(kFakes, "7"); }).find("there are 3 devices"),
+              std::string::npos);
+}
+
+TEST(ChooseDevice, unknown_name_is_an_error_with_all_names) {
+    const std::string text = error_of([] { choose_device(kFakes, "Apple"); });
+    EXPECT_NE(text.find("--device Apple"), std::string::npos) << text;
+    EXPECT_NE(text.find("GeForce RTX 4090"), std::string::npos) << text;
+}
+
+TEST(ChooseDevice, unusable_device_is_an_error_with_its_reason) {
+    const std::string text = error_of([] { choose_device(kFakes, "radeon"); });
+    EXPECT_NE(text.find("needs 1.3"), std::string::npos) << text;
+}
+
+TEST(ChooseDevice, no_device_is_an_error_that_says_what_to_install) {
+    const std::string text = error_of([] { choose_device({}, ""); });
+    EXPECT_NE(text.find("mesa-vulkan-drivers"), std::string::npos) << text;
+}
+
+TEST(ListDevices, every_usable_device_has_its_limits) {
+    const std::vector<DeviceInfo> devices = list_devices();
+    ASSERT_FALSE(devices.empty());
+    for (const DeviceInfo& info : devices) {
+        if (!info.usable) continue;
+        EXPECT_GE(info.max_storage_buffer_bytes, 1U << 27) << info.name;
+        EXPECT_GE(info.shared_memory_bytes, 16384U) << info.name;
+        EXPECT_GE(info.subgroup_size, 4U) << info.name;
+        EXPECT_GT(info.heap_bytes, 0U) << info.name;
+    }
+}
+
+TEST(Buffer, upload_then_download_returns_the_bytes) {
+    Device device;
+    for (const Memory memory : {Memory::device, Memory::host}) {
+        Buffer buffer(device, "numbers", 4096 * 4, memory);
+        std::vector<std::uint32_t> values(4096);
+        for (std::uint32_t i = 0; i < values.size(); ++i) values[i] = i * 2654435761U;
+        buffer.upload(values);
+        EXPECT_EQ(buffer.download<std::uint32_t>(4096), values);
+        EXPECT_EQ(buffer.download<std::uint32_t>(2, 40)[1], values[11]);
+    }
+}
+
+TEST(Buffer, long_upload_crosses_the_staging_pieces) {
+    Device device;
+    std::vector<std::uint32_t> values((40U << 20) / 4 + 3);
+    for (std::uint32_t i = 0; i < values.size(); ++i) values[i] = i ^ 0xabcd;
+    Buffer buffer(device, "long", values.size() * 4);
+    buffer.upload(values);
+    EXPECT_TRUE(buffer.download<std::uint32_t>(values.size()) == values);
+}
+
+TEST(Buffer, size_zero_is_legal) {
+    Device device;
+    const Buffer buffer(device, "empty", 0);
+    EXPECT_GT(buffer.bytes(), 0U);
+}
+
+TEST(Buffer, live_and_peak_bytes_are_counted) {
+    Device device;
+    Buffer kept(device, "kept", 1000);
+    {
+        const Buffer other(device, "other", 2000);
+        EXPECT_EQ(device.allocated_bytes(), 3000U);
+    }
+    Buffer moved = std::move(kept);
+    EXPECT_EQ(device.allocated_bytes(), 1000U);
+    EXPECT_EQ(device.peak_bytes(), 3000U);
+}
+
+TEST(Buffer, over_the_budget_is_an_error_with_name_and_size) {
+    Device device;
+    device.set_memory_budget(3 << 20);
+    const Buffer first(device, "first", 2 << 20);
+    const std::string text = error_of([&] { Buffer(device, "splat means", 2 << 20); });
+    EXPECT_NE(text.find("splat means"), std::string::npos) << text;
+    EXPECT_NE(text.find("2.0 MiB"), std::string::npos) << text;
+    EXPECT_EQ(device.allocated_bytes(), 2U << 20);
+}
+
+TEST(Buffer, larger_than_the_device_allows_is_an_error) {
+    Device device;
+    const std::string text = error_of([&] { Buffer(device, "huge", std::uint64_t{1} << 60); });
+    EXPECT_NE(text.find("\"huge\""), std::string::npos) << text;
+}
+
+TEST(Faults, text_that_is_no_fault_is_an_error) {
+    EXPECT_NE(error_of([] { parse_faults("oops"); }), "no error");
+    EXPECT_NE(error_of([] { parse_faults("lost:0"); }), "no error");
+    EXPECT_NE(error_of([] { parse_faults("lost:2x"); }), "no error");
+    const Faults faults = parse_faults("oom:a,lost:3,oom:b");
+    EXPECT_TRUE(faults.fails_allocation("b"));
+    EXPECT_FALSE(faults.fails_submit(2));
+    EXPECT_TRUE(faults.fails_submit(3));
+}
+
+TEST(Faults, out_of_memory_names_the_buffer_and_frees_nothing_else) {
+    const Environment environment("oom:pairs");
+    Device device;
+    const Buffer fine(device, "others", 64);
+    const std::string text = error_of([&] { Buffer(device, "pairs", 1 << 20); });
+    EXPECT_NE(text.find("buffer \"pairs\" (1.0 MiB): out of device memory"), std::string::npos)
+        << text;
+    EXPECT_EQ(device.allocated_bytes(), 64U);
+}
+
+TEST(Faults, lost_device_names_the_passes) {
+    const Environment environment("lost:2");
+    Device device;
+    Buffer buffer(device, "buffer", 64);
+    Commands commands(device);
+    const auto run = [&] {
+        commands.begin();
+        commands.pass("clear");
+        commands.fill(buffer, 1);
+        commands.pass("clear again");
+        commands.fill(buffer, 2);
+        commands.submit_and_wait();
+    };
+    run();
+    const std::string text = error_of(run);
+    EXPECT_NE(text.find("passes \"clear\" to \"clear again\": the device was lost"),
+              std::string::npos)
+        << text;
+}
+
+TEST(PipelineCache, broken_file_is_ignored) {
+    const auto folder = std::filesystem::path(::testing::TempDir()) / "darb_cache_test";
+    std::filesystem::remove_all(folder);
+    DeviceOptions options;
+    options.cache_folder = folder;
+    { const Device device(options); }
+    std::filesystem::create_directories(folder);
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+        std::ofstream(entry.path()) << "nonsense";
+    EXPECT_NO_THROW(Device{options});
+    std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace darb
