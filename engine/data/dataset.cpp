@@ -1,0 +1,74 @@
+#include "engine/data/dataset.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/core/error.h"
+#include "engine/data/colmap.h"
+#include "engine/data/source.h"
+
+namespace darb {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kHoldOutEvery = 8;
+constexpr double kExtentMargin = 1.1;
+
+Dataset load_source(const fs::path& path, const DatasetOptions& options) {
+    if (!fs::exists(path)) throw Error(path.string(), "does not exist", "Check the path.");
+    if (!fs::is_directory(path)) {
+        if (path.extension() == ".json") return load_transforms(path, options);
+        throw Error(path.string(), "is neither a folder nor a .json file",
+                    "Name a COLMAP project, a folder with transforms.json, or that file.");
+    }
+    const bool transforms =
+        fs::exists(path / "transforms.json") || fs::exists(path / "transforms_train.json");
+    for (const fs::path& model :
+         {path / "sparse" / "0", path / "sparse", path, path / "colmap" / "sparse" / "0"}) {
+        if (!is_colmap_model(model)) continue;
+        Dataset dataset = load_colmap(path, model, options);
+        if (transforms)
+            dataset.notes.push_back(fmt::format(
+                "{} was read; name the transforms file itself to use that.", model.string()));
+        return dataset;
+    }
+    if (transforms) return load_transforms(path, options);
+    throw Error(
+        path.string(),
+        "holds no cameras: neither a COLMAP model (sparse/0 with cameras and images, .bin or "
+        ".txt) nor transforms.json",
+        "Reconstruct the cameras first, for example with colmap.");
+}
+
+void hold_out(std::vector<View>& views) {
+    const bool own_test =
+        std::any_of(views.begin(), views.end(), [](const View& view) { return view.is_test; });
+    if (own_test) return;
+    for (std::size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].is_test = true;
+}
+
+}  // namespace
+
+Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
+    size_at_resolution(1, 1, options.resolution);  // a bad option fails before any reading
+    Dataset dataset = load_source(path, options);
+    std::stable_sort(dataset.views.begin(), dataset.views.end(),
+                     [](const View& a, const View& b) { return a.name < b.name; });
+    if (options.hold_out) hold_out(dataset.views);
+    fit_views(dataset, options);
+    return dataset;
+}
+
+double scene_extent(const std::vector<View>& views) {
+    glm::dvec3 mean(0.0);
+    for (const View& view : views) mean += view.camera.centre() / static_cast<double>(views.size());
+    double largest = 0;
+    for (const View& view : views)
+        largest = std::max(largest, glm::distance(mean, view.camera.centre()));
+    return kExtentMargin * largest;
+}
+
+}  // namespace darb

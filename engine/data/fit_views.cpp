@@ -1,0 +1,133 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "engine/core/error.h"
+#include "engine/data/image_io.h"
+#include "engine/data/lens.h"
+#include "engine/data/resample.h"
+#include "engine/data/source.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kDefaultWidth = 1600;  // px; wider photos are scaled down unless asked for
+
+/// What happened to how many photos, for the notes.
+struct Tally {
+    std::size_t resized = 0, unturned = 0, undistorted = 0, downscaled = 0;
+    std::string resize_example;
+};
+
+bool same_aspect(const LensModel& lens, int width, int height) {
+    const double wanted = static_cast<double>(width) * lens.height / lens.width;
+    return std::abs(height - wanted) <= 1.5 + 0.01 * wanted;
+}
+
+/// The EXIF number to apply; see load_photo.
+int choose_orientation(const ImageInfo& info, const LensModel& lens) {
+    if (info.orientation < 5)
+        return 1;  // no change of size: cameras are calibrated on stored pixels
+    if (info.width == lens.width && info.height == lens.height) return 1;
+    if (info.height == lens.width && info.width == lens.height) return info.orientation;
+    return same_aspect(lens, info.width, info.height) ? 1 : info.orientation;
+}
+
+void fit_lens(View& view, Dataset& dataset, Tally& tally) {
+    const ImageInfo info = read_image_info(view.photo);
+    dataset.has_alpha |= info.channels == 2 || info.channels == 4 || !view.mask.empty();
+    if (view.orientation == 1) view.orientation = choose_orientation(info, view.lens);
+    if (view.orientation != info.orientation) ++tally.unturned;
+    const bool swap = view.orientation >= 5;
+    const int width = swap ? info.height : info.width, height = swap ? info.width : info.height;
+    if (width == view.lens.width && height == view.lens.height) return;
+    if (!same_aspect(view.lens, width, height))
+        throw Error(view.photo.string(),
+                    fmt::format("is {} x {} px, but its camera declares {} x {}: another aspect "
+                                "ratio",
+                                width, height, view.lens.width, view.lens.height),
+                    "Use the photos that the cameras were calibrated with.");
+    if (tally.resized++ == 0)
+        tally.resize_example =
+            fmt::format("{} is {} x {} px where its camera declares {} x {}", view.name, width,
+                        height, view.lens.width, view.lens.height);
+    view.lens = scale_lens(view.lens, width, height);
+}
+
+void set_intrinsics(View& view, const UndistortedFrame& frame, int resolution, Tally& tally) {
+    const Camera& full = frame.camera;
+    const PhotoSize size = size_at_resolution(full.width, full.height, resolution);
+    if (size.width != full.width || size.height != full.height) ++tally.downscaled;
+    const double sx = static_cast<double>(size.width) / full.width;
+    const double sy = static_cast<double>(size.height) / full.height;
+    Camera& camera = view.camera;
+    camera.width = size.width;
+    camera.height = size.height;
+    camera.fx = full.fx * sx;
+    camera.fy = full.fy * sy;
+    camera.cx = full.cx * sx;
+    camera.cy = full.cy * sy;
+}
+
+void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& dataset) {
+    if (tally.resized > 0)
+        dataset.notes.push_back(fmt::format("The intrinsics of {} were scaled to the photos: {}.",
+                                            counted(tally.resized, "camera"),
+                                            tally.resize_example));
+    if (tally.unturned > 0)
+        dataset.notes.push_back(
+            fmt::format("Kept as stored in spite of an EXIF rotation, as calibrated: {}.",
+                        counted(tally.unturned, "photo")));
+    if (tally.undistorted > 0)
+        dataset.notes.push_back(
+            fmt::format("Undistorted at load: {}.", counted(tally.undistorted, "photo")));
+    if (tally.downscaled > 0 && options.resolution == -1)
+        dataset.notes.push_back(
+            fmt::format("Scaled down at load: {} wider than {} px; -r 1 keeps the size.",
+                        counted(tally.downscaled, "photo"), kDefaultWidth));
+}
+
+}  // namespace
+
+std::string counted(std::size_t count, const char* noun) {
+    return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+PhotoSize size_at_resolution(int width, int height, int resolution) {
+    const auto at_width = [&](int target) {  // truncates as 3DGS does
+        const double scale = static_cast<double>(width) / target;
+        return PhotoSize{target, std::max(1, static_cast<int>(height / scale))};
+    };
+    if (resolution == -1)
+        return width > kDefaultWidth ? at_width(kDefaultWidth) : PhotoSize{width, height};
+    if (resolution >= 1 && resolution <= 8)
+        return {
+            std::max(1, static_cast<int>(std::lround(static_cast<double>(width) / resolution))),
+            std::max(1, static_cast<int>(std::lround(static_cast<double>(height) / resolution)))};
+    if (resolution > 8) return resolution < width ? at_width(resolution) : PhotoSize{width, height};
+    throw Error("resolution", fmt::format("{} is no valid value", resolution),
+                "Use 1, 2, 4 or 8 (a divisor), a width in pixels above 8, or -1.");
+}
+
+void fit_views(Dataset& dataset, const DatasetOptions& options) {
+    Tally tally;
+    // Many views share one lens: its frame is found once.
+    std::map<std::pair<std::string, std::vector<double>>, UndistortedFrame> frames;
+    for (View& view : dataset.views) {
+        if (options.require_photos || std::filesystem::is_regular_file(view.photo))
+            fit_lens(view, dataset, tally);
+        std::vector<double> key = view.lens.parameters;
+        key.insert(key.end(), {double(view.lens.width), double(view.lens.height)});
+        const auto [at, is_new] = frames.try_emplace({view.lens.model, std::move(key)});
+        if (is_new) at->second = undistorted_frame(view.lens, view.name);
+        dataset.has_alpha |= at->second.has_gaps;
+        if (view.lens.distorted()) ++tally.undistorted;
+        set_intrinsics(view, at->second, options.resolution, tally);
+    }
+    add_notes(tally, options, dataset);
+}
+
+}  // namespace darb

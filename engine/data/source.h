@@ -1,0 +1,33 @@
+// Between the readers of a source and load_dataset. Internal to engine/data.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+/// Readers fill name, photo, mask, lens (as declared), is_test and the pose in camera.rotation and
+/// camera.translation; points; notes. Views come in any order.
+Dataset load_colmap(const std::filesystem::path& root, const std::filesystem::path& model_folder,
+                    const DatasetOptions& options);
+/// path: a .json file, or a folder with transforms_train.json or transforms.json.
+Dataset load_transforms(const std::filesystem::path& path, const DatasetOptions& options);
+
+/// Reads the head of every photo, decides on EXIF, scales declared lenses to the photos' sizes
+/// (with a note), and sets each camera's intrinsics to what load_photo returns. Throws Error naming
+/// the photo where its aspect ratio is not the camera's. Photos that do not exist keep declared
+/// sizes.
+void fit_views(Dataset& dataset, const DatasetOptions& options);
+
+/// Size at which a width x height photo is loaded: DatasetOptions::resolution.
+struct PhotoSize {
+    int width = 0, height = 0;
+};
+PhotoSize size_at_resolution(int width, int height, int resolution);
+
+/// Pluralised count for notes: "1 photo", "3 photos".
+std::string counted(std::size_t count, const char* noun);
+
+}  // namespace darb

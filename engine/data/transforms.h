@@ -1,0 +1,50 @@
+// transforms.json as the file states it: NeRF synthetic, instant-ngp and nerfstudio. No file
+// access.
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+/// What a frame, or the file for all frames, declares.
+struct TransformsIntrinsics {
+    std::optional<double> w, h, fl_x, fl_y, cx, cy;        // px
+    std::optional<double> camera_angle_x, camera_angle_y;  // rad
+    std::array<double, 6> k{};                             // k1 to k6
+    double p1 = 0, p2 = 0;
+    std::string camera_model;  // nerfstudio's name; empty where there is none
+    bool is_fisheye = false;   // instant-ngp
+};
+
+struct TransformsFrame {
+    std::string file_path;  // as written
+    std::string mask_path;  // may be empty
+    TransformsIntrinsics intrinsics;
+    glm::dmat3 rotation{1.0};  // world to camera, COLMAP's axes
+    glm::dvec3 translation{0.0};
+};
+
+struct TransformsFile {
+    std::vector<TransformsFrame> frames;
+    std::string ply_file_path;                // may be empty
+    std::vector<std::string> test_filenames;  // nerfstudio's split, may be empty
+};
+
+/// transform_matrix is camera to world with OpenGL's camera axes (y up, looking down -z).
+/// nerfstudio's applied_transform has been applied by the writer to the frames and to the ply
+/// alike, so both stay in the file's frame. Throws Error(where and frame, reason).
+TransformsFile parse_transforms(std::string_view json, const std::string& where);
+
+/// The lens for a photo of width x height px, used where the file declares no size. Throws Error
+/// where there is neither a focal length nor an angle, or the camera model cannot be read.
+LensModel lens_from_transforms(const TransformsIntrinsics& intrinsics, int width, int height,
+                               const std::string& where);
+
+}  // namespace darb
