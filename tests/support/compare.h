@@ -1,0 +1,44 @@
+// Comparison of arrays against a tolerance: prints case, index, expected, got and tolerance.
+//   EXPECT_TRUE(compare("d_position", expected, got, tolerance("gradient_float32"), 3));
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "tests/support/tolerance.h"
+
+namespace darb::test {
+
+struct ComparisonStats {
+    size_t count = 0;
+    size_t failures = 0;     // values outside abs + rel |expected|
+    size_t worst_index = 0;  // by error over allowed error
+    double worst_ratio = 0;  // that error over allowed error; infinite where got is not finite
+    double cosine = 1;       // 1 where both are zero, 0 where one is
+    double signed_bias = 0;  // sum(got - expected) / sum |expected|
+};
+
+/// Both of the same length.
+ComparisonStats comparison_stats(std::span<const double> expected, std::span<const double> got,
+                                 const Tolerance& tolerance);
+
+/// Fails on different lengths, on nothing to compare, and where the tolerance says so. The message
+/// names the first failures with their index as [i / inner][i % inner].
+testing::AssertionResult compare_doubles(std::string_view case_name,
+                                         std::span<const double> expected,
+                                         std::span<const double> got, const Tolerance& tolerance,
+                                         size_t inner);
+
+/// The same for any two containers of numbers.
+template <class Expected, class Got>
+testing::AssertionResult compare(std::string_view case_name, const Expected& expected,
+                                 const Got& got, const Tolerance& tolerance, size_t inner = 1) {
+    const std::vector<double> a(std::begin(expected), std::end(expected));
+    const std::vector<double> b(std::begin(got), std::end(got));
+    return compare_doubles(case_name, a, b, tolerance, inner);
+}
+
+}  // namespace darb::test

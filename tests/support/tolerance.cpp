@@ -1,0 +1,43 @@
+#include "tests/support/tolerance.h"
+
+#include "engine/core/check.h"
+
+namespace darb::test {
+namespace {
+
+constexpr Tolerance kTable[] = {
+    {"exact", 0, 0, 0, -1, 0, "counts, indices, order, and paths that must agree to the bit"},
+    {"difference", 2e-7, 2e-7, 0, 1 - 1e-12, 1e-6,
+     "double against central differences with h = 1e-5: truncation h^2 f''' / 6 = 1e-8 and "
+     "rounding 1e-15 / h = 1e-10, times a loss of about 100"},
+    {"difference_banded", 2e-6, 2e-6, 0.02, 1 - 1e-6, 1e-4,
+     "as difference, with the real cut-off: a pixel within h of it jumps by the cut-off / 2h"},
+    {"projection_float32", 1e-6, 2e-5, 0, 1 - 1e-9, 1e-5,
+     "about 60 float32 operations with mild cancellation in R and J W R"},
+    {"kernel_float32", 4e-7, 0, 0, 1 - 1e-12, 1e-6,
+     "polynomial 1.3e-7 and its rounding; the error of q comes on top, see the kernel test"},
+    {"image_float32", 2e-5, 2e-5, 0.002, 1 - 1e-8, 1e-5,
+     "sum of up to 1,000 layers in float32; the band is the alpha cut-off (a step of 1/255), the "
+     "edge of the support and the transmittance stop"},
+    {"gradient_float32", 1e-6, 2e-3, 0.005, 1 - 1e-6, 1e-3,
+     "recursion over all layers of a pixel, then sums over pixels that cancel; band as for images"},
+    {"loss_float32", 1e-6, 1e-5, 0, 1 - 1e-8, 1e-5,
+     "SSIM's variances cancel: 11x11 sums of squares"},
+    {"loss_gradient_float32", 1e-9, 1e-3, 0.001, 1 - 1e-7, 1e-4,
+     "per pixel 1/(3HW); flat windows divide by C2, and sign(x - y) flips where they meet"},
+    {"adam_float32", 1e-7, 1e-5, 0, 1 - 1e-9, 1e-5, "two square roots and a division"},
+};
+
+}  // namespace
+
+const Tolerance& tolerance(std::string_view name) {
+    for (const Tolerance& row : kTable) {
+        if (row.name == name) {
+            return row;
+        }
+    }
+    DARB_CHECK(false, "no tolerance named {}", name);
+    return kTable[0];
+}
+
+}  // namespace darb::test
