@@ -15,6 +15,7 @@ namespace darb {
 namespace {
 
 constexpr int kNodes = 64;          // enough for a pole at q = -1 with support 9
+constexpr double kNoise = 2e-15;    // of the samples: higher terms would spoil the derivative
 constexpr double kStep = 1e-200;    // of the complex-step derivative
 constexpr double kGaussRadius = 9;  // exp(-40) of the mass is beyond
 
@@ -48,7 +49,7 @@ ChebyshevSeries::ChebyshevSeries(const std::vector<double>& samples)
         coefficients_[k] = sum * (k == 0 ? 1 : 2) / n;
         largest = std::max(largest, std::abs(coefficients_[k]));
     }
-    while (coefficients_.size() > 1 && std::abs(coefficients_.back()) < 2e-16 * largest)
+    while (coefficients_.size() > 1 && std::abs(coefficients_.back()) < kNoise * largest)
         coefficients_.pop_back();
 }
 
@@ -94,7 +95,7 @@ double DerivedKernel::radial_moment(double radius, int power) const {
 }
 
 void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) const {
-    u = 1 - q / row_.support;
+    u = (row_.support - q) / row_.support;
     footprint_.evaluate(u, p, dp);
 }
 

@@ -103,6 +103,7 @@ void measure(const DerivedKernel& kernel, Footprint footprint, KernelCoefficient
         const double q = end * i / kSamples;
         double w, slope;
         evaluate(k, q, w, slope);
+        k.least_value = std::min(k.least_value, w);
         const double truth = kernel.value(footprint, q);
         k.value_error = std::max(k.value_error, std::abs(w - truth) / (gaussian ? truth : 1));
         k.slope_error = std::max(k.slope_error, std::abs(slope - kernel.slope(footprint, q)) *
@@ -143,20 +144,22 @@ KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint,
 KernelCoefficients fit_degree(const DerivedKernel& kernel, Footprint footprint, int degree) {
     KernelCoefficients plain = fit_literal(kernel, footprint, degree, false);
     if (plain.form != KERNEL_FORM_COMPACT || footprint == Footprint::exact) return plain;
-    KernelCoefficients squared = fit_literal(kernel, footprint, degree, true);
-    return squared.value_error < 0.5 * plain.value_error ? squared : plain;
+    const KernelCoefficients squared = fit_literal(kernel, footprint, degree, true);
+    return squared.least_value >= 0 && squared.value_error < 0.5 * plain.value_error ? squared
+                                                                                     : plain;
 }
 
 }  // namespace
 
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree) {
     DARB_CHECK(degree >= kLeastDegree && degree <= kFullDegree, "degree = {}", degree);
-    if (degree < kFullDegree) return fit_degree(kernel, footprint, degree);
-    for (int d = kLeastDegree; d < KERNEL_MAX_DEGREE; ++d) {
-        KernelCoefficients k = fit_degree(kernel, footprint, d);
-        if (k.value_error < kFullAccuracy) return k;
-    }
-    return fit_degree(kernel, footprint, KERNEL_MAX_DEGREE);
+    const bool full = degree == kFullDegree;
+    KernelCoefficients k = fit_degree(kernel, footprint, full ? kLeastDegree : degree);
+    while (full && k.value_error > kFullAccuracy && k.degree < KERNEL_MAX_DEGREE)
+        k = fit_degree(kernel, footprint, k.degree + 1);
+    DARB_CHECK(k.least_value >= 0, "kernel {}, degree {}: w = {}", kernel.row().name, k.degree,
+               k.least_value);
+    return k;
 }
 
 const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, int degree) {

@@ -24,6 +24,7 @@ struct KernelCoefficients {
     double inverse_support = 0;  // 1/R^2 as the shaders have it: rounded up to float, so that the
                                  // edge q = R^2 gives u <= 0 with fused and unfused arithmetic
     std::array<double, KERNEL_MAX_DEGREE + 1> c{};  // of the polynomial, rising powers
+    double least_value = 0;                         // smallest w, or 0: the shaders do not clamp it
     double value_error = 0;  // largest, of the fit in double; gaussian: relative
     double slope_error = 0;  // largest error of dw/dt (gaussian: dw/dq), t = q/R^2
 };
@@ -50,18 +51,18 @@ void evaluate_polynomial(const KernelCoefficients& k, Real x, Real& p, Real& dp)
 
 template <class Real>
 void evaluate_compact(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
-    const Real t = q * static_cast<Real>(k.inverse_support);
+    const Real t = std::min(q * static_cast<Real>(k.inverse_support), Real(1));
     const Real x = k.squared ? t * t : t;
     const Real dx = k.squared ? 2 * t * static_cast<Real>(k.inverse_support)
                               : static_cast<Real>(k.inverse_support);
-    const Real u = std::max(1 - x, Real(0));
+    const Real u = 1 - x;
     Real lower = u > 0 ? Real(1) : Real(0);  // u^(a-1), or u^0 for a = 0
     if (k.half_power == 1) lower = u > 0 ? 1 / std::sqrt(u) : Real(0);
     if (k.half_power >= 2 && k.half_power % 2 == 1) lower *= std::sqrt(u);
     for (int power = 4; power <= k.half_power; power += 2) lower *= u;
     Real p, dp;
     evaluate_polynomial(k, x, p, dp);
-    w = std::max(k.half_power == 0 ? lower * p : lower * u * p, Real(0));
+    w = k.half_power == 0 ? lower * p : lower * u * p;
     slope = k.half_power == 0 ? lower * dp * dx
                               : lower * (u * dp - Real(0.5) * Real(k.half_power) * p) * dx;
 }

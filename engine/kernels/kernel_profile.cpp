@@ -50,8 +50,8 @@ const std::array<KernelProfile, KERNEL_COUNT> kRows{{
      [](Complex q) { return cos_root(q / 9.0) * sinc_root(q / 9.0); }},  // = sin x/x, x = pi d/3
     {"inverse_quadratic", 9, 0, KERNEL_FORM_QUADRIC, [](Complex q) { return 1.0 / (1.0 + q); }},
     {"cosine", 9, 1, KERNEL_FORM_COMPACT, [](Complex q) { return cos_root(q / 9.0); }},
-    {"squared_raised_cosine", 9, 2, KERNEL_FORM_COMPACT,
-     [](Complex q) { return square(cos_root(square(q / 9.0))); }},  // = 1/2 + 1/2 cos(pi q/9)
+    {"squared_raised_cosine", 9, 4, KERNEL_FORM_COMPACT,
+     [](Complex q) { return square(square(cos_root(q / 9.0))); }},  // = (1/2 + 1/2 cos(pi d/3))^2
     {"inverse_multiquadric", 9, 0, KERNEL_FORM_QUADRIC,
      [](Complex q) { return 1.0 / std::sqrt(1.0 + q); }},
     {"parabolic", 9, 1, KERNEL_FORM_COMPACT, [](Complex q) { return 1.0 - q / 9.0; }},

@@ -24,6 +24,7 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     const KernelCoefficients& k = kernel_coefficients(kernel, footprint, degree);
     double margin = evaluation == EVALUATION_BUILTIN ? kBuiltinMargin : kRoundingMargin;
     if (k.form == KERNEL_FORM_GAUSSIAN) margin += 1.5 * k.value_error;
+    DARB_CHECK(k.half_power <= 9, "half_power = {}", k.half_power);  // shaders/kernels/compact.glsl
     SpecConstants constants{
         {"KERNEL", kernel},
         {"FOOTPRINT", static_cast<int>(footprint)},

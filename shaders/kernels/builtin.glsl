@@ -44,9 +44,10 @@ void builtin_value_slope(float q, out float w, out float slope) {
         w = cos(k * d);
         slope = -0.5 * k * sin(k * d) / d;
     } else {
-        const float k = PI / 9.0;
-        w = 0.5 + 0.5 * cos(k * q);
-        slope = -0.5 * k * sin(k * q);
+        const float k = PI / 3.0;
+        const float root = 0.5 + 0.5 * cos(k * d);
+        w = root * root;
+        slope = -0.5 * k * root * sin(k * d) / d;
     }
     const bool inside = q < KERNEL_SUPPORT;
     w = inside ? max(w, 0.0) : 0.0;

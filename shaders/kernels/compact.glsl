@@ -1,24 +1,29 @@
 // w = u^a P(x), u = 1 - x, x = t or t^2, t = q/R^2: every kernel that falls to zero at its edge, and its exact
 // footprint. slope = u^(a-1) (u P' - a P) dx/dq. Source: Taylor forms of the kernels, fitted by engine/kernels.
+// u^(a-1) for a of 3/2 to 9/2; the tests of the constant fold away.
+float compact_power(float u) {
+    const int power = KERNEL_HALF_POWER / 2 - 1;  // whole powers of u
+    const float u2 = u * u;
+    const float whole = power == 0 ? 1.0 : power == 1 ? u : power == 2 ? u2 : u2 * u;
+    return (KERNEL_HALF_POWER & 1) == 0 ? whole : power == 0 ? sqrt(u) : sqrt(u) * whole;
+}
+
 void compact_value_slope(float q, out float w, out float slope) {
-    const float t = q * KERNEL_INVERSE_SUPPORT;
+    const float t = min(q * KERNEL_INVERSE_SUPPORT, 1.0);
     const float x = KERNEL_SQUARED_VARIABLE != 0 ? t * t : t;
     const float dx =
         KERNEL_SQUARED_VARIABLE != 0 ? 2.0 * KERNEL_INVERSE_SUPPORT * t : KERNEL_INVERSE_SUPPORT;
-    const float u = max(1.0 - x, 0.0);
+    const float u = 1.0 - x;
     float lower = u > 0.0 ? 1.0 : 0.0;  // u^(a-1); u^0 for a = 0. The mask is needed for a <= 1 only
     if (KERNEL_HALF_POWER == 1) lower = u > 0.0 ? inversesqrt(u) : 0.0;
-    if (KERNEL_HALF_POWER == 3 || KERNEL_HALF_POWER == 5 || KERNEL_HALF_POWER == 7) lower = sqrt(u);
-    if (KERNEL_HALF_POWER == 4) lower = u;
-    if (KERNEL_HALF_POWER >= 5 && KERNEL_HALF_POWER != 6) lower *= u;
-    if (KERNEL_HALF_POWER >= 6) lower = KERNEL_HALF_POWER == 6 ? u * u : lower * u;
+    if (KERNEL_HALF_POWER > 2) lower = compact_power(u);
     float p, dp;
     kernel_polynomial(x, p, dp);
     if (KERNEL_HALF_POWER == 0) {
-        w = max(lower * p, 0.0);
+        w = lower * p;
         slope = lower * dp * dx;
     } else {
-        w = max(lower * u * p, 0.0);
+        w = lower * u * p;
         slope = lower * (u * dp - 0.5 * float(KERNEL_HALF_POWER) * p) * dx;
     }
 }
