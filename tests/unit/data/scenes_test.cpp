@@ -1,0 +1,138 @@
+// The real data sets load: counts, sizes, poses that see the points, and photos.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "engine/data/dataset.h"
+#include "tests/unit/data/data_files.h"
+
+namespace darb {
+namespace {
+
+struct Scene {
+    const char* folder;
+    std::size_t views, tests, points;
+    int width, height;
+    bool alpha;
+};
+
+class RealScene : public testing::TestWithParam<Scene> {};
+
+/// Share of the points before the camera and inside its frame.
+double seen_share(const View& view, const PointCloud& points) {
+    std::size_t seen = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const double* at = &points.position[i * 3];
+        const glm::dvec3 p =
+            view.camera.rotation * glm::dvec3(at[0], at[1], at[2]) + view.camera.translation;
+        if (!(p.z > 0)) continue;
+        const double x = view.camera.fx * p.x / p.z + view.camera.cx;
+        const double y = view.camera.fy * p.y / p.z + view.camera.cy;
+        if (x >= 0 && y >= 0 && x <= view.camera.width && y <= view.camera.height) ++seen;
+    }
+    return static_cast<double>(seen) / static_cast<double>(points.size());
+}
+
+TEST_P(RealScene, load_has_documented_counts_and_sizes) {
+    const Scene scene = GetParam();
+    DARB_NEED_DATA(test_data() / scene.folder);
+    DatasetOptions options;
+    options.hold_out = true;
+    const Dataset dataset = load_dataset(test_data() / scene.folder, options);
+    EXPECT_EQ(dataset.views.size(), scene.views);
+    EXPECT_EQ(dataset.points.size(), scene.points);
+    EXPECT_EQ(dataset.has_alpha, scene.alpha);
+    std::size_t tests = 0;
+    for (const View& view : dataset.views) {
+        EXPECT_EQ(view.camera.width, scene.width) << view.name;
+        EXPECT_EQ(view.camera.height, scene.height) << view.name;
+        EXPECT_GT(view.camera.fx, 0.3 * scene.width) << view.name;
+        if (view.is_test) ++tests;
+        if (scene.points > 0) {
+            EXPECT_GT(seen_share(view, dataset.points), 0.1) << view.name;
+        }
+    }
+    EXPECT_EQ(tests, scene.tests);
+    EXPECT_TRUE(std::is_sorted(dataset.views.begin(), dataset.views.end(),
+                               [](const View& a, const View& b) { return a.name < b.name; }));
+    EXPECT_GT(scene_extent(dataset.views), 0.1);
+}
+
+TEST_P(RealScene, photos_match_their_cameras) {
+    const Scene scene = GetParam();
+    DARB_NEED_DATA(test_data() / scene.folder);
+    Dataset dataset = load_dataset(test_data() / scene.folder);
+    dataset.views.resize(3);
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    ASSERT_EQ(photos.size(), 3u);
+    for (const ImageU8& photo : photos) {
+        EXPECT_EQ(std::tie(photo.width, photo.height), std::tie(scene.width, scene.height));
+        EXPECT_EQ(photo.channels, 4);
+        int low_alpha = 255, high = 0;
+        for (std::size_t i = 0; i < photo.data.size(); i += 4) {
+            low_alpha = std::min<int>(low_alpha, photo.data[i + 3]);
+            high = std::max<int>(high, photo.data[i]);
+        }
+        EXPECT_EQ(low_alpha, scene.alpha ? 0 : 255);
+        EXPECT_GT(high, 100);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    AllScenes, RealScene,
+    testing::Values(Scene{"fox_800", 50, 7, 13457, 449, 800, false},
+                    Scene{"fox_200_tiny", 25, 4, 4000, 200, 356, false},
+                    Scene{"monstree_800", 23, 3, 4876, 800, 601, false},
+                    Scene{"monstree_200_tiny", 23, 3, 4000, 200, 150, false},
+                    Scene{"miku_plush_800", 48, 6, 4767, 800, 597, false},
+                    Scene{"miku_plush_200_tiny", 48, 6, 3000, 200, 149, false},
+                    Scene{"sceaux_castle_800", 11, 2, 4799, 800, 594, false},
+                    Scene{"sceaux_castle_200_tiny", 11, 2, 3000, 200, 149, false},
+                    Scene{"lego_nerf_synthetic_400", 63, 11, 0, 400, 400, true},
+                    Scene{"lego_nerf_synthetic_200_tiny", 37, 6, 0, 200, 200, true}),
+    [](const auto& test) { return std::string(test.param.folder); });
+
+TEST(FoxTransforms, original_file_skips_the_photos_that_are_missing) {
+    const auto file = test_data() / "fox_800" / "transforms_instantngp_original_67.json";
+    DARB_NEED_DATA(file);
+    const Dataset dataset = load_dataset(file);
+    EXPECT_EQ(dataset.views.size(), 50u);
+    const auto has_note = [&](const std::string& text) {
+        return std::any_of(
+            dataset.notes.begin(), dataset.notes.end(),
+            [&](const std::string& note) { return note.find(text) != std::string::npos; });
+    };
+    EXPECT_TRUE(has_note("17 frames"));
+    EXPECT_TRUE(has_note("50 cameras were scaled"));
+    EXPECT_EQ(dataset.views[0].lens.model, "OPENCV");
+}
+
+TEST(RealScenes, lego_cameras_look_at_the_model) {
+    DARB_NEED_DATA(test_data() / "lego_nerf_synthetic_200_tiny");
+    for (const View& view : load_dataset(test_data() / "lego_nerf_synthetic_200_tiny").views) {
+        const Camera& camera = view.camera;
+        EXPECT_NEAR(camera.translation.z, glm::length(camera.centre()), 0.2) << view.name;
+        EXPECT_NEAR(glm::length(camera.centre()), 4.03, 0.01) << view.name;
+        EXPECT_NEAR(camera.fx, 0.5 * 200 / std::tan(0.5 * 0.6911112070083618), 1e-9);
+    }
+}
+
+TEST(RealScenes, folder_scaled_by_divisor_and_width) {
+    DARB_NEED_DATA(test_data() / "monstree_200_tiny");
+    DatasetOptions options;
+    options.resolution = 4;
+    const Dataset quarter = load_dataset(test_data() / "monstree_200_tiny", options);
+    EXPECT_EQ(quarter.views[0].camera.width, 50);
+    EXPECT_EQ(quarter.views[0].camera.height, 38);
+    EXPECT_EQ(load_photo(quarter.views[0]).width, 50);
+    options.resolution = 100;
+    const Dataset hundred = load_dataset(test_data() / "monstree_200_tiny", options);
+    EXPECT_EQ(hundred.views[0].camera.width, 100);
+    EXPECT_EQ(hundred.views[0].camera.height, 75);
+    EXPECT_DOUBLE_EQ(hundred.views[0].camera.fx * 2,
+                     load_dataset(test_data() / "monstree_200_tiny").views[0].camera.fx);
+}
+
+}  // namespace
+}  // namespace darb
