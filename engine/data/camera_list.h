@@ -1,0 +1,27 @@
+// cameras.json as 3DGS writes it beside a scene, and cameras from whatever a user names.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+/// A list of {id, img_name, width, height, position, rotation, fx, fy} and, where the principal
+/// point is off the centre, cx and cy; rotation: rows of camera to world. Views have no photo.
+/// Throws Error naming the record.
+std::vector<View> parse_camera_list(std::string_view json, const std::string& where);
+std::string format_camera_list(const std::vector<View>& views);
+
+/// Through write_file_atomic.
+void write_camera_list(const std::filesystem::path& path, const std::vector<View>& views);
+
+/// path: a data set folder, a folder with cameras.json, a transforms.json or a cameras.json. Photos
+/// are not required.
+std::vector<View> load_cameras(const std::filesystem::path& path,
+                               const DatasetOptions& options = {});
+
+}  // namespace darb

@@ -1,0 +1,149 @@
+#include "engine/data/metrics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <thread>
+#include <vector>
+
+#include "engine/core/check.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kRadius = 5;  // window 11
+constexpr double kSigma = 1.5;
+constexpr float kC1 = 1e-4f, kC2 = 9e-4f;
+constexpr int kMoments = 5;  // x, y, x^2, y^2, xy
+
+using Window = std::array<float, 2 * kRadius + 1>;
+
+Window gaussian_window() {
+    std::array<double, 2 * kRadius + 1> weights{};
+    double sum = 0;
+    for (int i = -kRadius; i <= kRadius; ++i) {
+        weights[static_cast<std::size_t>(i + kRadius)] = std::exp(-i * i / (2 * kSigma * kSigma));
+        sum += weights[static_cast<std::size_t>(i + kRadius)];
+    }
+    Window window{};
+    for (std::size_t i = 0; i < window.size(); ++i)
+        window[i] = static_cast<float>(weights[i] / sum);
+    return window;
+}
+
+int used_channels(const ImageF& image) {
+    return std::min(image.channels, 3);
+}
+
+void check_same_size(const ImageF& a, const ImageF& b) {
+    DARB_CHECK(
+        a.width == b.width && a.height == b.height && a.channels == b.channels && !a.data.empty(),
+        "{}x{}x{} and {}x{}x{}", a.width, a.height, a.channels, b.width, b.height, b.channels);
+}
+
+/// The five moments of one image row, filtered along x: [kMoments][width].
+void filter_row(const ImageF& a, const ImageF& b, int y, int channel, const Window& window,
+                std::vector<float>& padded, float* out) {
+    const auto width = static_cast<std::size_t>(a.width);
+    const std::size_t stride = width + 2 * kRadius;
+    for (std::size_t x = 0; x < width; ++x) {
+        const std::size_t at = (static_cast<std::size_t>(y) * width + x) * a.channels + channel;
+        const float p = std::clamp(a.data[at], 0.0f, 1.0f);
+        const float q = std::clamp(b.data[at], 0.0f, 1.0f);
+        const float moments[kMoments] = {p, q, p * p, q * q, p * q};
+        for (std::size_t m = 0; m < kMoments; ++m) padded[m * stride + kRadius + x] = moments[m];
+    }
+    std::fill(out, out + kMoments * width, 0.0f);
+    for (std::size_t m = 0; m < kMoments; ++m)
+        for (std::size_t tap = 0; tap < window.size(); ++tap) {
+            const float* from = &padded[m * stride + tap];
+            float* to = out + m * width;
+            for (std::size_t x = 0; x < width; ++x) to[x] += window[tap] * from[x];
+        }
+}
+
+/// The index at one pixel, from the filtered moments.
+float ssim_at(const float* moments, std::size_t stride) {
+    const float p = moments[0], q = moments[stride];
+    const float var_p = moments[2 * stride] - p * p, var_q = moments[3 * stride] - q * q;
+    const float covariance = moments[4 * stride] - p * q;
+    return ((2 * p * q + kC1) * (2 * covariance + kC2)) /
+           ((p * p + q * q + kC1) * (var_p + var_q + kC2));
+}
+
+/// Sum of the index over rows [begin, end) of one channel. A ring holds the last 11 filtered rows.
+double ssim_rows(const ImageF& a, const ImageF& b, int channel, int begin, int end) {
+    static const Window window = gaussian_window();
+    const auto width = static_cast<std::size_t>(a.width);
+    const std::size_t row_values = kMoments * width;
+    std::vector<float> padded(kMoments * (width + 2 * kRadius), 0.0f), sum(row_values);
+    std::vector<float> ring(window.size() * row_values, 0.0f);
+    double total = 0;
+    for (int y = begin - kRadius; y < end + kRadius; ++y) {
+        float* slot =
+            &ring[static_cast<std::size_t>(y + kRadius - begin) % window.size() * row_values];
+        if (y >= 0 && y < a.height)
+            filter_row(a, b, y, channel, window, padded, slot);
+        else
+            std::fill(slot, slot + row_values, 0.0f);
+        if (y < begin + kRadius) continue;
+        const int centre = y - kRadius;
+        std::fill(sum.begin(), sum.end(), 0.0f);
+        for (std::size_t tap = 0; tap < window.size(); ++tap) {
+            const auto row = static_cast<std::size_t>(centre - begin) + tap;
+            const float* from = &ring[row % window.size() * row_values];
+            for (std::size_t k = 0; k < row_values; ++k) sum[k] += window[tap] * from[k];
+        }
+        for (std::size_t x = 0; x < width; ++x)
+            total += static_cast<double>(ssim_at(&sum[x], width));
+    }
+    return total;
+}
+
+}  // namespace
+
+double psnr(const ImageF& image, const ImageF& truth) {
+    check_same_size(image, truth);
+    const auto channels = static_cast<std::size_t>(image.channels);
+    const auto used = static_cast<std::size_t>(used_channels(image));
+    double sum = 0;
+    for (std::size_t i = 0; i < image.data.size(); i += channels)
+        for (std::size_t c = 0; c < used; ++c) {
+            const double difference =
+                static_cast<double>(std::clamp(image.data[i + c], 0.0f, 1.0f)) -
+                static_cast<double>(std::clamp(truth.data[i + c], 0.0f, 1.0f));
+            sum += difference * difference;
+        }
+    const double mean = sum / static_cast<double>(image.data.size() / channels * used);
+    return mean == 0 ? std::numeric_limits<double>::infinity() : -10 * std::log10(mean);
+}
+
+double ssim(const ImageF& image, const ImageF& truth, int threads) {
+    check_same_size(image, truth);
+    const int parts = std::clamp(threads, 1, image.height);
+    std::vector<double> sums(static_cast<std::size_t>(parts), 0.0);
+    {
+        std::vector<std::jthread> workers;
+        for (int part = 0; part < parts; ++part)
+            workers.emplace_back([&, part] {
+                const int begin = static_cast<int>(std::int64_t{image.height} * part / parts);
+                const int end = static_cast<int>(std::int64_t{image.height} * (part + 1) / parts);
+                for (int c = 0; c < used_channels(image); ++c)
+                    sums[static_cast<std::size_t>(part)] += ssim_rows(image, truth, c, begin, end);
+            });
+    }
+    double total = 0;
+    for (const double sum : sums) total += sum;
+    return total / (static_cast<double>(image.width) * image.height * used_channels(image));
+}
+
+ImageF to_float(const ImageU8& image) {
+    ImageF out(image.width, image.height, image.channels);
+    std::transform(image.data.begin(), image.data.end(), out.data.begin(),
+                   [](std::uint8_t value) { return static_cast<float>(value) / 255.0f; });
+    return out;
+}
+
+}  // namespace darb

@@ -1,0 +1,125 @@
+#include "engine/data/run_colmap.h"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <deque>
+#include <memory>
+
+#include "engine/core/error.h"
+#include "engine/data/colmap.h"
+
+namespace darb {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kKeptLines = 8;  // shown when a command fails
+
+/// In single quotes, for the shell.
+std::string quoted(const fs::path& path) {
+    std::string text = "'";
+    for (const char c : path.string()) {
+        if (c == '\'')
+            text += "'\\''";
+        else
+            text += c;
+    }
+    return text + "'";
+}
+
+std::string joined(const auto& lines) {
+    std::string text;
+    for (const std::string& line : lines) text += "\n    " + line;
+    return text;
+}
+
+void run_command(const std::string& command,
+                 const std::function<void(std::string_view)>& progress) {
+    const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
+    std::unique_ptr<std::FILE, decltype(close)> pipe(::popen((command + " 2>&1").c_str(), "r"),
+                                                     close);
+    if (!pipe) throw Error("colmap", "cannot be started", "Free memory or processes.");
+    std::deque<std::string> last;
+    char buffer[4096];
+    std::string line;
+    while (std::fgets(buffer, sizeof buffer, pipe.get())) {
+        line += buffer;
+        if (!line.ends_with('\n') && !std::feof(pipe.get())) continue;
+        while (line.ends_with('\n') || line.ends_with('\r')) line.pop_back();
+        if (progress && !line.empty()) progress(line);
+        if (!line.empty()) last.push_back(line);
+        if (last.size() > kKeptLines) last.pop_front();
+        line.clear();
+    }
+    const int status = ::pclose(pipe.release());
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+        throw Error("colmap",
+                    fmt::format("failed:\n    {}\n  It printed last:{}", command, joined(last)),
+                    "Photos need 60 % overlap and texture; see what colmap says above.");
+}
+
+}  // namespace
+
+bool is_installed(std::string_view program) {
+    const char* path = std::getenv("PATH");
+    std::string_view rest = path ? path : "";
+    while (!rest.empty()) {
+        const std::size_t end = std::min(rest.find(':'), rest.size());
+        const fs::path candidate = fs::path(rest.substr(0, end)) / program;
+        if (fs::is_regular_file(candidate) && ::access(candidate.c_str(), X_OK) == 0) return true;
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+    return false;
+}
+
+std::vector<std::string> colmap_commands(const ColmapRun& run) {
+    const std::string colmap = "QT_QPA_PLATFORM=offscreen colmap ";
+    const std::string database = quoted(run.workspace / "database.db");
+    const std::string photos = quoted(run.photos);
+    // OPENCV: phones and consumer cameras; the undistorter turns it into a pinhole.
+    return {
+        fmt::format("{}feature_extractor --database_path {} --image_path {} "
+                    "--ImageReader.single_camera {} --ImageReader.camera_model OPENCV "
+                    "--SiftExtraction.use_gpu 0",
+                    colmap, database, photos, run.single_camera ? 1 : 0),
+        fmt::format("{}{}_matcher --database_path {} --SiftMatching.use_gpu 0", colmap,
+                    run.sequential ? "sequential" : "exhaustive", database),
+        fmt::format("{}mapper --database_path {} --image_path {} --output_path {}", colmap,
+                    database, photos, quoted(run.workspace / "sparse")),
+        fmt::format("{}image_undistorter --image_path {} --input_path {} --output_path {} "
+                    "--output_type COLMAP --max_image_size {}",
+                    colmap, photos, quoted(run.workspace / "sparse" / "0"),
+                    quoted(run.workspace / "dense"), run.max_image_size),
+    };
+}
+
+fs::path run_colmap(const ColmapRun& run, const std::function<void(std::string_view)>& progress) {
+    if (!fs::is_directory(run.photos))
+        throw Error(run.photos.string(), "is no folder of photos", "Check the path.");
+    const std::vector<std::string> commands = colmap_commands(run);
+    if (!is_installed("colmap"))
+        throw Error(
+            run.photos.string(), "holds photos without cameras, and colmap is not installed",
+            fmt::format("Install it (apt install colmap), or run elsewhere:\n    mkdir -p {}{}",
+                        quoted(run.workspace / "sparse"), joined(commands)));
+    std::error_code failure;
+    fs::create_directories(run.workspace / "sparse", failure);
+    if (failure)
+        throw Error(run.workspace.string(), "cannot be made: " + failure.message(),
+                    "Choose another workspace folder.");
+    for (std::size_t i = 0; i < commands.size(); ++i) {
+        if (progress) progress(fmt::format("[{}/{}] {}", i + 1, commands.size(), commands[i]));
+        run_command(commands[i], progress);
+        if (i == 2 && !is_colmap_model(run.workspace / "sparse" / "0"))
+            throw Error(run.photos.string(), "colmap found no common view of the photos",
+                        "Take more photos with more overlap, in good light.");
+    }
+    return run.workspace / "dense";
+}
+
+}  // namespace darb

@@ -1,0 +1,32 @@
+// From a folder of photos to a data set: runs the installed colmap on the CPU, without a display.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace darb {
+
+struct ColmapRun {
+    std::filesystem::path photos;     // a folder of PNG and JPEG files
+    std::filesystem::path workspace;  // made where missing; holds the data set afterwards
+    bool sequential = false;          // neighbours in name order only: for video frames
+    bool single_camera = true;        // all photos by one camera at one zoom
+    int max_image_size = 1600;        // px, of the undistorted photos
+};
+
+/// The shell commands, in order: feature_extractor, matcher, mapper, image_undistorter.
+std::vector<std::string> colmap_commands(const ColmapRun& run);
+
+/// Runs them, passing on what they print line by line. Returns the data set's folder
+/// (workspace/dense, with images and sparse). Throws Error: with the commands in its hint where
+/// colmap is not installed, with the last lines printed where a command fails.
+std::filesystem::path run_colmap(const ColmapRun& run,
+                                 const std::function<void(std::string_view line)>& progress);
+
+/// Whether a program of that name is on PATH.
+bool is_installed(std::string_view program);
+
+}  // namespace darb
