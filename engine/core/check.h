@@ -29,9 +29,9 @@ std::string check_values(fmt::format_string<Values...> format, Values&&... value
 }  // namespace darb
 
 /// DARB_CHECK(i < n, "i = {}, n = {}", i, n): the format and its values are optional.
-#define DARB_CHECK(expression, ...)                                                         \
-    do {                                                                                    \
-        if (!(expression)) [[unlikely]]                                                     \
-            ::darb::check_failed(__FILE__, __LINE__, #expression,                           \
-                                 ::darb::check_values(__VA_ARGS__));               \
+#define DARB_CHECK(expression, ...)                                  \
+    do {                                                             \
+        if (!(expression)) [[unlikely]]                              \
+            ::darb::check_failed(__FILE__, __LINE__, #expression,    \
+                                 ::darb::check_values(__VA_ARGS__)); \
     } while (false)

@@ -32,7 +32,7 @@ struct Image {
     }
 };
 
-using ImageF = Image<float>;         // linear in [0, 1] where it holds a photo divided by 255
+using ImageF = Image<float>;  // linear in [0, 1] where it holds a photo divided by 255
 using ImageU8 = Image<std::uint8_t>;
 
 }  // namespace darb

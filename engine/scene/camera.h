@@ -7,8 +7,8 @@
 namespace darb {
 
 struct Camera {
-    int width = 0;   // px
-    int height = 0;  // px
+    int width = 0;                          // px
+    int height = 0;                         // px
     double fx = 0, fy = 0, cx = 0, cy = 0;  // px
     glm::dmat3 rotation{1.0};  // world to camera: p_camera = rotation * p_world + translation
     glm::dvec3 translation{0.0};

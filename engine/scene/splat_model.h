@@ -14,8 +14,8 @@ struct SplatModel {
     int sh_degree = 0;             // 0..3
     int kernel = KERNEL_GAUSSIAN;  // shaders/shared/kernel_list.h
     Footprint footprint = Footprint::psi;
-    bool antialias = false;     // SplatRenderMode: mip
-    glm::dvec3 origin{0.0};     // added to every position on save; positions are relative to it
+    bool antialias = false;  // SplatRenderMode: mip
+    glm::dvec3 origin{0.0};  // added to every position on save; positions are relative to it
 
     std::vector<float> position;   // [N][3] world
     std::vector<float> log_scale;  // [N][3] natural log of the standard deviation, world
