@@ -1,0 +1,94 @@
+#include "engine/data/camera_list.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/core/files.h"
+#include "engine/data/colmap.h"
+#include "tests/unit/data/data_files.h"
+
+namespace darb {
+namespace {
+
+constexpr const char* kOne =
+    R"([{"id": 0, "img_name": "a", "width": 40, "height": 30, "position": [1, 2, 3],
+        "rotation": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "fy": 50, "fx": 60}])";
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(CameraList, position_is_the_centre_and_rows_are_camera_to_world) {
+    const std::vector<View> views = parse_camera_list(kOne, "cameras.json");
+    ASSERT_EQ(views.size(), 1u);
+    const Camera& camera = views[0].camera;
+    EXPECT_NEAR(glm::length(camera.centre() - glm::dvec3(1, 2, 3)), 0, 1e-12);
+    // Third column of camera to world: where the camera looks.
+    EXPECT_NEAR(
+        glm::length(glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1) - glm::dvec3(1, 0, 0)), 0,
+        1e-12);
+    EXPECT_EQ(camera.cx, 20);
+    EXPECT_EQ(camera.cy, 15);
+    EXPECT_EQ(camera.fx, 60);
+    EXPECT_EQ(camera.fy, 50);
+}
+
+TEST(CameraList, written_list_reads_back) {
+    std::vector<View> views = parse_camera_list(kOne, "cameras.json");
+    views[0].camera.cx = 17.25;
+    const auto path = test_folder() / "sub" / "cameras.json";
+    write_camera_list(path, views);
+    const std::vector<View> again = load_cameras(path);
+    EXPECT_EQ(again[0].camera.cx, 17.25);
+    EXPECT_EQ(again[0].camera.cy, 15);
+    EXPECT_NEAR(glm::length(again[0].camera.translation - views[0].camera.translation), 0, 1e-12);
+    EXPECT_EQ(load_cameras(path.parent_path())[0].name, "a");
+}
+
+TEST(CameraList, bad_records_are_errors_that_name_them) {
+    const auto error = [](const std::string& text) {
+        return error_of([&] { parse_camera_list(text, "c.json"); });
+    };
+    EXPECT_NE(error("[").find("JSON"), std::string::npos);
+    EXPECT_NE(error("[]").find("no list"), std::string::npos);
+    EXPECT_NE(error("[1]").find("camera 1 of 1"), std::string::npos);
+    EXPECT_NE(error(replaced(kOne, "60", "0")).find("focal"), std::string::npos);
+    EXPECT_NE(error(replaced(kOne, "60", "-1")).find("focal"), std::string::npos);
+    EXPECT_NE(error(replaced(kOne, "[0, 0, 1]", "[0, 0, 2]")).find("orthonormal"),
+              std::string::npos);
+    EXPECT_NE(error(replaced(kOne, "[0, 0, 1]", "[0, 0, -1]")).find("mirrors"), std::string::npos);
+    EXPECT_NE(error(replaced(kOne, "[1, 2, 3]", "[1, 2]")).find("position"), std::string::npos);
+    EXPECT_NE(error(replaced(kOne, "\"width\": 40", "\"width\": 0")).find("width"),
+              std::string::npos);
+}
+
+TEST(CameraList, original_list_of_3dgs_sees_its_points) {
+    const auto folder = test_data() / "fixtures" / "inria_miku_output";
+    DARB_NEED_DATA(folder);
+    const std::vector<View> views = load_cameras(folder / "cameras.json");
+    EXPECT_EQ(views.size(), 97u);
+    std::size_t dropped = 0, seen = 0;
+    const auto file = folder / "sparse_0_points3D.bin";
+    const PointCloud points = parse_colmap_points(read_file(file), file.string(), dropped);
+    EXPECT_EQ(points.size(), 25784u);
+    const Camera& camera = views[0].camera;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const double* at = &points.position[i * 3];
+        const glm::dvec3 p = camera.rotation * glm::dvec3(at[0], at[1], at[2]) + camera.translation;
+        const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+        if (p.z > 0 && x > 0 && y > 0 && x < camera.width && y < camera.height) ++seen;
+    }
+    EXPECT_GT(seen, points.size() / 5);
+}
+
+TEST(LoadCameras, data_sets_need_no_photos) {
+    const auto model = test_data() / "fixtures" / "colmap_bonsai_3img";
+    DARB_NEED_DATA(model);
+    EXPECT_EQ(load_cameras(model).size(), 3u);
+    EXPECT_EQ(load_cameras(test_data() / "lego_nerf_synthetic_200_tiny").size(), 37u);
+    EXPECT_EQ(
+        load_cameras(test_data() / "fox_800" / "transforms_instantngp_original_67.json").size(),
+        67u);
+}
+
+}  // namespace
+}  // namespace darb
