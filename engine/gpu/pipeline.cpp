@@ -58,19 +58,17 @@ struct Specialization {
     }
 };
 
-// Full subgroups need a workgroup that is a multiple of the subgroup size. 0 = the device's own
-// size does; else the size to require; full is cleared where none fits.
+// The subgroup size to require, 0 where the device has only one. SPIR-V 1.6 lets drivers vary the
+// size between pipelines, so one is always required where there is a choice. Full subgroups need a
+// workgroup that is a multiple of it: a smaller size is taken, or full is cleared.
 std::uint32_t fitting_subgroup_size(const DeviceInfo& info, std::uint32_t threads,
                                     std::uint32_t asked, bool& full) {
-    if (asked != 0) {
-        full = full && threads % asked == 0;
-        return asked;
-    }
-    if (!full || threads % info.subgroup_size == 0) return 0;
-    for (std::uint32_t size = info.max_subgroup_size; size >= info.min_subgroup_size; size /= 2)
-        if (threads % size == 0) return size;
-    full = false;
-    return 0;
+    if (asked == 0 && full && threads % info.subgroup_size != 0)
+        for (std::uint32_t size = info.max_subgroup_size; size >= info.min_subgroup_size; size /= 2)
+            if (asked == 0 && threads % size == 0) asked = size;
+    const std::uint32_t size = asked != 0 ? asked : info.subgroup_size;
+    full = full && threads % size == 0;
+    return info.min_subgroup_size == info.max_subgroup_size ? 0 : size;
 }
 
 VkDescriptorSetLayout create_set_layout(VkDevice device, std::size_t count,

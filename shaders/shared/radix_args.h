@@ -1,0 +1,39 @@
+// Arguments of the radix sort (shaders/sort/radix_*.comp, engine/render/radix_sort.h).
+#ifndef DARB_SHARED_RADIX_ARGS_H
+#define DARB_SHARED_RADIX_ARGS_H
+
+#include "types.h"
+
+#define RADIX_MAX_DIGITS 256  // 8 bits a pass
+
+#ifdef __cplusplus
+namespace darb::gpu {
+#endif
+
+struct RadixPrepareArgs {
+    uint capacity;    // pairs that the buffers hold
+    uint count_word;  // index of the pair count in its buffer, in words
+    uint block;       // pairs of one workgroup
+};
+
+// What the prepare pass leaves for the others. The first three words are a dispatch command.
+struct RadixPlan {
+    uint groups_x;  // blocks that hold the pairs
+    uint groups_y;
+    uint groups_z;
+    uint count;     // pairs, at most the capacity
+    uint counters;  // RADIX_MAX_DIGITS * blocks, the length of the histograms
+};
+
+struct RadixPassArgs {
+    uint shift;   // of this pass's digit
+    uint digits;  // values of the digit, a power of two up to RADIX_MAX_DIGITS
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(RadixPrepareArgs) == 12 && sizeof(RadixPlan) == 20);
+static_assert(sizeof(RadixPassArgs) == 8);
+}  // namespace darb::gpu
+#endif
+
+#endif

@@ -1,0 +1,32 @@
+// Radix sort, step 1 of 3 of a pass: how often each digit occurs in each block.
+// One workgroup a block of THREADS * ITEMS keys. Shared memory: 1 KiB of counters.
+// Reads keys [n]; writes histograms [RADIX_MAX_DIGITS][blocks], all digits, the unused as 0.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shaders/shared/radix_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 32;
+layout(constant_id = 1) const uint ITEMS = 256;
+
+layout(push_constant, scalar) uniform Push { RadixPassArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Plan { RadixPlan plan; };
+layout(set = 0, binding = 1, scalar) readonly buffer Keys { uint keys[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer Histograms { uint histograms[]; };
+
+shared uint counters[RADIX_MAX_DIGITS];
+
+void main() {
+    const uint thread = gl_LocalInvocationID.x;
+    for (uint d = thread; d < RADIX_MAX_DIGITS; d += THREADS) counters[d] = 0;
+    barrier();
+    const uint begin = gl_WorkGroupID.x * THREADS * ITEMS;
+    const uint end = min(begin + THREADS * ITEMS, plan.count);
+    const uint mask = args.digits - 1;
+    for (uint i = begin + thread; i < end; i += THREADS)
+        atomicAdd(counters[(keys[i] >> args.shift) & mask], 1);
+    barrier();
+    for (uint d = thread; d < RADIX_MAX_DIGITS; d += THREADS)
+        histograms[d * gl_NumWorkGroups.x + gl_WorkGroupID.x] = counters[d];
+}
