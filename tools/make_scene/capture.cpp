@@ -1,0 +1,124 @@
+#include "tools/make_scene/capture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+namespace darb::make_scene {
+
+namespace {
+
+using glm::dvec3;
+
+constexpr double kTau = 6.283185307179586;
+constexpr double kFocal = 235;        // px
+constexpr double kPointNoise = 1e-3;  // world units, standard deviation
+constexpr double kPointReach = 6;     // world units from the origin; the floor fades out beyond
+
+Camera look_at(const dvec3& eye, const dvec3& target) {
+    const dvec3 forward = glm::normalize(target - eye);
+    const dvec3 right = glm::normalize(glm::cross(forward, dvec3(0, 0, 1)));
+    const dvec3 down = glm::cross(forward, right);
+    Camera camera;
+    camera.width = kWidth;
+    camera.height = kHeight;
+    camera.fx = camera.fy = kFocal;
+    camera.cx = kWidth / 2.0;
+    camera.cy = kHeight / 2.0;
+    camera.rotation = glm::transpose(glm::dmat3(right, down, forward));
+    camera.translation = -(camera.rotation * eye);
+    return camera;
+}
+
+Ray ray_through(const Camera& camera, double x, double y) {
+    const dvec3 local((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1);
+    return {camera.centre(), glm::normalize(glm::transpose(camera.rotation) * local)};
+}
+
+std::uint8_t to_byte(double linear) {
+    const double soft = linear / (1 + 0.18 * linear);  // rolls highlights off
+    return static_cast<std::uint8_t>(
+        std::lround(255 * std::pow(std::clamp(soft, 0.0, 1.0), 1 / 2.2)));
+}
+
+dvec3 pixel_colour(const World& world, const Camera& camera, int x, int y, Pcg32& rng) {
+    dvec3 sum(0.0);
+    for (int i = 0; i < kSamples; ++i) {  // R2 sequence over the pixel
+        const double u = 0.7548776662466927 * (i + 1), v = 0.5698402909980532 * (i + 1);
+        const Ray ray = ray_through(camera, x + u - std::floor(u), y + v - std::floor(v));
+        sum += glm::min(radiance(world, ray, rng), dvec3(4.0));
+    }
+    return sum / static_cast<double>(kSamples);
+}
+
+ImageU8 take_photo(const World& world, const Camera& camera, std::uint64_t seed) {
+    ImageU8 photo(camera.width, camera.height, 3);
+    for (int y = 0; y < camera.height; ++y) {
+        Pcg32 rng(seed, static_cast<std::uint64_t>(y));
+        for (int x = 0; x < camera.width; ++x) {
+            const dvec3 colour = pixel_colour(world, camera, x, y, rng);
+            for (int c = 0; c < 3; ++c) photo.at(x, y, c) = to_byte(colour[c]);
+        }
+    }
+    return photo;
+}
+
+PointCloud sample_points(const World& world, const std::vector<View>& views,
+                         const std::vector<ImageU8>& photos) {
+    PointCloud points;
+    Pcg32 rng(7);
+    while (points.size() < kPoints) {
+        const std::size_t v = rng.below(static_cast<std::uint32_t>(views.size()));
+        const double x = rng.uniform(0, kWidth), y = rng.uniform(0, kHeight);
+        const Ray ray = ray_through(views[v].camera, x, y);
+        const double t = depth_along(world, ray);
+        if (views[v].is_test || t < 0 || glm::length(ray.at(t)) > kPointReach) continue;
+        for (int i = 0; i < 3; ++i) {
+            points.position.push_back(ray.at(t)[i] + kPointNoise * rng.normal());
+            points.colour.push_back(photos[v].at(static_cast<int>(x), static_cast<int>(y), i));
+        }
+    }
+    return points;
+}
+
+}  // namespace
+
+std::vector<View> camera_path() {
+    std::vector<View> views;
+    for (int i = 0; i < kViews; ++i) {
+        const double share = static_cast<double>(i) / kViews;
+        const double azimuth = kTau * 3 * share + 0.4;
+        const double height = glm::radians(31 + 17 * std::sin(kTau * 5 * share + 0.9));
+        const double radius = 3.1 + 0.35 * std::sin(kTau * 7 * share);
+        const dvec3 eye(radius * std::cos(azimuth) * std::cos(height),
+                        radius * std::sin(azimuth) * std::cos(height),
+                        0.2 + radius * std::sin(height));
+        View view;
+        view.name = fmt::format("view_{:02d}.png", i);
+        view.camera = look_at(eye, {0, 0, 0.24});
+        view.is_test = i % kTestEvery == kTestOffset;
+        views.push_back(view);
+    }
+    return views;
+}
+
+Capture capture_views(const World& world, const std::vector<View>& views) {
+    Capture capture;
+    capture.photos.resize(views.size());
+    std::atomic<std::size_t> next{0};
+    const auto work = [&] {
+        for (std::size_t i = next++; i < views.size(); i = next++)
+            capture.photos[i] = take_photo(world, views[i].camera, i);
+    };
+    std::vector<std::jthread> threads;
+    for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
+        threads.emplace_back(work);
+    threads.clear();
+    capture.points = sample_points(world, views, capture.photos);
+    return capture;
+}
+
+}  // namespace darb::make_scene

@@ -1,0 +1,30 @@
+// Cameras around the still life, the pictures they take and the points that they see.
+#pragma once
+
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "tools/make_scene/world.h"
+
+namespace darb::make_scene {
+
+constexpr int kViews = 48;
+constexpr int kTestEvery = 6;  // of 6 views one is held out: 8 of 48
+constexpr int kTestOffset = 3;
+constexpr int kWidth = 200, kHeight = 150;  // px
+constexpr int kSamples = 64;                // per pixel
+constexpr int kPoints = 4000;
+
+struct Capture {
+    std::vector<ImageU8> photos;  // [views], RGB
+    PointCloud points;
+};
+
+/// One turn and a half around the scene at changing heights; View::is_test marks the held-out ones.
+std::vector<View> camera_path();
+
+/// Photos (gamma 2.2, 8 bits) and kPoints surface points, evenly spread over the pixels of the
+/// training views, with 1 mm of noise. Uses all cores; the result does not depend on their number.
+Capture capture_views(const World& world, const std::vector<View>& views);
+
+}  // namespace darb::make_scene

@@ -1,0 +1,15 @@
+// Writes the captured scene as a data set that darb and the other trainers of the field read.
+#pragma once
+
+#include <filesystem>
+
+#include "tools/make_scene/capture.h"
+
+namespace darb::make_scene {
+
+/// FOLDER/images/NAME, sparse/0 (COLMAP, all views), test.txt (names of the held-out views, one a
+/// line), transforms_train.json and transforms_test.json (OpenGL camera frame). Throws Error.
+void write_scene(const std::filesystem::path& folder, const std::vector<View>& views,
+                 const Capture& capture);
+
+}  // namespace darb::make_scene
