@@ -1,0 +1,226 @@
+#include "engine/data/colmap.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/core/files.h"
+#include "engine/data/colmap_write.h"
+#include "engine/data/image_io.h"
+#include "engine/data/lens.h"
+#include "engine/data/pose.h"
+#include "tests/unit/data/data_files.h"
+
+namespace darb {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Bytes camera_file(int model = 1, double focal = 50, std::uint64_t width = 8) {
+    Bytes file;
+    file.put<std::uint64_t>(1).put<std::uint32_t>(3).put<std::int32_t>(model);
+    file.put<std::uint64_t>(width).put<std::uint64_t>(6);
+    return file.put(focal).put(51.0).put(4.0).put(3.0);
+}
+
+Bytes image_file(double qw = 1, double tx = 0.5, std::uint32_t camera = 3) {
+    Bytes file;
+    file.put<std::uint64_t>(1).put<std::uint32_t>(1);
+    file.put(qw).put(0.0).put(0.0).put(0.0).put(tx).put(0.0).put(2.0);
+    file.put(camera).text("a.png").put('\0').put<std::uint64_t>(1);
+    return file.put(1.5).put(2.5).put<std::uint64_t>(7);
+}
+
+Bytes point_file(double x = 1e6 + 0.25) {
+    Bytes file;
+    file.put<std::uint64_t>(1).put<std::uint64_t>(7).put(x).put(2.0).put(3.0);
+    file.put<std::uint8_t>(10).put<std::uint8_t>(20).put<std::uint8_t>(30).put(0.5);
+    return file.put<std::uint64_t>(1).put<std::uint32_t>(1).put<std::uint32_t>(0);
+}
+
+/// A project folder with one photo of 8 x 6 px.
+std::filesystem::path write_project(const Bytes& cameras, const Bytes& images,
+                                    const Bytes& points) {
+    const auto folder = test_folder();
+    write_file_atomic(folder / "sparse/0/cameras.bin", cameras.data);
+    write_file_atomic(folder / "sparse/0/images.bin", images.data);
+    write_file_atomic(folder / "sparse/0/points3D.bin", points.data);
+    write_png(folder / "images/a.png", ImageU8(8, 6, 3));
+    return folder;
+}
+
+TEST(ColmapBinary, fields_are_read) {
+    const Dataset dataset = load_dataset(write_project(camera_file(), image_file(), point_file()));
+    ASSERT_EQ(dataset.views.size(), 1u);
+    const Camera& camera = dataset.views[0].camera;
+    EXPECT_EQ(camera.fx, 50);
+    EXPECT_EQ(camera.fy, 51);
+    EXPECT_EQ(camera.cx, 4);
+    EXPECT_EQ(camera.cy, 3);
+    EXPECT_EQ(camera.translation, glm::dvec3(0.5, 0, 2));
+    EXPECT_EQ(dataset.source, "COLMAP binary");
+    ASSERT_EQ(dataset.points.size(), 1u);
+    EXPECT_EQ(dataset.points.position[0], 1e6 + 0.25) << "map coordinates stay double";
+    EXPECT_EQ(dataset.points.colour, (std::vector<std::uint8_t>{10, 20, 30}));
+}
+
+TEST(ColmapBinary, truncated_at_every_byte_is_an_error_that_names_the_file) {
+    const Bytes files[3] = {camera_file(), image_file(), point_file()};
+    const char* names[3] = {"cameras.bin", "images.bin", "points3D.bin"};
+    for (int which = 0; which < 3; ++which)
+        for (std::size_t length = 0; length < files[which].data.size(); ++length) {
+            const std::vector<std::byte> part(files[which].data.begin(),
+                                              files[which].data.begin() + length);
+            std::size_t dropped = 0;
+            const std::string error = error_of([&] {
+                if (which == 0) parse_colmap_cameras(part, names[0]);
+                if (which == 1) parse_colmap_images(part, names[1]);
+                if (which == 2) parse_colmap_points(part, names[2], dropped);
+            });
+            EXPECT_EQ(error.find(names[which]), 0u) << length << ": " << error;
+        }
+}
+
+TEST(ColmapBinary, declared_counts_beyond_the_file_are_refused_before_allocating) {
+    for (const std::uint64_t count : {2ull, 1ull << 31, 1ull << 32, 1ull << 63, ~0ull}) {
+        Bytes files[3] = {camera_file(), image_file(), point_file()};
+        for (Bytes& file : files) std::memcpy(file.data.data(), &count, 8);
+        std::size_t dropped = 0;
+        EXPECT_FALSE(error_of([&] { parse_colmap_cameras(files[0].data, "c"); }).empty());
+        EXPECT_FALSE(error_of([&] { parse_colmap_images(files[1].data, "i"); }).empty());
+        EXPECT_FALSE(error_of([&] { parse_colmap_points(files[2].data, "p", dropped); }).empty());
+        // Observations and tracks.
+        Bytes images = image_file(), points = point_file();
+        std::memcpy(images.data.data() + images.data.size() - 32, &count, 8);
+        std::memcpy(points.data.data() + points.data.size() - 16, &count, 8);
+        EXPECT_NE(error_of([&] { parse_colmap_images(images.data, "i"); }).find("observations"),
+                  std::string::npos);
+        EXPECT_NE(error_of([&] { parse_colmap_points(points.data, "p", dropped); }).find("track"),
+                  std::string::npos);
+    }
+}
+
+TEST(ColmapBinary, bad_records_are_errors_with_reason) {
+    const auto cameras = [](const Bytes& file) {
+        return error_of([&] { parse_colmap_cameras(file.data, "cameras.bin"); });
+    };
+    const auto images = [](const Bytes& file) {
+        return error_of([&] { parse_colmap_images(file.data, "images.bin"); });
+    };
+    EXPECT_NE(cameras(camera_file(11)).find("model id 11"), std::string::npos);
+    EXPECT_NE(cameras(camera_file(-1)).find("model id -1"), std::string::npos);
+    for (const double focal : {0.0, -5.0})
+        EXPECT_NE(cameras(camera_file(1, focal)).find("focal"), std::string::npos);
+    EXPECT_NE(cameras(camera_file(1, kNan)).find("not finite"), std::string::npos);
+    for (const std::uint64_t width : {0ull, 1ull << 31, 1ull << 63})
+        EXPECT_NE(cameras(camera_file(1, 50, width)).find("size"), std::string::npos);
+    EXPECT_NE(images(image_file(0)).find("quaternion is zero"), std::string::npos);
+    EXPECT_NE(images(image_file(kNan)).find("a.png"), std::string::npos);
+    EXPECT_NE(images(image_file(1, kNan)).find("not finite"), std::string::npos);
+}
+
+TEST(ColmapBinary, model_that_does_not_fit_together_is_an_error) {
+    const auto load = [](const Bytes& images) {
+        return error_of([&] { load_dataset(write_project(camera_file(), images, point_file())); });
+    };
+    EXPECT_NE(load(image_file(1, 0, 9)).find("camera id 9"), std::string::npos);
+    EXPECT_NE(load(Bytes().put<std::uint64_t>(0)).find("no images"), std::string::npos);
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    std::filesystem::remove(folder / "images/a.png");
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("a.png"), std::string::npos);
+    std::filesystem::remove(folder / "images");
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("images"), std::string::npos);
+    EXPECT_NE(error_of([&] { load_dataset(folder / "nowhere"); }).find("exist"), std::string::npos);
+    std::filesystem::remove_all(folder / "sparse");
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("no cameras"), std::string::npos);
+}
+
+TEST(ColmapBinary, nan_points_are_dropped_with_a_note) {
+    const Dataset dataset =
+        load_dataset(write_project(camera_file(), image_file(), point_file(kNan)));
+    EXPECT_EQ(dataset.points.size(), 0u);
+    EXPECT_NE(dataset.notes.at(0).find("1 point"), std::string::npos);
+}
+
+TEST(ColmapProject, photo_of_another_size_scales_the_intrinsics) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    write_png(folder / "images/a.png", ImageU8(16, 12, 3));
+    const Dataset dataset = load_dataset(folder);
+    EXPECT_EQ(dataset.views[0].camera.width, 16);
+    EXPECT_EQ(dataset.views[0].camera.fx, 100);
+    EXPECT_EQ(dataset.views[0].camera.cy, 6);
+    EXPECT_NE(dataset.notes.at(0).find("16 x 12"), std::string::npos);
+    write_png(folder / "images_2/a.png", ImageU8(4, 3, 3));
+    DatasetOptions options;
+    options.images_folder = "images_2";
+    EXPECT_EQ(load_dataset(folder, options).views[0].camera.fx, 25);
+    write_png(folder / "images/a.png", ImageU8(12, 12, 3));
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("aspect"), std::string::npos);
+}
+
+TEST(ColmapProject, masks_become_alpha) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    ImageU8 mask(8, 6, 1);
+    std::fill(mask.data.begin() + 8, mask.data.end(), std::uint8_t{255});
+    for (const char* name : {"masks/a.png.png", "masks/a.png"}) {
+        std::filesystem::remove_all(folder / "masks");
+        write_png(folder / name, mask);
+        const Dataset dataset = load_dataset(folder);
+        EXPECT_TRUE(dataset.has_alpha);
+        const ImageU8 photo = load_photo(dataset.views[0]);
+        EXPECT_EQ(photo.at(3, 0, 3), 0);
+        EXPECT_EQ(photo.at(3, 1, 3), 255);
+    }
+}
+
+TEST(ColmapProject, hold_out_takes_every_eighth_by_name) {
+    const auto folder = test_folder();
+    std::vector<View> views(17);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].name = "v" + std::to_string(100 + (i * 5) % 17) + ".png";
+        views[i].camera.width = views[i].camera.height = 4;
+        views[i].camera.fx = views[i].camera.fy = 4;
+        write_png(folder / "images" / views[i].name, ImageU8(4, 4, 3));
+    }
+    write_colmap_binary(folder / "sparse" / "0", views, {});
+    DatasetOptions options;
+    options.hold_out = true;
+    const Dataset dataset = load_dataset(folder, options);
+    for (std::size_t i = 0; i < 17; ++i) EXPECT_EQ(dataset.views[i].is_test, i % 8 == 0) << i;
+    EXPECT_EQ(dataset.views[16].name, "v116.png");
+}
+
+TEST(ColmapWrite, model_reads_back) {
+    std::vector<View> views(3);
+    for (std::size_t i = 0; i < 3; ++i) {
+        views[i].name = "folder/photo " + std::to_string(i) + ".png";
+        views[i].camera = {.width = 64, .height = 48, .fx = 70, .fy = 71, .cx = 31, .cy = 25};
+        views[i].camera.rotation =
+            rotation_from_quaternion({0.1, 0.5 * static_cast<double>(i), -0.3, 0.8}, "test");
+        views[i].camera.translation = {1e6, -2, static_cast<double>(i)};
+    }
+    views[2].camera.fx = 80;
+    PointCloud points;
+    points.position = {1, 2, 3, 1e6, 5e6, -4};
+    points.colour = {1, 2, 3, 250, 251, 252};
+    const auto folder = test_folder();
+    write_colmap_binary(folder, views, points);
+    const ColmapModel model = read_colmap(folder);
+    EXPECT_EQ(model.cameras.size(), 2u);
+    ASSERT_EQ(model.images.size(), 3u);
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(model.images[i].name, views[i].name);
+        EXPECT_EQ(model.images[i].translation, views[i].camera.translation);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(glm::length(model.images[i].rotation[c] - views[i].camera.rotation[c]), 0,
+                        1e-14);
+        EXPECT_EQ(model.cameras.at(model.images[i].camera_id).parameters[0], views[i].camera.fx);
+    }
+    EXPECT_EQ(model.points.position, points.position);
+    EXPECT_EQ(model.points.colour, points.colour);
+}
+
+}  // namespace
+}  // namespace darb

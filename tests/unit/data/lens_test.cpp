@@ -1,0 +1,171 @@
+#include "engine/data/lens.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/data/resample.h"
+#include "tests/unit/data/data_files.h"
+
+namespace darb {
+namespace {
+
+LensModel make(std::string model, std::vector<double> parameters) {
+    return {std::move(model), std::move(parameters), 640, 480};
+}
+
+/// One lens of each model, as strong as consumer and action cameras have them.
+std::vector<LensModel> all_models() {
+    return {
+        make("SIMPLE_PINHOLE", {500, 321, 239}),
+        make("PINHOLE", {500, 510, 321, 239}),
+        make("SIMPLE_RADIAL", {500, 321, 239, -0.1}),
+        make("RADIAL", {500, 321, 239, -0.1, 0.02}),
+        make("OPENCV", {500, 510, 321, 239, -0.25, 0.28, 0.0015, -0.0037}),
+        make("OPENCV_FISHEYE", {300, 305, 321, 239, 0.02, -0.01, 0.003, -0.0005}),
+        make("FULL_OPENCV", {500, 510, 321, 239, 0.1, 0.05, 0.001, -0.002, 0.01, 0.2, 0.01, 0.002}),
+        make("FOV", {350, 355, 321, 239, 0.9}),
+        make("SIMPLE_RADIAL_FISHEYE", {300, 321, 239, -0.02}),
+        make("RADIAL_FISHEYE", {300, 321, 239, -0.02, 0.003}),
+        make("THIN_PRISM_FISHEYE",
+             {300, 305, 321, 239, 0.01, -0.002, 0.001, -0.001, 0.0005, 0.0001, 0.002, -0.002})};
+}
+
+TEST(Lens, every_model_of_colmap_is_known_by_id_and_name) {
+    const std::vector<LensModel> models = all_models();
+    ASSERT_EQ(models.size(), static_cast<std::size_t>(kLensModelCount));
+    for (int id = 0; id < kLensModelCount; ++id) {
+        const LensModel& lens = models[static_cast<std::size_t>(id)];
+        EXPECT_EQ(lens_model_name(id), lens.model);
+        EXPECT_NO_THROW(check_lens(lens, "test")) << lens.model;
+        EXPECT_EQ(lens.distorted(), id >= 2) << lens.model;
+    }
+    EXPECT_TRUE(lens_model_name(-1).empty());
+    EXPECT_TRUE(lens_model_name(11).empty());
+}
+
+TEST(Lens, unproject_inverts_project_for_every_model) {
+    for (const LensModel& model : all_models()) {
+        const Lens lens(model);
+        for (double y = 0.5; y < 480; y += 23.5)
+            for (double x = 0.5; x < 640; x += 31.5) {
+                const auto ray = lens.unproject({x, y});
+                ASSERT_TRUE(ray) << model.model << " at " << x << ", " << y;
+                EXPECT_TRUE(lens.valid(*ray));
+                const glm::dvec2 again = lens.project(*ray);
+                EXPECT_NEAR(again.x, x, 1e-6) << model.model;
+                EXPECT_NEAR(again.y, y, 1e-6) << model.model;
+            }
+    }
+}
+
+TEST(Lens, known_values_by_hand) {
+    const glm::dvec2 ray(0.3, 0.4);  // r = 0.5
+    const auto expect = [&](const LensModel& model, double x, double y) {
+        const glm::dvec2 pixel = Lens(model).project(ray);
+        EXPECT_NEAR(pixel.x, x, 1e-9) << model.model;
+        EXPECT_NEAR(pixel.y, y, 1e-9) << model.model;
+    };
+    expect(make("SIMPLE_RADIAL", {100, 0, 0, 0.4}), 33, 44);  // 1 + 0.4 * 0.25
+    expect(make("RADIAL", {100, 0, 0, 0.4, 1.6}), 36, 48);
+    // Tangential: 2 p1 xy + p2 (r^2 + 2 x^2) and 2 p2 xy + p1 (r^2 + 2 y^2).
+    expect(make("OPENCV", {100, 100, 0, 0, 0, 0, 0.1, 0}), 32.4, 45.7);
+    expect(make("OPENCV", {100, 100, 0, 0, 0, 0, 0, 0.1}), 34.3, 42.4);
+    expect(make("FULL_OPENCV", {100, 100, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0}), 15, 20);  // / (1 + 4 r^2)
+    const double theta = std::atan(0.5);
+    expect(make("OPENCV_FISHEYE", {100, 100, 0, 0, 0, 0, 0, 0}), 60 * theta, 80 * theta);
+    const double bent = theta * (1 + 0.1 * theta * theta);
+    expect(make("SIMPLE_RADIAL_FISHEYE", {100, 0, 0, 0.1}), 60 * bent, 80 * bent);
+    const double fov = std::atan(2 * 0.5 * std::tan(0.45)) / 0.9;
+    expect(make("FOV", {100, 100, 0, 0, 0.9}), 60 * fov, 80 * fov);
+    expect(make("THIN_PRISM_FISHEYE", {100, 100, 0, 0, 0, 0, 0, 0, 0, 0, 0.2, 0}),
+           60 * theta + 20 * theta * theta, 80 * theta);
+}
+
+TEST(Lens, rays_beyond_the_fold_are_not_valid) {
+    // r (1 - 0.3 r^2) turns back at r = 1.054, where it is 0.703.
+    const Lens lens(make("SIMPLE_RADIAL", {100, 0, 0, -0.3}));
+    EXPECT_TRUE(lens.valid({1.0, 0}));
+    EXPECT_FALSE(lens.valid({1.1, 0}));
+    EXPECT_TRUE(lens.unproject({69, 0}));
+    EXPECT_FALSE(lens.unproject({71, 0}));
+}
+
+TEST(Lens, fisheye_beyond_ninety_degrees_has_no_ray) {
+    const Lens lens(make("OPENCV_FISHEYE", {100, 100, 0, 0, 0, 0, 0, 0}));
+    EXPECT_TRUE(lens.unproject({156, 0}));
+    EXPECT_FALSE(lens.unproject({158, 0}));
+}
+
+TEST(Lens, bad_parameters_are_errors) {
+    const auto error = [](const LensModel& lens) {
+        return error_of([&] { check_lens(lens, "camera 1"); });
+    };
+    EXPECT_NE(error(make("SPHERE", {1})).find("SPHERE"), std::string::npos);
+    EXPECT_NE(error(make("PINHOLE", {1, 2, 3})).find("4 parameters"), std::string::npos);
+    EXPECT_NE(error(make("PINHOLE", {500, 0, 1, 1})).find("focal"), std::string::npos);
+    EXPECT_NE(error(make("PINHOLE", {500, 1e300 * 1e300, 1, 1})).find("finite"), std::string::npos);
+}
+
+TEST(Undistort, frame_of_ordinary_lenses_has_no_gaps_and_keeps_the_focal_length) {
+    for (const LensModel& model : all_models()) {
+        const UndistortedFrame frame = undistorted_frame(model, "test");
+        EXPECT_FALSE(frame.has_gaps) << model.model;
+        EXPECT_EQ(frame.camera.fx, model.parameters[0]) << model.model;
+        EXPECT_GT(frame.camera.width, 300) << model.model;
+        EXPECT_LT(frame.camera.width, 1290) << model.model;
+        ImageU8 white(640, 480, 4);
+        std::fill(white.data.begin(), white.data.end(), std::uint8_t{255});
+        for (const std::uint8_t value : undistort(white, model, frame.camera).data)
+            ASSERT_EQ(value, 255) << model.model;
+    }
+}
+
+TEST(Undistort, photo_of_a_pattern_becomes_the_pinhole_view_of_it) {
+    const auto pattern = [](glm::dvec2 ray) {
+        return 127 + 100 * std::sin(9 * ray.x) * std::cos(7 * ray.y);
+    };
+    for (const LensModel& model : all_models()) {
+        const Lens lens(model);
+        ImageU8 photo(640, 480, 4);
+        for (int y = 0; y < 480; ++y)
+            for (int x = 0; x < 640; ++x) {
+                const auto ray = lens.unproject({x + 0.5, y + 0.5});
+                const auto value = static_cast<std::uint8_t>(pattern(ray.value()) + 0.5);
+                for (int c = 0; c < 3; ++c) photo.at(x, y, c) = value;
+                photo.at(x, y, 3) = 255;
+            }
+        const Camera camera = undistorted_frame(model, "test").camera;
+        const ImageU8 flat = undistort(photo, model, camera);
+        double worst = 0;
+        for (int y = 0; y < camera.height; ++y)
+            for (int x = 0; x < camera.width; ++x) {
+                const glm::dvec2 ray((x + 0.5 - camera.cx) / camera.fx,
+                                     (y + 0.5 - camera.cy) / camera.fy);
+                worst = std::max(worst, std::abs(pattern(ray) - flat.at(x, y, 1)));
+            }
+        EXPECT_LT(worst, 2.0) << model.model;
+    }
+}
+
+TEST(Undistort, strong_fisheye_is_capped_at_sixty_degrees) {
+    const LensModel model{"OPENCV_FISHEYE", {150, 150, 320, 240, 0, 0, 0, 0}, 640, 480};
+    const UndistortedFrame frame = undistorted_frame(model, "test");
+    EXPECT_NEAR(frame.camera.width, 2 * std::sqrt(3.0) * 150, 2);
+    EXPECT_NEAR(frame.camera.height, 2 * std::sqrt(3.0) * 150, 2);
+    EXPECT_FALSE(frame.has_gaps);
+}
+
+TEST(Undistort, pixels_beyond_the_fold_are_transparent) {
+    const LensModel model = make("SIMPLE_RADIAL", {100, 320, 240, -0.3});
+    const UndistortedFrame frame = undistorted_frame(model, "test");
+    EXPECT_TRUE(frame.has_gaps);
+    ImageU8 white(640, 480, 4);
+    std::fill(white.data.begin(), white.data.end(), std::uint8_t{255});
+    const ImageU8 flat = undistort(white, model, frame.camera);
+    EXPECT_EQ(flat.at(0, 0, 3), 0);
+    EXPECT_EQ(flat.at(flat.width / 2, flat.height / 2, 3), 255);
+}
+
+}  // namespace
+}  // namespace darb
