@@ -1,0 +1,175 @@
+// trainer/report: the page is well-formed, whole in itself, and stands strange input.
+#include "trainer/report/report.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/data/image_io.h"
+#include "trainer/report/html.h"
+#include "trainer/report/svg_plot.h"
+
+namespace darb {
+namespace {
+
+std::filesystem::path scratch(const std::string& name) {
+    return std::filesystem::path(testing::TempDir()) / name;
+}
+
+ReportData example() {
+    ReportData data;
+    data.title = "still life <1> & \"friends\"";
+    data.device = "llvmpipe, Mesa 22.3.6";
+    for (int i = 50; i <= 3000; i += 50) {
+        const double t = 0.02 * i;
+        data.samples.push_back({i, t, 0.3 * std::exp(-i / 500.0) + 0.02 + 0.002 * std::sin(i),
+                                30 - 15 * std::exp(-i / 700.0) + 0.4 * std::sin(0.3 * i),
+                                static_cast<std::uint32_t>(4000 + 3 * i)});
+    }
+    for (int i = 500; i <= 3000; i += 500)
+        data.evaluations.push_back({i, 0.02 * i, 28.5 - 13 * std::exp(-i / 700.0),
+                                    0.95 - 0.4 * std::exp(-i / 700.0),
+                                    static_cast<std::uint32_t>(4000 + 3 * i)});
+    data.passes = {{"project", 1.21, {}}, {"blend", 6.5, 0.12}, {"loss", 2.0, 0.4}};
+    data.settings = {{"kernel", "gaussian"}, {"--odd", "'<&>'"}};
+    data.notes = {"2 iterations were done again: their pairs did not fit."};
+    ImageU8 picture(60, 15, 3);
+    for (int y = 0; y < 15; ++y)
+        for (int x = 0; x < 60; ++x) picture.at(x, y, 1) = static_cast<std::uint8_t>(4 * x);
+    write_png(scratch("report_picture.png"), picture);
+    data.pictures = {{"view_03.png", scratch("report_picture.png"), 28.31, 0.93}};
+    return data;
+}
+
+// Every element is closed in order; attributes are quoted. Returns the first fault, or "".
+std::string first_fault(const std::string& html) {
+    const std::set<std::string> void_elements = {"meta", "img", "!DOCTYPE"};
+    std::vector<std::string> open;
+    for (std::size_t at = html.find('<'); at != std::string::npos; at = html.find('<', at)) {
+        std::size_t end = at + 1;
+        for (char quote = 0; end < html.size() && (quote != 0 || html[end] != '>'); ++end) {
+            if (quote != 0 && html[end] == quote)
+                quote = 0;
+            else if (quote == 0 && (html[end] == '\'' || html[end] == '"'))
+                quote = html[end];
+        }
+        if (end >= html.size()) return "tag without end at " + std::to_string(at);
+        const std::string tag = html.substr(at + 1, end - at - 1);
+        const std::string name = tag.substr(0, tag.find_first_of(" /", 1));
+        if (tag[0] == '/') {
+            if (open.empty() || open.back() != tag.substr(1)) return "unexpected <" + tag + ">";
+            open.pop_back();
+        } else if (tag.back() != '/' && !void_elements.contains(name)) {
+            open.push_back(name);
+        }
+        at = end;
+    }
+    return open.empty() ? "" : "open: " + open.back();
+}
+
+TEST(Report_wellFormedCheck, finds_planted_faults) {
+    EXPECT_EQ(first_fault("<p class='a>b'>x</p><img alt=''><br/>"), "");
+    EXPECT_NE(first_fault("<p><b></p></b>"), "");
+    EXPECT_NE(first_fault("<p>"), "");
+}
+
+TEST(Report_example, is_well_formed_and_without_outside_resources) {
+    const std::string html = report_html(example());
+    EXPECT_EQ(first_fault(html), "");
+    for (const char* outside : {"http:", "https:", "url(", "<script", "<link", "@import"})
+        EXPECT_EQ(html.find(outside), std::string::npos) << outside;
+    for (const char* part :
+         {"still life &lt;1&gt; &amp; &quot;friends&quot;", "PSNR (dB)", "iterations",
+          "training time (s)", "view_03.png", "28.31 dB", "data:image/png;base64,iVBORw0KGgo",
+          "of the memory roofline", "&#39;&lt;&amp;&gt;&#39;", "13,000"})
+        EXPECT_NE(html.find(part), std::string::npos) << part;
+    EXPECT_EQ(html.find("nan"), std::string::npos);
+    EXPECT_EQ(html.find("inf"), std::string::npos);
+}
+
+TEST(Report_emptyRun, leaves_parts_out) {
+    const std::string html = report_html({});
+    EXPECT_EQ(first_fault(html), "");
+    EXPECT_EQ(html.find("<svg"), std::string::npos);
+    EXPECT_EQ(html.find("<h2"), std::string::npos);
+}
+
+TEST(Report_valuesNotFinite, leave_gaps) {
+    ReportData data = example();
+    data.samples[3].loss = std::numeric_limits<double>::quiet_NaN();
+    data.samples[4].psnr_db = std::numeric_limits<double>::infinity();
+    data.evaluations.back().psnr_db = std::numeric_limits<double>::infinity();
+    const std::string html = report_html(data);
+    EXPECT_EQ(first_fault(html), "");
+    EXPECT_EQ(html.find("nan"), std::string::npos);
+    EXPECT_EQ(html.find("inf"), std::string::npos);
+}
+
+TEST(Report_oneSample, has_axes) {
+    ReportData data;
+    data.samples = {{1, 0.1, 0.2, 20, 100}};
+    const std::string html = report_html(data);
+    EXPECT_EQ(first_fault(html), "");
+    EXPECT_NE(html.find("<svg"), std::string::npos);
+}
+
+TEST(Report_missingPicture, is_an_error_with_its_name) {
+    ReportData data;
+    data.pictures = {{"a", scratch("no_such_picture.png"), 1, 1}};
+    try {
+        report_html(data);
+        FAIL();
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("no_such_picture"), std::string::npos);
+    }
+}
+
+TEST(Report_written, is_what_html_says) {
+    const ReportData data = example();
+    write_report(scratch("report.html"), data);
+    EXPECT_EQ(read_text_file(scratch("report.html")), report_html(data));
+}
+
+TEST(Base64_lengths, match_known_texts) {
+    const auto encode = [](std::string_view text) {
+        return base64(std::as_bytes(std::span(text.data(), text.size())));
+    };
+    EXPECT_EQ(encode(""), "");
+    EXPECT_EQ(encode("f"), "Zg==");
+    EXPECT_EQ(encode("fo"), "Zm8=");
+    EXPECT_EQ(encode("foo"), "Zm9v");
+    EXPECT_EQ(encode("foob\xff"), "Zm9vYv8=");
+}
+
+TEST(FormatNumber_values, are_grouped) {
+    EXPECT_EQ(format_number(0), "0");
+    EXPECT_EQ(format_number(-1234567.891, 2), "-1,234,567.89");
+    EXPECT_EQ(format_number(999), "999");
+    EXPECT_EQ(format_number(1000), "1,000");
+    EXPECT_EQ(format_number(std::numeric_limits<double>::infinity()), "-");
+}
+
+TEST(RoundTicks_ranges, are_few_and_inside) {
+    for (const auto& [low, high] : {std::pair{0.0, 1.0},
+                                    {0.0, 30000.0},
+                                    {17.3, 28.9},
+                                    {-4e-5, 3e-5},
+                                    {0.0, 7.0},
+                                    {99.0, 101.0}}) {
+        const std::vector<double> ticks = round_ticks(low, high);
+        EXPECT_GE(ticks.size(), 3u) << low << " to " << high;
+        EXPECT_LE(ticks.size(), 8u) << low << " to " << high;
+        EXPECT_GE(ticks.front(), low - 1e-9 * (high - low));
+        EXPECT_LE(ticks.back(), high + 1e-9 * (high - low));
+    }
+}
+
+}  // namespace
+}  // namespace darb

@@ -1,0 +1,61 @@
+// The report of a training run: one HTML file without outside resources, with curves, times per
+// pass, settings and held-out pictures. Readable on bright and dark screens and in print.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace darb {
+
+struct ReportSample {  // a point of the training curves, averaged or not
+    int iteration = 0;
+    double seconds = 0;  // of training
+    double loss = 0;
+    double psnr_db = 0;  // of the training batch
+    std::uint32_t splats = 0;
+};
+
+struct ReportEvaluation {  // means over the held-out views
+    int iteration = 0;
+    double seconds = 0;
+    double psnr_db = 0;
+    double ssim = 0;
+    std::uint32_t splats = 0;
+};
+
+struct ReportPass {
+    std::string name;
+    double ms = 0;                   // per iteration
+    std::optional<double> roofline;  // share of the device's memory bandwidth, 0 to 1
+};
+
+struct ReportPicture {
+    std::string name;            // of the view
+    std::filesystem::path file;  // PNG: photo, render and error side by side, equal widths
+    double psnr_db = 0, ssim = 0;
+};
+
+struct ReportData {
+    std::string title;                          // data set or output folder
+    std::string device;                         // name and driver
+    std::vector<ReportSample> samples;          // by iteration, ascending
+    std::vector<ReportEvaluation> evaluations;  // by iteration, ascending
+    std::vector<ReportPass> passes;             // in the order they run
+    std::vector<std::pair<std::string, std::string>> settings;
+    std::vector<ReportPicture> pictures;
+    std::string error_caption = "error x 4";  // of the pictures' third part
+    std::vector<std::string> notes;           // a sentence each
+};
+
+/// The whole page. Every list may be empty; its part is then left out. Values that are not finite
+/// leave a gap in a curve and a dash in a table. Throws Error where a picture cannot be read.
+std::string report_html(const ReportData& data);
+
+/// report_html to a file, through write_file_atomic.
+void write_report(const std::filesystem::path& path, const ReportData& data);
+
+}  // namespace darb
