@@ -14,7 +14,7 @@ namespace {
 
 // Of the view box, in user units; CSS scales the whole.
 constexpr double kWidth = 480, kHeight = 260;
-constexpr double kLeft = 58, kRight = 12, kTop = 30, kBottom = 44;
+constexpr double kLeft = 58, kRight = 20, kTop = 30, kBottom = 44;
 constexpr std::size_t kMaxPoints = 600;  // a curve; more cannot be told apart at this size
 
 struct Axis {
@@ -147,6 +147,7 @@ std::string svg_plot(const Plot& plot) {
                 y.include(py);
             }
     if (x.empty()) return {};
+    x.include(0);
     if (plot.from_zero && !plot.log_y) y.include(0);
     x.widen();
     y.widen();

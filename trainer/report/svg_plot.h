@@ -16,7 +16,7 @@ struct PlotSeries {
 
 struct Plot {
     std::string title;
-    std::string x_label, y_label;  // with unit
+    std::string x_label, y_label;  // with unit; the x axis starts at 0
     std::vector<PlotSeries> series;
     bool log_y = false;      // values that are not positive are gaps
     bool from_zero = false;  // the y axis starts at 0
