@@ -1,0 +1,258 @@
+// From files to pixels: formats, EXIF, masks, scaling, many at once.
+#include <gtest/gtest.h>
+#include <stb/stb_image_write.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/files.h"
+#include "engine/core/rng.h"
+#include "engine/data/colmap_write.h"
+#include "engine/data/exif.h"
+#include "engine/data/image_io.h"
+#include "engine/data/resample.h"
+#include "tests/unit/data/data_files.h"
+
+namespace darb {
+namespace {
+
+/// 16 x 8: red upper left quarter, green upper right, blue lower left, white lower right.
+ImageU8 quarters() {
+    ImageU8 image(16, 8, 3);
+    for (int y = 0; y < 8; ++y)
+        for (int x = 0; x < 16; ++x) {
+            const bool right = x >= 8, lower = y >= 4;
+            image.at(x, y, 0) = right == lower ? 255 : 0;
+            image.at(x, y, 1) = right ? 255 : 0;
+            image.at(x, y, 2) = lower ? 255 : 0;
+        }
+    return image;
+}
+
+std::vector<std::byte> jpeg(const ImageU8& image) {
+    std::vector<std::byte> file;
+    const auto append = [](void* to, void* data, int size) {
+        const auto* bytes = static_cast<const std::byte*>(data);
+        static_cast<std::vector<std::byte>*>(to)->insert(
+            static_cast<std::vector<std::byte>*>(to)->end(), bytes, bytes + size);
+    };
+    stbi_write_jpg_to_func(append, &file, image.width, image.height, image.channels,
+                           image.data.data(), 100);
+    return file;
+}
+
+std::vector<std::byte> with_orientation(std::vector<std::byte> file, int orientation, bool little) {
+    Bytes exif;
+    exif.text("Exif").put('\0').put('\0').text(little ? "II" : "MM");
+    const auto put = [&](std::uint32_t value, int size) {
+        for (int i = 0; i < size; ++i)
+            exif.put(static_cast<std::uint8_t>(value >> 8 * (little ? i : size - 1 - i)));
+    };
+    put(42, 2);
+    put(8, 4);
+    put(2, 2);  // entries
+    put(0x010f, 2), put(2, 2), put(1, 4), put(0, 4);
+    put(0x0112, 2), put(3, 2), put(1, 4), put(static_cast<std::uint32_t>(orientation), 2),
+        put(0, 2);
+    put(0, 4);
+    const auto length = exif.data.size() + 2;
+    std::vector<std::byte> segment = {std::byte{0xff}, std::byte{0xe1}, std::byte(length >> 8),
+                                      std::byte(length & 255)};
+    segment.insert(segment.end(), exif.data.begin(), exif.data.end());
+    file.insert(file.begin() + 2, segment.begin(), segment.end());
+    return file;
+}
+
+char colour_at(const ImageU8& image, int x, int y) {
+    const bool r = image.at(x, y, 0) > 128, g = image.at(x, y, 1) > 128,
+               b = image.at(x, y, 2) > 128;
+    if (r && g && b) return 'w';
+    return r ? 'r' : g ? 'g' : b ? 'b' : '?';
+}
+
+/// The colours of the quarters in reading order.
+std::string corners(const ImageU8& image) {
+    const int x = image.width - 2, y = image.height - 2;
+    return {colour_at(image, 1, 1), colour_at(image, x, 1), colour_at(image, 1, y),
+            colour_at(image, x, y)};
+}
+
+// TIFF 6.0: what the 0th row and column of the stored image are in the seen one.
+constexpr const char* kSeen[9] = {"",     "rgbw", "grwb", "wbgr", "bwrg",
+                                  "rbgw", "brwg", "wgbr", "gwrb"};
+
+TEST(Exif, photos_are_turned_as_each_orientation_asks) {
+    for (int orientation = 1; orientation <= 8; ++orientation)
+        for (const bool little : {true, false}) {
+            const auto file = with_orientation(jpeg(quarters()), orientation, little);
+            EXPECT_EQ(exif_orientation(file), orientation);
+            const ImageU8 image = decode_image(file, "test.jpg");
+            EXPECT_EQ(corners(image), kSeen[orientation]) << orientation;
+            EXPECT_EQ(image.width, orientation >= 5 ? 8 : 16) << orientation;
+            EXPECT_EQ(corners(decode_image(file, "test.jpg", 1)), "rgbw");
+        }
+}
+
+TEST(Exif, damaged_or_absent_data_means_upright) {
+    const auto file = with_orientation(jpeg(quarters()), 6, true);
+    for (std::size_t length = 0; length < 80; ++length) {
+        const int found = exif_orientation(std::span(file).first(length));
+        EXPECT_TRUE(found == 1 || found == 6) << length;
+    }
+    EXPECT_EQ(exif_orientation(with_orientation(jpeg(quarters()), 9, true)), 1);
+    EXPECT_EQ(exif_orientation(with_orientation(jpeg(quarters()), 0, false)), 1);
+    EXPECT_EQ(exif_orientation(jpeg(quarters())), 1);
+    Pcg32 rng(3);
+    for (int i = 0; i < 20000; ++i) {
+        std::vector<std::byte> damaged(file.begin(), file.begin() + 80);
+        for (int k = 0; k < 3; ++k) damaged[rng.below(80)] = std::byte(rng.below(256));
+        const int found = exif_orientation(damaged);
+        EXPECT_TRUE(found >= 1 && found <= 8);
+    }
+}
+
+TEST(Exif, the_declared_camera_decides_whether_a_photo_is_turned) {
+    const auto folder = test_folder();
+    write_file_atomic(folder / "images/a.jpg", with_orientation(jpeg(quarters()), 6, true));
+    std::vector<View> views(1);
+    views[0].name = "a.jpg";
+    for (const bool stored : {true, false}) {
+        views[0].camera = {.width = stored ? 16 : 8,
+                           .height = stored ? 8 : 16,
+                           .fx = 20,
+                           .fy = 20,
+                           .cx = 8,
+                           .cy = 4};
+        write_colmap_binary(folder / "sparse/0", views, {});
+        const Dataset dataset = load_dataset(folder);
+        const ImageU8 photo = load_photo(dataset.views[0]);
+        EXPECT_EQ(photo.width, dataset.views[0].camera.width);
+        EXPECT_EQ(photo.width, stored ? 16 : 8);
+        EXPECT_EQ(corners(photo), stored ? "rgbw" : kSeen[6]);
+    }
+}
+
+TEST(ImageIo, png_round_trips_with_each_channel_count) {
+    for (const int channels : {1, 3, 4}) {
+        ImageU8 image(5, 3, channels);
+        Pcg32 rng(1);
+        for (std::uint8_t& value : image.data) value = static_cast<std::uint8_t>(rng.below(256));
+        const auto path = test_folder() / "new" / "a.png";
+        write_png(path, image);
+        EXPECT_EQ(read_image(path).data, image.data);
+        EXPECT_EQ(read_image_info(path).channels, channels);
+        EXPECT_EQ(read_image_info(path).width, 5);
+    }
+}
+
+TEST(ImageIo, sixteen_bit_png_keeps_its_high_bytes) {
+    Bytes png;
+    png.text("\x89PNG\r\n\x1a\n");
+    const auto chunk = [&](const std::string& type, const std::vector<std::byte>& data) {
+        const auto big = [&](std::uint32_t value) {
+            for (int i = 3; i >= 0; --i) png.put(static_cast<std::uint8_t>(value >> 8 * i));
+        };
+        Bytes body;
+        body.text(type);
+        body.data.insert(body.data.end(), data.begin(), data.end());
+        big(static_cast<std::uint32_t>(data.size()));
+        png.data.insert(png.data.end(), body.data.begin(), body.data.end());
+        big(static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(body.data.data()),
+                                             static_cast<uInt>(body.data.size()))));
+    };
+    const std::uint8_t header[] = {0, 0, 0, 2, 0, 0, 0, 1, 16, 2, 0, 0, 0};  // 2 x 1, 16-bit RGB
+    const std::uint8_t rows[] = {0, 10, 99, 20, 99, 30, 99, 40, 0, 50, 0, 60, 0};
+    std::vector<std::byte> packed(100);
+    uLongf size = packed.size();
+    compress(reinterpret_cast<Bytef*>(packed.data()), &size, rows, sizeof rows);
+    packed.resize(size);
+    const auto* first = reinterpret_cast<const std::byte*>(header);
+    chunk("IHDR", {first, first + sizeof header});
+    chunk("IDAT", packed);
+    chunk("IEND", {});
+    EXPECT_EQ(decode_image(png.data, "deep.png").data,
+              (std::vector<std::uint8_t>{10, 20, 30, 40, 50, 60}));
+}
+
+TEST(ImageIo, damaged_files_are_errors_that_name_the_file) {
+    const auto path = test_folder() / "a.png";
+    write_png(path, quarters());
+    std::vector<std::byte> file = read_file(path);
+    for (std::size_t length = 0; length + 20 < file.size(); ++length)
+        EXPECT_EQ(
+            error_of([&] { decode_image(std::span(file).first(length), "cut.png"); }).find("cut"),
+            0u)
+            << length;
+    write_file_atomic(path, "no image");
+    EXPECT_NE(error_of([&] { read_image_info(path); }).find("a.png"), std::string::npos);
+    EXPECT_NE(error_of([&] { read_image_info(path / "b"); }).find("opened"), std::string::npos);
+}
+
+TEST(BoxDownscale, whole_factor_is_the_mean) {
+    ImageU8 image(4, 2, 4);
+    for (std::size_t i = 0; i < 8; ++i) {
+        image.data[i * 4] = static_cast<std::uint8_t>(i * 10);
+        image.data[i * 4 + 3] = 255;
+    }
+    const ImageU8 half = box_downscale(image, 2, 1);
+    EXPECT_EQ(half.data[0], 25);  // 0 10 40 50
+    EXPECT_EQ(half.data[4], 45);
+    EXPECT_EQ(half.data[3], 255);
+}
+
+TEST(BoxDownscale, fractional_factor_covers_parts_of_pixels) {
+    ImageU8 image(3, 1, 4);
+    for (std::size_t i = 0; i < 3; ++i) {
+        image.data[i * 4] = static_cast<std::uint8_t>(i * 90);
+        image.data[i * 4 + 3] = 255;
+    }
+    const ImageU8 out = box_downscale(image, 2, 1);
+    EXPECT_EQ(out.data[0], 30);   // (0 + 90 / 2) / 1.5
+    EXPECT_EQ(out.data[4], 150);  // (90 / 2 + 180) / 1.5
+}
+
+TEST(BoxDownscale, transparent_pixels_lend_no_colour) {
+    ImageU8 image(2, 1, 4);
+    image.data = {200, 100, 50, 255, 7, 7, 7, 0};
+    EXPECT_EQ(box_downscale(image, 1, 1).data, (std::vector<std::uint8_t>{200, 100, 50, 128}));
+}
+
+TEST(BoxDownscale, constant_image_stays_constant_at_any_size) {
+    ImageU8 image(37, 23, 4);
+    std::fill(image.data.begin(), image.data.end(), std::uint8_t{255});
+    for (int width = 1; width <= 37; ++width)
+        for (const std::uint8_t value : box_downscale(image, width, 1 + width % 23).data)
+            ASSERT_EQ(value, 255) << width;
+}
+
+TEST(Mask, of_another_size_and_of_zeros_and_ones) {
+    ImageU8 image = to_rgba(ImageU8(4, 2, 1)), mask(2, 1, 1);
+    mask.data = {0, 1};
+    apply_mask(image, mask);
+    for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < 4; ++x) EXPECT_EQ(image.at(x, y, 3), x < 2 ? 0 : 255);
+}
+
+TEST(LoadPhotos, order_is_kept_and_errors_arrive) {
+    const auto folder = test_folder();
+    std::vector<View> views(20);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        ImageU8 image(3, 2, 1);
+        image.data[0] = static_cast<std::uint8_t>(i);
+        views[i].photo = folder / (std::to_string(i) + ".png");
+        views[i].lens = {"PINHOLE", {1, 1, 1, 1}, 3, 2};
+        views[i].camera = {.width = 3, .height = 2};
+        write_png(views[i].photo, image);
+    }
+    for (const int threads : {0, 1, 3, 64}) {
+        const std::vector<ImageU8> photos = load_photos(views, threads);
+        for (std::size_t i = 0; i < views.size(); ++i) EXPECT_EQ(photos[i].data[0], i);
+    }
+    EXPECT_TRUE(load_photos({}).empty());
+    views[11].photo = folder / "missing.png";
+    EXPECT_NE(error_of([&] { load_photos(views); }).find("missing.png"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace darb

@@ -1,0 +1,170 @@
+#include "engine/data/transforms.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/core/files.h"
+#include "engine/data/image_io.h"
+#include "tests/unit/data/data_files.h"
+
+namespace darb {
+namespace {
+
+/// Camera at (1, 2, 3), OpenGL axes equal to the world's.
+constexpr const char* kPose = R"("transform_matrix": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]])";
+
+std::string frame(const std::string& path, const std::string& more = "") {
+    return R"({"file_path": ")" + path + "\", " + more + kPose + "}";
+}
+
+std::string file(const std::string& head, const std::string& frames) {
+    return "{" + head + R"("frames": [)" + frames + "]}";
+}
+
+LensModel lens_of(const std::string& head, const std::string& of_frame = "") {
+    const TransformsFile parsed = parse_transforms(file(head, frame("a", of_frame)), "t.json");
+    return lens_from_transforms(parsed.frames.at(0).intrinsics, 80, 60, "t.json");
+}
+
+std::string parse_error(const std::string& text) {
+    return error_of([&] { parse_transforms(text, "t.json"); });
+}
+
+TEST(Transforms, opengl_axes_become_those_of_colmap) {
+    const TransformsFile parsed = parse_transforms(file("", frame("a.png")), "t.json");
+    const TransformsFrame& only = parsed.frames.at(0);
+    // A point 5 before the OpenGL camera (down -z), 1 to the right, 2 up.
+    const glm::dvec3 p = only.rotation * glm::dvec3(1 + 1, 2 + 2, 3 - 5) + only.translation;
+    EXPECT_NEAR(glm::length(p - glm::dvec3(1, -2, 5)), 0, 1e-12);
+}
+
+TEST(Transforms, intrinsics_of_every_dialect) {
+    const LensModel angle = lens_of(R"("camera_angle_x": 1.5707963267948966, )");
+    EXPECT_EQ(angle.model, "PINHOLE");
+    EXPECT_NEAR(angle.parameters[0], 40, 1e-12);
+    EXPECT_NEAR(angle.parameters[1], 40, 1e-12);
+    EXPECT_EQ(angle.parameters[2], 40);
+    EXPECT_EQ(angle.parameters[3], 30);
+
+    const LensModel ngp = lens_of(
+        R"("w": 1080.0, "h": 1920, "fl_x": 1375, "fl_y": 1374, "cx": 554, "cy": 965, "camera_angle_x": 9,
+           "k1": 0.05, "k2": -0.08, "p1": -0.001, "p2": 0.0002, )");
+    EXPECT_EQ(ngp.model, "OPENCV");
+    EXPECT_EQ(ngp.width, 1080);
+    EXPECT_EQ(ngp.parameters,
+              (std::vector<double>{1375, 1374, 554, 965, 0.05, -0.08, -0.001, 0.0002}));
+
+    const std::string fisheye = R"("fl_x": 50, "k1": 1, "k2": 2, "k3": 3, "k4": 4, )";
+    EXPECT_EQ(lens_of(fisheye + R"("camera_model": "OPENCV_FISHEYE", )").parameters,
+              (std::vector<double>{50, 50, 40, 30, 1, 2, 3, 4}));
+    EXPECT_EQ(lens_of(fisheye + R"("is_fisheye": true, )").model, "OPENCV_FISHEYE");
+    EXPECT_EQ(lens_of(R"("fl_x": 50, "k1": 1, "k3": 3, )").parameters,
+              (std::vector<double>{50, 50, 40, 30, 1, 0, 0, 0, 3, 0, 0, 0}));
+}
+
+TEST(Transforms, frames_override_the_file) {
+    const LensModel lens =
+        lens_of(R"("fl_x": 50, "fl_y": 51, "cx": 1, "w": 80, "h": 60, "k1": 1, )",
+                R"("fl_x": 70, "w": 100, "k1": 0, )");
+    EXPECT_EQ(lens.model, "PINHOLE");
+    EXPECT_EQ(lens.width, 100);
+    EXPECT_EQ(lens.parameters, (std::vector<double>{70, 70, 1, 30}));
+}
+
+TEST(Transforms, bad_files_are_errors_that_name_the_frame) {
+    EXPECT_NE(parse_error("{").find("JSON"), std::string::npos);
+    EXPECT_NE(parse_error("[]").find("cameras.json"), std::string::npos);
+    EXPECT_NE(parse_error("{}").find("frames"), std::string::npos);
+    EXPECT_NE(parse_error(file("", frame("a") + ",{}")).find("frame 2 of 2"), std::string::npos);
+    EXPECT_NE(parse_error(file("", R"({"file_path": "a"})")).find("transform_matrix"),
+              std::string::npos);
+    EXPECT_NE(parse_error(file(R"("fl_x": "50", )", frame("a"))).find("fl_x"), std::string::npos);
+    const auto with = [](const std::string& row) {
+        return file("", R"({"file_path": "b.png", "transform_matrix": [)" + row +
+                            ",[0,1,0,2],[0,0,1,3],[0,0,0,1]]}");
+    };
+    EXPECT_NE(parse_error(with("[2,0,0,1]")).find("orthonormal"), std::string::npos);
+    EXPECT_NE(parse_error(with("[-1,0,0,1]")).find("mirrors"), std::string::npos);
+    EXPECT_NE(parse_error(with("[null,0,0,1]")).find("NaN"), std::string::npos);
+    EXPECT_NE(parse_error(with("[1,0,0,1e999]")).find("line 1"), std::string::npos);
+    EXPECT_NE(parse_error(with("[1,0,0]")).find("4 numbers"), std::string::npos);
+    for (const char* head : {R"("fl_x": 0, )", R"("fl_x": -5, )", R"("camera_angle_x": -1, )"})
+        EXPECT_NE(error_of([&] { lens_of(head); }).find("focal"), std::string::npos) << head;
+    EXPECT_NE(error_of([&] { lens_of(""); }).find("fl_x"), std::string::npos);
+    EXPECT_NE(error_of([&] {
+                  lens_of(R"("fl_x": 5, "camera_model": "EQUIRECTANGULAR", )");
+              }).find("EQUIRECTANGULAR"),
+              std::string::npos);
+    EXPECT_NE(error_of([&] { lens_of(R"("fl_x": 5, "w": 1e300, )"); }).find("size"),
+              std::string::npos);
+}
+
+TEST(Transforms, truncated_anywhere_is_an_error) {
+    const std::string text = file(R"("fl_x": 50, )", frame("a.png"));
+    for (std::size_t length = 0; length < text.size(); ++length)
+        EXPECT_FALSE(parse_error(text.substr(0, length)).empty()) << length;
+}
+
+TEST(TransformsSource, nerfstudio_folder_with_masks_points_and_split) {
+    const auto folder = test_folder();
+    for (const char* name : {"images/a.png", "images/b.png"})
+        write_png(folder / name, ImageU8(8, 6, 3));
+    for (const char* name : {"images_2/a.png", "images_2/b.png"})
+        write_png(folder / name, ImageU8(4, 3, 3));
+    ImageU8 mask(8, 6, 1);
+    mask.data[0] = 255;
+    write_png(folder / "masks/a.png", mask);
+    write_file_atomic(
+        folder / "sparse_pc.ply",
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+        "property float z\nproperty uint8 red\nproperty uint8 green\n"
+        "property uint8 blue\nend_header\n1000000.25 2 3 4 5 6\nnan 0 0 1 1 1\n");
+    write_file_atomic(
+        folder / "transforms.json",
+        file(R"("w": 8, "h": 6, "fl_x": 10, "fl_y": 10, "cx": 4, "cy": 3, "camera_model": "OPENCV",
+                "applied_transform": [[0,1,0,0],[1,0,0,0],[0,0,-1,0]],
+                "ply_file_path": "sparse_pc.ply", "test_filenames": ["./images/b.png"], )",
+             frame("./images/b.png") + "," +
+                 frame("images/a.png", R"("mask_path": "masks/a.png", )") + "," +
+                 frame("images/missing.png")));
+    const Dataset dataset = load_dataset(folder);
+    ASSERT_EQ(dataset.views.size(), 2u);
+    EXPECT_EQ(dataset.views[0].name, "images/a.png");
+    EXPECT_FALSE(dataset.views[0].is_test);
+    EXPECT_TRUE(dataset.views[1].is_test);
+    EXPECT_TRUE(dataset.has_alpha);
+    const ImageU8 photo = load_photo(dataset.views[0]);
+    EXPECT_EQ(photo.data[3], 255);
+    EXPECT_EQ(photo.data[7], 0);
+    // The frames' matrices and the ply share the file's frame: neither is changed.
+    EXPECT_EQ(dataset.points.position, (std::vector<double>{1000000.25, 2, 3}));
+    EXPECT_NEAR(glm::length(dataset.views[0].camera.centre() - glm::dvec3(1, 2, 3)), 0, 1e-12);
+    EXPECT_EQ(dataset.notes.size(), 2u) << "a missing photo, a dropped point";
+
+    DatasetOptions half;
+    half.images_folder = "images_2";
+    EXPECT_EQ(load_dataset(folder / "transforms.json", half).views[0].camera.fx, 5);
+    std::filesystem::remove_all(folder / "images");
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("none of its 3 photos"),
+              std::string::npos);
+}
+
+TEST(TransformsSource, synthetic_folder_has_train_and_test_and_no_extensions) {
+    const auto folder = test_folder();
+    write_png(folder / "train/r_0.png", ImageU8(8, 8, 4));
+    write_png(folder / "test/r_0.png", ImageU8(8, 8, 4));
+    const std::string head = R"("camera_angle_x": 1.5707963267948966, )";
+    write_file_atomic(folder / "transforms_train.json", file(head, frame("./train/r_0")));
+    write_file_atomic(folder / "transforms_test.json", file(head, frame("./test/r_0")));
+    const Dataset dataset = load_dataset(folder);
+    ASSERT_EQ(dataset.views.size(), 2u);
+    EXPECT_EQ(dataset.views[0].name, "test/r_0");
+    EXPECT_TRUE(dataset.views[0].is_test);
+    EXPECT_FALSE(dataset.views[1].is_test);
+    EXPECT_NEAR(dataset.views[1].camera.fx, 4, 1e-12);
+    EXPECT_TRUE(dataset.has_alpha);
+}
+
+}  // namespace
+}  // namespace darb
