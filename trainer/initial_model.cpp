@@ -101,7 +101,7 @@ std::vector<double> neighbour_distance2(const std::vector<double>& position) {
     tree.buildIndex();
     const size_t wanted = std::min<size_t>(4, count);  // the point itself comes first
     for (size_t i = 0; i < count; ++i) {
-        size_t index[4];
+        std::uint32_t index[4];
         double distance2[4];
         const size_t found = tree.knnSearch(&position[3 * i], wanted, index, distance2);
         double sum = 0.0;

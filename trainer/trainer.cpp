@@ -71,6 +71,8 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
                     "Every view is held out; train without --eval or add photos.");
     cameras_ = upload_cameras(device, camera_data_);
     d_image_ = Buffer(device, "d_image", pixels * 12);
+    forward_.reserve(splats_.count(), splats_.count() * 4, largest(dataset, &Camera::width),
+                     largest(dataset, &Camera::height));
 }
 
 int Trainer::sh_degree() const {
@@ -105,13 +107,13 @@ AdamStep Trainer::rates(int iteration) const {
 
 void Trainer::step() {
     launch(++iteration_);
-    finish(flights_[(iteration_ + 1) & 1]);
+    settle(flights_[(iteration_ + 1) & 1]);
     density_control(iteration_);
 }
 
 void Trainer::drain() {
-    finish(flights_[(iteration_ + 1) & 1]);
-    finish(flights_[iteration_ & 1]);
+    settle(flights_[(iteration_ + 1) & 1]);
+    settle(flights_[iteration_ & 1]);
 }
 
 void Trainer::launch(int iteration) {
@@ -138,15 +140,14 @@ void Trainer::launch(int iteration) {
     commands.submit();
 }
 
-void Trainer::finish(Flight& flight) {
-    if (flight.iteration == 0) return;
+std::uint32_t Trainer::finish(Flight& flight) {
     flight.commands.wait();
     const int iteration = std::exchange(flight.iteration, 0);
     gpu::FrameStatus status;
     gpu::LossResult loss;
     std::memcpy(&status, flight.status.mapped(), sizeof status);
     std::memcpy(&loss, flight.loss.mapped(), sizeof loss);
-    if (status.overflow != 0) return redo_from(iteration, status.pairs);
+    if (status.overflow != 0) return status.pairs;
 
     for (size_t r = 0; r < counters_.culled.size(); ++r) counters_.culled[r] += status.culled[r];
     counters_.bad_gradients =
@@ -160,23 +161,31 @@ void Trainer::finish(Flight& flight) {
             known->ms += pass.ms;
     }
     ++timed_iterations_;
-    if (!on_result) return;
-    const double mse = std::max(double(loss.mse), 1e-12);
-    on_result({iteration, Loss::value(loss, options_.lambda_dssim), -10.0 * std::log10(mse),
-               splats_.count(), status.visible, status.pairs});
+    if (on_result) {
+        const double mse = std::max(double(loss.mse), 1e-12);
+        on_result({iteration, Loss::value(loss, options_.lambda_dssim), -10.0 * std::log10(mse),
+                   splats_.count(), status.visible, status.pairs});
+    }
+    return 0;
 }
 
-// The overflow flag is sticky: whatever was submitted after this iteration changed nothing either.
-void Trainer::redo_from(int iteration, std::uint32_t pairs) {
-    for (Flight& flight : flights_)
-        if (std::exchange(flight.iteration, 0) != 0) flight.commands.wait();
-    forward_.reserve(splats_.count(), pairs + pairs / 2, 1, 1);
-    forward_.clear_status();
-    const int last = iteration_;
-    counters_.redone_iterations += static_cast<std::uint64_t>(last - iteration + 1);
-    for (int i = iteration; i <= last; ++i) {
-        launch(i);
-        finish(flights_[i & 1]);
+// The overflow flag is sticky: whatever was submitted after the iteration that overflowed changed
+// nothing either, and all of it is done again in order.
+void Trainer::settle(Flight& flight) {
+    if (flight.iteration == 0) return;
+    const int first = flight.iteration;
+    std::uint32_t pairs = finish(flight);
+    if (pairs == 0) return;
+    for (Flight& later : flights_)
+        if (std::exchange(later.iteration, 0) != 0) later.commands.wait();
+    for (int i = first; i <= iteration_; ++i) {
+        do {
+            ++counters_.redone_iterations;
+            if (pairs > 0) forward_.reserve(splats_.count(), pairs + pairs / 2, 1, 1);
+            forward_.clear_status();
+            launch(i);
+            pairs = finish(flights_[i & 1]);
+        } while (pairs > 0);
     }
 }
 

@@ -1,0 +1,20 @@
+// The subcommands of darb: each adds itself to the command line and leaves what to run.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace darb {
+
+/// The chosen subcommand's body; returns the exit code.
+using Action = std::function<int()>;
+
+void add_train(CLI::App& app, Action& action, const std::vector<std::string>& arguments);
+void add_eval(CLI::App& app, Action& action);
+void add_render(CLI::App& app, Action& action);
+void add_info(CLI::App& app, Action& action);
+void add_devices(CLI::App& app, Action& action);
+
+}  // namespace darb

@@ -1,0 +1,61 @@
+// darb: train, render and measure splat scenes. Exit codes: 0 done, 1 internal error, 2 bad usage
+// or input.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "engine/core/error.h"
+#include "tools/darb/commands.h"
+
+namespace {
+
+// 3DGS spells options with underscores; here they are the same as dashes.
+std::vector<std::string> with_dashes(int argc, char** argv) {
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    for (std::string& argument : arguments) {
+        if (argument.rfind("--", 0) != 0) continue;
+        const size_t end = std::min(argument.find('='), argument.size());
+        for (size_t i = 2; i < end; ++i)
+            if (argument[i] == '_') argument[i] = '-';
+    }
+    return arguments;
+}
+
+int run(int argc, char** argv) {
+    const std::vector<std::string> arguments = with_dashes(argc, argv);
+    CLI::App app(
+        "Train, render and measure 3D splat scenes with a choice of kernel, on any Vulkan device.",
+        "darb");
+    app.set_version_flag("--version", std::string("darb ") + DARB_VERSION);
+    app.require_subcommand(1);
+    darb::Action action;
+    darb::add_train(app, action, arguments);
+    darb::add_eval(app, action);
+    darb::add_render(app, action);
+    darb::add_info(app, action);
+    darb::add_devices(app, action);
+    try {
+        app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+    } catch (const CLI::ParseError& e) {
+        return app.exit(e) == 0 ? 0 : 2;
+    }
+    return action();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return run(argc, argv);
+    } catch (const darb::Error& e) {
+        fmt::print(stderr, "error: {}\n", e.what());
+        return 2;
+    } catch (const std::exception& e) {
+        fmt::print(stderr, "internal error: {}\n", e.what());
+        return 1;
+    }
+}

@@ -1,0 +1,4 @@
+#include "tools/darb/commands.h"
+namespace darb {
+void add_render(CLI::App&, Action&) {}
+}  // namespace darb

@@ -1,0 +1,91 @@
+// darb train DATASET -o OUT: photos to a splat scene.
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "tools/darb/commands.h"
+#include "tools/darb/train_flags.h"
+#include "tools/darb/train_plan.h"
+
+namespace darb {
+
+namespace {
+
+std::atomic<bool> g_stop{false};  // a signal handler can reach nothing else
+
+void on_interrupt(int) {
+    if (g_stop.exchange(true)) std::_Exit(130);  // the second Ctrl-C does not wait
+}
+
+// `darb train --resume -o OUT` alone: the arguments of the run that it goes on with.
+void recall_arguments(TrainFlags& flags) {
+    const auto path = flags.run.output / "command.json";
+    const auto saved = nlohmann::json::parse(read_text_file(path), nullptr, false);
+    if (!saved.is_array())
+        throw Error(path.string(), "is no list of arguments",
+                    "Repeat the whole command with --resume.");
+    std::vector<std::string> arguments = saved.get<std::vector<std::string>>();
+    TrainFlags recalled;
+    CLI::App app;
+    add_train_flags(*app.add_subcommand("train"), recalled);
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+    recalled.resume = true;
+    recalled.run.output = flags.run.output;
+    if (!flags.device.empty()) recalled.device = flags.device;
+    recalled.run.quiet = flags.run.quiet;
+    flags = recalled;
+}
+
+void print_summary(const RunSummary& summary, const TrainFlags& flags) {
+    fmt::print("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
+    if (!summary.evaluations.empty() && !summary.evaluations.back().views.empty()) {
+        const Evaluation& e = summary.evaluations.back();
+        fmt::print("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
+                   e.splats);
+    }
+    if (!summary.model.empty()) fmt::print("scene    {}\n", summary.model.string());
+    if (!summary.picture.empty()) fmt::print("picture  {}\n", summary.picture.string());
+    if (!summary.report.empty()) fmt::print("report   {}\n", summary.report.string());
+    if (summary.interrupted)
+        fmt::print("interrupted; go on with: darb train --resume -o {}\n",
+                   flags.run.output.string());
+}
+
+int train(TrainFlags flags, std::vector<std::string> arguments) {
+    if (flags.resume && flags.dataset.empty() && !flags.run.output.empty())
+        recall_arguments(flags);
+    else if (!flags.run.output.empty())
+        write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
+    finish_train_flags(flags);
+    if (flags.dataset.empty())
+        throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
+
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    Device device(device_options);
+    const Dataset dataset = load_training_data(flags);
+    print_plan(device, dataset, flags);
+    std::signal(SIGINT, on_interrupt);
+    std::signal(SIGTERM, on_interrupt);
+    print_summary(run_training(device, dataset, flags.train, flags.run, &g_stop), flags);
+    return 0;
+}
+
+}  // namespace
+
+void add_train(CLI::App& app, Action& action, const std::vector<std::string>& arguments) {
+    auto flags = std::make_shared<TrainFlags>();
+    CLI::App* command = app.add_subcommand("train", "Train a splat scene from photos");
+    add_train_flags(*command, *flags);
+    command->callback([flags, arguments, &action] {
+        action = [flags, arguments] { return train(*flags, arguments); };
+    });
+}
+
+}  // namespace darb

@@ -1,0 +1,175 @@
+#include "tools/darb/train_flags.h"
+
+#include <fmt/format.h>
+
+#include "engine/core/error.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kStandardEvaluations[] = {7'000, 30'000};
+
+// Options of the field whose features are not there yet: an error that says so, never ignored.
+void add_missing(CLI::App& command, const std::string& name, const std::string& feature) {
+    command
+        .add_option_function<std::string>(
+            name,
+            [name, feature](const std::string&) {
+                throw Error(name, feature + " is not part of this version",
+                            "Leave the option out.");
+            },
+            "not available yet")
+        ->expected(0, 1)
+        ->group("");
+}
+
+void add_data_flags(CLI::App& command, TrainFlags& f) {
+    command.add_option(
+        "dataset,-s,--source-path", f.dataset,
+        "COLMAP project, folder with transforms.json, a .json file, or a folder of photos");
+    command.add_option("-o,-m,--model-path,--output", f.run.output, "output folder");
+    command.add_option("-i,--images", f.data.images_folder, "photo folder of a COLMAP project")
+        ->capture_default_str();
+    command.add_option("-r,--resolution", f.data.resolution,
+                       "1, 2, 4, 8: divide the photos' size; above 8: their width in px; "
+                       "default: as they are, at most 1,600 px wide");
+    command.add_flag("--eval", f.data.hold_out,
+                     "hold out every 8th view, or the source's own test views");
+    command.add_flag("-w,--white-background", f.train.white_background,
+                     "white behind alpha, not black");
+    command.add_flag("--sequential", f.sequential,
+                     "photos without cameras: match neighbours in name order only");
+}
+
+void add_schedule_flags(CLI::App& command, TrainFlags& f) {
+    TrainOptions& t = f.train;
+    command.add_option("--iterations", t.iterations, "length of the run")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 10'000'000));
+    command.add_option("--test-iterations", f.run.test_iterations,
+                       "evaluate after these (default 7000 30000 and the last)");
+    command.add_option("--save-iterations", f.run.save_iterations,
+                       "write a PLY after these (default 7000 30000 and the last)");
+    command.add_option("--checkpoint-iterations", f.run.checkpoint_iterations,
+                       "keep a checkpoint of its own after these");
+    command
+        .add_option("--checkpoint-interval", f.run.checkpoint_interval,
+                    "refresh checkpoint.darb every so many iterations; 0: at the end only")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command.add_option("--start-checkpoint", f.start_checkpoint, "go on from this checkpoint");
+    command.add_flag("--resume", f.resume, "go on from OUT/checkpoint.darb");
+    command.add_option("--sh-degree", t.sh_degree, "highest degree of view-dependent colour")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 3));
+    command.add_option("--lambda-dssim", t.lambda_dssim, "weight of 1 - SSIM in the loss")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
+    command.add_option("--position-lr-init", t.position_lr_init)
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command.add_option("--position-lr-final", t.position_lr_final)
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command.add_option("--scaling-lr", t.scale_lr)
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command.add_option("--rotation-lr", t.rotation_lr)
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command.add_option("--opacity-lr", t.opacity_lr)
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command
+        .add_option("--feature-lr", t.sh_dc_lr,
+                    "of the colour; its view-dependent part learns at a 20th")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+}
+
+void add_density_flags(CLI::App& command, TrainFlags& f) {
+    TrainOptions& t = f.train;
+    command.add_option("--densify-grad-threshold", t.densify_grad_threshold)
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command.add_option("--densification-interval", t.densify_interval)
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command.add_option("--densify-from-iter", t.densify_from)
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command.add_option("--densify-until-iter", t.densify_until,
+                       "default: half of the run, at most 15,000");
+    command.add_option("--opacity-reset-interval", t.opacity_reset_interval)
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command
+        .add_option("--percent-dense", t.clone_split_extent,
+                    "share of the scene extent above which a splat splits rather than clones")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command
+        .add_option("--cap-max,--max-splats,--budget", t.max_splats,
+                    "growth stops at this many splats")
+        ->check(CLI::PositiveNumber);
+    command.add_option("--random-points", t.random_points,
+                       "splats to start from where the data set has no points");
+}
+
+}  // namespace
+
+void add_train_flags(CLI::App& command, TrainFlags& f) {
+    add_data_flags(command, f);
+    add_schedule_flags(command, f);
+    add_density_flags(command, f);
+    command
+        .add_option(
+            "--kernel", f.kernel,
+            "gaussian, raised_cosine, half_cosine_squared, sinc, inverse_quadratic, cosine, "
+            "squared_raised_cosine, inverse_multiquadric, parabolic")
+        ->capture_default_str();
+    command
+        .add_option("--footprint", f.footprint,
+                    "psi: the paper's; exact: the kernel's true projection")
+        ->capture_default_str();
+    command.add_option("--evaluation", f.evaluation, "polynomial, or builtin sin, cos and exp")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"polynomial", "builtin"}));
+    command.add_option("--seed", f.train.seed)->capture_default_str();
+    command.add_option("--device", f.device, "number or part of a name, see `darb devices`");
+    command.add_flag("-q,--quiet", f.run.quiet, "no progress");
+    command.add_flag("--deterministic", f.deterministic,
+                     "accepted: every run on one device already repeats bit by bit");
+    add_missing(command, "--strategy", "another strategy than adc");
+    add_missing(command, "--antialiasing", "anti-aliasing");
+    add_missing(command, "--effects", "the effect plan");
+    add_missing(command, "--accuracy", "the choice of accuracy");
+    add_missing(command, "--exposure-lr-init", "per-photo exposure");
+    add_missing(command, "--depths,-d", "depth supervision");
+    add_missing(command, "--view", "the live view");
+}
+
+void finish_train_flags(TrainFlags& f) {
+    const auto kernel = kernel_from_name(f.kernel);
+    if (!kernel)
+        throw Error("--kernel " + f.kernel, "no such kernel",
+                    "See `darb train --help` for the nine names.");
+    const auto footprint = footprint_from_name(f.footprint);
+    if (!footprint)
+        throw Error("--footprint " + f.footprint, "no such footprint", "Use psi or exact.");
+    f.train.kernel = *kernel;
+    f.train.footprint = *footprint;
+    f.train.evaluation = f.evaluation == "builtin" ? EVALUATION_BUILTIN : EVALUATION_POLYNOMIAL;
+    f.train.sh_rest_lr = f.train.sh_dc_lr / 20.0f;
+    for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
+        if (list->empty())
+            list->assign(std::begin(kStandardEvaluations), std::end(kStandardEvaluations));
+    if (f.run.output.empty())
+        throw Error("darb train", "no output folder", "Name one with -o OUT.");
+    if (f.resume && f.start_checkpoint.empty())
+        f.start_checkpoint = f.run.output / "checkpoint.darb";
+    f.run.resume_from = f.start_checkpoint;
+}
+
+}  // namespace darb

@@ -1,0 +1,33 @@
+// The command line of `darb train`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+
+#include "engine/data/dataset.h"
+#include "trainer/options.h"
+#include "trainer/run.h"
+
+namespace darb {
+
+struct TrainFlags {
+    std::string dataset;
+    std::string device;
+    bool resume = false;
+    bool sequential = false;
+    bool deterministic = false;  // every run is; the flag only lets scripts say so
+    std::filesystem::path start_checkpoint;
+    std::string kernel = "gaussian", footprint = "psi", evaluation = "polynomial";
+    DatasetOptions data;
+    TrainOptions train;
+    RunOptions run;
+};
+
+/// Adds every option to the subcommand; values land in flags, which must outlive the parse.
+void add_train_flags(CLI::App& command, TrainFlags& flags);
+
+/// Names to ids, lists to their defaults, contradictions to an Error.
+void finish_train_flags(TrainFlags& flags);
+
+}  // namespace darb

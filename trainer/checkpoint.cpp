@@ -1,0 +1,238 @@
+#include "trainer/checkpoint.h"
+
+#include <zlib.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+
+namespace darb {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr char kMagic[8] = {'D', 'A', 'R', 'B', 'C', 'K', 'P', 'T'};
+constexpr std::uint32_t kVersion = 1;
+constexpr size_t kHeadBytes = sizeof kMagic + 4 + 8;
+constexpr std::uint64_t kMaxSplats = 1u << 30;
+
+// The arrays of a state in file order.
+template <class State, class Visit>
+void for_each_array(State& state, Visit visit) {
+    for (int a = 0; a < kAttributeCount; ++a) visit(attribute_values(state.model, a));
+    for (int a = 0; a < kAttributeCount; ++a) visit(state.moments[a]);
+    visit(state.gradient_sum);
+}
+
+std::uint32_t checksum(std::span<const std::byte> bytes) {
+    uLong crc = crc32(0, nullptr, 0);
+    while (!bytes.empty()) {
+        const size_t part = std::min<size_t>(bytes.size(), 1u << 30);
+        crc = crc32(crc, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(part));
+        bytes = bytes.subspan(part);
+    }
+    return static_cast<std::uint32_t>(crc);
+}
+
+Json header_of(const Checkpoint& c, std::uint32_t crc) {
+    const SplatModel& m = c.state.model;
+    const TrainCounters& n = c.state.counters;
+    return Json{{"iteration", c.state.iteration},
+                {"splats", m.size()},
+                {"sh_degree", m.sh_degree},
+                {"kernel", kernel_name(m.kernel)},
+                {"footprint", footprint_name(m.footprint)},
+                {"antialias", m.antialias},
+                {"origin", {m.origin.x, m.origin.y, m.origin.z}},
+                {"seconds", c.seconds},
+                {"settings", c.settings},
+                {"dataset", c.dataset},
+                {"counters", {n.redone_iterations, n.bad_gradients, n.cloned_or_split, n.pruned}},
+                {"culled", n.culled},
+                {"crc32", crc}};
+}
+
+void read_header(const Json& h, Checkpoint& c, const std::string& where) {
+    SplatModel& m = c.state.model;
+    c.state.iteration = h.at("iteration").get<int>();
+    m.sh_degree = h.at("sh_degree").get<int>();
+    const auto kernel = kernel_from_name(h.at("kernel").get<std::string>());
+    const auto footprint = footprint_from_name(h.at("footprint").get<std::string>());
+    const auto splats = h.at("splats").get<std::uint64_t>();
+    if (!kernel || !footprint || m.sh_degree < 0 || m.sh_degree > 3 || splats > kMaxSplats ||
+        c.state.iteration < 0)
+        throw Error(where, "the header's values make no sense",
+                    "Start again from another checkpoint.");
+    m.kernel = *kernel;
+    m.footprint = *footprint;
+    m.antialias = h.at("antialias").get<bool>();
+    for (int a = 0; a < 3; ++a) m.origin[a] = h.at("origin").at(a).get<double>();
+    c.seconds = h.at("seconds").get<double>();
+    c.settings = h.at("settings").get<std::string>();
+    c.dataset = h.at("dataset").get<std::string>();
+    TrainCounters& n = c.state.counters;
+    n.redone_iterations = h.at("counters").at(0).get<std::uint64_t>();
+    n.bad_gradients = h.at("counters").at(1).get<std::uint64_t>();
+    n.cloned_or_split = h.at("counters").at(2).get<std::uint64_t>();
+    n.pruned = h.at("counters").at(3).get<std::uint64_t>();
+    n.culled = h.at("culled").get<decltype(n.culled)>();
+}
+
+std::uint64_t floats_per_splat(const SplatModel& m) {
+    const std::uint64_t parameters = 14 + static_cast<std::uint64_t>(m.rest_count());
+    return parameters * 3 + 2;
+}
+
+void size_arrays(Checkpoint& c, std::uint64_t splats) {
+    c.state.model.resize(splats);
+    c.state.moments.resize(kAttributeCount);
+    for (int a = 0; a < kAttributeCount; ++a)
+        c.state.moments[a].resize(attribute_values(c.state.model, a).size() * 2);
+    c.state.gradient_sum.resize(splats * 2);
+}
+
+}  // namespace
+
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+    std::vector<std::byte> payload;
+    for_each_array(checkpoint.state, [&](const std::vector<float>& values) {
+        const auto bytes = std::as_bytes(std::span(values));
+        payload.insert(payload.end(), bytes.begin(), bytes.end());
+    });
+    const std::string header = header_of(checkpoint, checksum(payload)).dump();
+    const std::uint64_t header_bytes = header.size();
+    std::vector<std::byte> file(kHeadBytes + header.size() + payload.size());
+    std::memcpy(file.data(), kMagic, sizeof kMagic);
+    std::memcpy(file.data() + 8, &kVersion, 4);
+    std::memcpy(file.data() + 12, &header_bytes, 8);
+    std::memcpy(file.data() + kHeadBytes, header.data(), header.size());
+    if (!payload.empty())
+        std::memcpy(file.data() + kHeadBytes + header.size(), payload.data(), payload.size());
+    write_file_atomic(path, file);
+}
+
+Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& where) {
+    const auto fail = [&](const std::string& what) {
+        return Error(where, what, "Start from another checkpoint, or without --resume.");
+    };
+    std::uint32_t version = 0;
+    std::uint64_t header_bytes = 0;
+    if (file.size() < kHeadBytes || std::memcmp(file.data(), kMagic, sizeof kMagic) != 0)
+        throw fail("this is no darb checkpoint");
+    std::memcpy(&version, file.data() + 8, 4);
+    std::memcpy(&header_bytes, file.data() + 12, 8);
+    if (version != kVersion)
+        throw fail(fmt::format("version {}, this program reads {}", version, kVersion));
+    if (header_bytes > file.size() - kHeadBytes) throw fail("truncated in the header");
+    const auto* text = reinterpret_cast<const char*>(file.data() + kHeadBytes);
+    Checkpoint c;
+    std::uint64_t splats = 0;
+    std::uint32_t crc = 0;
+    try {
+        const Json header = Json::parse(text, text + header_bytes);
+        read_header(header, c, where);
+        splats = header.at("splats").get<std::uint64_t>();
+        crc = header.at("crc32").get<std::uint32_t>();
+    } catch (const Json::exception& e) {
+        throw fail(std::string("the header cannot be read: ") + e.what());
+    }
+    const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
+    const std::uint64_t expected = splats * floats_per_splat(c.state.model) * sizeof(float);
+    if (payload.size() != expected)
+        throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
+                               payload.size(), splats, expected));
+    if (checksum(payload) != crc) throw fail("damaged: the checksum of the data does not match");
+    size_arrays(c, splats);
+    size_t at = 0;
+    for_each_array(c.state, [&](std::vector<float>& values) {
+        if (!values.empty())
+            std::memcpy(values.data(), payload.data() + at, values.size() * sizeof(float));
+        at += values.size() * sizeof(float);
+    });
+    return c;
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+    return parse_checkpoint(read_file(path), path.string());
+}
+
+std::string settings_text(const TrainOptions& o) {
+    return Json{{"iterations", o.iterations},
+                {"seed", o.seed},
+                {"kernel", kernel_name(o.kernel)},
+                {"footprint", footprint_name(o.footprint)},
+                {"evaluation", o.evaluation == EVALUATION_BUILTIN ? "builtin" : "polynomial"},
+                {"sh_degree", o.sh_degree},
+                {"sh_interval", o.sh_interval},
+                {"white_background", o.white_background},
+                {"lambda_dssim", o.lambda_dssim},
+                {"position_lr", {o.position_lr_init, o.position_lr_final}},
+                {"scale_lr", o.scale_lr},
+                {"rotation_lr", o.rotation_lr},
+                {"opacity_lr", o.opacity_lr},
+                {"sh_lr", {o.sh_dc_lr, o.sh_rest_lr}},
+                {"densify_from", o.densify_from},
+                {"densify_until", o.densify_end()},
+                {"densify_interval", o.densify_interval},
+                {"densify_grad_threshold", o.densify_grad_threshold},
+                {"clone_split_extent", o.clone_split_extent},
+                {"prune_opacity", o.prune_opacity},
+                {"prune_extent", o.prune_extent},
+                {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to}},
+                {"max_splats", o.max_splats},
+                {"initial_opacity", o.initial_opacity},
+                {"random_points", o.random_points}}
+        .dump();
+}
+
+std::string dataset_fingerprint(const Dataset& dataset) {
+    std::uint64_t hash = 1469598103934665603ull;  // FNV-1a
+    const auto add = [&](const void* data, size_t size) {
+        const auto* bytes = static_cast<const unsigned char*>(data);
+        for (size_t i = 0; i < size; ++i) hash = (hash ^ bytes[i]) * 1099511628211ull;
+    };
+    for (const View& v : dataset.views) {
+        add(v.name.data(), v.name.size());
+        const Camera& c = v.camera;
+        const double numbers[] = {double(c.width),
+                                  double(c.height),
+                                  c.fx,
+                                  c.fy,
+                                  c.cx,
+                                  c.cy,
+                                  c.translation.x,
+                                  c.translation.y,
+                                  c.translation.z,
+                                  v.is_test ? 1.0 : 0.0};
+        add(numbers, sizeof numbers);
+        add(&c.rotation[0][0], 9 * sizeof(double));
+    }
+    add(dataset.points.position.data(), dataset.points.position.size() * sizeof(double));
+    return fmt::format("{:016x}", hash);
+}
+
+void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
+                     const TrainOptions& options, const Dataset& dataset) {
+    const Json before = Json::parse(checkpoint.settings, nullptr, false);
+    const Json now = Json::parse(settings_text(options));
+    std::string differences;
+    for (const auto& [name, value] : now.items())
+        if (!before.is_object() || !before.contains(name) || before[name] != value)
+            differences += fmt::format(
+                " {}: {} then, {} now;", name,
+                before.is_object() && before.contains(name) ? before[name].dump() : "unknown",
+                value.dump());
+    if (!differences.empty())
+        throw Error(path.string(), "was written with other settings:" + differences,
+                    "Repeat the options of that run, or start without --resume.");
+    if (checkpoint.dataset != dataset_fingerprint(dataset))
+        throw Error(path.string(),
+                    "the data set " + dataset.root.string() + " is not the one it was trained on",
+                    "Restore the photos and cameras of that run, or start without --resume.");
+}
+
+}  // namespace darb

@@ -1,0 +1,40 @@
+// Checkpoints: everything a run needs to go on bit-equal. One file: "DARBCKPT", version, a JSON
+// header with the sizes, the settings and a CRC-32 of what follows, then float32 arrays. Written
+// atomically.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "trainer/options.h"
+#include "trainer/trainer.h"
+
+namespace darb {
+
+struct Checkpoint {
+    Trainer::State state;
+    std::string settings;  // settings_text() of the run that wrote it
+    std::string dataset;   // dataset_fingerprint() of it
+    double seconds = 0;    // of training until then
+};
+
+/// Throws Error naming the file where it cannot be written; an older file is then intact.
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
+
+/// Throws Error naming the file and the place: not a checkpoint, truncated, damaged (CRC), of
+/// another version, or with sizes that do not fit together.
+Checkpoint read_checkpoint(const std::filesystem::path& path);
+Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& where);
+
+/// Every option that changes the result, as one JSON object in text.
+std::string settings_text(const TrainOptions& options);
+/// Names, sizes, cameras and points of a data set, hashed.
+std::string dataset_fingerprint(const Dataset& dataset);
+
+/// Throws Error naming each difference when the checkpoint is of other settings or another data
+/// set.
+void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
+                     const TrainOptions& options, const Dataset& dataset);
+
+}  // namespace darb

@@ -1,0 +1,105 @@
+#include "trainer/evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
+
+namespace darb {
+
+namespace {
+
+constexpr float kErrorGain = 4.0f;
+
+std::string file_stem(const std::string& view_name) {
+    std::string stem = std::filesystem::path(view_name).replace_extension().string();
+    std::replace_if(
+        stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
+    return stem;
+}
+
+ImageU8 side_by_side(const ImageF& photo, const ImageF& render) {
+    ImageF all(photo.width * 3, photo.height, 3);
+    for (int y = 0; y < photo.height; ++y)
+        for (int x = 0; x < photo.width; ++x)
+            for (int c = 0; c < 3; ++c) {
+                const float truth = photo.at(x, y, c);
+                const float shown = std::clamp(render.at(x, y, c), 0.0f, 1.0f);
+                all.at(x, y, c) = truth;
+                all.at(photo.width + x, y, c) = shown;
+                all.at(2 * photo.width + x, y, c) = kErrorGain * std::abs(shown - truth);
+            }
+    return to_8bit(all);
+}
+
+}  // namespace
+
+ImageF composite(const ImageU8& photo, const glm::vec3& background) {
+    ImageF image(photo.width, photo.height, 3);
+    const size_t pixels = size_t(photo.width) * photo.height;
+    for (size_t p = 0; p < pixels; ++p) {
+        const float alpha = photo.channels == 4 ? photo.data[p * 4 + 3] / 255.0f : 1.0f;
+        for (int c = 0; c < 3; ++c)
+            image.data[p * 3 + c] = photo.data[p * photo.channels + c] / 255.0f * alpha +
+                                    background[c] * (1.0f - alpha);
+    }
+    return image;
+}
+
+ImageU8 to_8bit(const ImageF& image) {
+    ImageU8 result(image.width, image.height, image.channels);
+    for (size_t i = 0; i < image.data.size(); ++i) {
+        const float v = image.data[i];
+        result.data[i] =
+            static_cast<std::uint8_t>(v > 0.0f ? std::min(v, 1.0f) * 255.0f + 0.5f : 0.0f);
+    }
+    return result;
+}
+
+ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
+                         const glm::vec3& background) {
+    const ImageF truth = composite(photo, background);
+    return {name, psnr(render, truth), ssim(render, truth)};
+}
+
+void take_means(Evaluation& evaluation) {
+    double psnr_sum = 0, ssim_sum = 0;
+    for (const ViewMetrics& v : evaluation.views) {
+        psnr_sum += v.psnr_db;
+        ssim_sum += v.ssim;
+    }
+    const double count = std::max<double>(1.0, static_cast<double>(evaluation.views.size()));
+    evaluation.psnr_db = psnr_sum / count;
+    evaluation.ssim = ssim_sum / count;
+}
+
+Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
+                             const std::vector<ImageU8>& photos) {
+    Evaluation evaluation;
+    for (size_t i = 0; i < dataset.views.size(); ++i) {
+        const View& view = dataset.views[i];
+        if (view.is_test)
+            evaluation.views.push_back(compare_view(view.name, trainer.render(view.camera),
+                                                    photos[i], trainer.background()));
+    }
+    take_means(evaluation);
+    return evaluation;
+}
+
+std::filesystem::path write_side_by_side(Trainer& trainer, const Dataset& dataset,
+                                         const std::vector<ImageU8>& photos,
+                                         const std::filesystem::path& folder) {
+    std::filesystem::path first;
+    for (size_t i = 0; i < dataset.views.size(); ++i) {
+        const View& view = dataset.views[i];
+        if (!view.is_test) continue;
+        const auto path = folder / (file_stem(view.name) + ".png");
+        write_png(path, side_by_side(composite(photos[i], trainer.background()),
+                                     trainer.render(view.camera)));
+        if (first.empty()) first = path;
+    }
+    return first;
+}
+
+}  // namespace darb

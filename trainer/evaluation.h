@@ -1,0 +1,34 @@
+// Held-out views: their metrics, and their pictures beside the photos.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/data/dataset.h"
+#include "trainer/run.h"
+#include "trainer/trainer.h"
+
+namespace darb {
+
+/// The photo as float RGB over a background, value / 255, straight alpha composited.
+ImageF composite(const ImageU8& photo, const glm::vec3& background);
+/// Clamped to [0, 1] and rounded to 8 bits.
+ImageU8 to_8bit(const ImageF& image);
+
+/// PSNR and SSIM of a render, clamped to [0, 1], against the photo over the same background.
+ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
+                         const glm::vec3& background);
+/// Mean of the views into evaluation.psnr_db and ssim.
+void take_means(Evaluation& evaluation);
+
+/// Only views, means: iteration, seconds and splats are the caller's. photos: all views' in order.
+Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
+                             const std::vector<ImageU8>& photos);
+
+/// photo | render | absolute error x 4, a PNG a held-out view; returns the first one's path.
+std::filesystem::path write_side_by_side(Trainer& trainer, const Dataset& dataset,
+                                         const std::vector<ImageU8>& photos,
+                                         const std::filesystem::path& folder);
+
+}  // namespace darb

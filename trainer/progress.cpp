@@ -1,0 +1,74 @@
+#include "trainer/progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace darb {
+
+namespace {
+constexpr double kSmoothing = 0.05;
+constexpr double kTerminalSeconds = 0.2, kPlainSeconds = 10.0;
+}  // namespace
+
+std::string format_duration(double seconds) {
+    const auto whole = static_cast<long>(seconds + 0.5);
+    if (whole < 60) return fmt::format("{} s", whole);
+    if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+    return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+std::string format_bytes(double bytes) {
+    if (bytes < 1024.0 * 1024.0) return fmt::format("{:.0f} KiB", bytes / 1024.0);
+    if (bytes < 1024.0 * 1024.0 * 1024.0) return fmt::format("{:.0f} MiB", bytes / 1024.0 / 1024.0);
+    return fmt::format("{:.1f} GiB", bytes / 1024.0 / 1024.0 / 1024.0);
+}
+
+Progress::Progress(int first_iteration, int last_iteration, bool quiet)
+    : first_(first_iteration),
+      last_(last_iteration),
+      quiet_(quiet),
+      terminal_(::isatty(STDERR_FILENO) == 1),
+      start_(Clock::now()),
+      last_print_(start_) {}
+
+void Progress::update(const IterationResult& r, const Device& device) {
+    loss_ = any_ ? loss_ + kSmoothing * (r.loss - loss_) : r.loss;
+    psnr_db_ = any_ ? psnr_db_ + kSmoothing * (r.psnr_db - psnr_db_) : r.psnr_db;
+    any_ = true;
+    if (quiet_) return;
+    const auto now = Clock::now();
+    const double since = std::chrono::duration<double>(now - last_print_).count();
+    if (since < (terminal_ ? kTerminalSeconds : kPlainSeconds) && r.iteration < last_) return;
+    last_print_ = now;
+    fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"), text(r, device));
+    std::fflush(stderr);
+}
+
+std::string Progress::text(const IterationResult& r, const Device& device) const {
+    const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    const double done = r.iteration - first_ + 1;
+    const double rate = done / std::max(seconds, 1e-6);
+    std::string bar;
+    if (terminal_) {
+        const int filled = static_cast<int>(20.0 * r.iteration / std::max(last_, 1));
+        bar = "[" + std::string(filled, '#') + std::string(20 - filled, '.') + "] ";
+    }
+    return fmt::format(
+        "{}{}/{}  {:.1f} it/s  {:.1f} ms  loss {:.4f}  PSNR {:.2f} dB  {} splats  {}  {} left", bar,
+        r.iteration, last_, rate, 1000.0 / rate, loss_, psnr_db_, r.splats,
+        format_bytes(static_cast<double>(device.allocated_bytes())),
+        format_duration((last_ - r.iteration) / std::max(rate, 1e-9)));
+}
+
+void Progress::note(const std::string& line) {
+    if (quiet_) return;
+    fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K\n" : "{}\n"), line);
+}
+
+void Progress::finish() {
+    if (!quiet_ && terminal_ && any_) fmt::print(stderr, "\n");
+}
+
+}  // namespace darb

@@ -1,0 +1,37 @@
+// Progress on stderr: one line rewritten in place on a terminal, a plain line now and then
+// elsewhere.
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "trainer/trainer.h"
+
+namespace darb {
+
+class Progress {
+  public:
+    Progress(int first_iteration, int last_iteration, bool quiet);
+
+    /// After every finished iteration; decides itself when to print.
+    void update(const IterationResult& result, const Device& device);
+    /// A line of its own (evaluation, saved file), leaving the bar intact.
+    void note(const std::string& line);
+    void finish();
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    std::string text(const IterationResult& result, const Device& device) const;
+
+    int first_, last_;
+    bool quiet_, terminal_;
+    Clock::time_point start_, last_print_;
+    double loss_ = 0, psnr_db_ = 0;  // smoothed
+    bool any_ = false;
+};
+
+/// "3 min 20 s" and "1.2 GiB".
+std::string format_duration(double seconds);
+std::string format_bytes(double bytes);
+
+}  // namespace darb

@@ -1,0 +1,163 @@
+#include "trainer/run.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/data/camera_list.h"
+#include "engine/scene/ply.h"
+#include "trainer/checkpoint.h"
+#include "trainer/evaluation.h"
+#include "trainer/initial_model.h"
+#include "trainer/progress.h"
+#include "trainer/run_log.h"
+
+namespace darb {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+bool contains(const std::vector<int>& list, int value) {
+    return std::find(list.begin(), list.end(), value) != list.end();
+}
+
+// One run: the loop and what it writes. The stopwatch counts training alone.
+class Run {
+  public:
+    Run(Device& device, const Dataset& dataset, const TrainOptions& options, const RunOptions& run)
+        : device_(device),
+          dataset_(dataset),
+          options_(options),
+          run_(run),
+          photos_(load_photos(dataset.views)),
+          trainer_(device, dataset, photos_, initial_model(dataset, options), options),
+          log_(run.output, !run.resume_from.empty()),
+          progress_(1, options.iterations, run.quiet) {}
+
+    RunSummary execute(const std::atomic<bool>* stop);
+
+  private:
+    void resume();
+    void on_result(const IterationResult& result);
+    void evaluate(int iteration);
+    void save_model(int iteration);
+    void save_checkpoint(const std::filesystem::path& path);
+    double seconds() const {
+        return seconds_ +
+               (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
+    }
+    void stopwatch(bool run) {
+        seconds_ = seconds();
+        running_ = run;
+        started_ = Clock::now();
+    }
+
+    Device& device_;
+    const Dataset& dataset_;
+    const TrainOptions& options_;
+    const RunOptions& run_;
+    std::vector<ImageU8> photos_;
+    Trainer trainer_;
+    RunLog log_;
+    Progress progress_;
+    RunSummary summary_;
+    double seconds_ = 0;
+    bool running_ = false;
+    Clock::time_point started_;
+};
+
+void Run::resume() {
+    const Checkpoint checkpoint = read_checkpoint(run_.resume_from);
+    check_resumable(checkpoint, run_.resume_from, options_, dataset_);
+    trainer_.restore(checkpoint.state);
+    seconds_ = checkpoint.seconds;
+    log_.cut_after(checkpoint.state.iteration);
+    progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
+    progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
+                               checkpoint.state.iteration));
+}
+
+void Run::on_result(const IterationResult& result) {
+    log_.iteration(result, seconds());
+    progress_.update(result, device_);
+}
+
+void Run::evaluate(int iteration) {
+    stopwatch(false);
+    Evaluation evaluation = evaluate_held_out(trainer_, dataset_, photos_);
+    evaluation.iteration = iteration;
+    evaluation.seconds = seconds_;
+    evaluation.splats = trainer_.splat_count();
+    if (!evaluation.views.empty()) {
+        const auto folder = run_.output / "held_out" / std::to_string(iteration);
+        summary_.picture = write_side_by_side(trainer_, dataset_, photos_, folder);
+        progress_.note(fmt::format(
+            "iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats",
+            iteration, evaluation.psnr_db, evaluation.ssim, evaluation.views.size(),
+            evaluation.splats));
+    }
+    log_.evaluation(evaluation);
+    summary_.evaluations.push_back(std::move(evaluation));
+    stopwatch(true);
+}
+
+void Run::save_model(int iteration) {
+    stopwatch(false);
+    summary_.model =
+        run_.output / "point_cloud" / fmt::format("iteration_{}", iteration) / "point_cloud.ply";
+    write_ply(summary_.model, trainer_.model());
+    stopwatch(true);
+}
+
+void Run::save_checkpoint(const std::filesystem::path& path) {
+    stopwatch(false);
+    write_checkpoint(
+        path, {trainer_.state(), settings_text(options_), dataset_fingerprint(dataset_), seconds_});
+    stopwatch(true);
+}
+
+RunSummary Run::execute(const std::atomic<bool>* stop) {
+    const std::filesystem::path latest = run_.output / "checkpoint.darb";
+    trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
+    write_camera_list(run_.output / "cameras.json", dataset_.views);
+    write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
+    if (!run_.resume_from.empty()) resume();
+    log_.start(device_, dataset_, options_, trainer_.splat_count());
+
+    stopwatch(true);
+    while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
+        trainer_.step();
+        const int i = trainer_.iteration();
+        const bool last = i == options_.iterations;
+        if (last || contains(run_.test_iterations, i)) evaluate(i);
+        if (last || contains(run_.save_iterations, i)) save_model(i);
+        if (contains(run_.checkpoint_iterations, i))
+            save_checkpoint(run_.output / fmt::format("chkpnt{}.darb", i));
+        if (last || (run_.checkpoint_interval > 0 && i % run_.checkpoint_interval == 0))
+            save_checkpoint(latest);
+    }
+    trainer_.drain();
+    stopwatch(false);
+    summary_.interrupted = trainer_.iteration() < options_.iterations;
+    if (summary_.interrupted) {
+        save_checkpoint(latest);
+        save_model(trainer_.iteration());
+        stopwatch(false);
+    }
+    progress_.finish();
+    summary_.iteration = trainer_.iteration();
+    summary_.seconds = seconds_;
+    summary_.report = log_.finish(summary_, trainer_, device_);
+    return summary_;
+}
+
+}  // namespace
+
+RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                        const RunOptions& run, const std::atomic<bool>* stop) {
+    return Run(device, dataset, options, run).execute(stop);
+}
+
+}  // namespace darb

@@ -1,0 +1,58 @@
+// A whole training run: photos in, output folder out. Folder layout as the ecosystem's viewers
+// expect:
+//   point_cloud/iteration_N/point_cloud.ply  cameras.json  cfg_args
+//   run.jsonl (a line an event)  metrics.json  report.html  held_out/ITERATION/*.png
+//   checkpoint.darb
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
+#include "trainer/options.h"
+#include "trainer/trainer.h"
+
+namespace darb {
+
+struct RunOptions {
+    std::filesystem::path output;
+    std::vector<int> test_iterations, save_iterations, checkpoint_iterations;
+    int checkpoint_interval =
+        1'000;  // of checkpoint.darb, the latest; 0: only at the end and Ctrl-C
+    std::filesystem::path resume_from;  // empty: start afresh
+    bool quiet = false;
+};
+
+struct ViewMetrics {
+    std::string name;
+    double psnr_db = 0, ssim = 0;
+};
+
+struct Evaluation {
+    int iteration = 0;
+    double seconds = 0;  // of training, evaluation left out
+    std::uint32_t splats = 0;
+    std::vector<ViewMetrics> views;
+    double psnr_db = 0, ssim = 0;  // means over the views
+};
+
+struct RunSummary {
+    std::vector<Evaluation> evaluations;
+    int iteration = 0;
+    bool interrupted = false;
+    double seconds = 0;
+    std::filesystem::path model;    // the last PLY written
+    std::filesystem::path picture;  // a held-out view beside its photo, where there is one
+    std::filesystem::path report;
+};
+
+/// Trains until options.iterations or until *stop; saves, evaluates and logs as RunOptions says.
+/// Progress goes to stderr: a bar on a terminal, plain lines elsewhere. Throws Error; the last
+/// checkpoint is then intact.
+RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                        const RunOptions& run, const std::atomic<bool>* stop = nullptr);
+
+}  // namespace darb

@@ -1,0 +1,165 @@
+#include "trainer/run_log.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <sstream>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "trainer/checkpoint.h"
+
+namespace darb {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* kCullNames[CULL_REASONS] = {"near",    "rotation", "opacity", "covariance",
+                                                  "outside", "colour",   "",        ""};
+
+Json evaluation_json(const Evaluation& e) {
+    Json views = Json::array();
+    for (const ViewMetrics& v : e.views)
+        views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
+    return {{"event", "evaluation"}, {"iteration", e.iteration}, {"seconds", e.seconds},
+            {"splats", e.splats},    {"psnr_db", e.psnr_db},     {"ssim", e.ssim},
+            {"views", views}};
+}
+
+double peak_host_bytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<double>(usage.ru_maxrss) * 1024.0;
+}
+
+}  // namespace
+
+std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
+                     const std::filesystem::path& output) {
+    return fmt::format(
+        "Namespace(sh_degree={}, source_path='{}', model_path='{}', images='images', "
+        "resolution=-1, white_background={}, data_device='cpu', eval={})",
+        options.sh_degree, std::filesystem::absolute(dataset.root).string(),
+        std::filesystem::absolute(output).string(), options.white_background ? "True" : "False",
+        std::any_of(dataset.views.begin(), dataset.views.end(),
+                    [](const View& v) { return v.is_test; })
+            ? "True"
+            : "False");
+}
+
+RunLog::RunLog(const std::filesystem::path& folder, bool append)
+    : folder_(folder), file_(nullptr, &std::fclose) {
+    const auto path = folder / "run.jsonl";
+    if (append && std::filesystem::exists(path)) {
+        std::istringstream lines(read_text_file(path));
+        for (std::string line; std::getline(lines, line);) {
+            Json event = Json::parse(line, nullptr, false);
+            if (event.is_object()) events_.push_back(std::move(event));
+        }
+    }
+    std::error_code ignored;
+    std::filesystem::create_directories(folder, ignored);
+    file_.reset(std::fopen(path.c_str(), append ? "ab" : "wb"));
+    if (!file_)
+        throw Error(path.string(), std::string("cannot be written: ") + std::strerror(errno),
+                    "Choose another output folder with -o.");
+}
+
+void RunLog::cut_after(int iteration) {
+    std::erase_if(events_, [&](const Json& e) { return e.value("iteration", 0) > iteration; });
+    std::string text;
+    for (const Json& e : events_) text += e.dump() + "\n";
+    const auto path = folder_ / "run.jsonl";
+    write_file_atomic(path, text);
+    file_.reset(std::fopen(path.c_str(), "ab"));
+    if (!file_)
+        throw Error(path.string(), std::strerror(errno), "Choose another output folder with -o.");
+}
+
+void RunLog::write(const Json& event) {
+    const std::string line = event.dump() + "\n";
+    if (std::fwrite(line.data(), 1, line.size(), file_.get()) != line.size() ||
+        std::fflush(file_.get()) != 0)
+        throw Error((folder_ / "run.jsonl").string(),
+                    std::string("cannot be written: ") + std::strerror(errno),
+                    "Free space; the last checkpoint is intact, go on with --resume.");
+    events_.push_back(event);
+}
+
+void RunLog::start(const Device& device, const Dataset& dataset, const TrainOptions& options,
+                   std::uint32_t splats) {
+    int held_out = 0;
+    for (const View& v : dataset.views) held_out += v.is_test ? 1 : 0;
+    start_ = {{"event", "start"},
+              {"version", DARB_VERSION},
+              {"device", device.info().name},
+              {"driver", device.info().driver},
+              {"dataset", dataset.root.string()},
+              {"source", dataset.source},
+              {"notes", dataset.notes},
+              {"train_views", dataset.views.size() - held_out},
+              {"held_out_views", held_out},
+              {"splats", splats},
+              {"settings", Json::parse(settings_text(options))}};
+    write(start_);
+}
+
+void RunLog::iteration(const IterationResult& r, double seconds) {
+    loss_sum_ += r.loss;
+    psnr_sum_ += r.psnr_db;
+    ++summed_;
+    if (r.iteration % kLogInterval != 0) return;
+    write({{"event", "iteration"},
+           {"iteration", r.iteration},
+           {"seconds", seconds},
+           {"loss", loss_sum_ / summed_},
+           {"psnr_db", psnr_sum_ / summed_},
+           {"splats", r.splats},
+           {"visible", r.visible},
+           {"pairs", r.pairs}});
+    loss_sum_ = psnr_sum_ = 0;
+    summed_ = 0;
+}
+
+void RunLog::evaluation(const Evaluation& evaluation) {
+    write(evaluation_json(evaluation));
+}
+
+std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& trainer,
+                                     const Device& device) {
+    const TrainCounters& c = trainer.counters();
+    Json passes = Json::array();
+    for (const PassTotal& p : trainer.pass_totals())
+        passes.push_back(
+            {{"name", p.name},
+             {"ms", p.ms / std::max<double>(1.0, double(trainer.timed_iterations()))}});
+    Json culled = Json::object();
+    for (int r = 0; r < CULL_REASONS; ++r)
+        if (kCullNames[r][0] != 0) culled[kCullNames[r]] = c.culled[r];
+    Json evaluations = Json::array();
+    for (const Json& e : events_)
+        if (e.value("event", "") == "evaluation") evaluations.push_back(e);
+    const Json metrics{
+        {"start", start_},
+        {"iteration", summary.iteration},
+        {"interrupted", summary.interrupted},
+        {"seconds", summary.seconds},
+        {"ms_per_iteration", summary.seconds * 1000.0 / std::max(summary.iteration, 1)},
+        {"splats", trainer.splat_count()},
+        {"passes_ms", passes},
+        {"peak_device_bytes", device.peak_bytes()},
+        {"peak_host_bytes", peak_host_bytes()},
+        {"redone_iterations", c.redone_iterations},
+        {"bad_gradients", c.bad_gradients},
+        {"cloned_or_split", c.cloned_or_split},
+        {"pruned", c.pruned},
+        {"culled_splat_frames", culled},
+        {"evaluations", evaluations}};
+    write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
+    return {};
+}
+
+}  // namespace darb

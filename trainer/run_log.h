@@ -1,0 +1,50 @@
+// RunLog: run.jsonl (an event a line, flushed), metrics.json and report.html of one output folder.
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "trainer/run.h"
+
+namespace darb {
+
+/// cfg_args as 3DGS writes it: one Python Namespace, which the ecosystem's viewers parse.
+std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
+                     const std::filesystem::path& output);
+
+class RunLog {
+  public:
+    /// append: keep the lines of an earlier part of the run. Throws Error where the folder cannot
+    /// be written.
+    RunLog(const std::filesystem::path& folder, bool append);
+
+    /// Forgets events after an iteration: a resumed run writes them again.
+    void cut_after(int iteration);
+
+    void start(const Device& device, const Dataset& dataset, const TrainOptions& options,
+               std::uint32_t splats);
+    void iteration(const IterationResult& result,
+                   double seconds);  // keeps one line in kLogInterval
+    void evaluation(const Evaluation& evaluation);
+    /// metrics.json and report.html; returns the report's path.
+    std::filesystem::path finish(const RunSummary& summary, const Trainer& trainer,
+                                 const Device& device);
+
+    static constexpr int kLogInterval = 50;  // iterations a line, values averaged over them
+
+  private:
+    void write(const nlohmann::json& event);
+
+    std::filesystem::path folder_;
+    std::vector<nlohmann::json> events_;
+    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+    double loss_sum_ = 0, psnr_sum_ = 0;
+    int summed_ = 0;
+    nlohmann::json start_;
+};
+
+}  // namespace darb
