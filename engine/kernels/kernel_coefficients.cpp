@@ -15,8 +15,8 @@ namespace darb {
 namespace {
 
 constexpr int kNodes = 64;
-constexpr double kFullAccuracy = 6e-8;  // one rounding of float32 at 1
-constexpr double kSlopeShare = 0.25;    // a slope error counts this much of a value error
+constexpr double kFullAccuracy = 1.2e-7;  // the spacing of float32 above 1
+constexpr double kSlopeShare = 0.25;      // a slope error counts this much of a value error
 
 /// Chebyshev nodes of (from, to).
 std::vector<double> nodes(double from, double to) {

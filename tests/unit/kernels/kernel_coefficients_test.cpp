@@ -68,7 +68,7 @@ TEST(KernelCoefficients, FullDegree_isAtFloatRounding) {
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
         for (const Footprint f : kBoth) {
             const KernelCoefficients& k = kernel_coefficients(kernel, f, kFullDegree);
-            EXPECT_LT(k.value_error, 6e-8) << kernel_name(kernel) << " " << footprint_name(f);
+            EXPECT_LT(k.value_error, 1.2e-7) << kernel_name(kernel) << " " << footprint_name(f);
         }
 }
 
@@ -77,7 +77,7 @@ TEST(KernelCoefficients, HigherDegree_isNeverWorse) {
         for (const Footprint f : kBoth)
             for (int degree = kLeastDegree; degree < kFullDegree; ++degree)
                 EXPECT_LE(kernel_coefficients(kernel, f, degree + 1).value_error,
-                          kernel_coefficients(kernel, f, degree).value_error + 6e-8)
+                          kernel_coefficients(kernel, f, degree).value_error + 1.2e-7)
                     << kernel_name(kernel) << " " << footprint_name(f) << " degree " << degree;
 }
 
