@@ -87,7 +87,7 @@ TEST(Transforms, bad_files_are_errors_that_name_the_frame) {
     EXPECT_NE(parse_error(with("[2,0,0,1]")).find("orthonormal"), std::string::npos);
     EXPECT_NE(parse_error(with("[-1,0,0,1]")).find("mirrors"), std::string::npos);
     EXPECT_NE(parse_error(with("[null,0,0,1]")).find("NaN"), std::string::npos);
-    EXPECT_NE(parse_error(with("[1,0,0,1e999]")).find("line 1"), std::string::npos);
+    EXPECT_NE(parse_error(with("[1,0,0,1e999]")).find("1e999"), std::string::npos);
     EXPECT_NE(parse_error(with("[1,0,0]")).find("4 numbers"), std::string::npos);
     for (const char* head : {R"("fl_x": 0, )", R"("fl_x": -5, )", R"("camera_angle_x": -1, )"})
         EXPECT_NE(error_of([&] { lens_of(head); }).find("focal"), std::string::npos) << head;
