@@ -59,8 +59,7 @@ std::vector<double> fit(const Function& f) {
 }  // namespace
 
 KernelTable::KernelTable(int kernel, Footprint footprint)
-    : kernel_(kernel),
-      exact_(footprint == Footprint::exact),
+    : exact_(footprint == Footprint::exact),
       support_(kernel_support(kernel)),
       covariance_scale_(darb::covariance_scale(kernel, footprint)) {
     if (!std::isfinite(support_)) {

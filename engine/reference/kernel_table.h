@@ -24,7 +24,6 @@ class KernelTable {
   private:
     double evaluate(const std::vector<double>& table, double x) const;
 
-    int kernel_;
     bool exact_;      // tabled in s, else in q / R^2
     double support_;  // R^2
     double covariance_scale_;

@@ -56,7 +56,7 @@ Vec3<T> colour_of(const Splats<T>& splats, size_t index, int degree, const Vec3<
         for (int k = 1; k < (degree + 1) * (degree + 1); ++k) {
             colour[c] += basis[k] * rest[(k - 1) * 3 + c];
         }
-        colour[c] = std::max(T(0), colour[c]);
+        colour[c] = colour[c] < 0 ? T(0) : colour[c];  // keeps NaN
     }
     return colour;
 }
@@ -145,8 +145,8 @@ Vec3<T> colour_backward(const Splats<T>& splats, size_t index, int degree, const
 }  // namespace
 
 std::string_view cull_name(Cull cull) {
-    constexpr std::string_view kNames[kCullCount] = {"none",    "near_plane", "rotation",
-                                                     "opacity", "covariance", "outside"};
+    constexpr std::string_view kNames[kCullCount] = {
+        "none", "near_plane", "rotation", "opacity", "covariance", "outside", "colour"};
     return kNames[static_cast<int>(cull)];
 }
 
@@ -200,6 +200,9 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     p.reach = T(kernel.reach(static_cast<double>(p.opacity), settings.alpha_cutoff));
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     p.colour = colour_of(splats, index, active_degree(splats, settings), view.direction);
+    if (!std::isfinite(p.colour.x + p.colour.y + p.colour.z)) {
+        p.cull = Cull::colour;
+    }
     return p;
 }
 

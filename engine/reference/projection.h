@@ -11,9 +11,10 @@
 
 namespace darb::reference {
 
-/// Why a splat takes no part, in the order of the tests. The numbers are those of CULL_* + 1.
-enum class Cull { none, near_plane, rotation, opacity, covariance, outside };
-constexpr int kCullCount = 6;
+/// Why a splat takes no part: the CULL_* of shaders/shared/render_args.h, plus one. The first that
+/// holds; `outside` comes last here, as it takes the tiles.
+enum class Cull { none, near_plane, rotation, opacity, covariance, outside, colour };
+constexpr int kCullCount = 7;
 std::string_view cull_name(Cull cull);
 
 template <class T>

@@ -74,6 +74,9 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     DARB_CHECK(d_image.width == camera.width && d_image.height == camera.height &&
                    d_image.channels == 3 && result.projected.size() == splats.size(),
                "{}x{}x{}", d_image.width, d_image.height, d_image.channels);
+    DARB_CHECK(
+        d_alpha.data.empty() || (d_alpha.width == camera.width && d_alpha.height == camera.height),
+        "{}x{}", d_alpha.width, d_alpha.height);
     const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
     const TileLists& tiles = result.tiles;
     // Every pair has a slot of its own and the sums run in list order, so that the result does not

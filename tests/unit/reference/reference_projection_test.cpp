@@ -37,6 +37,9 @@ TEST(ProjectionCull, EachReason_IsNamedAndCounted) {
     EXPECT_EQ(cull_of({.logit = -5.5}), Cull::none);
     EXPECT_EQ(cull_of({.log_scale = glm::dvec3(50)}), Cull::covariance);
     EXPECT_EQ(cull_of({.log_scale = glm::dvec3(-20)}, {.low_pass = 0}), Cull::covariance);
+    EXPECT_EQ(cull_of({.logit = kNan}), Cull::opacity);
+    EXPECT_EQ(cull_of({.log_scale = {0, kNan, 0}}), Cull::covariance);
+    EXPECT_EQ(cull_of({.colour = {0, kNan, 0}}), Cull::colour);
     EXPECT_EQ(cull_of({.position = {9, 0, 2}}), Cull::outside);
     EXPECT_EQ(cull_of({.position = {0, -5, 2}}), Cull::outside);
     const auto result = render(splats_of({{}, {.logit = -9}, {.logit = -9}}), small_camera(), {});
