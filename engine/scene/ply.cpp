@@ -157,7 +157,7 @@ std::string make_header(const SplatModel& model, bool double_positions) {
 
 template <class T>
 std::byte* put(std::byte* to, const T* values, std::size_t count) {
-    std::memcpy(to, values, count * sizeof(T));
+    if (count > 0) std::memcpy(to, values, count * sizeof(T));  // values may be null without any
     return to + count * sizeof(T);
 }
 
