@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <thread>
 
 #include "engine/core/check.h"
@@ -11,8 +12,11 @@ namespace darb {
 
 namespace {
 
-constexpr int kStripWidth = 64;  // px read by a strip, of which 44 are its own
-constexpr int kMinRows = 16;     // px; a strip reads 20 rows more than it owns
+constexpr int kMinRows = 16;  // px; a strip reads 20 rows more than it owns
+// On GPUs a strip reads 64 columns: with 32 lanes 2 a thread, whose state of about 110 floats fits
+// the registers. lavapipe keeps it on the stack, where wider strips pay until the cache is full.
+constexpr int kGpuStripWidth = 64;
+constexpr int kMinCpuColumns = 8, kMaxCpuColumns = 14;
 
 int ceil_divide(int a, int b) {
     return (a + b - 1) / b;
@@ -27,17 +31,31 @@ int cluster_lanes(const Device& device) {
     return static_cast<int>(std::min(32u, std::bit_floor(smallest)));
 }
 
+// Columns a thread: the fewest columns computed in all for this width of image.
+int cpu_columns(int lanes, int width) {
+    int best = kMaxCpuColumns, best_cost = std::numeric_limits<int>::max();
+    for (int columns = kMaxCpuColumns; columns >= kMinCpuColumns; --columns) {
+        const int cost = columns * ceil_divide(width, lanes * columns - 2 * LOSS_HALO);
+        if (cost < best_cost) {
+            best = columns;
+            best_cost = cost;
+        }
+    }
+    return best;
+}
+
 }  // namespace
 
 Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& options)
     : max_width_(max_width), max_height_(max_height), lanes_(cluster_lanes(device)) {
     DARB_CHECK(max_width > 0 && max_height > 0, "{} x {}", max_width, max_height);
     const DeviceInfo& info = device.info();
-    columns_ = kStripWidth / lanes_;
     if (device.is_lavapipe()) {
+        columns_ = cpu_columns(lanes_, max_width);
         threads_ = static_cast<int>(info.subgroup_size);
         wanted_works_ = 4 * static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     } else {
+        columns_ = kGpuStripWidth / lanes_;
         threads_ = static_cast<int>(std::max(64u, info.max_subgroup_size));
         wanted_works_ = 4096;
     }
@@ -48,7 +66,7 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
     loss_ = Pipeline(device, "loss", constants);
     sum_ = Pipeline(device, "loss_sum", {}, false);
     // The most strips that any size up to the largest can be cut into.
-    const int strips = ceil_divide(max_width, kStripWidth - 2 * LOSS_HALO);
+    const int strips = ceil_divide(max_width, lanes_ * columns_ - 2 * LOSS_HALO);
     const std::uint64_t works = std::uint64_t{3} * strips * ceil_divide(max_height, kMinRows);
     partial_ = Buffer(device, "loss.partial", works * sizeof(glm::vec4));
 }
@@ -57,7 +75,7 @@ gpu::LossArgs Loss::arguments(int width, int height) const {
     gpu::LossArgs args{};
     args.width = width;
     args.height = height;
-    const int strips = ceil_divide(width, kStripWidth - 2 * LOSS_HALO);
+    const int strips = ceil_divide(width, lanes_ * columns_ - 2 * LOSS_HALO);
     int rows = height;
     while (rows > kMinRows && 3 * strips * ceil_divide(height, rows) < wanted_works_) {
         rows = std::max(kMinRows, ceil_divide(rows, 2));

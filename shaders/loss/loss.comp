@@ -86,7 +86,8 @@ void main() {
         [[unroll]] for (int j = 0; j < 10; ++j) past[0][j][k] = past[1][j][k] = past[2][j][k] = 0.0;
     }
     vec4 sums = vec4(0.0);
-    for (int row = s.first - LOSS_HALO; row < s.last + LOSS_HALO; ++row) {
+    // Rows above the image are 0, as the sums are at the start.
+    for (int row = max(s.first - LOSS_HALO, 0); row < s.last + LOSS_HALO; ++row) {
         float mean_a[COLUMNS], mean_b[COLUMNS], mean_aa[COLUMNS], mean_bb[COLUMNS];
         [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
             [[unroll]] for (int j = 0; j < 10; ++j) {
