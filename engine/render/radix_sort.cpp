@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <utility>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
@@ -13,8 +14,9 @@ namespace darb {
 namespace {
 
 constexpr int kDigitBits = 8;
-constexpr std::uint32_t kColumnBytes = RADIX_MAX_DIGITS * 4;  // counters of a thread or subgroup
-constexpr std::uint32_t kColumnThreads = 32, kColumnItems = 256;
+constexpr std::uint32_t kRowBytes = RADIX_MAX_DIGITS * 4;  // counters of a subgroup
+// 1024 keys a thread make the 256 counters of its column cheap; 8 lanes are then 8192 keys a block.
+constexpr std::uint32_t kColumnItems = 1024;
 constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
 
 RadixSort::Strategy resolve(const Device& device, RadixSort::Strategy strategy) {
@@ -30,6 +32,10 @@ SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_
             {"IOTA", iota ? 1 : 0}};
 }
 
+const char* histogram_name(RadixSort::Strategy strategy) {
+    return strategy == RadixSort::Strategy::columns ? "radix_histogram_columns" : "radix_histogram";
+}
+
 const char* scatter_name(RadixSort::Strategy strategy) {
     return strategy == RadixSort::Strategy::columns ? "radix_scatter_columns"
                                                     : "radix_scatter_ballot";
@@ -39,10 +45,10 @@ const char* scatter_name(RadixSort::Strategy strategy) {
 
 RadixSort::Shape RadixSort::choose_shape(const Device& device, Strategy strategy,
                                          std::uint32_t subgroup_size) {
-    const std::uint32_t columns = std::bit_floor(device.info().shared_memory_bytes / kColumnBytes);
-    if (strategy == Strategy::columns) return {std::min(kColumnThreads, columns), kColumnItems, 1};
     const std::uint32_t lanes = subgroup_size != 0 ? subgroup_size : device.info().subgroup_size;
-    const std::uint32_t threads = std::max(std::min(kBallotThreads, columns * lanes), lanes);
+    if (strategy == Strategy::columns) return {lanes, kColumnItems, 1};
+    const std::uint32_t rows = std::bit_floor(device.info().shared_memory_bytes / kRowBytes);
+    const std::uint32_t threads = std::max(std::min(kBallotThreads, rows * lanes), lanes);
     return {threads, kBallotItems, threads / lanes};
 }
 
@@ -61,7 +67,7 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, Strategy strategy,
     const SpecConstants plain = constants(threads, items, subgroups, false);
     const SpecConstants iota = constants(threads, items, subgroups, true);
     prepare_ = Pipeline(device, "radix_prepare");
-    histogram_ = Pipeline(device, "radix_histogram", plain);
+    histogram_ = Pipeline(device, histogram_name(strategy_), plain, true, subgroup_size);
     scatter_ = Pipeline(device, scatter_name(strategy_), plain, true, subgroup_size);
     scatter_iota_ = Pipeline(device, scatter_name(strategy_), iota, true, subgroup_size);
 

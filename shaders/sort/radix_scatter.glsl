@@ -1,7 +1,7 @@
 // What both scatter shaders of the radix sort bind (step 3 of 3 of a pass).
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;
-layout(constant_id = 1) const uint ITEMS = 256;      // keys of one thread
+layout(constant_id = 1) const uint ITEMS = 256;   // keys of one thread
 layout(constant_id = 2) const bool IOTA = false;     // value i is i, and is not read
 
 layout(push_constant, scalar) uniform Push { RadixPassArgs args; };

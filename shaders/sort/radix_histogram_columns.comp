@@ -1,0 +1,31 @@
+// Radix sort, step 1 of 3 of a pass, for lavapipe: how often each digit occurs in each block.
+// One workgroup, which is one subgroup, a block of THREADS * ITEMS keys; columns as in
+// radix_scatter_columns.comp.
+// Reads keys [n]; writes histograms [RADIX_MAX_DIGITS][blocks], all digits, the unused as 0.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "shaders/shared/radix_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 32;
+layout(constant_id = 1) const uint ITEMS = 256;
+
+layout(push_constant, scalar) uniform Push { RadixPassArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Plan { RadixPlan plan; };
+layout(set = 0, binding = 1, scalar) readonly buffer Keys { uint keys[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer Histograms { uint histograms[]; };
+
+void main() {
+    const uint begin = min((gl_WorkGroupID.x * THREADS + gl_LocalInvocationID.x) * ITEMS, plan.count);
+    const uint end = min(begin + ITEMS, plan.count);
+    uint column[RADIX_MAX_DIGITS];
+    for (uint d = 0; d < RADIX_MAX_DIGITS; ++d) column[d] = 0;
+    for (uint i = begin; i < end; ++i) column[(keys[i] >> args.shift) & (args.digits - 1)] += 1;
+    for (uint d = 0; d < RADIX_MAX_DIGITS; ++d) {
+        const uint count = subgroupAdd(column[d]);
+        if (gl_LocalInvocationID.x == 0)
+            histograms[d * gl_NumWorkGroups.x + gl_WorkGroupID.x] = count;
+    }
+}
