@@ -1,0 +1,70 @@
+#include "tools/darb/devices.h"
+
+#include <fmt/format.h>
+#include <vulkan/vulkan.h>
+
+#include "engine/core/error.h"
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+namespace {
+
+std::string mebibytes(std::uint64_t bytes) {
+    if (bytes >= std::uint64_t{10} << 30)
+        return fmt::format("{:.0f} GiB", static_cast<double>(bytes) / (1 << 30));
+    return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+std::string subgroups(const DeviceInfo& info) {
+    if (info.min_subgroup_size == info.max_subgroup_size)
+        return fmt::format("{}", info.subgroup_size);
+    return fmt::format("{} ({} to {})", info.subgroup_size, info.min_subgroup_size,
+                       info.max_subgroup_size);
+}
+
+void print_device(std::FILE* out, const DeviceInfo& info, bool chosen) {
+    fmt::print(out, "{} {}  {}\n", chosen ? '*' : ' ', info.index, info.name);
+    const auto row = [&](const char* label, const std::string& value) {
+        fmt::print(out, "       {:<19}{}\n", label, value);
+    };
+    row("type", info.type + (info.unified_memory ? ", memory shared with the host" : ""));
+    row("driver",
+        fmt::format("{}, Vulkan {}.{}.{}", info.driver, VK_API_VERSION_MAJOR(info.api_version),
+                    VK_API_VERSION_MINOR(info.api_version),
+                    VK_API_VERSION_PATCH(info.api_version)));
+    row("memory", mebibytes(info.heap_bytes));
+    row("largest allocation", mebibytes(info.max_allocation_bytes));
+    row("largest binding", mebibytes(info.max_storage_buffer_bytes));
+    row("subgroup size", subgroups(info));
+    row("workgroup", fmt::format("{} threads, {} KiB shared memory", info.max_workgroup_threads,
+                                 info.shared_memory_bytes / 1024));
+    row("float atomics", info.float_atomics ? "yes" : "no");
+    row("timestamps",
+        info.timestamp_period_ns > 0 ? fmt::format("every {} ns", info.timestamp_period_ns) : "no");
+    row("status", info.reason);
+}
+
+}  // namespace
+
+void print_devices(std::FILE* out, const std::string& select) {
+    const std::vector<DeviceInfo> devices = list_devices();
+    const std::size_t chosen = choose_device(devices, select);
+    for (const DeviceInfo& info : devices) print_device(out, info, &info == &devices[chosen]);
+    const char* why = !select.empty() ? "asked for with --device"
+                      : devices.size() > 1
+                          ? "the best usable one: discrete before integrated before "
+                            "virtual before cpu, then the largest memory"
+                          : "the only one";
+    fmt::print(out, "\nchosen: {} {} ({})\n", devices[chosen].index, devices[chosen].name, why);
+}
+
+int run_devices(const std::string& select) try {
+    print_devices(stdout, select);
+    return 0;
+} catch (const Error& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+    return 2;
+}
+
+}  // namespace darb

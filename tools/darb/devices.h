@@ -1,0 +1,16 @@
+// What `darb devices` prints: every Vulkan device with its limits, which is chosen, and why.
+#pragma once
+
+#include <cstdio>
+#include <string>
+
+namespace darb {
+
+/// All devices, best first, the one that select (as --device) means marked with a star.
+/// Throws Error as Device does where select means no usable device.
+void print_devices(std::FILE* out, const std::string& select = {});
+
+/// print_devices to stdout. Returns the exit code: 0, or 2 where no device is usable.
+int run_devices(const std::string& select = {});
+
+}  // namespace darb
