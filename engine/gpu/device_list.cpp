@@ -215,7 +215,7 @@ std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::str
     std::vector<std::size_t> candidates;
     if (const auto index = parse_index(select)) {
         if (*index >= devices.size())
-            throw Error(where, fmt::format("there are {} devices, from 0", devices.size()), hint);
+            throw Error(where, fmt::format("devices: {}, counted from 0", devices.size()), hint);
         candidates = {*index};
     } else {
         for (std::size_t i = 0; i < devices.size(); ++i)

@@ -1,7 +1,6 @@
 #include "tools/darb/devices.h"
 
 #include <fmt/format.h>
-#include <vulkan/vulkan.h>
 
 #include "engine/core/error.h"
 #include "engine/gpu/device.h"

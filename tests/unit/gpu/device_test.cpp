@@ -50,7 +50,7 @@ TEST(ChooseDevice, part_of_name_matches_in_any_case) {
 }
 
 TEST(ChooseDevice, index_out_of_range_is_an_error_with_the_count) {
-    EXPECT_NE(error_of([] { choose_device(kFakes, "7"); }).find("there are 3 devices"),
+    EXPECT_NE(error_of([] { choose_device(kFakes, "7"); }).find("devices: 3, counted from 0"),
               std::string::npos);
 }
 
