@@ -52,11 +52,14 @@ std::string base64(std::span<const std::byte> bytes) {
 
 std::string format_number(double v, int decimals) {
     if (!std::isfinite(v)) return "-";
-    std::string text = fmt::format("{:.{}f}", v, decimals);
-    const std::size_t first = text[0] == '-' ? 1 : 0;
-    std::size_t point = text.find('.');
-    if (point == std::string::npos) point = text.size();
-    for (std::size_t i = point; i > first + 3;) text.insert(i -= 3, ",");
+    const std::string plain = fmt::format("{:.{}f}", v, decimals);
+    const std::size_t first = plain[0] == '-' ? 1 : 0;
+    const std::size_t point = std::min(plain.find('.'), plain.size());
+    std::string text;
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+        if (i > first && i < point && (point - i) % 3 == 0) text += ',';
+        text += plain[i];
+    }
     return text;
 }
 
