@@ -47,7 +47,10 @@ int cpu_columns(int lanes, int width) {
 }  // namespace
 
 Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& options)
-    : max_width_(max_width), max_height_(max_height), lanes_(cluster_lanes(device)) {
+    : max_width_(max_width),
+      max_height_(max_height),
+      lanes_(cluster_lanes(device)),
+      rows_(options.rows) {
     DARB_CHECK(max_width > 0 && max_height > 0, "{} x {}", max_width, max_height);
     const DeviceInfo& info = device.info();
     if (device.is_lavapipe()) {
@@ -59,6 +62,8 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
         threads_ = static_cast<int>(std::max(64u, info.max_subgroup_size));
         wanted_works_ = 4096;
     }
+    if (options.columns > 0) columns_ = options.columns;
+    DARB_CHECK(lanes_ * columns_ > 2 * LOSS_HALO, "{} lanes, {} columns", lanes_, columns_);
     const SpecConstants constants = {{"THREADS", threads_},
                                      {"LANES", lanes_},
                                      {"COLUMNS", columns_},
@@ -67,7 +72,8 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
     sum_ = Pipeline(device, "loss_sum", {}, false);
     // The most strips that any size up to the largest can be cut into.
     const int strips = ceil_divide(max_width, lanes_ * columns_ - 2 * LOSS_HALO);
-    const std::uint64_t works = std::uint64_t{3} * strips * ceil_divide(max_height, kMinRows);
+    const std::uint64_t works =
+        std::uint64_t{3} * strips * ceil_divide(max_height, rows_ > 0 ? rows_ : kMinRows);
     partial_ = Buffer(device, "loss.partial", works * sizeof(glm::vec4));
 }
 
@@ -76,8 +82,9 @@ gpu::LossArgs Loss::arguments(int width, int height) const {
     args.width = width;
     args.height = height;
     const int strips = ceil_divide(width, lanes_ * columns_ - 2 * LOSS_HALO);
-    int rows = height;
-    while (rows > kMinRows && 3 * strips * ceil_divide(height, rows) < wanted_works_) {
+    int rows = rows_ > 0 ? rows_ : height;
+    while (rows_ == 0 && rows > kMinRows &&
+           3 * strips * ceil_divide(height, rows) < wanted_works_) {
         rows = std::max(kMinRows, ceil_divide(rows, 2));
     }
     args.rows = rows;

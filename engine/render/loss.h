@@ -20,6 +20,9 @@ struct LossOptions {
     // around the image does), the gradient is 0 and L1 and squared error are left out of the sums;
     // means still divide by 3 H W.
     bool use_mask = false;
+    // Columns a thread and rows a strip; 0: what suits the device. The gradient does not depend on
+    // them, the sums do in their last bit.
+    int columns = 0, rows = 0;
 };
 
 class Loss {
@@ -47,6 +50,7 @@ class Loss {
     int max_width_, max_height_;
     int lanes_, columns_, threads_;
     int wanted_works_;  // strips that keep the device busy
+    int rows_;          // of a strip, 0: by wanted_works_
     Pipeline loss_, sum_;
     Buffer partial_;
 };

@@ -288,6 +288,22 @@ TEST(Loss_repeated, is_bit_equal_and_serves_smaller_images) {
     EXPECT_EQ(first.result.mse, again.result.mse);
 }
 
+TEST(Loss_stripShapes, give_the_same_gradient) {
+    const Case c{203, 71};
+    const Data data = make_data(c);
+    const Output want = run(c, data);
+    const int least = 20 / static_cast<int>(device().info().min_subgroup_size) + 1;
+    for (const auto& [columns, rows] :
+         {std::pair{least, 16}, {least + 1, 1}, {11, 7}, {16, 1000}}) {
+        Loss loss(device(), c.width, c.height, {.columns = columns, .rows = rows});
+        const Output got = run(loss, c, data);
+        EXPECT_EQ(got.gradient, want.gradient) << columns << " columns, " << rows << " rows";
+        EXPECT_NEAR(static_cast<double>(got.result.ssim), static_cast<double>(want.result.ssim),
+                    1e-6);
+        EXPECT_EQ(got.guards_hit, 0u);
+    }
+}
+
 // The gradient against the measured change of the loss itself, along a random direction.
 TEST(Loss_gradient, is_the_slope_of_the_value) {
     const Case c{.width = 40, .height = 30, .lambda = 1.0f};
