@@ -5,6 +5,6 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 tools/setup.sh --no-tests
-cmake --preset release >/dev/null
+cmake --preset release -DDARB_TESTS=OFF >/dev/null
 cmake --build --preset release --target darb
 build/darb train assets/scene -o "$PWD/out/demo" --eval --iterations 3000 "$@"
