@@ -71,6 +71,23 @@ vec2 sum_and_difference(Strip s, int k, int row, float background) {
     return counts ? vec2(x + y, x - y) : vec2(0.0);
 }
 
+// SSIM of one row and its derivatives, 0 outside the image; returns the sum over owned columns.
+float ssim_row(Strip s, int row, float mean_a[COLUMNS], float mean_b[COLUMNS], float mean_aa[COLUMNS],
+               float mean_bb[COLUMNS], out float d_mean[COLUMNS], out float d_aa[COLUMNS],
+               out float d_bb[COLUMNS]) {
+    float sum = 0.0;
+    [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
+        const bool inside = in_image(s.left + k, row);
+        vec3 d;
+        const float value = ssim(mean_a[k], mean_b[k], mean_aa[k], mean_bb[k], d);
+        d_mean[k] = inside ? d.x : 0.0;
+        d_aa[k] = inside ? d.y : 0.0;
+        d_bb[k] = inside ? d.z : 0.0;
+        sum += inside && owns(s, k) && row >= s.first && row < s.last ? value : 0.0;
+    }
+    return sum;
+}
+
 void main() {
     const uint clusters = gl_SubgroupSize / uint(LANES);
     const uint work = (gl_WorkGroupID.x * gl_NumSubgroups + gl_SubgroupID) * clusters +
@@ -105,16 +122,7 @@ void main() {
         blur_across(mean_aa);
         blur_across(mean_bb);
         float d_mean[COLUMNS], d_aa[COLUMNS], d_bb[COLUMNS];
-        [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
-            const bool inside = in_image(s.left + k, row - 5);
-            vec3 d;
-            const float value = ssim(mean_a[k], mean_b[k], mean_aa[k], mean_bb[k], d);
-            d_mean[k] = inside ? d.x : 0.0;
-            d_aa[k] = inside ? d.y : 0.0;
-            d_bb[k] = inside ? d.z : 0.0;
-            const bool mine = inside && owns(s, k) && row - 5 >= s.first && row - 5 < s.last;
-            sums.y += mine ? value : 0.0;
-        }
+        sums.y += ssim_row(s, row - 5, mean_a, mean_b, mean_aa, mean_bb, d_mean, d_aa, d_bb);
         blur_across(d_mean);
         blur_across(d_aa);
         blur_across(d_bb);
