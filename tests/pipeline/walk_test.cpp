@@ -47,7 +47,8 @@ Walk run_walk(Device& device, const test::TestScene& scene, const std::vector<fl
     commands.submit_and_wait();
     Walk walk;
     walk.status = forward.read_status();
-    walk.image = planes_to_image(forward.image().download<float>(weights.size()), c.width, c.height);
+    walk.image =
+        planes_to_image(forward.image().download<float>(weights.size()), c.width, c.height);
     for (int a = 0; a < kAttributeCount; ++a) {
         const size_t n = size_t{splats.count()} * splats.stride(a);
         std::vector<float> moments = splats.moments(a).download<float>(n * 2), g(n);
@@ -68,8 +69,12 @@ class WalkTest : public testing::TestWithParam<Case> {};
 
 TEST_P(WalkTest, random_scene_matches_double) {
     const Case& p = GetParam();
-    test::TestScene scene = test::random_scene(
-        {.count = 60, .width = 53, .height = 37, .kernel = p.kernel, .footprint = p.footprint, .seed = 7});
+    test::TestScene scene = test::random_scene({.count = 60,
+                                                .width = 53,
+                                                .height = 37,
+                                                .kernel = p.kernel,
+                                                .footprint = p.footprint,
+                                                .seed = 7});
     const glm::vec3 background(0.2f, 0.4f, 0.7f);
     Device device;
     const size_t pixels = size_t(scene.camera.width) * scene.camera.height;
@@ -81,7 +86,7 @@ TEST_P(WalkTest, random_scene_matches_double) {
     ASSERT_GT(walk.status.pairs, 100u);
 
     reference::RenderSettings settings;
-    settings.background = {background.r, background.g, background.b};
+    for (int c = 0; c < 3; ++c) settings.background[c] = background[c];
     settings.sh_degree = scene.model.sh_degree;
     const reference::RenderResult truth = reference::render(scene.model, scene.camera, settings);
     EXPECT_TRUE(test::compare("image", truth.images.colour.data, walk.image.data,
@@ -117,10 +122,11 @@ std::vector<Case> all_cases() {
 }
 
 INSTANTIATE_TEST_SUITE_P(every_kernel, WalkTest, testing::ValuesIn(all_cases()),
-                         [](const testing::TestParamInfo<Case>& info) {
-                             return std::string(kernel_name(info.param.kernel)) + "_" +
-                                    std::string(footprint_name(info.param.footprint)) +
-                                    (info.param.evaluation == EVALUATION_BUILTIN ? "_builtin" : "");
+                         [](const testing::TestParamInfo<Case>& param) {
+                             return std::string(kernel_name(param.param.kernel)) + "_" +
+                                    std::string(footprint_name(param.param.footprint)) +
+                                    (param.param.evaluation == EVALUATION_BUILTIN ? "_builtin"
+                                                                                  : "");
                          });
 
 }  // namespace
