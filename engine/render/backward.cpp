@@ -54,7 +54,7 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
     if (pairs > pair_capacity_ || pair_capacity_ == 0) {
         const std::uint64_t k = pair_capacity_ = std::max(pairs, 1024u);
         partial_a_ = Buffer(*device_, "pair partials a", k * 16);
-        partial_b_ = Buffer(*device_, "pair partials b", k * 8);
+        partial_b_ = Buffer(*device_, "pair partials b", k * 16);
         partial_c_ = Buffer(*device_, "pair partials c", k * 16);
     }
 }
