@@ -59,13 +59,14 @@ uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCov
     c = TileCover(uvec2(low), uvec2(max(high - low, 0.0)), uvec2(0));
     if (c.extent.x == 0u || c.extent.y == 0u) return 0u;
     const uvec2 size = cell_size(c.extent);
+    const vec2 image = vec2(camera.width, camera.height);
     uint count = 0u;
     for (uint y = 0u; y * size.y < c.extent.y; ++y) {
         for (uint x = 0u; x * size.x < c.extent.x; ++x) {
             const uvec2 first = uvec2(x, y) * size;
             const uvec2 last = min(first + size, c.extent);
             const vec2 corner_low = vec2((c.origin + first) * TILE_SIZE) + 0.5;
-            const vec2 corner_high = vec2((c.origin + last) * TILE_SIZE) - 0.5;
+            const vec2 corner_high = min(vec2((c.origin + last) * TILE_SIZE), image) - 0.5;
             if (!reaches(smallest_q(mean, f.l11, f.l21, f.l22, corner_low, corner_high), reach)) continue;
             const uint bit = y * 8u + x;
             if (bit < 32u) c.bits.x |= 1u << bit; else c.bits.y |= 1u << (bit - 32u);

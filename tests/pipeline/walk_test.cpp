@@ -1,133 +1,121 @@
 // The whole walk on the device, splats to image and image gradient to every parameter, against the
-// double-precision reference.
-
+// double-precision reference, for every kernel, footprint and evaluation.
 #include <gtest/gtest.h>
 
 #include "engine/core/rng.h"
 #include "engine/reference/render.h"
-#include "engine/render/backward.h"
-#include "engine/render/renderer.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/device_walk.h"
 
-namespace darb {
+namespace darb::test {
 namespace {
 
-struct Walk {
-    ImageF image;
-    std::vector<std::vector<float>> gradients;  // by attribute
-    std::vector<float> gradient_sum;
-    gpu::FrameStatus status;
-};
-
-// One forward and backward pass on the device with dL/dimage = weights [3][H][W].
-Walk run_walk(Device& device, const test::TestScene& scene, const std::vector<float>& weights,
-              const glm::vec3& background, int evaluation) {
-    ForwardOptions options;
-    options.kernel = scene.model.kernel;
-    options.footprint = scene.model.footprint;
-    options.evaluation = evaluation;
-    options.sh_stored = scene.model.sh_degree;
-    options.store_for_backward = true;
-    GpuSplats splats(device, scene.model, true);
-    Forward forward(device, options);
-    Backward backward(device, options, BackwardResult::store_gradient);
-    const Camera& c = scene.camera;
-    const gpu::CameraData data = camera_data(c, scene.model.origin);
-    const Buffer cameras = upload_cameras(device, {data});
-    Buffer d_image(device, "d_image", weights.size() * sizeof(float));
-    d_image.upload(weights);
-    forward.reserve(splats.count(), 100'000, c.width, c.height);
-    backward.reserve(splats.count(), forward.pair_capacity());
-    Commands commands(device);
-    commands.begin();
-    forward.record(commands, splats, cameras, 0, data, scene.model.sh_degree, background);
-    backward.record(commands, forward, splats, d_image, cameras, 0, data, scene.model.sh_degree,
-                    background, AdamStep{});
-    commands.submit_and_wait();
-    Walk walk;
-    walk.status = forward.read_status();
-    walk.image =
-        planes_to_image(forward.image().download<float>(weights.size()), c.width, c.height);
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const size_t n = size_t{splats.count()} * splats.stride(a);
-        std::vector<float> moments = splats.moments(a).download<float>(n * 2), g(n);
-        for (size_t i = 0; i < n; ++i) g[i] = moments[2 * i];
-        walk.gradients.push_back(g);
+struct Case {
+    int kernel = KERNEL_GAUSSIAN;
+    Footprint footprint = Footprint::psi;
+    int evaluation = EVALUATION_POLYNOMIAL;
+    std::string name() const {
+        return std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint)) +
+               (evaluation == EVALUATION_BUILTIN ? "_builtin" : "");
     }
-    walk.gradient_sum = backward.gradient_sum().download<float>(size_t{splats.count()} * 2);
-    return walk;
+    /// Exact footprints of the kernels with a jump fall like a root at their edge: the slope there
+    /// grows without bound, and a rounding of q is a percent of it.
+    bool steep_edge() const {
+        return footprint == Footprint::exact &&
+               (kernel == KERNEL_INVERSE_QUADRATIC || kernel == KERNEL_INVERSE_MULTIQUADRIC);
+    }
+};
+void PrintTo(const Case& c, std::ostream* out) {
+    *out << c.name();
 }
 
-struct Case {
-    int kernel;
-    Footprint footprint;
-    int evaluation;
-};
-
-class WalkTest : public testing::TestWithParam<Case> {};
-
-TEST_P(WalkTest, random_scene_matches_double) {
-    const Case& p = GetParam();
-    test::TestScene scene = test::random_scene({.count = 60,
-                                                .width = 53,
-                                                .height = 37,
-                                                .kernel = p.kernel,
-                                                .footprint = p.footprint,
-                                                .seed = 7});
-    const glm::vec3 background(0.2f, 0.4f, 0.7f);
-    Device device;
-    const size_t pixels = size_t(scene.camera.width) * scene.camera.height;
+Image<double> random_weights(const Camera& camera) {
     Pcg32 random(3);
-    std::vector<float> planes(pixels * 3);
-    for (float& w : planes) w = static_cast<float>(random.uniform(-1, 1));
-    const Walk walk = run_walk(device, scene, planes, background, p.evaluation);
-    ASSERT_GT(walk.status.visible, 30u);
-    ASSERT_GT(walk.status.pairs, 100u);
+    Image<double> weights(camera.width, camera.height, 3);
+    for (double& w : weights.data) w = static_cast<float>(random.uniform(-1, 1));
+    return weights;
+}
 
-    reference::RenderSettings settings;
-    for (int c = 0; c < 3; ++c) settings.background[c] = background[c];
-    settings.sh_degree = scene.model.sh_degree;
-    const reference::RenderResult truth = reference::render(scene.model, scene.camera, settings);
-    EXPECT_TRUE(test::compare("image", truth.images.colour.data, walk.image.data,
-                              test::tolerance("image_float32"), 3));
-    Image<double> d_image(scene.camera.width, scene.camera.height, 3);
-    for (size_t i = 0; i < pixels; ++i)
-        for (size_t c = 0; c < 3; ++c) d_image.data[i * 3 + c] = planes[c * pixels + i];
+void expect_walk_matches(const TestScene& scene, const WalkSettings& settings,
+                         const Tolerance& gradient) {
+    const Image<double> weights = random_weights(scene.camera);
+    const DeviceWalk walk = walk_on_device(scene.model, scene.camera, weights, settings);
+    reference::RenderSettings raster;
+    for (int c = 0; c < 3; ++c) raster.background[c] = settings.background[c];
+    raster.sh_degree = settings.sh_degree;
+    const reference::RenderResult truth = reference::render(scene.model, scene.camera, raster);
+    ASSERT_GT(walk.status.visible, scene.model.size() / 2);
+    ASSERT_GT(walk.status.pairs, walk.status.visible);
+    // The slack of the tile test may list a splat that reaches no pixel centre.
+    EXPECT_GE(walk.status.visible, truth.visible_count());
+    EXPECT_LE(walk.status.visible, truth.visible_count() + 1);
+    EXPECT_EQ(walk.status.bad_gradients, 0U);
+    EXPECT_TRUE(
+        compare("image", truth.images.colour.data, walk.image.data, tolerance("image_float32"), 3));
+
     const reference::Gradients g =
-        reference::backward(scene.model, scene.camera, settings, truth, d_image);
-    const auto check = [&](const char* name, const std::vector<double>& expected, int attribute) {
-        EXPECT_TRUE(test::compare(name, expected, walk.gradients[attribute],
-                                  test::tolerance("gradient_float32"), 1));
-    };
-    check("d_position", g.splats.position, kPosition);
-    check("d_log_scale", g.splats.log_scale, kLogScale);
-    check("d_rotation", g.splats.rotation, kRotation);
-    check("d_opacity", g.splats.opacity, kOpacity);
-    check("d_sh_dc", g.splats.sh_dc, kShDc);
-    check("d_sh_rest", g.splats.sh_rest, kShRest);
-    std::vector<float> norms;
-    for (size_t i = 0; i < scene.model.size(); ++i) norms.push_back(walk.gradient_sum[2 * i]);
-    EXPECT_TRUE(test::compare("mean gradient", g.mean_gradient_ndc, norms,
-                              test::tolerance("gradient_float32"), 1));
+        reference::backward(scene.model, scene.camera, raster, truth, weights);
+    const std::array<const std::vector<double>*, kAttributeCount> expected = {
+        &g.splats.position, &g.splats.log_scale, &g.splats.rotation,
+        &g.splats.opacity,  &g.splats.sh_dc,     &g.splats.sh_rest};
+    for (int a = 0; a < kAttributeCount; ++a) {
+        if (expected[a]->empty()) continue;
+        EXPECT_TRUE(compare_scaled(std::string("d_") + attribute_name(a), *expected[a], walk.d[a],
+                                   gradient));
+    }
+    EXPECT_TRUE(
+        compare_scaled("mean gradient", g.mean_gradient_ndc, walk.mean_gradient_ndc, gradient));
+}
+
+class Walk : public testing::TestWithParam<Case> {};
+
+TEST_P(Walk, random_scene_matches_double) {
+    const Case& c = GetParam();
+    const TestScene scene = random_scene({.count = 60,
+                                          .width = 53,
+                                          .height = 37,
+                                          .kernel = c.kernel,
+                                          .footprint = c.footprint,
+                                          .seed = 7});
+    WalkSettings settings;
+    settings.evaluation = c.evaluation;
+    settings.background = {0.2f, 0.4f, 0.7f};
+    expect_walk_matches(
+        scene, settings,
+        tolerance(c.steep_edge() ? "gradient_steep_float32" : "gradient_scaled_float32"));
 }
 
 std::vector<Case> all_cases() {
     std::vector<Case> cases;
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
-        for (Footprint footprint : {Footprint::psi, Footprint::exact})
-            for (int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
+        for (const Footprint footprint : {Footprint::psi, Footprint::exact})
+            for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
                 cases.push_back({kernel, footprint, evaluation});
     return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(every_kernel, WalkTest, testing::ValuesIn(all_cases()),
-                         [](const testing::TestParamInfo<Case>& param) {
-                             return std::string(kernel_name(param.param.kernel)) + "_" +
-                                    std::string(footprint_name(param.param.footprint)) +
-                                    (param.param.evaluation == EVALUATION_BUILTIN ? "_builtin"
-                                                                                  : "");
-                         });
+INSTANTIATE_TEST_SUITE_P(every_kernel, Walk, testing::ValuesIn(all_cases()),
+                         [](const auto& c) { return c.param.name(); });
+
+// Many layers of all opacities, small and large splats mixed, several thousand pairs, every degree.
+class WalkDegree : public testing::TestWithParam<int> {};
+
+TEST_P(WalkDegree, dense_scene_matches_double) {
+    TestScene scene = random_scene({.count = 600,
+                                    .width = 121,
+                                    .height = 83,
+                                    .kernel = KERNEL_RAISED_COSINE,
+                                    .sh_degree = 3,
+                                    .min_log_scale = -4.5,
+                                    .max_log_scale = -1,
+                                    .min_logit = -5,
+                                    .max_logit = 6,
+                                    .seed = 21});
+    WalkSettings settings;
+    settings.sh_degree = GetParam();
+    expect_walk_matches(scene, settings, tolerance("gradient_scaled_float32"));
+}
+
+INSTANTIATE_TEST_SUITE_P(sh, WalkDegree, testing::Range(0, 4));
 
 }  // namespace
-}  // namespace darb
+}  // namespace darb::test

@@ -21,6 +21,11 @@ constexpr Tolerance kTable[] = {
      "edge of the support and the transmittance stop"},
     {"gradient_float32", 1e-6, 2e-3, 0.005, 1 - 1e-6, 1e-3,
      "recursion over all layers of a pixel, then sums over pixels that cancel; band as for images"},
+    {"gradient_scaled_float32", 2e-5, 2e-3, 0.005, 1 - 1e-6, 1e-3,
+     "the same for compare_scaled: the sums cancel, so abs is in units of the root mean square"},
+    {"gradient_steep_float32", 2e-4, 1e-2, 0.02, 1 - 1e-5, 1e-3,
+     "as gradient_scaled_float32, where the slope goes like 1/sqrt(1 - q/9) towards the edge: "
+     "1 - q/9 is 1e-5 at the cut-off, and float32 knows it to a percent"},
     {"loss_float32", 1e-6, 1e-5, 0, 1 - 1e-8, 1e-5,
      "SSIM's variances cancel: 11x11 sums of squares"},
     {"loss_gradient_float32", 1e-9, 1e-3, 0.001, 1 - 1e-7, 1e-4,
