@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "engine/core/error.h"
+#include <memory>
+
 #include "engine/gpu/device.h"
+#include "tools/darb/commands.h"
 
 namespace darb {
 
@@ -58,12 +60,17 @@ void print_devices(std::FILE* out, const std::string& select) {
     fmt::print(out, "\nchosen: {} {} ({})\n", devices[chosen].index, devices[chosen].name, why);
 }
 
-int run_devices(const std::string& select) try {
-    print_devices(stdout, select);
-    return 0;
-} catch (const Error& error) {
-    fmt::print(stderr, "error: {}\n", error.what());
-    return 2;
+void add_devices(CLI::App& app, Action& action) {
+    auto select = std::make_shared<std::string>();
+    CLI::App* command = app.add_subcommand("devices", "List the Vulkan devices and their limits");
+    command->add_option("--device", *select,
+                        "show what this number or part of a name would choose");
+    command->callback([select, &action] {
+        action = [select] {
+            print_devices(stdout, *select);
+            return 0;
+        };
+    });
 }
 
 }  // namespace darb

@@ -10,7 +10,4 @@ namespace darb {
 /// Throws Error as Device does where select means no usable device.
 void print_devices(std::FILE* out, const std::string& select = {});
 
-/// print_devices to stdout. Returns the exit code: 0, or 2 where no device is usable.
-int run_devices(const std::string& select = {});
-
 }  // namespace darb

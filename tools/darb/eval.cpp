@@ -1,4 +1,111 @@
+// darb eval SCENE.ply DATASET: PSNR and SSIM of the scene's pictures against the photos.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/data/dataset.h"
+#include "engine/render/renderer.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/scene_file.h"
+#include "trainer/evaluation.h"
+
 namespace darb {
-void add_eval(CLI::App&, Action&) {}
+
+namespace {
+
+struct EvalFlags {
+    std::filesystem::path scene, dataset, json;
+    std::string split = "test", device;
+    bool white_background = false;
+    DatasetOptions data;
+};
+
+std::vector<View> views_of(const Dataset& dataset, const EvalFlags& flags) {
+    std::vector<View> views;
+    for (const View& view : dataset.views)
+        if (flags.split == "all" || view.is_test == (flags.split == "test")) views.push_back(view);
+    if (views.empty())
+        throw Error(flags.dataset.string(),
+                    fmt::format("none of its {} views belongs to the split '{}'",
+                                dataset.views.size(), flags.split),
+                    "Choose another one with --split test, train or all.");
+    return views;
+}
+
+nlohmann::json to_json(const Evaluation& evaluation) {
+    nlohmann::json views = nlohmann::json::array();
+    for (const ViewMetrics& v : evaluation.views)
+        views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
+    return {{"mean", {{"psnr_db", evaluation.psnr_db}, {"ssim", evaluation.ssim}}},
+            {"views", views}};
+}
+
+void print_table(const Evaluation& evaluation) {
+    const std::string mean = fmt::format("mean of {}", evaluation.views.size());
+    size_t width = mean.size();
+    for (const ViewMetrics& v : evaluation.views) width = std::max(width, v.name.size());
+    const auto row = [&](const std::string& name, double psnr_db, double ssim) {
+        fmt::print("{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
+    };
+    fmt::print("{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
+    for (const ViewMetrics& v : evaluation.views) row(v.name, v.psnr_db, v.ssim);
+    row(mean, evaluation.psnr_db, evaluation.ssim);
+}
+
+int eval(EvalFlags flags) {
+    flags.data.hold_out = true;  // sources without a split of their own: every 8th view
+    const SplatModel model = load_scene(flags.scene);
+    const Dataset dataset = load_dataset(flags.dataset, flags.data);
+    const std::vector<View> views = views_of(dataset, flags);
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    Device device(device_options);
+    Renderer renderer(device, model);
+    const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
+    Evaluation evaluation;
+    for (const View& view : views)
+        evaluation.views.push_back(compare_view(view.name, renderer.render(view.camera, background),
+                                                load_photo(view), background));
+    take_means(evaluation);
+    print_table(evaluation);
+    if (!flags.json.empty())
+        write_file_atomic(
+            flags.json,
+            to_json(evaluation).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) +
+                "\n");
+    return 0;
+}
+
+}  // namespace
+
+void add_eval(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<EvalFlags>();
+    CLI::App* command = app.add_subcommand("eval", "Measure a scene against photos: PSNR and SSIM");
+    command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train")
+        ->required();
+    command->add_option("dataset", flags->dataset, "photos with cameras, as darb train takes them")
+        ->required();
+    command
+        ->add_option("--split", flags->split,
+                     "test: the data set's own test views, else every 8th by name; train: the "
+                     "others; all")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"test", "train", "all"}));
+    command->add_option("--json", flags->json, "write the numbers to this file too");
+    command
+        ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
+        ->capture_default_str();
+    command->add_option("-r,--resolution", flags->data.resolution,
+                        "as in training: 1, 2, 4, 8 or a width in px");
+    command->add_flag("-w,--white-background", flags->white_background,
+                      "white behind alpha, not black");
+    command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    command->callback([flags, &action] { action = [flags] { return eval(*flags); }; });
+}
+
 }  // namespace darb

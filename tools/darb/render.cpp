@@ -1,4 +1,122 @@
+// darb render SCENE.ply --cameras X -o DIR: a PNG of each camera.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <set>
+
+#include "engine/core/error.h"
+#include "engine/data/camera_list.h"
+#include "engine/data/image_io.h"
+#include "engine/render/renderer.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/scene_file.h"
+#include "trainer/evaluation.h"
+
 namespace darb {
-void add_render(CLI::App&, Action&) {}
+
+namespace {
+
+struct RenderFlags {
+    std::filesystem::path scene, cameras, output;
+    std::string device;
+    bool white_background = false;
+    int sh_degree = -1;
+    float near_plane = static_cast<float>(NEAR_DEFAULT);
+    DatasetOptions data;
+};
+
+// The view's name without its extension and folders; "_2", "_3" where it was there before.
+std::string frame_name(const std::string& view_name, std::set<std::string>& used) {
+    std::string stem = std::filesystem::path(view_name).replace_extension().string();
+    std::replace_if(
+        stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
+    if (stem.empty()) stem = "view";
+    std::string name = stem;
+    for (int n = 2; !used.insert(name).second; ++n) name = fmt::format("{}_{}", stem, n);
+    return name + ".png";
+}
+
+// -r of a camera list, which states sizes rather than photos: divisor up to 8, width above.
+void scale_camera(Camera& camera, int resolution) {
+    if (resolution == -1) return;
+    if (resolution < 1)
+        throw Error("-r", fmt::format("{} is no valid value", resolution),
+                    "Use 1, 2, 4 or 8 (a divisor), or a width in pixels above 8.");
+    const double scale = resolution <= 8 ? 1.0 / resolution : double(resolution) / camera.width;
+    const int width = std::max(1, static_cast<int>(std::lround(camera.width * scale)));
+    const int height = std::max(1, static_cast<int>(std::lround(camera.height * scale)));
+    const double sx = double(width) / camera.width, sy = double(height) / camera.height;
+    camera.fx *= sx;
+    camera.fy *= sy;
+    camera.cx *= sx;
+    camera.cy *= sy;
+    camera.width = width;
+    camera.height = height;
+}
+
+double median(std::vector<double> values) {
+    if (values.empty()) return 0;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+int render(const RenderFlags& flags) {
+    const SplatModel model = load_scene(flags.scene);
+    std::vector<View> views = load_cameras(flags.cameras, flags.data);
+    const bool is_list = !views.empty() && views[0].photo.empty();
+    if (is_list)
+        for (View& view : views) scale_camera(view.camera, flags.data.resolution);
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    Device device(device_options);
+    Renderer renderer(device, model);
+    const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
+    std::set<std::string> used;
+    std::vector<double> frame_ms;
+    for (const View& view : views) {
+        const auto start = std::chrono::steady_clock::now();
+        const ImageF image =
+            renderer.render(view.camera, background, flags.sh_degree, flags.near_plane);
+        const std::chrono::duration<double, std::milli> ms =
+            std::chrono::steady_clock::now() - start;
+        frame_ms.push_back(ms.count());
+        write_png(flags.output / frame_name(view.name, used), to_8bit(image));
+    }
+    fmt::print("{} frames in {}, median {:.2f} ms a frame on {}\n", views.size(),
+               flags.output.string(), median(frame_ms), device.info().name);
+    return 0;
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<RenderFlags>();
+    CLI::App* command = app.add_subcommand("render", "Render a scene to PNG files");
+    command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train")
+        ->required();
+    command
+        ->add_option("--cameras", flags->cameras,
+                     "a cameras.json, a transforms.json, or a data set; photos are not needed")
+        ->required();
+    command->add_option("-o,--output", flags->output, "folder of the frames, made where missing")
+        ->required();
+    command->add_option("-r,--resolution", flags->data.resolution,
+                        "1, 2, 4, 8: divide the cameras' size; above 8: width in px");
+    command->add_flag("-w,--white-background", flags->white_background, "white, not black");
+    command
+        ->add_option("--sh-degree", flags->sh_degree,
+                     "highest degree of view-dependent colour (default: all the scene has)")
+        ->check(CLI::Range(0, 3));
+    command->add_option("--near", flags->near_plane, "nearest distance drawn, world units")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    command->callback([flags, &action] { action = [flags] { return render(*flags); }; });
+}
+
 }  // namespace darb

@@ -1,0 +1,65 @@
+#include "tools/darb/scene_file.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <string>
+#include <string_view>
+
+#include "engine/core/error.h"
+#include "engine/scene/ply.h"
+
+namespace darb {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::string_view kPrefix = "iteration_";
+
+// -1 where the folder is not named iteration_N.
+long iteration_of(const fs::path& folder) {
+    const std::string name = folder.filename().string();
+    if (!name.starts_with(kPrefix)) return -1;
+    long iteration = -1;
+    const char* end = name.data() + name.size();
+    const auto [rest, error] = std::from_chars(name.data() + kPrefix.size(), end, iteration);
+    return error == std::errc{} && rest == end ? iteration : -1;
+}
+
+}  // namespace
+
+fs::path find_scene(const fs::path& path) {
+    if (!fs::is_directory(path)) return path;
+    fs::path found;
+    long latest = -1;
+    std::error_code none;  // no such folder: no entries
+    for (const fs::directory_entry& entry : fs::directory_iterator(path / "point_cloud", none)) {
+        const long iteration = iteration_of(entry.path());
+        const fs::path scene = entry.path() / "point_cloud.ply";
+        if (iteration <= latest || !fs::is_regular_file(scene)) continue;
+        latest = iteration;
+        found = scene;
+    }
+    if (found.empty())
+        throw Error(path.string(), "is a folder without point_cloud/iteration_N/point_cloud.ply",
+                    "Name a PLY file, or the output folder of darb train.");
+    return found;
+}
+
+SplatModel load_scene(const fs::path& path) {
+    const fs::path file = find_scene(path);
+    std::size_t dropped = 0;
+    SplatModel model = read_ply(file, &dropped);
+    if (dropped > 0)
+        fmt::print(stderr, "warning: {}: {} splats with NaN or infinity were dropped\n",
+                   file.string(), dropped);
+    if (model.antialias)
+        fmt::print(stderr,
+                   "warning: {}: was trained with anti-aliasing (SplatRenderMode mip), which this "
+                   "version does not render\n",
+                   file.string());
+    return model;
+}
+
+}  // namespace darb

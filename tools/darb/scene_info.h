@@ -1,0 +1,19 @@
+// What `darb info` says of a splat scene.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+namespace darb {
+
+/// Reads a PLY. Keys: path, bytes, splats, dropped, kernel, footprint, render_mode, sh_degree,
+/// origin; bounds and inner_bounds (1st to 99th percentile by axis) {low, high}, world; scale
+/// (the largest standard deviation of a splat, world) and opacity {p1, p10, p50, p90, p99};
+/// zero_rotations, huge, needles, saturated, invisible (counts); warnings (sentences). Throws Error
+/// for other files. O(N).
+nlohmann::json scene_info(const std::filesystem::path& path);
+
+/// The same as lines of text.
+void print_scene_info(const nlohmann::json& info);
+
+}  // namespace darb
