@@ -70,28 +70,4 @@ json dataset_info(const std::filesystem::path& path, const DatasetOptions& optio
             {"notes", dataset.notes}};
 }
 
-void print_dataset_info(const json& info) {
-    const auto row = [](const char* label, const std::string& value) {
-        fmt::print("{:<13}{}\n", label, value);
-    };
-    const auto size = [](const json& of) {
-        return fmt::format("{} x {} px", of["width"].get<int>(), of["height"].get<int>());
-    };
-    row("data set", info["path"].get<std::string>());
-    row("source", info["source"].get<std::string>());
-    row("views", fmt::format("{}{}", info["views"].get<size_t>(),
-                             info["test"] == 0 ? ""
-                                               : fmt::format(", of which its own split tests {}",
-                                                             info["test"].get<size_t>())));
-    for (const json& of : info["sizes"])
-        row("size", fmt::format("{}, {} views", size(of), of["views"].get<size_t>()));
-    for (const json& of : info["lenses"])
-        row("lens", fmt::format("{}, {}, {} views", of["model"].get<std::string>(), size(of),
-                                of["views"].get<size_t>()));
-    row("points", fmt::format("{}", info["points"].get<size_t>()));
-    row("extent", fmt::format("{:.4g}", info["extent"].get<double>()));
-    if (info["has_alpha"].get<bool>()) row("alpha", "some photos have transparent parts");
-    for (const json& note : info["notes"]) row("note", note.get<std::string>());
-}
-
 }  // namespace darb

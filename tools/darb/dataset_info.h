@@ -14,7 +14,4 @@ namespace darb {
 /// notes. Throws Error as load_dataset does.
 nlohmann::json dataset_info(const std::filesystem::path& path, const DatasetOptions& options);
 
-/// The same as lines of text.
-void print_dataset_info(const nlohmann::json& info);
-
 }  // namespace darb

@@ -6,6 +6,7 @@
 
 #include "tools/darb/commands.h"
 #include "tools/darb/dataset_info.h"
+#include "tools/darb/info_text.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/scene_info.h"
 

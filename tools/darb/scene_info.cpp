@@ -10,7 +10,6 @@
 
 #include "engine/scene/ply.h"
 #include "shaders/shared/limits.h"
-#include "trainer/progress.h"
 
 namespace darb {
 
@@ -110,24 +109,6 @@ void add_warnings(json& info) {
     info["warnings"] = warnings;
 }
 
-std::string vector_text(const json& v) {
-    return fmt::format("{:.5g} {:.5g} {:.5g}", v[0].get<double>(), v[1].get<double>(),
-                       v[2].get<double>());
-}
-
-std::string bounds_text(const json& b) {
-    return b.is_null() ? "none" : vector_text(b["low"]) + "  to  " + vector_text(b["high"]);
-}
-
-std::string percentiles_text(const json& values) {
-    std::string text;
-    for (const char* p : {"p1", "p10", "p50", "p90", "p99"})
-        if (!values.is_null())
-            text +=
-                fmt::format("{}{} {:.4g}", text.empty() ? "" : "  ", p, values[p].get<double>());
-    return text.empty() ? "none" : text;
-}
-
 }  // namespace
 
 json scene_info(const std::filesystem::path& path) {
@@ -147,25 +128,6 @@ json scene_info(const std::filesystem::path& path) {
     add_splats(model, info);
     add_warnings(info);
     return info;
-}
-
-void print_scene_info(const json& info) {
-    const auto row = [](const char* label, const std::string& value) {
-        fmt::print("{:<13}{}\n", label, value);
-    };
-    row("scene", fmt::format("{}, {}", info["path"].get<std::string>(),
-                             format_bytes(info["bytes"].get<double>())));
-    row("splats", fmt::format("{}", info["splats"].get<size_t>()));
-    row("kernel",
-        fmt::format("{}, footprint {}, render mode {}", info["kernel"].get<std::string>(),
-                    info["footprint"].get<std::string>(), info["render_mode"].get<std::string>()));
-    row("SH degree", fmt::format("{}", info["sh_degree"].get<int>()));
-    row("origin", vector_text(info["origin"]));
-    row("bounds", bounds_text(info["bounds"]));
-    row("98 % within", bounds_text(info["inner_bounds"]));
-    row("scale", percentiles_text(info["scale"]));
-    row("opacity", percentiles_text(info["opacity"]));
-    for (const json& warning : info["warnings"]) row("warning", warning.get<std::string>());
 }
 
 }  // namespace darb

@@ -13,7 +13,4 @@ namespace darb {
 /// for other files. O(N).
 nlohmann::json scene_info(const std::filesystem::path& path);
 
-/// The same as lines of text.
-void print_scene_info(const nlohmann::json& info);
-
 }  // namespace darb

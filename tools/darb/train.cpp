@@ -58,10 +58,8 @@ void print_summary(const RunSummary& summary, const TrainFlags& flags) {
 }
 
 int train(TrainFlags flags, std::vector<std::string> arguments) {
-    if (flags.resume && flags.dataset.empty() && !flags.run.output.empty())
-        recall_arguments(flags);
-    else if (!flags.run.output.empty())
-        write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
+    const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
+    if (recalled) recall_arguments(flags);
     finish_train_flags(flags);
     if (flags.dataset.empty())
         throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
@@ -70,6 +68,8 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
     device_options.select = flags.device;
     Device device(device_options);
     const Dataset dataset = load_training_data(flags);
+    if (!recalled)  // only now: a command that fails above leaves that of an earlier run
+        write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
     print_plan(device, dataset, flags);
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);

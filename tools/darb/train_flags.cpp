@@ -1,14 +1,10 @@
 #include "tools/darb/train_flags.h"
 
-#include <fmt/format.h>
-
 #include "engine/core/error.h"
 
 namespace darb {
 
 namespace {
-
-constexpr int kStandardEvaluations[] = {7'000, 30'000};
 
 // Options of the field whose features are not there yet: an error that says so, never ignored.
 void add_missing(CLI::App& command, const std::string& name, const std::string& feature) {
@@ -136,40 +132,19 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     command.add_option("--evaluation", f.evaluation, "polynomial, or builtin sin, cos and exp")
         ->capture_default_str()
         ->check(CLI::IsMember({"polynomial", "builtin"}));
+    command.add_option("--strategy", f.strategy, "how the splats grow: adc, as 3DGS")
+        ->capture_default_str();
     command.add_option("--seed", f.train.seed)->capture_default_str();
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`");
     command.add_flag("-q,--quiet", f.run.quiet, "no progress");
     command.add_flag("--deterministic", f.deterministic,
                      "accepted: every run on one device already repeats bit by bit");
-    add_missing(command, "--strategy", "another strategy than adc");
     add_missing(command, "--antialiasing", "anti-aliasing");
     add_missing(command, "--effects", "the effect plan");
     add_missing(command, "--accuracy", "the choice of accuracy");
     add_missing(command, "--exposure-lr-init", "per-photo exposure");
     add_missing(command, "--depths,-d", "depth supervision");
     add_missing(command, "--view", "the live view");
-}
-
-void finish_train_flags(TrainFlags& f) {
-    const auto kernel = kernel_from_name(f.kernel);
-    if (!kernel)
-        throw Error("--kernel " + f.kernel, "no such kernel",
-                    "See `darb train --help` for the nine names.");
-    const auto footprint = footprint_from_name(f.footprint);
-    if (!footprint)
-        throw Error("--footprint " + f.footprint, "no such footprint", "Use psi or exact.");
-    f.train.kernel = *kernel;
-    f.train.footprint = *footprint;
-    f.train.evaluation = f.evaluation == "builtin" ? EVALUATION_BUILTIN : EVALUATION_POLYNOMIAL;
-    f.train.sh_rest_lr = f.train.sh_dc_lr / 20.0f;
-    for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
-        if (list->empty())
-            list->assign(std::begin(kStandardEvaluations), std::end(kStandardEvaluations));
-    if (f.run.output.empty())
-        throw Error("darb train", "no output folder", "Name one with -o OUT.");
-    if (f.resume && f.start_checkpoint.empty())
-        f.start_checkpoint = f.run.output / "checkpoint.darb";
-    f.run.resume_from = f.start_checkpoint;
 }
 
 }  // namespace darb

@@ -18,7 +18,7 @@ struct TrainFlags {
     bool sequential = false;
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
-    std::string kernel = "gaussian", footprint = "psi", evaluation = "polynomial";
+    std::string kernel = "gaussian", footprint = "psi", evaluation = "polynomial", strategy = "adc";
     DatasetOptions data;
     TrainOptions train;
     RunOptions run;

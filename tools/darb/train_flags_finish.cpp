@@ -1,0 +1,44 @@
+// Command line to options: what the parser leaves as words.
+#include "engine/core/error.h"
+#include "tools/darb/train_flags.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kStandardEvaluations[] = {7'000, 30'000};
+
+void check_strategy(const std::string& name) {
+    if (name == "adc") return;
+    const bool planned = name == "mcmc" || name == "budget";
+    throw Error("--strategy " + name,
+                planned ? "this strategy is not part of this version" : "no such strategy",
+                "Use adc, or leave the option out.");
+}
+
+}  // namespace
+
+void finish_train_flags(TrainFlags& f) {
+    const auto kernel = kernel_from_name(f.kernel);
+    if (!kernel)
+        throw Error("--kernel " + f.kernel, "no such kernel",
+                    "See `darb train --help` for the nine names.");
+    const auto footprint = footprint_from_name(f.footprint);
+    if (!footprint)
+        throw Error("--footprint " + f.footprint, "no such footprint", "Use psi or exact.");
+    check_strategy(f.strategy);
+    f.train.kernel = *kernel;
+    f.train.footprint = *footprint;
+    f.train.evaluation = f.evaluation == "builtin" ? EVALUATION_BUILTIN : EVALUATION_POLYNOMIAL;
+    f.train.sh_rest_lr = f.train.sh_dc_lr / 20.0f;
+    for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
+        if (list->empty())
+            list->assign(std::begin(kStandardEvaluations), std::end(kStandardEvaluations));
+    if (f.run.output.empty())
+        throw Error("darb train", "no output folder", "Name one with -o OUT.");
+    if (f.resume && f.start_checkpoint.empty())
+        f.start_checkpoint = f.run.output / "checkpoint.darb";
+    f.run.resume_from = f.start_checkpoint;
+}
+
+}  // namespace darb
