@@ -37,7 +37,6 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
                  const SplatModel& start, const TrainOptions& options)
     : device_(&device),
       options_(options),
-      dataset_(&dataset),
       background_(options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset.views)),
       splats_(device, start, true),

@@ -101,7 +101,6 @@ class Trainer {
 
     Device* device_;
     TrainOptions options_;
-    const Dataset* dataset_;
     glm::vec3 background_;
     double extent_;
     std::vector<int> train_views_;

@@ -3,18 +3,19 @@
 #ifndef DARB_LIMITS_H
 #define DARB_LIMITS_H
 
-#define LOG_SCALE_LIMIT 20.0      // log_scale is clamped to +-20: a standard deviation of 2e-9 .. 5e8
-#define OPACITY_LOGIT_LIMIT 30.0  // logit is clamped to +-30: the sigmoid is 1 in float32 from 17 on
+#define LOG_SCALE_LIMIT 20.0  // log_scale is clamped to +-20: a standard deviation of 2e-9 .. 5e8
+#define OPACITY_LOGIT_LIMIT \
+    30.0  // logit is clamped to +-30: the sigmoid is 1 in float32 from 17 on
 #define ROTATION_MIN_SQUARE 1e-12  // squared norm of a quaternion below which a splat is rejected
-#define DETERMINANT_MIN 1e-12     // px^4, of the projected covariance with the low-pass
-#define DETERMINANT_MAX 1e30      // px^4; beyond it float32 overflows in the next steps
-#define ALPHA_MAX 0.99            // bounds 1 - alpha, the divisor of the backward pass, by 0.01
-#define TRANSMITTANCE_STOP 1e-4   // a pixel ends before the splat that would bring it below
+#define DETERMINANT_MIN 1e-12      // px^4, of the projected covariance with the low-pass
+#define DETERMINANT_MAX 1e30       // px^4; beyond it float32 overflows in the next steps
+#define ALPHA_MAX 0.99             // bounds 1 - alpha, the divisor of the backward pass, by 0.01
+#define TRANSMITTANCE_STOP 1e-4    // a pixel ends before the splat that would bring it below
 #define ALPHA_CUTOFF_DEFAULT (1.0 / 255.0)
-#define LOW_PASS_DEFAULT 0.3      // px^2
-#define NEAR_DEFAULT 0.2          // world units
+#define LOW_PASS_DEFAULT 0.3  // px^2
+#define NEAR_DEFAULT 0.2      // world units
 
-#define JACOBIAN_MARGIN 0.3       // the Jacobian is clamped to the image plus this share of W/(2 fx)
-#define TILE_SIZE 16              // px, both ways; a blend workgroup owns one tile
+#define JACOBIAN_MARGIN 0.3  // the Jacobian is clamped to the image plus this share of W/(2 fx)
+#define TILE_SIZE 16         // px, both ways; a blend workgroup owns one tile
 
 #endif

@@ -9,9 +9,9 @@ namespace darb::gpu {
 #endif
 
 struct ProjectBackwardArgs {
-    uint splat_count;   // N
+    uint splat_count;  // N
     uint camera_index;
-    float low_pass;     // px^2
+    float low_pass;  // px^2
     // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
     float rate_position, rate_scale, rate_rotation, rate_opacity, rate_dc, rate_rest;
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
@@ -25,8 +25,8 @@ struct ProjectBackwardArgs {
 #define DENSIFY_ACTIONS 4
 
 struct DensifyArgs {
-    uint splat_count;       // N before
-    uint growth_limit;      // no clone or split beyond this count; 0xFFFFFFFF = none
+    uint splat_count;          // N before
+    uint growth_limit;         // no clone or split beyond this count; 0xFFFFFFFF = none
     float gradient_threshold;  // NDC units, on the mean over the frames that saw the splat
     float clone_split_scale;   // world: largest standard deviation below clones, above splits
     float prune_opacity;       // below it a splat goes
@@ -35,9 +35,9 @@ struct DensifyArgs {
 };
 
 struct GatherArgs {
-    uint out_count;         // splats after
-    uint stride;            // floats per splat of this attribute
-    uint clear_new;         // 1: zero for new splats (moments), 0: copy
+    uint out_count;  // splats after
+    uint stride;     // floats per splat of this attribute
+    uint clear_new;  // 1: zero for new splats (moments), 0: copy
 };
 
 struct ResetOpacityArgs {

@@ -6,9 +6,9 @@
 #include "limits.h"
 #include "types.h"
 
-#define SPLAT_GROUP 64        // threads of the passes that run once per splat or pair
-#define MAX_GROUPS 65535u     // the portable limit of one dispatch dimension
-#define CULL_REASONS 8        // see CULL_* below
+#define SPLAT_GROUP 64     // threads of the passes that run once per splat or pair
+#define MAX_GROUPS 65535u  // the portable limit of one dispatch dimension
+#define CULL_REASONS 8     // see CULL_* below
 
 // Why a splat takes no part in a frame; index into FrameStatus.culled.
 #define CULL_NEAR 0        // not in front of the near plane, or position not finite
@@ -42,9 +42,9 @@ struct CameraData {
 
 // What one frame counts, written by the passes, read by later passes and by the host afterwards.
 struct FrameStatus {
-    uint visible;   // V
-    uint pairs;     // K as wanted, may exceed the capacity
-    uint overflow;  // 1: pairs exceeded the capacity; sticky until the host clears it
+    uint visible;        // V
+    uint pairs;          // K as wanted, may exceed the capacity
+    uint overflow;       // 1: pairs exceeded the capacity; sticky until the host clears it
     uint bad_gradients;  // splats whose gradient was not finite, since the host cleared it
     uint culled[CULL_REASONS];
 };
@@ -56,16 +56,16 @@ struct FrameGroups {
 };
 
 struct ProjectArgs {
-    uint splat_count;   // N
+    uint splat_count;  // N
     uint camera_index;
-    float low_pass;     // px^2, added to the diagonal of the projected covariance
+    float low_pass;  // px^2, added to the diagonal of the projected covariance
 };
 
-struct SplatArgs {      // compact, gather_counts
-    uint splat_count;   // N
+struct SplatArgs {     // compact, gather_counts
+    uint splat_count;  // N
 };
 
-struct PairArgs {       // frame_groups, emit, tile_ranges
+struct PairArgs {  // frame_groups, emit, tile_ranges
     uint pair_capacity;
     uint tiles_x;
     uint tile_count;
