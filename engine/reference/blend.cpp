@@ -6,6 +6,10 @@
 namespace darb::reference {
 namespace {
 
+// As the shaders know it. Two clamped layers leave a transmittance of 1 - 2e-6 of the stop in
+// float32, and of 1 + 2e-15 of it with 0.99 in double: the same constant stops both.
+constexpr double kAlphaMax = static_cast<float>(ALPHA_MAX);
+
 // One splat as a pixel meets it.
 template <class T>
 struct Sample {
@@ -32,8 +36,8 @@ bool sample_splat(const ProjectedSplat<T>& s, T x, T y, const KernelTable& kerne
     }
     sample.weight = static_cast<T>(kernel.value(static_cast<double>(sample.q)));
     const T unclamped = s.opacity * sample.weight;
-    sample.clamped = unclamped > T(ALPHA_MAX);
-    sample.alpha = sample.clamped ? T(ALPHA_MAX) : unclamped;
+    sample.clamped = unclamped > T(kAlphaMax);
+    sample.alpha = sample.clamped ? T(kAlphaMax) : unclamped;
     return sample.alpha >= cutoff && sample.alpha > 0;
 }
 

@@ -43,7 +43,7 @@ Image<double> plain_render(const Splats<double>& splats, const Camera& camera,
                 const double q =
                     (p.cov_yy * dx * dx - 2 * p.cov_xy * dx * dy + p.cov_xx * dy * dy) / det;
                 const double w = kernel_value(splats.kernel, splats.footprint, q);
-                const double alpha = std::min(0.99, p.opacity * w);
+                const double alpha = std::min<double>(0.99f, p.opacity * w);
                 if (alpha < settings.alpha_cutoff) {
                     continue;
                 }
