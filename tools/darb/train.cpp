@@ -10,6 +10,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
 

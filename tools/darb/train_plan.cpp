@@ -2,14 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/core/error.h"
-#include "engine/data/run_colmap.h"
-
 namespace darb {
-
-Dataset load_training_data(const TrainFlags& flags) {
-    return load_dataset(flags.dataset, flags.data);
-}
 
 void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags) {
     if (flags.run.quiet) return;

@@ -8,9 +8,6 @@
 
 namespace darb {
 
-/// Loads flags.dataset; a folder of photos without cameras goes through the installed COLMAP first.
-Dataset load_training_data(const TrainFlags& flags);
-
 /// Prints views, sizes, notes, and the forecast of splats, time and memory on this device.
 void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags);
 

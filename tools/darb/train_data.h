@@ -1,0 +1,15 @@
+// What `darb train` trains on: a data set, or photos whose cameras COLMAP finds first.
+#pragma once
+
+#include "engine/data/dataset.h"
+#include "tools/darb/train_flags.h"
+
+namespace darb {
+
+/// Loads flags.dataset. A folder of PNG and JPEG files (itself, or its --images folder) without
+/// sparse, sparse/0 or transforms*.json goes through the installed COLMAP into OUT/colmap first;
+/// what is there from an earlier run over the same photos is used again. Throws Error as
+/// load_dataset and run_colmap do, and where OUT lies among the photos.
+Dataset load_training_data(const TrainFlags& flags);
+
+}  // namespace darb
