@@ -7,4 +7,5 @@ cd "$(dirname "$0")/.."
 tools/setup.sh --no-tests
 cmake --preset release -DDARB_TESTS=OFF >/dev/null
 cmake --build --preset release --target darb
-build/darb train assets/scene -o "$PWD/out/demo" --eval --iterations 3000 "$@"
+[[ " $*" == *" --iterations"* ]] || set -- --iterations 3000 "$@"
+build/darb train assets/scene -o "$PWD/out/demo" --eval "$@"
