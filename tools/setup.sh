@@ -8,6 +8,7 @@ usage() {
 usage: tools/setup.sh [options]
   --dry-run             only say what would be installed
   --no-tests            leave out what only the tests and the quality checks need
+  --with-colmap         COLMAP too: training from photos without cameras runs it
   --with-mesa-backport  Debian 12: Mesa 25 from bookworm-backports; on the CPU it blends 1.5-1.7
                         times as fast as Mesa 22.3
 TEXT
@@ -26,7 +27,7 @@ build    libfmt-dev           text
 build    libcli11-dev         command line
 build    nlohmann-json3-dev   JSON
 build    libstb-dev           PNG and JPEG
-build    zlib1g-dev           gzip (SPZ)
+build    zlib1g-dev           checksums and compression
 run      mesa-vulkan-drivers  lavapipe, the CPU device, and the GPU drivers of Mesa
 tests    libgtest-dev         tests
 tests    vulkan-validationlayers  synchronization validation
@@ -34,13 +35,15 @@ tests    clang                second compiler, sanitizer build
 tests    libclang-rt-dev      ASan and UBSan run time
 tests    clang-format-14      layout check; one version, so one answer
 tests    python3              style script (standard library only)
+colmap   colmap               cameras from photos; optional
 '
 
 dry_run=0 backport=0 groups="build run tests"
 for option in "$@"; do
     case $option in
         --dry-run) dry_run=1 ;;
-        --no-tests) groups="build run" ;;
+        --no-tests) groups=${groups/tests/} ;;
+        --with-colmap) groups+=" colmap" ;;
         --with-mesa-backport) backport=1 ;;
         -h | --help) usage; exit 0 ;;
         *) echo "setup.sh: unknown option $option" >&2; usage >&2; exit 2 ;;

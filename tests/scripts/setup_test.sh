@@ -21,7 +21,7 @@ SCRIPT
     chmod +x "$fake/dpkg-query"
 }
 
-# expect NAME STATUS PATTERN OPTIONS...
+# expect NAME STATUS PATTERN OPTIONS...: setup.sh --dry-run ends with STATUS and prints a matching line.
 expect() {
     local name=$1 wanted=$2 pattern=$3 output status
     shift 3
@@ -42,6 +42,7 @@ mapfile -t all < <(sed -n "/^packages='/,/^'/p" "$setup" | awk 'NF > 2 { print $
 machine "debian 12" none=1
 expect "bare Debian lists every package" 0 'to install: g\+\+ cmake .*mesa-vulkan-drivers .*python3'
 expect "--no-tests leaves the test packages out" 0 'zlib1g-dev mesa-vulkan-drivers *$' --no-tests
+expect "--with-colmap adds it" 0 'mesa-vulkan-drivers colmap *$' --no-tests --with-colmap
 machine "ubuntu 24.04" none=1
 expect "bare Ubuntu lists every package" 0 'to install: g\+\+ cmake .*python3'
 expect "the backport is for Debian" 2 'is for Debian 12' --with-mesa-backport
