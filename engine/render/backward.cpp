@@ -23,12 +23,13 @@ AdamStep adam_step(const AdamStep& rates, int t) {
 }
 
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
-    : device_(&device), options_(options), result_(result), shape_(blend_shape(device)) {
+    : device_(&device), options_(options), result_(result) {
     SpecConstants blend = kernel_constants(options.kernel, options.footprint, options.evaluation,
                                            options.polynomial_degree, options.alpha_cutoff);
-    blend["THREADS"] = static_cast<std::int32_t>(shape_.threads);
-    blend["SUBGROUPS"] = static_cast<std::int32_t>(shape_.subgroups);
-    blend_ = Pipeline(device, "blend_backward", blend);
+    const std::uint32_t subgroup = blend_subgroup(device);
+    blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    blend["THREADS"] = static_cast<std::int32_t>(subgroup);
+    blend_ = Pipeline(device, "blend_backward", blend, true, subgroup);
 }
 
 Pipeline& Backward::project_pipeline(int sh_degree) {
@@ -53,9 +54,8 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
     }
     if (pairs > pair_capacity_ || pair_capacity_ == 0) {
         const std::uint64_t k = pair_capacity_ = std::max(pairs, 1024u);
-        partial_a_ = Buffer(*device_, "pair partials a", k * 16);
-        partial_b_ = Buffer(*device_, "pair partials b", k * 16);
-        partial_c_ = Buffer(*device_, "pair partials c", k * 16);
+        partials_ = Buffer(*device_, "pair partials", k * 32);
+        partial_rest_ = Buffer(*device_, "pair partials, rest", k * 4);
     }
 }
 
@@ -65,13 +65,15 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                       const AdamStep& step) {
     DARB_CHECK(splats.has_moments() && forward.options().store_for_backward, "set up for training");
     commands.pass("blend backward");
+    commands.fill(partials_, 0);
+    commands.fill(partial_rest_, 0);
     const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x,
                                background.r, background.g, background.b};
     commands.dispatch(
         blend_, blend,
         {forward.tile_range(), forward.pair_order(), forward.pair_splat(), forward.splat_shape(),
          forward.splat_light(), forward.splat_bound(), d_image, forward.final_transmittance(),
-         forward.last_pair(), partial_a_, partial_b_, partial_c_},
+         forward.last_pair(), partials_, partial_rest_},
         data.tiles_x, data.tiles_y);
 
     if (splats.count() == 0) return;
@@ -87,28 +89,15 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                         step.sh_rest,
                                         step.inverse_sqrt_correction2};
     const Groups g = groups_for(splats.count());
-    commands.dispatch(project_pipeline(sh_degree), args,
-                      {cameras,
-                       splats.parameters(kPosition),
-                       splats.parameters(kLogScale),
-                       splats.parameters(kRotation),
-                       splats.parameters(kOpacity),
-                       splats.parameters(kShDc),
-                       splats.parameters(kShRest),
-                       splats.moments(kPosition),
-                       splats.moments(kLogScale),
-                       splats.moments(kRotation),
-                       splats.moments(kOpacity),
-                       splats.moments(kShDc),
-                       splats.moments(kShRest),
-                       forward.pair_count(),
-                       forward.pair_begin(),
-                       partial_a_,
-                       partial_b_,
-                       partial_c_,
-                       gradient_sum_,
-                       forward.status()},
-                      g.x, g.y);
+    commands.dispatch(
+        project_pipeline(sh_degree), args,
+        {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
+         splats.parameters(kRotation), splats.parameters(kOpacity), splats.parameters(kShDc),
+         splats.parameters(kShRest), splats.moments(kPosition), splats.moments(kLogScale),
+         splats.moments(kRotation), splats.moments(kOpacity), splats.moments(kShDc),
+         splats.moments(kShRest), forward.pair_count(), forward.pair_begin(), partials_,
+         partial_rest_, gradient_sum_, forward.status()},
+        g.x, g.y);
 }
 
 }  // namespace darb

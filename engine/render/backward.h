@@ -44,11 +44,10 @@ class Backward {
     Device* device_;
     ForwardOptions options_;
     BackwardResult result_;
-    BlendShape shape_;
     Pipeline blend_;
     std::map<int, Pipeline> project_;
     std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0;
-    Buffer partial_a_, partial_b_, partial_c_, gradient_sum_;
+    Buffer partials_, partial_rest_, gradient_sum_;
 };
 
 }  // namespace darb

@@ -56,22 +56,13 @@ Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& camera
     return buffer;
 }
 
-BlendShape blend_shape(const Device& device) {
-    BlendShape shape;
-    const std::uint32_t subgroup = std::max(device.info().subgroup_size, 1u);
-    // A CPU wants its 8 lanes busy with 8 pixels each; a GPU wants a thread a pixel.
-    shape.threads = device.is_lavapipe() ? std::max(32u, subgroup) : 256u;
-    shape.subgroups = std::max(shape.threads / subgroup, 1u);
-    return shape;
+std::uint32_t blend_subgroup(const Device& device) {
+    return std::clamp(device.info().subgroup_size, 4u, 64u);
 }
 
 Forward::Forward(Device& device, const ForwardOptions& options)
-    : device_(&device), options_(options), shape_(blend_shape(device)) {
+    : device_(&device), options_(options) {
     const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
-    const auto with = [](SpecConstants constants, std::string name, SpecValue value) {
-        constants[std::move(name)] = value;
-        return constants;
-    };
     compact_ = Pipeline(device, "compact", per_item);
     gather_counts_ = Pipeline(device, "gather_counts", per_item);
     groups_visible_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 0}}, false);
@@ -82,8 +73,10 @@ Forward::Forward(Device& device, const ForwardOptions& options)
                                            options.polynomial_degree, options.alpha_cutoff);
     blend["MIN_TRANSMITTANCE"] = options.transmittance_stop;
     blend["STORE_FOR_BACKWARD"] = options.store_for_backward ? 1 : 0;
-    blend_ = Pipeline(device, "blend",
-                      with(blend, "THREADS", static_cast<std::int32_t>(shape_.threads)));
+    const std::uint32_t subgroup = blend_subgroup(device);
+    blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    blend["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
+    blend_ = Pipeline(device, "blend", blend, true, subgroup);
 
     status_ = Buffer(device, "frame status", sizeof(gpu::FrameStatus));
     groups_ = Buffer(device, "frame groups", sizeof(gpu::FrameGroups));
@@ -108,9 +101,9 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
 }
 
 std::uint32_t Forward::max_pairs(const Device& device) {
-    // The widest entry per pair is the backward pass's partial, a vec4.
+    // The widest entry per pair is the backward pass's: eight floats.
     return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(device.info().max_storage_buffer_bytes / 16, 1u << 30));
+        std::min<std::uint64_t>(device.info().max_storage_buffer_bytes / 32, 1u << 30));
 }
 
 void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height) {
@@ -217,10 +210,10 @@ void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std:
                                offsetof(gpu::FrameGroups, visible_x));
     scan_->record(commands, pair_count_sorted_, pair_offset_, visible_in_use_, 0, pairs_total_);
     commands.dispatch(groups_pairs_, args, {status_, groups_, pairs_total_, pairs_in_use_}, 1);
-    commands.dispatch_indirect(
-        emit_, args,
-        {status_, depth_order_, pair_offset_, cover_, pair_tile_, pair_splat_, pair_begin_},
-        groups_, offsetof(gpu::FrameGroups, visible_x));
+    commands.dispatch_indirect(emit_, args,
+                               {status_, depth_order_, pair_offset_, cover_, pair_tile_,
+                                pair_splat_, pair_begin_, splat_shape_, splat_bound_},
+                               groups_, offsetof(gpu::FrameGroups, visible_x));
 
     commands.pass("tile sort");
     tile_sort_->record(commands, pair_tile_, pair_order_, pairs_in_use_, 0, bits_for(tile_count),

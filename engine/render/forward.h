@@ -39,12 +39,8 @@ gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin,
 /// Cameras in a device buffer, in the order given.
 Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& cameras);
 
-/// How the blend passes deal a tile's 256 pixels on this device.
-struct BlendShape {
-    std::uint32_t threads = 32;
-    std::uint32_t subgroups = 4;
-};
-BlendShape blend_shape(const Device& device);
+/// The subgroup size that the blend passes are compiled for and require.
+std::uint32_t blend_subgroup(const Device& device);
 
 class Forward {
   public:
@@ -89,7 +85,6 @@ class Forward {
 
     Device* device_;
     ForwardOptions options_;
-    BlendShape shape_;
     std::map<int, Pipeline> project_;  // by SH degree in use
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_, blend_;
     std::optional<Scan> scan_;

@@ -1,27 +1,27 @@
-// Gradients of blend.comp: from dL/dimage to dL/d(mean, l11, l21, l22, opacity, colour), one partial for each
-// splat-tile pair, in the pair's own slot, so that sums per splat need no atomics and repeat bit by bit.
-// Place: after the loss. Source: KERNELS section 4, the moments form below.
-// Back to front: T before a splat is T after it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; behind = colour
-// behind the splat, dotted with dL/dcolour, is a convex combination, which no cancellation can hurt.
-// Work: one workgroup a tile, pixels dealt as in blend.comp. Shared memory: partials of one batch for each
-// subgroup, two batches. Reads what the forward pass stored; writes partials of every pair of the tile.
+// Gradients of blend.comp: from dL/dimage to sums over pixels from which dL/d(mean, l11, l21, l22, opacity, colour)
+// follow, PARTIALS floats for each splat-tile pair in the pair's own slot, so that sums per splat need no
+// atomics and repeat bit by bit. Place: after the loss. Source: KERNELS section 4 in moments form.
+// Back to front: T before a splat is T after it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; what is behind,
+// dotted with dL/dcolour, is a convex combination, so nothing cancels.
+// Work: one subgroup a tile, its blocks one after another, pixels dealt as in blend.comp; the lanes' sums are
+// reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.
+// Reads what the forward pass stored; slots must be zero before.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#extension GL_KHR_shader_subgroup_ballot : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_shuffle : require
 
 #include "shared/limits.h"
 #include "shared/render_args.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 0) const uint THREADS = 32;
-layout(constant_id = 1) const uint SUBGROUPS = 4;  // THREADS / subgroup size
+layout(constant_id = 0) const uint THREADS = 8;  // SUBGROUP_SIZE
+layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
 
 #include "kernels/kernel.glsl"
 #include "lib/block.glsl"
-#include "lib/tile.glsl"
 
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
@@ -33,14 +33,10 @@ layout(set = 0, binding = 5, scalar) readonly buffer SplatBound { vec4 splat_bou
 layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
 layout(set = 0, binding = 7, scalar) readonly buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer LastPair { uint last_pair[]; };
-layout(set = 0, binding = 9, scalar) writeonly buffer PartialA { vec4 partial_a[]; };  // G x, G x dx, G x dy, G dy
-layout(set = 0, binding = 10, scalar) writeonly buffer PartialB { vec4 partial_b[]; };  // G dy dy, d_opacity
-layout(set = 0, binding = 11, scalar) writeonly buffer PartialC { vec4 partial_c[]; };  // d_colour, 0
+layout(set = 0, binding = 9, scalar) buffer Partials { float partials[]; };      // [K][PARTIALS]
+layout(set = 0, binding = 10, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
 
-const uint BATCH = 32;
-shared vec4 sum_a[2 * SUBGROUPS * BATCH];
-shared vec4 sum_c[2 * SUBGROUPS * BATCH];
-shared float sum_b[2 * SUBGROUPS * BATCH];
+#include "lib/reduce.glsl"
 
 struct Pixels {
     float transmittance[PIXELS];
@@ -49,43 +45,98 @@ struct Pixels {
     uint last[PIXELS];
 };
 
-uint load_pixels(uvec2 tile, out Pixels px, out vec2 centre[PIXELS]) {
+// Sums over the thread's pixels; G = opacity dL/dalpha dw/dq without the opacity.
+struct Sums {
+    float gx, gxdx, gxdy, gdy, gdydy, opacity;
+    vec3 colour;
+};
+
+uint load_pixels(uvec2 first, out Pixels px) {
     const vec3 background = vec3(args.background_r, args.background_g, args.background_b);
     const uint plane = args.width * args.height;
     uint last = 0u;
     for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = tile * TILE_SIZE + pixel_of(k);
-        centre[k] = vec2(at) + 0.5;
-        const bool inside = at.x < args.width && at.y < args.height;
-        const uint o = inside ? at.y * args.width + at.x : 0u;
-        const vec3 g = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
-        px.d_colour[k] = inside ? g : vec3(0.0);
-        px.transmittance[k] = inside ? final_transmittance[o] : 1.0;
+        const uvec2 at = first + slot_offset(k);
+        px.d_colour[k] = vec3(0.0);
+        px.transmittance[k] = 1.0;
+        px.last[k] = 0u;
+        if (at.x < args.width && at.y < args.height) {
+            const uint o = at.y * args.width + at.x;
+            px.d_colour[k] = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
+            px.transmittance[k] = final_transmittance[o];
+            px.last[k] = last_pair[o];
+        }
         px.behind[k] = dot(px.d_colour[k], background);
-        px.last[k] = inside ? last_pair[o] : 0u;
         last = max(last, px.last[k]);
     }
     return last;
 }
 
-// Adds up what the subgroups found for one batch; thread t has entry t.
-void write_batch(uint base, uint half_, uvec2 range) {
-    for (uint t = gl_LocalInvocationIndex; t < BATCH; t += THREADS) {
-        const uint j = base + t;
-        if (j >= range.y) continue;
-        vec4 a = vec4(0.0);
-        vec4 c = vec4(0.0);
-        float b = 0.0;
-        for (uint s = 0u; s < SUBGROUPS; ++s) {
-            const uint o = (half_ * SUBGROUPS + s) * BATCH + t;
-            a += sum_a[o];
-            b += sum_b[o];
-            c += sum_c[o];
+Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number) {
+    Sums s = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const vec2 to_mean = d - vec2(slot_offset(k));
+        const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
+        float w, slope;
+        kernel_value_slope(x * x + y * y, w, slope);
+        const float raw = light.w * w;
+        const bool counts = raw >= ALPHA_CUTOFF && number <= px.last[k];
+        const float alpha = counts ? min(raw, ALPHA_MAX) : 0.0;
+        const float before = px.transmittance[k] / (1.0 - alpha);
+        const float ahead = dot(light.rgb, px.d_colour[k]) - px.behind[k];
+        const float d_alpha = counts && raw < ALPHA_MAX ? before * ahead : 0.0;
+        const float g = d_alpha * slope, gx = g * x, gdy = g * to_mean.y;
+        s.gx += gx;
+        s.gxdx += gx * to_mean.x;
+        s.gxdy += gx * to_mean.y;
+        s.gdy += gdy;
+        s.gdydy += gdy * to_mean.y;
+        s.opacity += d_alpha * w;
+        s.colour += (alpha * before) * px.d_colour[k];
+        px.behind[k] += alpha * ahead;
+        px.transmittance[k] = before;
+    }
+    return s;
+}
+
+void blend_block(uint block, uvec2 tile, uvec2 range) {
+    const uint bit = block_bit(block);
+    const uvec2 first = tile * TILE_SIZE + first_pixel(block, gl_SubgroupInvocationID);
+    const vec2 centre = vec2(first) + 0.5;
+    Pixels px;
+    const uint end = subgroupMax(load_pixels(first, px));
+    const uint batches = end > range.x ? (end - range.x + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE : 0u;
+    for (uint n = batches; n > 0u; --n) {
+        const uint batch = range.x + (n - 1u) * SUBGROUP_SIZE;
+        const uint j = batch + gl_SubgroupInvocationID;
+        uint slot = 0u, pair = 0u;
+        if (j < end) {
+            slot = pair_order[j];
+            pair = pair_splat[slot];
         }
-        const uint slot = pair_order[j];
-        partial_a[slot] = a;
-        partial_b[slot] = vec4(b, c.w, 0.0, 0.0);
-        partial_c[slot] = vec4(c.rgb, 0.0);
+        const bool hit = (pair & bit) != 0u;
+        uvec4 hits = subgroupBallot(hit);
+        if (subgroupBallotBitCount(hits) == 0u) continue;
+        vec4 shape = vec4(0.0), light = vec4(0.0);
+        float l22 = 0.0;
+        if (hit) {
+            const uint splat = pair & PAIR_SPLAT_MASK;
+            shape = splat_shape[splat];
+            light = splat_light[splat];
+            l22 = splat_bound[splat].x;
+        }
+        while (subgroupBallotBitCount(hits) > 0u) {
+            const uint lane = subgroupBallotFindMSB(hits);
+            hits[lane >> 5] &= ~(1u << (lane & 31u));
+            const vec4 s = subgroupBroadcast(shape, lane);
+            const vec4 c = subgroupBroadcast(light, lane);
+            const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
+                                         batch + lane + 1u);
+            float parts[PARTIALS] =
+                float[](sums.gx * c.w, sums.gxdx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
+                        sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
+            add_to_slot(subgroupBroadcast(slot, lane), parts, sums.gdydy * c.w);
+        }
     }
 }
 
@@ -93,81 +144,5 @@ void main() {
     const uvec2 tile = gl_WorkGroupID.xy;
     const uvec2 range = tile_range[tile.y * args.tiles_x + tile.x];
     if (range.x >= range.y) return;
-    const vec2 corner = vec2(tile * TILE_SIZE) + 0.5;
-    uvec2 low, high;
-    block_bounds(low, high);
-    const vec2 block_low = corner + vec2(low), block_high = corner + vec2(high);
-
-    Pixels px;
-    vec2 centre[PIXELS];
-    const uint block_last = subgroupMax(load_pixels(tile, px, centre));
-
-    const uint batches = (range.y - range.x + BATCH - 1u) / BATCH;
-    for (uint n = 0u; n < batches; ++n) {
-        const uint base = range.x + (batches - 1u - n) * BATCH;
-        const uint half_ = n & 1u;
-        const uint mine_at = (half_ * SUBGROUPS + gl_SubgroupID) * BATCH;
-        for (uint t = gl_SubgroupInvocationID; t < BATCH; t += gl_SubgroupSize) {
-            sum_a[mine_at + t] = vec4(0.0);
-            sum_b[mine_at + t] = 0.0;
-            sum_c[mine_at + t] = vec4(0.0);
-        }
-        subgroupBarrier();
-        if (base < block_last) {
-            for (uint part = BATCH; part > 0u;) {
-                part -= min(gl_SubgroupSize, part);
-                const uint j = base + part + gl_SubgroupInvocationID;
-                const bool mine = j < min(range.y, block_last);
-                const uint splat = pair_splat[pair_order[mine ? j : range.x]];
-                const vec4 shape = splat_shape[splat];
-                const vec4 light = splat_light[splat];
-                const vec2 bound = splat_bound[splat].xy;
-                const bool hit = mine && reaches(smallest_q(shape.xy, shape.z, shape.w, bound.x,
-                                                            block_low, block_high), bound.y);
-                for (uvec4 hits = subgroupBallot(hit); subgroupBallotBitCount(hits) > 0u;) {
-                    const uint lane = subgroupBallotFindMSB(hits);
-                    hits[lane >> 5] &= ~(1u << (lane & 31u));
-                    const vec4 s = subgroupBroadcast(shape, lane);
-                    const vec4 c = subgroupBroadcast(light, lane);
-                    const float l22 = subgroupBroadcast(bound.x, lane);
-                    const uint number = base + part + lane + 1u;
-                    vec4 a = vec4(0.0);  // sums of G x, G x dx, G x dy, G dy
-                    vec4 d_light = vec4(0.0);  // d_colour, d_opacity
-                    float b = 0.0;  // sum of G dy dy
-                    for (uint k = 0u; k < PIXELS; ++k) {
-                        const vec2 d = s.xy - centre[k];
-                        const float x = s.z * d.x + s.w * d.y, y = l22 * d.y;
-                        float w, slope;
-                        kernel_value_slope(x * x + y * y, w, slope);
-                        const float raw = c.w * w;
-                        const float alpha = min(raw, ALPHA_MAX);
-                        const bool counts = alpha >= ALPHA_CUTOFF && number <= px.last[k];
-                        const float shown = counts ? alpha : 0.0;
-                        const float before = px.transmittance[k] / (1.0 - shown);
-                        const float lit = dot(c.rgb, px.d_colour[k]);
-                        const float d_alpha =
-                            counts && raw < ALPHA_MAX ? before * (lit - px.behind[k]) : 0.0;
-                        d_light.rgb += shown * before * px.d_colour[k];
-                        d_light.w += d_alpha * w;
-                        const float g = d_alpha * slope, gx = g * x, gy = g * d.y;
-                        a += vec4(gx, gx * d.x, gx * d.y, gy);
-                        b += gy * d.y;
-                        px.behind[k] += shown * (lit - px.behind[k]);
-                        px.transmittance[k] = before;
-                    }
-                    a = subgroupAdd(a);
-                    b = subgroupAdd(b);
-                    d_light = subgroupAdd(d_light);
-                    if (subgroupElect()) {
-                        const uint o = mine_at + part + lane;
-                        sum_a[o] = a * c.w;
-                        sum_b[o] = b * c.w;
-                        sum_c[o] = d_light;
-                    }
-                }
-            }
-        }
-        barrier();
-        write_batch(base, half_, range);
-    }
+    for (uint block = 0u; block < BLOCKS; ++block) blend_block(block, tile, range);
 }

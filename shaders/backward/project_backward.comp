@@ -34,11 +34,10 @@ layout(set = 0, binding = 11, scalar) buffer MShDc { vec2 m_dc[]; };
 layout(set = 0, binding = 12, scalar) buffer MShRest { vec2 m_rest[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer PairCount { uint pair_count[]; };
 layout(set = 0, binding = 14, scalar) readonly buffer PairBegin { uint pair_begin[]; };
-layout(set = 0, binding = 15, scalar) readonly buffer PartialA { vec4 partial_a[]; };
-layout(set = 0, binding = 16, scalar) readonly buffer PartialB { vec4 partial_b[]; };
-layout(set = 0, binding = 17, scalar) readonly buffer PartialC { vec4 partial_c[]; };
-layout(set = 0, binding = 18, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
-layout(set = 0, binding = 19, scalar) buffer Status { FrameStatus status; };
+layout(set = 0, binding = 15, scalar) readonly buffer Partials { vec4 partials[]; };  // [K][2]
+layout(set = 0, binding = 16, scalar) readonly buffer PartialRest { float partial_rest[]; };
+layout(set = 0, binding = 17, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
+layout(set = 0, binding = 18, scalar) buffer Status { FrameStatus status; };
 
 const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
 const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
@@ -55,11 +54,11 @@ Partial sum_partials(uint i) {
     const uint begin = pair_begin[i], end = begin + pair_count[i];
     for (uint block = begin; block < end; block += 32768u) {  // some drivers end loops at 65,535
         for (uint e = block; e < min(block + 32768u, end); ++e) {
-            const vec2 b = partial_b[e].xy;
-            sums.a += partial_a[e];
-            sums.b += b.x;
-            sums.d_opacity += b.y;
-            sums.d_colour += partial_c[e].rgb;
+            const vec4 light = partials[2u * e + 1u];
+            sums.a += partials[2u * e];
+            sums.b += partial_rest[e];
+            sums.d_opacity += light.x;
+            sums.d_colour += light.yzw;
         }
     }
     return sums;

@@ -21,16 +21,34 @@ layout(set = 0, binding = 3, scalar) readonly buffer Cover { uvec4 cover[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer PairTile { uint pair_tile[]; };
 layout(set = 0, binding = 5, scalar) writeonly buffer PairSplat { uint pair_splat[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer PairBegin { uint pair_begin[]; };  // by splat
+layout(set = 0, binding = 7, scalar) readonly buffer SplatShape { vec4 splat_shape[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
 
-uint emit_cell(TileCover c, uint cell, uint splat, uint slot) {
+struct Ellipse {
+    vec4 shape;  // mean, l11, l21
+    vec2 bound;  // l22, reach
+};
+
+uint touched_blocks(Ellipse e, uvec2 tile) {
+    uint bits = 0u;
+    for (uint block = 0u; block < 4u; ++block) {
+        const vec2 low = vec2(tile * TILE_SIZE + uvec2(block & 1u, block >> 1) * 8u) + 0.5;
+        const float q = smallest_q(e.shape.xy, e.shape.z, e.shape.w, e.bound.x, low, low + 7.0);
+        if (reaches(q, e.bound.y)) bits |= 1u << block;
+    }
+    return bits << PAIR_BLOCK_SHIFT;
+}
+
+uint emit_cell(TileCover c, uint cell, uint splat, Ellipse e, uint slot) {
     const uvec2 size = cell_size(c.extent);
     const uvec2 first = uvec2(cell & 7u, cell >> 3) * size;
     const uvec2 last = min(first + size, c.extent);
     for (uint y = first.y; y < last.y; ++y) {
         for (uint x = first.x; x < last.x; ++x) {
             if (slot < args.pair_capacity) {
-                pair_tile[slot] = (c.origin.y + y) * args.tiles_x + c.origin.x + x;
-                pair_splat[slot] = splat;
+                const uvec2 tile = c.origin + uvec2(x, y);
+                pair_tile[slot] = tile.y * args.tiles_x + tile.x;
+                pair_splat[slot] = splat | touched_blocks(e, tile);
             }
             ++slot;
         }
@@ -43,10 +61,11 @@ void main() {
     if (rank >= status.visible) return;
     const uint splat = depth_order[rank];
     const TileCover c = unpack_cover(cover[splat]);
+    const Ellipse e = Ellipse(splat_shape[splat], splat_bound[splat].xy);
     uint slot = pair_offset[rank];
     pair_begin[splat] = slot;
     for (uint bits = c.bits.x; bits != 0u; bits &= bits - 1u)
-        slot = emit_cell(c, uint(findLSB(bits)), splat, slot);
+        slot = emit_cell(c, uint(findLSB(bits)), splat, e, slot);
     for (uint bits = c.bits.y; bits != 0u; bits &= bits - 1u)
-        slot = emit_cell(c, uint(findLSB(bits)) + 32u, splat, slot);
+        slot = emit_cell(c, uint(findLSB(bits)) + 32u, splat, e, slot);
 }

@@ -10,6 +10,11 @@
 #define MAX_GROUPS 65535u  // the portable limit of one dispatch dimension
 #define CULL_REASONS 8     // see CULL_* below
 
+// A pair names its splat in the low bits and, in the high ones, which of the tile's four 8 x 8 blocks its
+// ellipse touches: bit 0 the top left, 1 the top right, 2 the bottom left, 3 the bottom right.
+#define PAIR_BLOCK_SHIFT 28
+#define PAIR_SPLAT_MASK 0x0FFFFFFFu
+
 // Why a splat takes no part in a frame; index into FrameStatus.culled.
 #define CULL_NEAR 0        // not in front of the near plane, or position not finite
 #define CULL_ROTATION 1    // quaternion of no direction
