@@ -19,6 +19,10 @@ constexpr Tolerance kTable[] = {
     {"image_float32", 2e-5, 2e-5, 0.002, 1 - 1e-8, 1e-5,
      "sum of up to 1,000 layers in float32; the band is the alpha cut-off (a step of 1/255), the "
      "edge of the support and the transmittance stop"},
+    {"image_exact_kernel", 2e-6, 0, 0, 1 - 1e-10, 1e-5,
+     "one layer, so only the kernel's own error and that of q, with no cut-off in reach"},
+    {"image_thin_layers", 2e-5, 3e-4, 0, 1 - 1e-7, 3e-4,
+     "10,000 equal layers: 1 - alpha rounds by up to 3e-8, and by the same in every one of them"},
     {"gradient_float32", 1e-6, 2e-3, 0.005, 1 - 1e-6, 1e-3,
      "recursion over all layers of a pixel, then sums over pixels that cancel; band as for images"},
     {"gradient_scaled_float32", 2e-5, 2e-3, 0.005, 1 - 1e-6, 1e-3,

@@ -1,0 +1,175 @@
+// blend.comp alone against the blending of the reference, on splats set by hand.
+#include "tests/support/blend_scene.h"
+#include "tests/support/compare.h"
+
+namespace darb::test {
+namespace {
+
+struct Blended {
+    reference::TileLists lists;
+    reference::BlendImages<double> truth;
+    BlendOutput got;
+
+    double pixel(int x, int y, int c) const {
+        const Image<double>& image = truth.colour;
+        return got.image[(size_t(c) * image.height + y) * image.width + x];
+    }
+};
+
+/// Blends on both sides and compares colours and transmittance.
+Blended expect_blend_matches(const BlendScene& scene, const char* allowed = "image_float32") {
+    Blended b{scene.lists(), {}, {}};
+    b.truth = blend_in_double(scene, b.lists);
+    b.got = blend_on_device(scene, b.lists);
+    std::vector<double> expected;
+    for (int c = 0; c < 3; ++c)
+        for (int y = 0; y < scene.height; ++y)
+            for (int x = 0; x < scene.width; ++x) expected.push_back(b.truth.colour.at(x, y, c));
+    EXPECT_TRUE(compare("image", expected, b.got.image, tolerance(allowed), scene.width));
+    EXPECT_TRUE(compare("transmittance", b.truth.transmittance.data, b.got.transmittance,
+                        tolerance(allowed), scene.width));
+    return b;
+}
+
+struct Variant {
+    int kernel;
+    Footprint footprint;
+    int evaluation;
+    std::string name() const {
+        return std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint)) +
+               (evaluation == EVALUATION_BUILTIN ? "_builtin" : "");
+    }
+    BlendScene scene(int width = 16, int height = 16) const {
+        BlendScene s;
+        s.width = width;
+        s.height = height;
+        s.kernel = kernel;
+        s.footprint = footprint;
+        s.evaluation = evaluation;
+        s.background = {0.1f, 0.5f, 0.9f};
+        return s;
+    }
+};
+void PrintTo(const Variant& v, std::ostream* out) {
+    *out << v.name();
+}
+
+class Blend : public testing::TestWithParam<Variant> {};
+
+TEST_P(Blend, random_layers_match_double) {
+    BlendScene scene = GetParam().scene(53, 37);
+    scene.add_random(150, 4, 0.01, 1);
+    const Blended b = expect_blend_matches(scene);
+    EXPECT_GT(b.lists.pair_count(), 300U);
+}
+
+TEST_P(Blend, mean_on_a_pixel_centre_shows_the_full_opacity) {
+    BlendScene scene = GetParam().scene();
+    scene.add({5.5, 7.5}, {2, 0.3, 1}, 0.75, {1, 0.5, 0});
+    const Blended b = expect_blend_matches(scene, "image_exact_kernel");
+    const float expected = 0.75f + 0.25f * 0.1f;
+    EXPECT_NEAR(b.pixel(5, 7, 0), expected, 3e-7);
+}
+
+// Pixels at both sides of the edge, at 1e-5 and 1e-3 of the support, where the support has an edge.
+TEST_P(Blend, pixels_at_the_edge_of_the_support_match_double) {
+    const double support = kernel_support(GetParam().kernel);
+    if (!std::isfinite(support)) return;
+    for (const double off : {-1e-3, -1e-5, 1e-5, 1e-3}) {
+        SCOPED_TRACE(off);
+        BlendScene scene = GetParam().scene();
+        const double sigma = 5 / std::sqrt(support * (1 + off));  // 5 px away on every side
+        scene.add({8.5, 8.5}, {sigma * sigma, 0, sigma * sigma}, 0.9, {1, 1, 1});
+        const Blended b = expect_blend_matches(scene, "image_exact_kernel");
+        EXPECT_EQ(b.truth.contributions.at(14, 8, 0), 0);
+        EXPECT_GT(b.truth.contributions.at(12, 8, 0), 0);
+        const double w = kernel_value(GetParam().kernel, GetParam().footprint, support * (1 + off));
+        EXPECT_EQ(b.truth.contributions.at(13, 8, 0), 0.9 * w >= ALPHA_CUTOFF_DEFAULT ? 1 : 0);
+    }
+}
+
+TEST_P(Blend, opaque_stack_stops_before_the_transmittance_limit) {
+    BlendScene scene = GetParam().scene();
+    for (int i = 0; i < 40; ++i)
+        scene.add({8.5 + i % 3, 8.5}, {200, 0, 200}, 1, {i % 2 * 1.0, 1 - i % 2, 0.5});
+    const Blended b = expect_blend_matches(scene);
+    for (const double t : b.truth.transmittance.data) ASSERT_LT(t, 0.02);
+    EXPECT_NEAR(b.got.transmittance[8 * 16 + 8], 0.01, 1e-7);
+    EXPECT_EQ(b.got.last[8 * 16 + 8], 1U);
+}
+
+std::vector<Variant> variants() {
+    std::vector<Variant> all;
+    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+        for (const Footprint footprint : {Footprint::psi, Footprint::exact})
+            for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
+                all.push_back({kernel, footprint, evaluation});
+    return all;
+}
+INSTANTIATE_TEST_SUITE_P(every_kernel, Blend, testing::ValuesIn(variants()),
+                         [](const auto& v) { return v.param.name(); });
+
+const Variant kCosine{KERNEL_RAISED_COSINE, Footprint::psi, EVALUATION_POLYNOMIAL};
+
+TEST(BlendCases, ten_thousand_thin_layers_match_double) {
+    BlendScene scene = kCosine.scene();
+    scene.cutoff = 1e-6f;  // else the transmittance stop ends a pixel after 2,300 layers
+    for (int i = 0; i < 10'000; ++i)
+        scene.add({8.5, 8.5}, {400, 0, 400}, 3e-4, {i % 7 / 7.0, i % 3 / 3.0, 0.5});
+    const Blended b = expect_blend_matches(scene, "image_thin_layers");
+    EXPECT_EQ(b.truth.contributions.at(8, 8, 0), 10'000);
+    EXPECT_EQ(b.got.last[8 * 16 + 8], 10'000U);
+}
+
+TEST(BlendCases, no_splats_leave_the_background) {
+    const Blended b = expect_blend_matches(kCosine.scene(40, 20), "exact");
+    for (const std::uint32_t last : b.got.last) EXPECT_EQ(last, 0U);
+    EXPECT_EQ(b.pixel(39, 19, 2), 0.9f);
+}
+
+TEST(BlendCases, image_sizes_that_are_no_multiple_of_a_tile_match_double) {
+    for (const auto& [width, height] :
+         std::vector<std::pair<int, int>>{{1, 1}, {17, 5}, {1, 4096}, {4096, 1}, {31, 33}}) {
+        SCOPED_TRACE(fmt::format("{} x {}", width, height));
+        BlendScene scene = kCosine.scene(width, height);
+        scene.add_random(200, 6, 0.1, 0.9);
+        const Blended b = expect_blend_matches(scene);
+        EXPECT_GT(b.lists.pair_count(), 20U);
+    }
+}
+
+TEST(BlendCases, storing_for_the_backward_pass_changes_no_bit) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.add_random(150, 4, 0.01, 1);
+    const reference::TileLists lists = scene.lists();
+    EXPECT_EQ(blend_on_device(scene, lists, true).image,
+              blend_on_device(scene, lists, false).image);
+}
+
+TEST(BlendCases, a_list_that_shows_nothing_changes_no_bit) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.add_random(150, 4, 0.01, 1);
+    const std::vector<float> before = blend_on_device(scene, scene.lists()).image;
+    // In front of the others: between pixels and too small, and off the image.
+    BlendScene more = kCosine.scene(53, 37);
+    for (int i = 0; i < 50; ++i) {
+        more.add({i + 1.0, 9}, {0.02, 0, 0.02}, 0.9, {1, 1, 1});
+        more.add({-40.0, i}, {9, 0, 9}, 0.9, {1, 1, 1});
+    }
+    more.splats.insert(more.splats.end(), scene.splats.begin(), scene.splats.end());
+    reference::TileLists lists = scene.lists();
+    for (std::uint32_t& splat : lists.splats) splat += 100;
+    reference::TileLists longer = lists;
+    longer.splats.clear();
+    for (size_t t = 0; t < lists.tile_count(); ++t) {
+        longer.begin[t] = static_cast<std::uint32_t>(longer.splats.size());
+        for (std::uint32_t i = 0; i < 100; ++i) longer.splats.push_back(i);
+        longer.splats.insert(longer.splats.end(), lists.splats.begin() + lists.begin[t],
+                             lists.splats.begin() + lists.begin[t + 1]);
+    }
+    longer.begin.back() = static_cast<std::uint32_t>(longer.splats.size());
+    EXPECT_EQ(blend_on_device(more, longer).image, before);
+}
+
+}  // namespace
+}  // namespace darb::test
