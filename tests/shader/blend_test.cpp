@@ -31,30 +31,7 @@ Blended expect_blend_matches(const BlendScene& scene, const char* allowed = "ima
     return b;
 }
 
-struct Variant {
-    int kernel;
-    Footprint footprint;
-    int evaluation;
-    std::string name() const {
-        return std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint)) +
-               (evaluation == EVALUATION_BUILTIN ? "_builtin" : "");
-    }
-    BlendScene scene(int width = 16, int height = 16) const {
-        BlendScene s;
-        s.width = width;
-        s.height = height;
-        s.kernel = kernel;
-        s.footprint = footprint;
-        s.evaluation = evaluation;
-        s.background = {0.1f, 0.5f, 0.9f};
-        return s;
-    }
-};
-void PrintTo(const Variant& v, std::ostream* out) {
-    *out << v.name();
-}
-
-class Blend : public testing::TestWithParam<Variant> {};
+class Blend : public testing::TestWithParam<BlendVariant> {};
 
 TEST_P(Blend, random_layers_match_double) {
     BlendScene scene = GetParam().scene(53, 37);
@@ -98,18 +75,10 @@ TEST_P(Blend, opaque_stack_stops_before_the_transmittance_limit) {
     EXPECT_EQ(b.got.last[8 * 16 + 8], 1U);
 }
 
-std::vector<Variant> variants() {
-    std::vector<Variant> all;
-    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
-        for (const Footprint footprint : {Footprint::psi, Footprint::exact})
-            for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
-                all.push_back({kernel, footprint, evaluation});
-    return all;
-}
-INSTANTIATE_TEST_SUITE_P(every_kernel, Blend, testing::ValuesIn(variants()),
+INSTANTIATE_TEST_SUITE_P(every_kernel, Blend, testing::ValuesIn(every_blend_variant()),
                          [](const auto& v) { return v.param.name(); });
 
-const Variant kCosine{KERNEL_RAISED_COSINE, Footprint::psi, EVALUATION_POLYNOMIAL};
+const BlendVariant kCosine{KERNEL_RAISED_COSINE, Footprint::psi, EVALUATION_POLYNOMIAL};
 
 TEST(BlendCases, ten_thousand_thin_layers_match_double) {
     BlendScene scene = kCosine.scene();

@@ -70,54 +70,129 @@ struct BlendScene {
     }
 };
 
-/// What the passes leave. Partials are in the order of the lists.
+struct BlendVariant {
+    int kernel = KERNEL_GAUSSIAN;
+    Footprint footprint = Footprint::psi;
+    int evaluation = EVALUATION_POLYNOMIAL;
+
+    std::string name() const {
+        return std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint)) +
+               (evaluation == EVALUATION_BUILTIN ? "_builtin" : "");
+    }
+    /// Exact footprints of the kernels with a jump fall like a root at their edge: the slope there
+    /// grows without bound, and a rounding of q is a percent of it.
+    bool steep_edge() const {
+        return footprint == Footprint::exact &&
+               (kernel == KERNEL_INVERSE_QUADRATIC || kernel == KERNEL_INVERSE_MULTIQUADRIC);
+    }
+    /// Empty, on a background of three different values.
+    BlendScene scene(int width = 16, int height = 16) const {
+        BlendScene s;
+        s.width = width;
+        s.height = height;
+        s.kernel = kernel;
+        s.footprint = footprint;
+        s.evaluation = evaluation;
+        s.background = {0.1f, 0.5f, 0.9f};
+        return s;
+    }
+};
+inline void PrintTo(const BlendVariant& v, std::ostream* out) {
+    *out << v.name();
+}
+
+inline std::vector<BlendVariant> every_blend_variant() {
+    std::vector<BlendVariant> all;
+    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+        for (const Footprint footprint : {Footprint::psi, Footprint::exact})
+            for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
+                all.push_back({kernel, footprint, evaluation});
+    return all;
+}
+
+/// Sums over the pixels of a tile that a pair's gradients follow from; G = opacity dL/dalpha dw/dq,
+/// d = mean - pixel centre, x = l11 dx + l21 dy.
+struct PairSums {
+    float gx, gx_dx, gx_dy, g_dy, d_opacity;
+    glm::vec3 d_colour;
+    float g_dy_dy;
+};
+
+/// What the passes leave. Pairs are in the order of the lists.
 struct BlendOutput {
-    std::vector<float> image;                                // [3][H][W]
-    std::vector<float> transmittance;                        // [H][W], with store
-    std::vector<std::uint32_t> last;                         // [H][W], with store
-    std::vector<glm::vec4> partial_a, partial_b, partial_c;  // [K], with d_image
+    std::vector<float> image;          // [3][H][W]
+    std::vector<float> transmittance;  // [H][W], with store
+    std::vector<std::uint32_t> last;   // [H][W], with store
+    std::vector<PairSums> pairs;       // [K], with d_image
+};
+
+/// Pairs as emit.comp writes them, but in slots of any order that only pair_order knows.
+struct ShuffledPairs {
+    std::vector<std::uint32_t> order, pair_splat;
+    std::vector<glm::uvec2> ranges;
+
+    /// all_blocks: every pair claims to touch every block of its tile.
+    ShuffledPairs(const BlendScene& scene, const reference::TileLists& lists, bool all_blocks)
+        : order(lists.pair_count()), pair_splat(lists.pair_count()) {
+        std::iota(order.begin(), order.end(), 0U);
+        Pcg32 rng(17);
+        for (size_t i = order.size(); i > 1; --i)
+            std::swap(order[i - 1], order[rng.below(static_cast<std::uint32_t>(i))]);
+        for (size_t t = 0; t < lists.tile_count(); ++t) {
+            const std::uint32_t begin = lists.begin[t], end = lists.begin[t + 1];
+            ranges.push_back(begin == end ? glm::uvec2(0) : glm::uvec2(begin, end));
+            const int x = static_cast<int>(t) % lists.tiles_x * TILE_SIZE;
+            const int y = static_cast<int>(t) / lists.tiles_x * TILE_SIZE;
+            for (std::uint32_t j = begin; j < end; ++j) {
+                const std::uint32_t splat = lists.splats[j];
+                const std::uint32_t bits = all_blocks ? 15 : blocks(scene.splats[splat], x, y);
+                pair_splat[order[j]] = splat | bits << PAIR_BLOCK_SHIFT;
+            }
+        }
+    }
+
+    static std::uint32_t blocks(const reference::ProjectedSplat<double>& s, int x, int y) {
+        std::uint32_t bits = 0;
+        for (int b = 0; b < 4; ++b) {
+            const int left = x + b % 2 * 8, top = y + b / 2 * 8;
+            const double q = reference::smallest_q(s, left, top, left + 8, top + 8);
+            if (q <= s.reach * (1 + 1e-5)) bits |= 1U << b;
+        }
+        return bits;
+    }
 };
 
 /// d_image: [3][H][W], or empty for the forward pass alone.
 inline BlendOutput blend_on_device(const BlendScene& scene, const reference::TileLists& lists,
-                                   bool store = true, const std::vector<float>& d_image = {}) {
+                                   bool store = true, const std::vector<float>& d_image = {},
+                                   bool all_blocks = false) {
     Device& device = shared_device();
-    const BlendShape deal = blend_shape(device);
+    const auto subgroup = static_cast<std::int32_t>(blend_subgroup(device));
     SpecConstants constants =
         kernel_constants(scene.kernel, scene.footprint, scene.evaluation, 5, scene.cutoff);
-    constants["THREADS"] = static_cast<std::int32_t>(deal.threads);
-    constants["SUBGROUPS"] = static_cast<std::int32_t>(deal.subgroups);
     constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
+    constants["SUBGROUP_SIZE"] = subgroup;
+    constants["THREADS"] = subgroup * 4;
+    const Pipeline blend(device, "blend", constants, true, subgroup);
+    constants["THREADS"] = subgroup;
+    const Pipeline backward(device, "blend_backward", constants, true, subgroup);
 
-    // Pairs lie in their slots in any order; only pair_order knows the lists.
-    const size_t pairs = lists.pair_count();
-    std::vector<std::uint32_t> order(pairs), pair_splat(pairs + 1, 0);
-    std::iota(order.begin(), order.end(), 0U);
-    Pcg32 rng(17);
-    for (size_t i = pairs; i > 1; --i)
-        std::swap(order[i - 1], order[rng.below(static_cast<std::uint32_t>(i))]);
-    for (size_t j = 0; j < pairs; ++j) pair_splat[order[j]] = lists.splats[j];
-    std::vector<glm::uvec2> ranges;
-    for (size_t t = 0; t < lists.tile_count(); ++t) {
-        const bool empty = lists.begin[t] == lists.begin[t + 1];
-        ranges.push_back(empty ? glm::uvec2(0) : glm::uvec2(lists.begin[t], lists.begin[t + 1]));
-    }
+    const ShuffledPairs shuffled(scene, lists, all_blocks);
     std::vector<glm::vec4> shape, light, bound;
     for (const auto& s : scene.splats) {
         shape.emplace_back(s.mean_px.x, s.mean_px.y, s.l11, s.l21);
         light.emplace_back(s.colour.x, s.colour.y, s.colour.z, s.opacity);
         bound.emplace_back(s.l22, s.reach * (1 + 1e-5), s.depth, 0.0);
     }
-
-    const size_t pixels = size_t(scene.width) * scene.height;
-    const GuardedBuffer tile_range(device, "tile range", ranges),
-        pair_order(device, "pair order", order), pair_splats(device, "pair splat", pair_splat),
+    const size_t pixels = size_t(scene.width) * scene.height, pairs = lists.pair_count();
+    const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
+        order(device, "pair order", shuffled.order), splats(device, "pairs", shuffled.pair_splat),
         shapes(device, "shape", shape), lights(device, "light", light),
         bounds(device, "bound", bound), image(device, "image", pixels * 12),
         final_t(device, "final T", store ? pixels * 4 : 4),
         last(device, "last pair", store ? pixels * 4 : 4), d_images(device, "d_image", d_image),
-        a(device, "partial a", pairs * 16), b(device, "partial b", pairs * 16),
-        c(device, "partial c", pairs * 16);
+        partials(device, "partials", std::vector<float>(pairs * 8, 0.0f)),
+        rest(device, "partial rest", std::vector<float>(pairs, 0.0f));
     const gpu::BlendArgs args{static_cast<std::uint32_t>(scene.width),
                               static_cast<std::uint32_t>(scene.height),
                               static_cast<std::uint32_t>(lists.tiles_x),
@@ -126,36 +201,27 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
                               scene.background.b};
     const auto groups_x = static_cast<std::uint32_t>(lists.tiles_x);
     const auto groups_y = static_cast<std::uint32_t>(lists.tiles_y);
-    const Pipeline blend(device, "blend", constants);
-    const Pipeline backward(device, "blend_backward", constants);
     Commands commands(device);
     commands.begin();
-    commands.dispatch(
-        blend, args,
-        {tile_range, pair_order, pair_splats, shapes, lights, bounds, image, final_t, last},
-        groups_x, groups_y);
+    commands.dispatch(blend, args,
+                      {ranges, order, splats, shapes, lights, bounds, image, final_t, last},
+                      groups_x, groups_y);
     if (!d_image.empty())
         commands.dispatch(backward, args,
-                          {tile_range, pair_order, pair_splats, shapes, lights, bounds, d_images,
-                           final_t, last, a, b, c},
+                          {ranges, order, splats, shapes, lights, bounds, d_images, final_t, last,
+                           partials, rest},
                           groups_x, groups_y);
     commands.submit_and_wait();
-    for (const GuardedBuffer* buffer : {&tile_range, &pair_order, &pair_splats, &shapes, &lights,
-                                        &bounds, &image, &final_t, &last, &a, &b, &c})
+    for (const GuardedBuffer* buffer : {&ranges, &order, &splats, &shapes, &lights, &bounds, &image,
+                                        &final_t, &last, &partials, &rest})
         EXPECT_TRUE(buffer->intact());
-    BlendOutput out;
-    out.image = image.read<float>();
-    out.transmittance = final_t.read<float>();
-    out.last = last.read<std::uint32_t>();
-    const auto by_list = [&](const GuardedBuffer& from) {
-        const auto slots = from.read<glm::vec4>();
-        std::vector<glm::vec4> sorted(pairs);
-        for (size_t j = 0; j < pairs; ++j) sorted[j] = slots[order[j]];
-        return sorted;
-    };
-    out.partial_a = by_list(a);
-    out.partial_b = by_list(b);
-    out.partial_c = by_list(c);
+    BlendOutput out{image.read<float>(), final_t.read<float>(), last.read<std::uint32_t>(), {}};
+    const auto sums = partials.read<float>(), rests = rest.read<float>();
+    for (size_t j = 0; j < pairs; ++j) {
+        const float* p = &sums[shuffled.order[j] * size_t{8}];
+        out.pairs.push_back(
+            {p[0], p[1], p[2], p[3], p[4], {p[5], p[6], p[7]}, rests[shuffled.order[j]]});
+    }
     return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -110,6 +111,22 @@ testing::AssertionResult compare_doubles(std::string_view case_name,
     reasons += "\n  worst" + describe(expected, got, tolerance, inner, stats.worst_index).substr(2);
     return testing::AssertionFailure()
            << fmt::format("{} against {}{}", case_name, tolerance.name, reasons);
+}
+
+testing::AssertionResult compare_scaled_doubles(const std::string& case_name,
+                                                std::span<const double> expected,
+                                                std::span<const double> got,
+                                                const Tolerance& tolerance) {
+    double square = 0, worst = 0;
+    for (size_t i = 0; i < std::min(expected.size(), got.size()); ++i) {
+        square += expected[i] * expected[i];
+        worst = std::max(worst, std::abs(got[i] - expected[i]));
+    }
+    const double rms = std::sqrt(square / static_cast<double>(std::max<size_t>(got.size(), 1)));
+    testing::Test::RecordProperty(case_name, fmt::format("{:.2e}", rms > 0 ? worst / rms : worst));
+    Tolerance scaled = tolerance;
+    if (rms > 0) scaled.abs *= rms;
+    return compare_doubles(case_name, expected, got, scaled, 1);
 }
 
 }  // namespace darb::test

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -39,6 +40,22 @@ testing::AssertionResult compare(std::string_view case_name, const Expected& exp
     const std::vector<double> a(std::begin(expected), std::end(expected));
     const std::vector<double> b(std::begin(got), std::end(got));
     return compare_doubles(case_name, a, b, tolerance, inner);
+}
+
+/// The same with the absolute part in units of the root mean square of the expected values: for
+/// sums that cancel, whose rounding goes with their terms. The worst error in that unit goes to the
+/// test's XML record under the name of the case.
+testing::AssertionResult compare_scaled_doubles(const std::string& case_name,
+                                                std::span<const double> expected,
+                                                std::span<const double> got,
+                                                const Tolerance& tolerance);
+
+template <class Expected, class Got>
+testing::AssertionResult compare_scaled(const std::string& case_name, const Expected& expected,
+                                        const Got& got, const Tolerance& tolerance) {
+    const std::vector<double> a(std::begin(expected), std::end(expected));
+    const std::vector<double> b(std::begin(got), std::end(got));
+    return compare_scaled_doubles(case_name, a, b, tolerance);
 }
 
 }  // namespace darb::test

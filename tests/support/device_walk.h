@@ -1,8 +1,6 @@
-// One forward and backward pass of a scene on the device, read back; and comparison of gradients,
-// whose rounding error goes with the size of their attribute's gradients in the scene.
+// One forward and backward pass of a scene on the device, read back.
 #pragma once
 
-#include <cmath>
 #include <string>
 #include <vector>
 
@@ -91,22 +89,6 @@ inline DeviceWalk walk_on_device(const SplatModel& model, const Camera& camera,
     const auto sums = backward.gradient_sum().download<float>(size_t{splats.count()} * 2);
     for (size_t i = 0; i < splats.count(); ++i) walk.mean_gradient_ndc.push_back(sums[2 * i]);
     return walk;
-}
-
-/// The absolute part in units of the root mean square of the expected values. The worst error in
-/// that unit goes to the test's XML record.
-template <class Got>
-testing::AssertionResult compare_scaled(const std::string& name,
-                                        const std::vector<double>& expected, const Got& got,
-                                        Tolerance tolerance, size_t inner = 1) {
-    double square = 0, worst = 0;
-    for (const double value : expected) square += value * value;
-    const double rms = std::sqrt(square / static_cast<double>(expected.size()));
-    for (size_t i = 0; i < std::min(expected.size(), got.size()); ++i)
-        worst = std::max(worst, std::abs(static_cast<double>(got[i]) - expected[i]));
-    testing::Test::RecordProperty(name, fmt::format("{:.2e}", worst / rms));
-    tolerance.abs *= rms;
-    return compare(name, expected, got, tolerance, inner);
 }
 
 }  // namespace darb::test

@@ -30,6 +30,9 @@ constexpr Tolerance kTable[] = {
     {"gradient_steep_float32", 2e-4, 1e-2, 0.02, 1 - 1e-5, 1e-3,
      "as gradient_scaled_float32, where the slope goes like 1/sqrt(1 - q/9) towards the edge: "
      "1 - q/9 is 1e-5 at the cut-off, and float32 knows it to a percent"},
+    {"gradient_thin_layers", 5e-4, 5e-3, 0, 1 - 1e-6, 1e-3,
+     "for compare_scaled; as image_thin_layers, forward and back, and sums over the tile that "
+     "cancel"},
     {"loss_float32", 1e-6, 1e-5, 0, 1 - 1e-8, 1e-5,
      "SSIM's variances cancel: 11x11 sums of squares"},
     {"loss_gradient_float32", 1e-9, 1e-3, 0.001, 1 - 1e-7, 1e-4,

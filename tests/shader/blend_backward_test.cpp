@@ -1,0 +1,167 @@
+// blend_backward.comp alone against the reference: one gradient for each splat-tile pair.
+#include "tests/support/blend_scene.h"
+#include "tests/support/compare.h"
+
+namespace darb::test {
+namespace {
+
+using Pairs = std::vector<reference::ProjectedGradient<double>>;
+
+/// By the chain rule of q = x^2 + y^2, x = l11 dx + l21 dy, y = l22 dy.
+Pairs gradients_of(const BlendScene& scene, const reference::TileLists& lists,
+                   const BlendOutput& out) {
+    Pairs pairs;
+    for (size_t k = 0; k < lists.pair_count(); ++k) {
+        const auto& s = scene.splats[lists.splats[k]];
+        const PairSums& p = out.pairs[k];
+        pairs.push_back({{2 * s.l11 * p.gx, 2 * (s.l21 * p.gx + s.l22 * s.l22 * p.g_dy)},
+                         2.0 * p.gx_dx,
+                         2.0 * p.gx_dy,
+                         2 * s.l22 * p.g_dy_dy,
+                         p.d_opacity,
+                         glm::dvec3(p.d_colour)});
+    }
+    return pairs;
+}
+
+/// One quantity of every pair in a row.
+template <class Get>
+std::vector<double> column(const Pairs& pairs, const Get& get) {
+    std::vector<double> values;
+    for (const auto& p : pairs) values.push_back(get(p));
+    return values;
+}
+
+struct Result {
+    reference::TileLists lists;
+    Pairs truth, got;
+    BlendOutput out;
+};
+
+Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed) {
+    const size_t pixels = size_t(scene.width) * scene.height;
+    Pcg32 rng(23);
+    Image<double> d_colour(scene.width, scene.height, 3);
+    std::vector<float> planes(pixels * 3);
+    for (size_t i = 0; i < pixels; ++i)
+        for (size_t c = 0; c < 3; ++c) {
+            planes[c * pixels + i] = static_cast<float>(rng.uniform(-1, 1));
+            d_colour.data[i * 3 + c] = planes[c * pixels + i];
+        }
+    Result r{scene.lists(), {}, {}, {}};
+    r.truth.resize(r.lists.pair_count());
+    for (size_t t = 0; t < r.lists.tile_count(); ++t)
+        reference::blend_tile_backward(r.lists, t, scene.splats, scene.table(), scene.settings(),
+                                       d_colour, {}, r.truth.data() + r.lists.begin[t]);
+    r.out = blend_on_device(scene, r.lists, true, planes);
+    r.got = gradients_of(scene, r.lists, r.out);
+    const auto check = [&](const char* name, const auto& get) {
+        const std::vector<double> expected = column(r.truth, get);
+        EXPECT_TRUE(compare_scaled(name, expected, column(r.got, get), allowed));
+    };
+    check("d_mean.x", [](const auto& p) { return p.d_mean_px.x; });
+    check("d_mean.y", [](const auto& p) { return p.d_mean_px.y; });
+    check("d_l11", [](const auto& p) { return p.d_l11; });
+    check("d_l21", [](const auto& p) { return p.d_l21; });
+    check("d_l22", [](const auto& p) { return p.d_l22; });
+    check("d_opacity", [](const auto& p) { return p.d_opacity; });
+    for (int c = 0; c < 3; ++c)
+        check(fmt::format("d_colour.{}", c).c_str(), [c](const auto& p) { return p.d_colour[c]; });
+    return r;
+}
+
+class BlendBackward : public testing::TestWithParam<BlendVariant> {
+  protected:
+    const Tolerance& allowed() const {
+        return tolerance(GetParam().steep_edge() ? "gradient_steep_float32"
+                                                 : "gradient_scaled_float32");
+    }
+};
+
+TEST_P(BlendBackward, random_layers_match_double) {
+    BlendScene scene = GetParam().scene(53, 37);
+    scene.add_random(120, 4, 0.01, 0.98);
+    const Result r = expect_backward_matches(scene, allowed());
+    EXPECT_GT(r.lists.pair_count(), 200U);
+}
+
+TEST_P(BlendBackward, opaque_layers_match_double_through_clamp_and_stop) {
+    BlendScene scene = GetParam().scene();
+    // Layers of 0.985: the third would cross the stop; and clamped ones, without a gradient of
+    // alpha.
+    for (int i = 0; i < 12; ++i)
+        scene.add({4.0 + 3 * (i % 4), 8.2 - i % 3}, {9, 1, 7}, i % 2 ? 1 : 0.985,
+                  {i % 2 * 1.0, 1 - i % 2, 0.5});
+    expect_backward_matches(scene, allowed());
+}
+
+// The mean on a pixel centre: dq = 0 and every gradient of the shape vanishes, none is NaN.
+TEST_P(BlendBackward, mean_on_a_pixel_centre_gives_finite_gradients) {
+    BlendScene scene = GetParam().scene();
+    scene.add({5.5, 7.5}, {0.3, 0, 0.3}, 0.7, {1, 0.5, 0});
+    scene.add({5.5, 7.5}, {4, 0.3, 6}, 0.7, {0, 0.5, 1});
+    expect_backward_matches(scene, allowed());
+}
+
+INSTANTIATE_TEST_SUITE_P(every_kernel, BlendBackward, testing::ValuesIn(every_blend_variant()),
+                         [](const auto& v) { return v.param.name(); });
+
+const BlendVariant kCosine{KERNEL_RAISED_COSINE, Footprint::psi, EVALUATION_POLYNOMIAL};
+
+TEST(BlendBackwardCases, ten_thousand_thin_layers_match_double) {
+    BlendScene scene = kCosine.scene();
+    scene.cutoff = 1e-6f;
+    for (int i = 0; i < 10'000; ++i)
+        scene.add({8.5, 8.5}, {400, 0, 400}, 3e-4, {i % 7 / 7.0, i % 3 / 3.0, 0.5});
+    expect_backward_matches(scene, tolerance("gradient_thin_layers"));
+}
+
+TEST(BlendBackwardCases, odd_image_sizes_match_double) {
+    for (const auto& [width, height] :
+         std::vector<std::pair<int, int>>{{1, 1}, {17, 5}, {1, 300}, {300, 1}, {31, 33}}) {
+        SCOPED_TRACE(fmt::format("{} x {}", width, height));
+        BlendScene scene = kCosine.scene(width, height);
+        scene.add_random(100, 6, 0.1, 0.9);
+        const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+        EXPECT_GT(r.lists.pair_count(), 5U);
+    }
+}
+
+TEST(BlendBackwardCases, pairs_behind_the_stop_get_zero) {
+    BlendScene scene = kCosine.scene();
+    for (int i = 0; i < 100; ++i) scene.add({8.5, 8.5}, {400, 0, 400}, 0.97, {1, 0.5, 0.2});
+    const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+    for (size_t k = 5; k < 100; ++k) {
+        const PairSums& p = r.out.pairs[k];
+        EXPECT_EQ(glm::vec4(p.gx, p.gx_dx, p.gx_dy, p.g_dy), glm::vec4(0)) << "pair " << k;
+        EXPECT_EQ(glm::vec4(p.d_colour, p.g_dy_dy), glm::vec4(0)) << "pair " << k;
+        EXPECT_EQ(p.d_opacity, 0) << "pair " << k;
+    }
+}
+
+bool same_bits(const BlendOutput& a, const BlendOutput& b) {
+    return a.pairs.size() == b.pairs.size() && a.image == b.image &&
+           std::memcmp(a.pairs.data(), b.pairs.data(), a.pairs.size() * sizeof(PairSums)) == 0;
+}
+
+TEST(BlendBackwardCases, a_second_run_gives_the_same_bits) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.add_random(150, 4, 0.01, 1);
+    const std::vector<float> d_image(53 * 37 * 3, 0.3f);
+    const reference::TileLists lists = scene.lists();
+    const BlendOutput one = blend_on_device(scene, lists, true, d_image);
+    EXPECT_TRUE(same_bits(one, blend_on_device(scene, lists, true, d_image)));
+    EXPECT_NE(one.pairs[0].d_colour, glm::vec3(0));
+}
+
+TEST(BlendBackwardCases, skipping_blocks_that_are_not_touched_changes_no_bit) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.add_random(150, 4, 0.01, 1);
+    const std::vector<float> d_image(53 * 37 * 3, 0.3f);
+    const reference::TileLists lists = scene.lists();
+    EXPECT_TRUE(same_bits(blend_on_device(scene, lists, true, d_image),
+                          blend_on_device(scene, lists, true, d_image, true)));
+}
+
+}  // namespace
+}  // namespace darb::test
