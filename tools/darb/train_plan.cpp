@@ -2,7 +2,73 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "trainer/forecast.h"
+#include "trainer/progress.h"
+
 namespace darb {
+
+namespace {
+
+constexpr int kShortRun = 200;          // iterations: over sooner than the measurement
+constexpr double kLongSeconds = 3'600;  // from here on a smaller -r is suggested
+constexpr double kMemoryShare = 0.85;   // of the device's memory that a run can hope to have
+constexpr int kSmallWidth = 400;        // px: no smaller photos are suggested
+
+// The next -r that divides the photos' sides by two, where that leaves enough of them.
+std::optional<int> smaller_resolution(const std::vector<View>& views) {
+    const View& view = views.front();
+    if (view.camera.width < 2 * kSmallWidth) return std::nullopt;
+    const double divisor = double(view.lens.width) / view.camera.width;
+    for (const int r : {2, 4, 8})
+        if (r > 1.5 * divisor) return r;
+    return view.camera.width / 2;
+}
+
+std::string time_text(const Forecast& f, int iterations) {
+    if (f.seconds <= 0) return fmt::format("{} iterations", iterations);
+    const std::string first =
+        fmt::format("{:.1f} ms an iteration at {} splats", f.start_ms, f.start_splats);
+    return fmt::format(
+        "about {} for {} iterations ({}{})", format_duration(f.seconds), iterations, first,
+        f.splats > f.start_splats ? fmt::format(", {:.1f} ms at the end", f.end_ms) : "");
+}
+
+void print_advice(const Device& device, const Dataset& dataset, const Forecast& f,
+                  std::uint64_t bytes) {
+    const auto budget =
+        static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(device.info().heap_bytes));
+    const bool too_large = bytes > budget;
+    if (!too_large && f.seconds < kLongSeconds) return;
+    std::string advice;
+    if (const auto r = smaller_resolution(dataset.views))
+        advice += fmt::format(" -r {} takes about a quarter.", *r);
+    if (const std::uint64_t most = splats_within(f.demand, budget); too_large && most > 0)
+        advice += fmt::format(" --cap-max {} stays within the memory.", most);
+    if (too_large)
+        fmt::print(stderr, "warning: more than the {} of this device allow.{}\n",
+                   format_bytes(static_cast<double>(device.info().heap_bytes)), advice);
+    else if (!advice.empty())
+        fmt::print(stderr, "hint:{}\n", advice);
+}
+
+void print_forecast(const Device& device, const Dataset& dataset, const TrainFlags& flags) {
+    DeviceOptions options;
+    options.select = flags.device;
+    Device scratch(options);
+    const Forecast f =
+        forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
+    const std::uint64_t bytes = plan_memory(f.demand).total();
+    fmt::print(stderr, "forecast: {}, about {} splats at the end, {} of device memory\n",
+               time_text(f, flags.train.iterations), f.splats,
+               format_bytes(static_cast<double>(bytes)));
+    print_advice(device, dataset, f, bytes);
+}
+
+}  // namespace
 
 void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags) {
     if (flags.run.quiet) return;
@@ -13,6 +79,9 @@ void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags)
                dataset.points.size());
     for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}\n", note);
     fmt::print(stderr, "device: {} ({})\n", device.info().name, device.info().driver);
+    // A resumed run knows better: its progress shows the time left.
+    if (flags.run.resume_from.empty() && held_out < dataset.views.size())
+        print_forecast(device, dataset, flags);
 }
 
 }  // namespace darb

@@ -1,5 +1,4 @@
-// What `darb train` does before it trains: the data set, cameras by COLMAP where there are none,
-// and a forecast.
+// What `darb train` prints before it trains: the data set, the device and a forecast.
 #pragma once
 
 #include "engine/data/dataset.h"
@@ -8,7 +7,8 @@
 
 namespace darb {
 
-/// Prints views, sizes, notes, and the forecast of splats, time and memory on this device.
+/// Prints views, notes, and the forecast of splats, time and memory on this device, which takes a
+/// few seconds; nothing with --quiet.
 void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags);
 
 }  // namespace darb

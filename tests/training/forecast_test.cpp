@@ -1,0 +1,98 @@
+// trainer/forecast: splats, time and memory before a run.
+#include "trainer/forecast.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "trainer/initial_model.h"
+
+namespace darb {
+namespace {
+
+constexpr std::uint32_t kNoLimit = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t kManyPixels = 1'000'000'000;
+
+Dataset small_scene() {
+    DatasetOptions options;
+    options.resolution = 4;
+    return load_dataset(std::filesystem::path(DARB_SOURCE_DIR) / "assets" / "scene", options);
+}
+
+TEST(PredictSplats, without_density_control_stays_at_the_start) {
+    TrainOptions options;
+    options.iterations = 900;  // ends at 450, before it begins
+    EXPECT_EQ(predict_splats(4'000, kManyPixels, options, kNoLimit), 4'000U);
+    options.iterations = 30'000;
+    options.densify_until = 0;
+    EXPECT_EQ(predict_splats(4'000, kManyPixels, options, kNoLimit), 4'000U);
+}
+
+TEST(PredictSplats, is_bounded_by_pixels_start_and_limit) {
+    const TrainOptions options;
+    const std::uint32_t free = predict_splats(4'000, kManyPixels, options, kNoLimit);
+    EXPECT_GT(free, 4'000U);
+    EXPECT_EQ(predict_splats(8'000, kManyPixels, options, kNoLimit), 2 * free);
+    EXPECT_LT(predict_splats(4'000, 1'000'000, options, kNoLimit), free);
+    EXPECT_EQ(predict_splats(4'000, 10, options, kNoLimit), 4'000U);
+    EXPECT_EQ(predict_splats(4'000, kManyPixels, options, 5'000), 5'000U);
+}
+
+TEST(PredictSplats, few_rounds_grow_less) {
+    TrainOptions options;
+    options.iterations = 1'300;
+    const std::uint32_t one_round = predict_splats(4'000, kManyPixels, options, kNoLimit);
+    options.iterations = 1'500;
+    EXPECT_GT(one_round, 4'000U);
+    EXPECT_GT(predict_splats(4'000, kManyPixels, options, kNoLimit), one_round);
+}
+
+TEST(MeanSplats, lies_between_start_and_end) {
+    TrainOptions options;
+    EXPECT_DOUBLE_EQ(mean_splats(10, 10, options), 10);
+    // 500 at 10, up to 15,000 on average at 20, then at 30.
+    EXPECT_DOUBLE_EQ(mean_splats(10, 30, options),
+                     (500 * 10 + 14'500 * 20 + 15'000 * 30) / 30'000.0);
+}
+
+TEST(SplitModel, keeps_place_and_area) {
+    const SplatModel start = initial_model(small_scene(), {});
+    const SplatModel split = split_model(start, 10'000, 1);
+    ASSERT_EQ(split.size(), 2 * start.size());
+    double area = 0, split_area = 0, moved = 0;
+    for (size_t i = 0; i < split.size(); ++i) {
+        const size_t from = i % start.size();
+        const double scale = std::exp(double{start.log_scale[3 * from]});
+        if (i < start.size()) area += scale * scale;
+        split_area += std::exp(2 * double{split.log_scale[3 * i]});
+        moved = std::max(moved, std::abs(split.position[3 * i] - start.position[3 * from]) / scale);
+    }
+    EXPECT_NEAR(split_area, area, 1e-3 * area);
+    EXPECT_LT(moved, 6.0);
+    EXPECT_EQ(split_model(start, 10, 1).size(), start.size());
+}
+
+TEST(Forecast, measures_on_the_scratch_device) {
+    TrainOptions options;
+    options.max_splats = 8'000;
+    Device scratch;
+    const Forecast f = forecast_training(scratch, small_scene(), options);
+    EXPECT_EQ(f.start_splats, 4'000U);
+    EXPECT_GT(f.start_ms, 0);
+    EXPECT_GE(f.end_ms, f.start_ms);
+    EXPECT_GE(f.seconds, options.iterations * f.start_ms * 0.999e-3);
+    EXPECT_LE(f.seconds, options.iterations * f.end_ms * 1.001e-3);
+    EXPECT_GE(f.demand.pairs, 4U * f.splats);
+}
+
+TEST(Forecast, without_measuring_has_no_time) {
+    Device scratch;
+    const Forecast f = forecast_training(scratch, small_scene(), {}, false);
+    EXPECT_EQ(f.seconds, 0);
+    EXPECT_GT(f.splats, 0U);
+}
+
+}  // namespace
+}  // namespace darb

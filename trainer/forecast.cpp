@@ -1,0 +1,197 @@
+#include "trainer/forecast.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "engine/core/error.h"
+#include "engine/core/rng.h"
+#include "engine/render/gpu_splats.h"
+#include "trainer/initial_model.h"
+#include "trainer/trainer.h"
+
+namespace darb {
+
+namespace {
+
+// Rule of thumb for density control with the thresholds of 3DGS: training adds splats up to about
+// one for so many pixels of the photos, up to so many for one point of the start, and not faster
+// than so much a round.
+constexpr std::uint64_t kPixelsPerSplat = 25;
+constexpr double kMaxGrowth = 60;
+constexpr double kGrowthPerRound = 1.4;
+
+// The stand-in for a trained scene: most trained splats are more opaque than those at the start.
+constexpr double kTrainedOpacity = 0.5;
+// Trainer's buffers grow to 1.5 times the pairs that did not fit.
+constexpr double kPairRoom = 1.5;
+constexpr std::uint32_t kMinPairsPerSplat = 4;
+
+// The measurement: enough to average over, no more than a moment.
+constexpr int kViews = 4, kIterations = 10;
+constexpr double kSeconds = 1.0;  // at most, for warming up and for measuring each
+// More splats cost more to make than they tell; times beyond are extrapolated.
+constexpr std::uint32_t kMostMeasuredCpu = 100'000, kMostMeasuredGpu = 1'000'000;
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct Measurement {
+    double ms = 0;            // an iteration
+    std::uint64_t pairs = 0;  // the most of any frame
+};
+
+// A few training views, evenly picked.
+Dataset some_views(const Dataset& dataset) {
+    Dataset few;
+    few.root = dataset.root;
+    std::vector<const View*> views;
+    for (const View& view : dataset.views)
+        if (!view.is_test) views.push_back(&view);
+    const size_t count = std::min<size_t>(kViews, views.size());
+    for (size_t i = 0; i < count; ++i) few.views.push_back(*views[i * views.size() / count]);
+    return few;
+}
+
+std::vector<ImageU8> grey_photos(const std::vector<View>& views) {
+    std::vector<ImageU8> photos;
+    for (const View& view : views) {
+        photos.emplace_back(view.camera.width, view.camera.height, 4);
+        std::fill(photos.back().data.begin(), photos.back().data.end(), std::uint8_t{128});
+    }
+    return photos;
+}
+
+// Steps until there were `most` or the time is over, at least one. Returns ms a step.
+double timed_steps(Trainer& trainer, int most) {
+    trainer.drain();
+    const Clock::time_point start = Clock::now();
+    int steps = 0;
+    while (steps == 0 || (steps < most && seconds_since(start) < kSeconds)) {
+        trainer.step();
+        ++steps;
+    }
+    trainer.drain();
+    return seconds_since(start) * 1e3 / steps;
+}
+
+// With all bands of colour and no density control, from the first iteration on.
+Measurement measure_training(Device& device, const Dataset& few, const SplatModel& model,
+                             TrainOptions options) {
+    options.densify_until = 0;
+    SplatModel placeholder;  // restore() brings the model; two at once would double the memory
+    placeholder.sh_degree = model.sh_degree;
+    placeholder.kernel = model.kernel;
+    placeholder.footprint = model.footprint;
+    placeholder.origin = model.origin;
+    Trainer trainer(device, few, grey_photos(few.views), placeholder, options);
+    Trainer::State state;
+    state.iteration = options.sh_degree * std::max(options.sh_interval, 1);
+    state.model = model;
+    state.moments.resize(kAttributeCount);
+    trainer.restore(state);
+    Measurement result;
+    trainer.on_result = [&](const IterationResult& r) {
+        result.pairs = std::max<std::uint64_t>(result.pairs, r.pairs);
+    };
+    timed_steps(trainer, static_cast<int>(few.views.size()));  // compiles, and grows the buffers
+    result.ms = timed_steps(trainer, kIterations);
+    return result;
+}
+
+// Times and pairs of the forecast, from the count at the start and one near that at the end.
+void measure_both(Device& device, const Dataset& dataset, const SplatModel& start,
+                  const TrainOptions& options, Forecast& f) {
+    const Dataset few = some_views(dataset);
+    const Measurement at_start = measure_training(device, few, start, options);
+    f.start_ms = f.end_ms = at_start.ms;
+    double pairs_per_splat = static_cast<double>(at_start.pairs) / std::max(f.start_splats, 1u);
+    const std::uint32_t most = device.info().type == "cpu" ? kMostMeasuredCpu : kMostMeasuredGpu;
+    const SplatModel grown = split_model(start, std::min(f.splats, most), options.seed);
+    if (grown.size() > start.size()) {
+        const Measurement at_end = measure_training(device, few, grown, options);
+        const double more = static_cast<double>(grown.size() - start.size());
+        const double per_splat = std::max(0.0, (at_end.ms - at_start.ms) / more);
+        f.end_ms = at_start.ms + per_splat * (f.splats - f.start_splats);
+        pairs_per_splat = static_cast<double>(at_end.pairs) / static_cast<double>(grown.size());
+    }
+    const double share = (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
+                         std::max(1.0, double(f.splats) - f.start_splats);
+    f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
+    f.demand.pairs = std::max(f.demand.pairs,
+                              static_cast<std::uint64_t>(kPairRoom * pairs_per_splat * f.splats));
+}
+
+}  // namespace
+
+std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
+                             const TrainOptions& options, std::uint32_t limit) {
+    const int first = std::max(options.densify_from, 0) / options.densify_interval;
+    const int last = std::max(options.densify_end() - 1, 0) / options.densify_interval;
+    const int rounds = std::max(0, last - first);
+    const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
+    const double most = std::min(growth * start, static_cast<double>(limit));
+    const double wanted = static_cast<double>(photo_pixels / kPixelsPerSplat);
+    return std::max(start, static_cast<std::uint32_t>(std::min(wanted, most)));
+}
+
+double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
+    const double all = options.iterations;
+    const double to = std::clamp<double>(options.densify_end(), 0, all);
+    const double from = std::clamp<double>(options.densify_from, 0, to);
+    return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;
+}
+
+SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64_t seed) {
+    const size_t n = start.size(), pieces = n == 0 ? 1 : std::max<size_t>(count / n, 1);
+    if (pieces == 1) return start;
+    // Splats lie on surfaces: k pieces cover one where each has a k-th of its area.
+    const auto shrink = static_cast<float>(0.5 * std::log(double(pieces)));
+    SplatModel model = start;
+    model.resize(n * pieces);
+    Pcg32 random(seed, 2);
+    const auto logit = static_cast<float>(std::log(kTrainedOpacity / (1 - kTrainedOpacity)));
+    const size_t rest = static_cast<size_t>(start.rest_count());
+    for (size_t i = 0; i < n * pieces; ++i) {
+        const size_t from = i % n;
+        for (size_t a = 0; a < 3; ++a) {
+            const float scale = start.log_scale[3 * from + a];
+            model.position[3 * i + a] =
+                start.position[3 * from + a] +
+                static_cast<float>(random.normal() * std::exp(double{scale}));
+            model.log_scale[3 * i + a] = scale - shrink;
+            model.sh_dc[3 * i + a] = start.sh_dc[3 * from + a];
+        }
+        for (size_t a = 0; a < 4; ++a) model.rotation[4 * i + a] = start.rotation[4 * from + a];
+        for (size_t a = 0; a < rest; ++a)
+            model.sh_rest[rest * i + a] = start.sh_rest[rest * from + a];
+        model.opacity[i] = logit;
+    }
+    return model;
+}
+
+Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
+                           bool measure) {
+    const SplatModel start = initial_model(dataset, options);
+    Forecast f;
+    add_photos(dataset.views, f.demand);
+    f.start_splats = static_cast<std::uint32_t>(start.size());
+    const std::uint32_t limit =
+        std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
+    f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);
+    f.demand.splats = f.splats;
+    f.demand.pairs = std::uint64_t{kMinPairsPerSplat} * f.splats;
+    f.demand.sh_degree = options.sh_degree;
+    f.demand.densifies = options.densify_end() > options.densify_from;
+    if (measure && f.demand.photo_pixels > 0) try {
+            measure_both(scratch, dataset, start, options, f);
+        } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
+            f.start_ms = f.end_ms = f.seconds = 0;
+        }
+    return f;
+}
+
+}  // namespace darb

@@ -1,0 +1,42 @@
+// Forecast: what a training run will take on this device, from the data set's size and a few
+// measured iterations.
+#pragma once
+
+#include <cstdint>
+
+#include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
+#include "engine/scene/splat_model.h"
+#include "trainer/memory_plan.h"
+#include "trainer/options.h"
+
+namespace darb {
+
+struct Forecast {
+    std::uint32_t start_splats = 0;
+    std::uint32_t splats = 0;         // at the end
+    double start_ms = 0, end_ms = 0;  // an iteration at these counts; 0: not measured
+    double seconds = 0;               // of the whole run; 0: not measured
+    MemoryDemand demand;              // at the end
+};
+
+/// Splats at the end, from those at the start and the pixels of all training photos: a rule of
+/// thumb, see the constants in the .cpp. limit: what the device and options.max_splats allow.
+std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
+                             const TrainOptions& options, std::uint32_t limit);
+
+/// Mean count over the run, where it grows evenly while density control runs.
+double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options);
+
+/// `start` split into pieces, at least as many as it has and at most `count`, which cover what it
+/// covers: a stand-in for a trained scene of that size.
+SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64_t seed);
+
+/// Runs some iterations on grey photos at the start's count and at the predicted one, a few
+/// seconds in all; time is a + b * splats through both. measure = false, and where the device has
+/// no room for that: splats and memory alone. scratch: a device of its own, so that the run's
+/// peak_bytes stay the run's.
+Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
+                           bool measure = true);
+
+}  // namespace darb
