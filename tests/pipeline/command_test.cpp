@@ -1,0 +1,329 @@
+// The built darb command, as a user runs it: exit codes, what errors name, and what eval, render,
+// info and devices put out.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "engine/core/files.h"
+#include "engine/data/image_io.h"
+#include "tests/support/test_data.h"
+
+namespace darb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+
+// One a process: ctest may run the cases at once.
+fs::path scratch() {
+    const fs::path folder = fs::path(testing::TempDir()) / fmt::format("darb_{}", ::getpid());
+    fs::create_directories(folder);
+    return folder;
+}
+
+class RemoveScratch : public testing::Environment {
+    void TearDown() override { fs::remove_all(scratch()); }
+};
+const testing::Environment* const kRemoveScratch =
+    testing::AddGlobalTestEnvironment(new RemoveScratch);
+
+struct Outcome {
+    int code = -1;  // -1: killed by a signal
+    std::string out, err;
+};
+
+Outcome darb(const std::string& arguments) {
+    const std::string out = scratch() / "stdout", err = scratch() / "stderr";
+    const int status = std::system(
+        fmt::format("'{}' {} > '{}' 2> '{}'", DARB_COMMAND, arguments, out, err).c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text_file(out), read_text_file(err)};
+}
+
+struct BadCommand {
+    std::string arguments, message;  // a part of what stderr says
+};
+
+void expect_refused(const std::vector<BadCommand>& commands) {
+    for (const BadCommand& bad : commands) {
+        const Outcome o = darb(bad.arguments);
+        EXPECT_EQ(o.code, 2) << "darb " << bad.arguments << "\n" << o.err;
+        EXPECT_NE(o.err.find(bad.message), std::string::npos)
+            << "darb " << bad.arguments << ": no '" << bad.message << "' in\n"
+            << o.err;
+    }
+}
+
+TEST(Command, bad_usage_is_exit_code_2) {
+    const std::string out = " -o " + (scratch() / "unused").string() + " ";
+    const std::string train = "train " + kScene + out;
+    expect_refused({{"", "subcommand"},
+                    {"no_such", "no_such"},
+                    {"train --no-such-option", "--no-such-option"},
+                    {"train " + kScene, "no output folder"},
+                    {"train" + out, "no data set"},
+                    {train + "--sh_degree 4", "--sh-degree"},
+                    {train + "--kernel no_such", "no such kernel"},
+                    {train + "--footprint no_such", "psi or exact"},
+                    {train + "--strategy no_such", "no such strategy"},
+                    {"eval", "scene"},
+                    {"eval a.ply b --split no_such", "--split"},
+                    {"render a.ply -o b", "--cameras"},
+                    {"info", "path"},
+                    {"devices --device no_such_device", "no_such_device"}});
+}
+
+TEST(Command, missing_files_are_named) {
+    const std::string none = scratch() / "none";
+    expect_refused({{"train " + none + " -o " + none + "_out", none},
+                    {"train " + kScene + " -i no_photos -o " + none + "_out", "no_photos"},
+                    {"train --resume -o " + none, "command.json"},
+                    {"eval " + none + ".ply " + kScene, none + ".ply"},
+                    {"render " + none + ".ply --cameras " + kScene + " -o " + none, none + ".ply"},
+                    {"info " + none + ".ply", none + ".ply"},
+                    {"info " + std::string(DARB_SOURCE_DIR) + "/README.md", "no PLY"},
+                    {"info " + std::string(DARB_SOURCE_DIR) + "/assets", "holds no cameras"}});
+    EXPECT_FALSE(fs::exists(none + "_out"));
+}
+
+TEST(Command, features_that_are_not_there_say_so) {
+    const std::string train =
+        fmt::format("train {} -o {} ", kScene, (scratch() / "unused").string());
+    std::vector<BadCommand> commands;
+    for (const char* option :
+         {"--strategy mcmc", "--strategy=budget", "--antialiasing", "--effects all",
+          "--accuracy high", "--exposure_lr_init 0.01", "-d depths", "--depths depths", "--view"})
+        commands.push_back({train + option, "not part of this version"});
+    expect_refused(commands);
+}
+
+TEST(Command, help_and_version_are_exit_code_0) {
+    for (const char* arguments : {"--help", "train --help", "eval --help", "render --help",
+                                  "info --help", "devices --help", "--version"})
+        EXPECT_EQ(darb(arguments).code, 0) << arguments;
+}
+
+TEST(Command, devices_marks_the_chosen_one) {
+    const Outcome o = darb("devices");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("* 0"), std::string::npos) << o.out;
+    EXPECT_NE(o.out.find("chosen: 0"), std::string::npos) << o.out;
+}
+
+TEST(Command, info_describes_a_data_set) {
+    const Outcome text = darb("info " + kScene);
+    EXPECT_EQ(text.code, 0) << text.err;
+    EXPECT_NE(text.out.find("COLMAP binary"), std::string::npos) << text.out;
+    const json info = json::parse(darb("info --json -r 2 " + kScene).out);
+    EXPECT_EQ(info["views"], 48);
+    EXPECT_EQ(info["points"], 4000);
+    EXPECT_EQ(info["sizes"], json::parse(R"([{"width": 100, "height": 75, "views": 48}])"));
+    EXPECT_EQ(info["lenses"][0]["model"], "PINHOLE");
+    EXPECT_EQ(info["lenses"][0]["width"], 200);
+    EXPECT_GT(info["extent"].get<double>(), 1.0);
+    EXPECT_EQ(json::parse(darb("info --json " + kScene + "/transforms_train.json").out)["views"],
+              40);
+}
+
+TEST(Command, info_refuses_a_point_cloud_and_reads_a_camera_list) {
+    const auto data = test::test_data_folder();
+    if (!data) GTEST_SKIP() << test::kNoTestData;
+    const std::string inria = *data / "fixtures" / "inria_miku_output";
+    expect_refused({{"info " + inria + "/input.ply", "not a point cloud"}});
+    const json info = json::parse(darb("info --json " + inria + "/cameras.json").out);
+    EXPECT_EQ(info["views"], 97);
+    EXPECT_EQ(info["source"], "cameras.json");
+}
+
+// Photos without cameras, and a program named colmap that notes its calls and takes the scene's own
+// model as its result.
+class PhotosCommand : public testing::Test {
+  protected:
+    void SetUp() override {
+        for (const char* name : {"view_00.png", "view_01.png", "view_02.png"}) {
+            fs::create_directories(photos());
+            fs::copy_file(kScene + "/images/" + name, photos() / name,
+                          fs::copy_options::overwrite_existing);
+        }
+        write_file_atomic(
+            scratch() / "bin" / "colmap",
+            fmt::format("#!/bin/sh\n"
+                        "echo \"$1\" >> '{0}'\n"
+                        "command=$1\n"
+                        "while [ $# -gt 1 ]; do\n"
+                        "  [ \"$1\" = --output_path ] && out=$2\n"
+                        "  shift\n"
+                        "done\n"
+                        "case $command in\n"
+                        "mapper) mkdir -p \"$out/0\"; cp '{1}'/sparse/0/* \"$out/0\" ;;\n"
+                        "image_undistorter) mkdir -p \"$out/sparse\"\n"
+                        "  cp '{1}'/sparse/0/* \"$out/sparse\"\n"
+                        "  cp -r '{1}/images' \"$out\" ;;\n"
+                        "esac\n",
+                        calls().string(), kScene));
+        fs::permissions(scratch() / "bin" / "colmap", fs::perms::owner_all);
+    }
+    static fs::path photos() { return scratch() / "photos"; }
+    static fs::path calls() { return scratch() / "calls"; }
+    static std::string train() {
+        return fmt::format("train {} -o {} --iterations 1 -q", photos().string(),
+                           (scratch() / "from_photos").string());
+    }
+    // PATH for the command alone.
+    static Outcome with_path(const std::string& path, const std::string& arguments) {
+        const std::string before = std::getenv("PATH");
+        ::setenv("PATH", path.c_str(), 1);
+        const Outcome o = darb(arguments);
+        ::setenv("PATH", before.c_str(), 1);
+        return o;
+    }
+};
+
+TEST_F(PhotosCommand, without_colmap_the_commands_are_shown) {
+    const Outcome o = with_path("/nowhere", train());
+    EXPECT_EQ(o.code, 2);
+    for (const char* part : {"apt install colmap", "feature_extractor", "exhaustive_matcher",
+                             "mapper", "image_undistorter"})
+        EXPECT_NE(o.err.find(part), std::string::npos) << part << " in\n" << o.err;
+    EXPECT_NE(with_path("/nowhere", train() + " --sequential").err.find("sequential_matcher"),
+              std::string::npos);
+}
+
+TEST_F(PhotosCommand, colmap_runs_once_for_the_same_photos) {
+    const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
+    const Outcome first = with_path(path, train() + " --sequential");
+    ASSERT_EQ(first.code, 0) << first.err;
+    const std::string all = "feature_extractor\nsequential_matcher\nmapper\nimage_undistorter\n";
+    EXPECT_EQ(read_text_file(calls()), all);
+    EXPECT_EQ(with_path(path, train()).code, 0);
+    EXPECT_EQ(
+        with_path("/nowhere", "train --resume -o " + (scratch() / "from_photos").string()).code, 0);
+    EXPECT_EQ(read_text_file(calls()), all);
+    fs::copy_file(photos() / "view_00.png", photos() / "view_03.png");
+    const Outcome other = with_path(path, train());
+    EXPECT_EQ(other.code, 2);
+    EXPECT_NE(other.err.find("other photos"), std::string::npos) << other.err;
+}
+
+TEST_F(PhotosCommand, output_among_the_photos_is_refused) {
+    expect_refused({{"train " + photos().string() + " -o " + (photos() / "out").string(),
+                     "lies among the photos"}});
+}
+
+// A scene of 20 iterations. 3DGS's names of the options, with underscores.
+class TrainedCommand : public testing::Test {
+  protected:
+    static void SetUpTestSuite() {
+        const Outcome o =
+            darb(fmt::format("train -s {} -m {} -r 2 --eval --iterations 20 --test_iterations 20 "
+                             "--densify_from_iter 500 --strategy adc -i images -w --quiet",
+                             kScene, output()));
+        ASSERT_EQ(o.code, 0) << o.err;
+        EXPECT_EQ(o.err, "");
+    }
+    static std::string output() { return scratch() / "run"; }
+    static std::string ply() { return output() + "/point_cloud/iteration_20/point_cloud.ply"; }
+    static size_t count_png(const fs::path& folder) {
+        return static_cast<size_t>(
+            std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
+                          [](const auto& entry) { return entry.path().extension() == ".png"; }));
+    }
+};
+
+TEST_F(TrainedCommand, eval_reports_what_training_reported) {
+    const std::string file = scratch() / "eval.json";
+    const Outcome o = darb(fmt::format("eval {} {} -r 2 -w --json {}", ply(), kScene, file));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("mean of 6"), std::string::npos) << o.out;
+    const json eval = json::parse(read_text_file(file));
+    const json trained = json::parse(read_text_file(output() + "/metrics.json"))["evaluations"][0];
+    EXPECT_NEAR(eval["mean"]["psnr_db"].get<double>(), trained["psnr_db"].get<double>(), 1e-6);
+    EXPECT_NEAR(eval["mean"]["ssim"].get<double>(), trained["ssim"].get<double>(), 1e-6);
+    ASSERT_EQ(eval["views"].size(), 6U);
+    EXPECT_EQ(eval["views"][0]["name"], "view_00.png");
+    EXPECT_GT(eval["views"][0]["psnr_db"].get<double>(), 5.0);
+}
+
+TEST_F(TrainedCommand, eval_takes_the_split_asked_for) {
+    const std::string command = fmt::format("eval {} {} -r 4 --split ", output(), kScene);
+    EXPECT_NE(darb(command + "train").out.find("mean of 42"), std::string::npos);
+    const std::string single = scratch() / "single";
+    json cameras = json::parse(read_text_file(kScene + "/transforms_train.json"));
+    cameras["frames"].erase(cameras["frames"].begin() + 1, cameras["frames"].end());
+    cameras["frames"][0]["file_path"] = kScene + "/images/view_00.png";
+    write_file_atomic(single + "/transforms.json", cameras.dump());
+    expect_refused({{fmt::format("eval {} {} --split train", ply(), single), "split 'train'"}});
+}
+
+TEST_F(TrainedCommand, render_takes_every_kind_of_cameras) {
+    const std::string own = scratch() / "own", transforms = scratch() / "transforms";
+    const Outcome o =
+        darb(fmt::format("render {} --cameras {}/cameras.json -o {} -w", ply(), output(), own));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("48 frames"), std::string::npos) << o.out;
+    EXPECT_EQ(count_png(own), 48U);
+    EXPECT_EQ(read_image_info(own + "/view_00.png").width, 100);
+    const Outcome t =
+        darb(fmt::format("render {} --cameras {}/transforms_test.json -r 4 "
+                         "--sh_degree 0 --near 0.5 -o {}",
+                         ply(), kScene, transforms));
+    ASSERT_EQ(t.code, 0) << t.err;
+    EXPECT_EQ(count_png(transforms), 8U);
+    if (const auto data = test::test_data_folder()) {
+        const std::string list = *data / "fixtures" / "inria_miku_output" / "cameras.json";
+        const std::string foreign = scratch() / "foreign";
+        ASSERT_EQ(
+            darb(fmt::format("render {} --cameras {} -r 64 -o {}", ply(), list, foreign)).code, 0);
+        EXPECT_EQ(count_png(foreign), 97U);
+        EXPECT_EQ(read_image_info(foreign + "/20240212_003919.png").width, 64);
+    }
+}
+
+TEST_F(TrainedCommand, frames_of_equal_names_are_kept_apart) {
+    json cameras = json::parse(read_text_file(output() + "/cameras.json"));
+    cameras.erase(cameras.begin() + 3, cameras.end());
+    cameras[0]["img_name"] = "a/b.png";
+    cameras[1]["img_name"] = "a_b.jpg";
+    cameras[2]["img_name"] = "../../a";
+    const std::string list = scratch() / "list.json", frames = scratch() / "frames";
+    write_file_atomic(list, cameras.dump());
+    ASSERT_EQ(darb(fmt::format("render {} --cameras {} -r 4 -o {}", ply(), list, frames)).code, 0);
+    for (const char* name : {"a_b.png", "a_b_2.png", ".._.._a.png"})
+        EXPECT_TRUE(fs::exists(fs::path(frames) / name)) << name;
+    EXPECT_EQ(count_png(frames), 3U);
+}
+
+TEST_F(TrainedCommand, info_describes_the_scene) {
+    const Outcome text = darb("info " + output());
+    EXPECT_EQ(text.code, 0) << text.err;
+    EXPECT_NE(text.out.find("gaussian, footprint psi"), std::string::npos) << text.out;
+    const json info = json::parse(darb("info --json " + ply()).out);
+    EXPECT_EQ(info["splats"], 4000);
+    EXPECT_EQ(info["bytes"], fs::file_size(ply()));
+    EXPECT_EQ(info["sh_degree"], 3);
+    EXPECT_EQ(info["warnings"], json::array());
+    for (const char* key : {"p1", "p10", "p50", "p90", "p99"}) {
+        EXPECT_GT(info["scale"][key].get<double>(), 0) << key;
+        EXPECT_GT(info["opacity"][key].get<double>(), 0) << key;
+    }
+    for (size_t axis = 0; axis < 3; ++axis)
+        EXPECT_LT(info["bounds"]["low"][axis], info["bounds"]["high"][axis]) << axis;
+}
+
+TEST_F(TrainedCommand, finished_run_resumes_to_the_same_end) {
+    const Outcome o = darb("train --resume -o " + output());
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("at iteration 20"), std::string::npos) << o.err;
+}
+
+}  // namespace
+}  // namespace darb
