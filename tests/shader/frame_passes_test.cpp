@@ -1,0 +1,264 @@
+// The small passes between projection and blending, each alone against the host: compact,
+// gather_counts, frame_groups, emit and tile_ranges.
+#include <algorithm>
+#include <numeric>
+
+#include "engine/core/rng.h"
+#include "engine/reference/render.h"
+#include "tests/support/projected_frame.h"
+#include "tests/support/random_scene.h"
+
+namespace darb::test {
+namespace {
+
+using Words = std::vector<std::uint32_t>;
+
+void run(const char* shader, const auto& args, std::initializer_list<BufferRange> buffers,
+         std::uint32_t items, SpecConstants constants = {}, bool one_thread = false) {
+    constants["THREADS"] = one_thread ? 1 : SPLAT_GROUP;
+    const Pipeline pipeline(shared_device(), shader, constants, !one_thread);
+    Commands commands(shared_device());
+    commands.begin();
+    const Groups g = one_thread ? Groups{} : groups_for(items);
+    commands.dispatch(pipeline, args, buffers, g.x, g.y);
+    commands.submit_and_wait();
+}
+
+TEST(Compact, visible_splats_keep_their_order) {
+    Device& device = shared_device();
+    for (const std::uint32_t n : {1U, 63U, 64U, 65U, 1000U}) {
+        Pcg32 rng(n);
+        Words visible(n), offset(n), keys, order;
+        std::vector<glm::vec4> bound(n);
+        for (std::uint32_t i = 0; i < n; ++i) {
+            visible[i] = rng.below(3) > 0 ? 1 : 0;
+            offset[i] = static_cast<std::uint32_t>(order.size());
+            bound[i] = glm::vec4(0, 0, static_cast<float>(rng.uniform(0.2, 100)), 0);
+            if (visible[i] == 0) continue;
+            order.push_back(i);
+            keys.push_back(std::bit_cast<std::uint32_t>(bound[i].z));
+        }
+        const GuardedBuffer flags(device, "visible", visible), offsets(device, "offset", offset),
+            bounds(device, "bound", bound), key(device, "key", keys.size() * 4),
+            splat(device, "order", order.size() * 4);
+        run("compact", gpu::SplatArgs{n}, {flags, offsets, bounds, key, splat}, n);
+        EXPECT_EQ(key.read<std::uint32_t>(), keys) << n;
+        EXPECT_EQ(splat.read<std::uint32_t>(), order) << n;
+        EXPECT_TRUE(key.intact() && splat.intact()) << n;
+    }
+}
+
+TEST(GatherCounts, counts_come_in_depth_order) {
+    Device& device = shared_device();
+    const Words order = {4, 1, 0, 7}, counts = {10, 11, 12, 13, 14, 15, 16, 17};
+    std::vector<gpu::FrameStatus> status(1);
+    status[0].visible = 4;
+    const GuardedBuffer s(device, "status", status), o(device, "order", order),
+        c(device, "counts", counts), sorted(device, "sorted", 4 * 4);
+    run("gather_counts", gpu::SplatArgs{8}, {s, o, c, sorted}, 64);
+    EXPECT_EQ(sorted.read<std::uint32_t>(), (Words{14, 11, 10, 17}));
+    EXPECT_TRUE(sorted.intact());
+}
+
+struct GroupsOutcome {
+    gpu::FrameStatus status;
+    gpu::FrameGroups groups;
+    std::uint32_t in_use;
+};
+GroupsOutcome frame_groups(int stage, std::uint32_t total, std::uint32_t capacity,
+                           std::uint32_t overflow_before = 0) {
+    Device& device = shared_device();
+    std::vector<gpu::FrameStatus> before(1);
+    before[0].overflow = overflow_before;
+    const GuardedBuffer status(device, "status", before),
+        groups(device, "groups", sizeof(gpu::FrameGroups)), sum(device, "total", Words{total}),
+        in_use(device, "in use", 4);
+    run("frame_groups", gpu::PairArgs{capacity, 1, 1}, {status, groups, sum, in_use}, 1,
+        {{"STAGE", stage}}, true);
+    EXPECT_TRUE(status.intact() && groups.intact() && in_use.intact());
+    return {status.read<gpu::FrameStatus>()[0], groups.read<gpu::FrameGroups>()[0],
+            in_use.read<std::uint32_t>()[0]};
+}
+
+void expect_groups_hold(std::uint32_t x, std::uint32_t y, std::uint32_t z, std::uint64_t count) {
+    EXPECT_GE(std::uint64_t(x) * y * SPLAT_GROUP, count);
+    EXPECT_LE(std::uint64_t(x) * y, count / SPLAT_GROUP + 1 + y) << "idle groups";
+    EXPECT_TRUE(x >= 1 && x <= MAX_GROUPS && y >= 1 && y <= MAX_GROUPS && z == 1) << x << " " << y;
+}
+
+TEST(FrameGroups, dispatches_hold_every_count) {
+    for (const std::uint32_t n : {0U, 1U, 64U, 65U, 4'194'240U, 4'194'241U, 9'000'000U, 1U << 30}) {
+        SCOPED_TRACE(n);
+        const GroupsOutcome visible = frame_groups(0, n, 0);
+        EXPECT_EQ(visible.status.visible, n);
+        EXPECT_EQ(visible.in_use, n);
+        expect_groups_hold(visible.groups.visible_x, visible.groups.visible_y,
+                           visible.groups.visible_z, n);
+        const GroupsOutcome pairs = frame_groups(1, n, n);
+        EXPECT_EQ(pairs.status.pairs, n);
+        EXPECT_EQ(pairs.status.overflow, 0U);
+        expect_groups_hold(pairs.groups.pairs_x, pairs.groups.pairs_y, pairs.groups.pairs_z, n);
+    }
+}
+
+TEST(FrameGroups, more_pairs_than_room_raise_the_flag_and_are_cut) {
+    for (const std::uint32_t total : {1001U, 5000U, 0xffffffffU}) {
+        const GroupsOutcome o = frame_groups(1, total, 1000);
+        EXPECT_EQ(o.status.overflow, 1U);
+        EXPECT_EQ(o.status.pairs, total);
+        EXPECT_EQ(o.in_use, 1000U);
+        expect_groups_hold(o.groups.pairs_x, o.groups.pairs_y, o.groups.pairs_z, 1000);
+    }
+    EXPECT_EQ(frame_groups(1, 1000, 1000).status.overflow, 0U);
+    EXPECT_EQ(frame_groups(1, 10, 1000, 1).status.overflow, 1U)
+        << "the host clears it, nobody else";
+}
+
+struct EmitInput {
+    TestScene scene;
+    ProjectedFrame frame;
+    Words order, offset;  // by rank
+    std::uint32_t pairs = 0, tiles_x = 0;
+
+    explicit EmitInput(const SceneOptions& options)
+        : scene(random_scene(options)), frame(project_on_device(scene.model, scene.camera)) {
+        for (std::uint32_t i = 0; i < frame.visible.size(); ++i)
+            if (frame.visible[i] == 1) order.push_back(i);
+        std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return frame.bound[a].z < frame.bound[b].z;
+        });
+        for (const std::uint32_t i : order) {
+            offset.push_back(pairs);
+            pairs += frame.pair_count[i];
+        }
+        tiles_x = static_cast<std::uint32_t>(scene.camera.width + TILE_SIZE - 1) / TILE_SIZE;
+    }
+};
+
+struct Emitted {
+    Words tile, splat, begin;
+};
+
+Emitted emit(const EmitInput& in, std::uint32_t capacity) {
+    Device& device = shared_device();
+    const auto visible = static_cast<std::uint32_t>(in.order.size());
+    std::vector<gpu::FrameStatus> counts(1);
+    counts[0].visible = visible;
+    const GuardedBuffer status(device, "status", counts), order(device, "order", in.order),
+        offset(device, "offset", in.offset), cover(device, "cover", in.frame.cover),
+        tile(device, "pair tile", capacity * 4), splat(device, "pair splat", capacity * 4),
+        begin(device, "pair begin", in.frame.visible.size() * 4),
+        shape(device, "shape", in.frame.shape), bound(device, "bound", in.frame.bound);
+    run("emit", gpu::PairArgs{capacity, in.tiles_x, 0},
+        {status, order, offset, cover, tile, splat, begin, shape, bound}, visible);
+    EXPECT_TRUE(tile.intact() && splat.intact() && begin.intact());
+    return {tile.read<std::uint32_t>(), splat.read<std::uint32_t>(), begin.read<std::uint32_t>()};
+}
+
+const SceneOptions kEmitScene{.count = 120,
+                              .width = 333,
+                              .height = 210,
+                              .sh_degree = 0,
+                              .min_log_scale = -5,
+                              .max_log_scale = -0.5,
+                              .min_logit = -4,
+                              .seed = 31};
+
+TEST(Emit, pairs_follow_depth_and_cover) {
+    const EmitInput in(kEmitScene);
+    ASSERT_GT(in.pairs, 1000U);
+    const Emitted out = emit(in, in.pairs);
+    std::uint32_t slot = 0;
+    for (std::uint32_t rank = 0; rank < in.order.size(); ++rank) {
+        const std::uint32_t i = in.order[rank];
+        EXPECT_EQ(out.begin[i], slot) << "splat " << i;
+        for (const std::uint32_t tile : cover_tiles(in.frame.cover[i], in.tiles_x)) {
+            ASSERT_EQ(out.tile[slot], tile) << "slot " << slot;
+            ASSERT_EQ(out.splat[slot] & PAIR_SPLAT_MASK, i) << "slot " << slot;
+            ++slot;
+        }
+    }
+    EXPECT_EQ(slot, in.pairs);
+}
+
+// Against every pixel: a block that the bits leave out holds no pixel above the cut-off, and one
+// that they name is within the ellipse and its slack.
+TEST(Emit, block_bits_name_the_blocks_that_are_touched) {
+    const EmitInput in(kEmitScene);
+    const Emitted out = emit(in, in.pairs);
+    const auto truth = reference::render(in.scene.model, in.scene.camera, {});
+    const auto& kernel = reference::kernel_table(KERNEL_GAUSSIAN, Footprint::psi);
+    size_t set = 0, needed = 0;
+    for (std::uint32_t slot = 0; slot < in.pairs; ++slot) {
+        const auto& s = truth.projected[out.splat[slot] & PAIR_SPLAT_MASK];
+        if (s.cull != reference::Cull::none) continue;
+        for (std::uint32_t block = 0; block < 4; ++block) {
+            const auto x0 = static_cast<int>(out.tile[slot] % in.tiles_x * 16 + block % 2 * 8);
+            const auto y0 = static_cast<int>(out.tile[slot] / in.tiles_x * 16 + block / 2 * 8);
+            const bool bit = (out.splat[slot] >> (PAIR_BLOCK_SHIFT + block) & 1) != 0;
+            bool seen = false;
+            for (int k = 0; k < 64; ++k) {
+                const double dx = s.mean_px.x - x0 - k % 8 - 0.5;
+                const double dy = s.mean_px.y - y0 - k / 8 - 0.5;
+                const double u = s.l11 * dx + s.l21 * dy, v = s.l22 * dy, q = u * u + v * v;
+                seen |=
+                    q < s.reach && s.opacity * kernel.value(q) >= ALPHA_CUTOFF_DEFAULT * (1 + 1e-4);
+            }
+            set += bit;
+            needed += seen;
+            EXPECT_TRUE(bit || !seen) << "slot " << slot << " block " << block;
+            const double q = reference::smallest_q(s, x0, y0, x0 + 8, y0 + 8);
+            EXPECT_TRUE(!bit || q <= s.reach * 1.003 + 3e-3)
+                << "slot " << slot << " block " << block << ", q " << q << ", reach " << s.reach;
+        }
+    }
+    EXPECT_GT(needed, in.pairs);
+    EXPECT_LT(set, in.pairs * size_t{4}) << "some blocks must be left out";
+}
+
+TEST(Emit, pairs_beyond_the_capacity_are_left_out) {
+    const EmitInput in(kEmitScene);
+    const Emitted all = emit(in, in.pairs);
+    for (const std::uint32_t capacity : {1U, 64U, in.pairs / 2, in.pairs - 1}) {
+        const Emitted out = emit(in, capacity);  // guard words stand behind the capacity
+        EXPECT_TRUE(std::equal(out.tile.begin(), out.tile.end(), all.tile.begin()));
+        EXPECT_TRUE(std::equal(out.splat.begin(), out.splat.end(), all.splat.begin()));
+    }
+}
+
+Words tile_ranges(const Words& tiles, std::uint32_t tile_count, std::uint32_t in_use) {
+    Device& device = shared_device();
+    const GuardedBuffer count(device, "pairs in use", Words{in_use}), tile(device, "tiles", tiles),
+        range(device, "range", Words(tile_count * size_t{2}, 0));
+    run("tile_ranges", gpu::PairArgs{1000, 1, tile_count}, {count, tile, range}, 1000);
+    EXPECT_TRUE(range.intact());
+    return range.read<std::uint32_t>();
+}
+
+TEST(TileRanges, runs_begin_and_end_where_the_tile_changes) {
+    EXPECT_EQ(tile_ranges({1, 1, 1, 3, 6, 6}, 7, 6),
+              (Words{0, 0, 0, 3, 0, 0, 3, 4, 0, 0, 0, 0, 4, 6}));
+    EXPECT_EQ(tile_ranges({0, 0, 0}, 1, 3), (Words{0, 3}));
+    EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 3), (Words{0, 1, 1, 2, 2, 3}));
+}
+
+TEST(TileRanges, only_pairs_in_use_count) {
+    EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 0), (Words{0, 0, 0, 0, 0, 0}));
+    EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 2), (Words{0, 1, 1, 2, 0, 0}));
+}
+
+TEST(TileRanges, a_long_random_list_matches_the_host) {
+    Pcg32 rng(5);
+    Words tiles(1000);
+    for (std::uint32_t& t : tiles) t = rng.below(300);
+    std::sort(tiles.begin(), tiles.end());
+    Words expected(600, 0);
+    for (std::uint32_t j = 0; j < 1000; ++j) {
+        if (j == 0 || tiles[j - 1] != tiles[j]) expected[tiles[j] * 2] = j;
+        expected[tiles[j] * 2 + 1] = j + 1;
+    }
+    EXPECT_EQ(tile_ranges(tiles, 300, 1000), expected);
+}
+
+}  // namespace
+}  // namespace darb::test
