@@ -21,8 +21,6 @@ layout(constant_id = 0) const uint THREADS = 8;  // SUBGROUP_SIZE
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
 
 #include "kernels/kernel.glsl"
-#include "lib/block.glsl"
-
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer PairOrder { uint pair_order[]; };
@@ -36,6 +34,7 @@ layout(set = 0, binding = 8, scalar) readonly buffer LastPair { uint last_pair[]
 layout(set = 0, binding = 9, scalar) buffer Partials { float partials[]; };      // [K][PARTIALS]
 layout(set = 0, binding = 10, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
 
+#include "lib/block.glsl"
 #include "lib/reduce.glsl"
 
 struct Pixels {
@@ -99,44 +98,47 @@ Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint
     return s;
 }
 
-void blend_block(uint block, uvec2 tile, uvec2 range) {
-    const uint bit = block_bit(block);
-    const uvec2 first = tile * TILE_SIZE + first_pixel(block, gl_SubgroupInvocationID);
-    const vec2 centre = vec2(first) + 0.5;
-    Pixels px;
-    const uint end = subgroupMax(load_pixels(first, px));
-    const uint batches = end > range.x ? (end - range.x + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE : 0u;
-    for (uint n = batches; n > 0u; --n) {
-        const uint batch = range.x + (n - 1u) * SUBGROUP_SIZE;
-        const uint j = batch + gl_SubgroupInvocationID;
-        uint slot = 0u, pair = 0u;
-        if (j < end) {
-            slot = pair_order[j];
-            pair = pair_splat[slot];
-        }
-        const bool hit = (pair & bit) != 0u;
-        uvec4 hits = subgroupBallot(hit);
-        if (subgroupBallotBitCount(hits) == 0u) continue;
+// The collected splats of a block, last to first.
+void blend_hits(inout Pixels px, vec2 centre, uint count) {
+    for (uint rest = count; rest > 0u;) {
+        const uint size = min(rest, SUBGROUP_SIZE);
+        rest -= size;
         vec4 shape = vec4(0.0), light = vec4(0.0);
         float l22 = 0.0;
-        if (hit) {
-            const uint splat = pair & PAIR_SPLAT_MASK;
+        uint number = 0u, slot = 0u;
+        if (gl_SubgroupInvocationID < size) {
+            const uint at = hits_base() + rest + gl_SubgroupInvocationID;
+            const uint splat = hit_pair[at];
+            number = hit_index[at] + 1u;
+            slot = pair_order[number - 1u];
             shape = splat_shape[splat];
             light = splat_light[splat];
             l22 = splat_bound[splat].x;
         }
-        while (subgroupBallotBitCount(hits) > 0u) {
-            const uint lane = subgroupBallotFindMSB(hits);
-            hits[lane >> 5] &= ~(1u << (lane & 31u));
+        uint lane = size;
+        do {  // not a for: some drivers run the body once more behind a mask
+            --lane;
             const vec4 s = subgroupBroadcast(shape, lane);
             const vec4 c = subgroupBroadcast(light, lane);
             const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
-                                         batch + lane + 1u);
+                                         subgroupBroadcast(number, lane));
             float parts[PARTIALS] =
                 float[](sums.gx * c.w, sums.gxdx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
                         sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
             add_to_slot(subgroupBroadcast(slot, lane), parts, sums.gdydy * c.w);
-        }
+        } while (lane > 0u);
+    }
+}
+
+void blend_block(uint block, uvec2 tile, uvec2 range) {
+    const uvec2 first = tile * TILE_SIZE + first_pixel(block, gl_SubgroupInvocationID);
+    Pixels px;
+    const uint end = subgroupMax(load_pixels(first, px));
+    if (end <= range.x) return;
+    for (uint chunk = range.x + (end - 1u - range.x) / CHUNK * CHUNK;; chunk -= CHUNK) {
+        const uint count = collect_hits(chunk, min(chunk + CHUNK, end), block_bit(block));
+        if (count > 0u) blend_hits(px, vec2(first) + 0.5, count);
+        if (chunk == range.x) break;
     }
 }
 

@@ -21,8 +21,6 @@ layout(constant_id = 2) const float MIN_TRANSMITTANCE = TRANSMITTANCE_STOP;
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
 
 #include "kernels/kernel.glsl"
-#include "lib/block.glsl"
-
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer PairOrder { uint pair_order[]; };
@@ -34,9 +32,10 @@ layout(set = 0, binding = 6, scalar) writeonly buffer ImageOut { float image[]; 
 layout(set = 0, binding = 7, scalar) writeonly buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer LastPair { uint last_pair[]; };
 
+#include "lib/block.glsl"
+
 struct Pixels {
-    float transmittance[PIXELS];  // 0 once the pixel has ended
-    float final[PIXELS];          // the transmittance it ended with
+    float transmittance[PIXELS];  // negative once the pixel has ended
     vec3 colour[PIXELS];
     uint last[PIXELS];  // 1 + the last pair looked at while it was alive; 0: none
 };
@@ -47,14 +46,43 @@ void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uin
         const vec2 to_mean = d - vec2(slot_offset(k));
         const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
         const float alpha = min(light.w * kernel_value(x * x + y * y), ALPHA_MAX);
-        const float wanted = (alpha >= ALPHA_CUTOFF ? alpha : 0.0) * px.transmittance[k];
-        const float next = px.transmittance[k] - wanted;
-        const bool goes_on = next >= MIN_TRANSMITTANCE;
+        const float before = px.transmittance[k];
+        const float wanted = (alpha >= ALPHA_CUTOFF ? alpha : 0.0) * before;
+        const float next = before - wanted;
+        const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
         px.colour[k] += (goes_on ? wanted : 0.0) * light.rgb;
-        px.transmittance[k] = goes_on ? next : 0.0;
-        px.final[k] = goes_on ? next : px.final[k];
+        px.transmittance[k] = goes_on ? next : -abs(before);
         if (STORE_FOR_BACKWARD == 1) px.last[k] = goes_on ? number : px.last[k];
     }
+}
+
+// All collected splats in order; false when every pixel has ended.
+bool blend_hits(inout Pixels px, vec2 centre, uint count) {
+    float alive = 1.0;
+    for (uint batch = 0u; batch < count; batch += SUBGROUP_SIZE) {
+        const uint mine = batch + gl_SubgroupInvocationID;
+        vec4 shape = vec4(0.0), light = vec4(0.0);
+        float l22 = 0.0;
+        uint number = 0u;
+        if (mine < count) {
+            const uint splat = hit_pair[hits_base() + mine];
+            number = hit_index[hits_base() + mine] + 1u;
+            shape = splat_shape[splat];
+            light = splat_light[splat];
+            l22 = splat_bound[splat].x;
+        }
+        const uint end = min(SUBGROUP_SIZE, count - batch);
+        uint lane = 0u;
+        do {  // not a for: some drivers run the body once more behind a mask
+            const vec4 s = subgroupBroadcast(shape, lane);
+            blend_splat(px, s.xy - centre, s, subgroupBroadcast(light, lane),
+                        subgroupBroadcast(l22, lane), subgroupBroadcast(number, lane));
+        } while (++lane < end);
+        alive = px.transmittance[0];
+        for (uint k = 1u; k < PIXELS; ++k) alive = max(alive, px.transmittance[k]);
+        if (subgroupAll(alive < 0.0)) break;
+    }
+    return subgroupAny(alive > 0.0);
 }
 
 void store(Pixels px, uvec2 first) {
@@ -64,12 +92,13 @@ void store(Pixels px, uvec2 first) {
         const uvec2 at = first + slot_offset(k);
         if (at.x >= args.width || at.y >= args.height) continue;
         const uint o = at.y * args.width + at.x;
-        const vec3 colour = px.colour[k] + px.final[k] * background;
+        const float transmittance = abs(px.transmittance[k]);
+        const vec3 colour = px.colour[k] + transmittance * background;
         image[o] = colour.r;
         image[plane + o] = colour.g;
         image[2u * plane + o] = colour.b;
         if (STORE_FOR_BACKWARD == 1) {
-            final_transmittance[o] = px.final[k];
+            final_transmittance[o] = transmittance;
             last_pair[o] = px.last[k];
         }
     }
@@ -85,37 +114,13 @@ void main() {
     Pixels px;
     for (uint k = 0u; k < PIXELS; ++k) {
         const uvec2 at = first + slot_offset(k);
-        px.transmittance[k] = at.x < args.width && at.y < args.height ? 1.0 : 0.0;
-        px.final[k] = 1.0;
+        px.transmittance[k] = at.x < args.width && at.y < args.height ? 1.0 : -1.0;
         px.colour[k] = vec3(0.0);
         px.last[k] = 0u;
     }
-
-    for (uint batch = range.x; batch < range.y; batch += SUBGROUP_SIZE) {
-        const uint j = batch + gl_SubgroupInvocationID;
-        uint pair = 0u;
-        if (j < range.y) pair = pair_splat[pair_order[j]];
-        const bool hit = (pair & bit) != 0u;
-        uvec4 hits = subgroupBallot(hit);
-        if (subgroupBallotBitCount(hits) == 0u) continue;
-        vec4 shape = vec4(0.0), light = vec4(0.0);
-        float l22 = 0.0;
-        if (hit) {
-            const uint splat = pair & PAIR_SPLAT_MASK;
-            shape = splat_shape[splat];
-            light = splat_light[splat];
-            l22 = splat_bound[splat].x;
-        }
-        while (subgroupBallotBitCount(hits) > 0u) {
-            const uint lane = subgroupBallotFindLSB(hits);
-            hits[lane >> 5] &= ~(1u << (lane & 31u));
-            const vec4 s = subgroupBroadcast(shape, lane);
-            blend_splat(px, s.xy - centre, s, subgroupBroadcast(light, lane),
-                        subgroupBroadcast(l22, lane), batch + lane + 1u);
-        }
-        float alive = 0.0;
-        for (uint k = 0u; k < PIXELS; ++k) alive += px.transmittance[k];
-        if (subgroupAll(alive == 0.0)) break;
+    for (uint chunk = range.x; chunk < range.y; chunk += CHUNK) {
+        const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bit);
+        if (!blend_hits(px, centre, count)) break;
     }
     store(px, first);
 }

@@ -23,3 +23,34 @@ uvec2 slot_offset(uint k) {
 uint block_bit(uint block) {
     return 1u << (PAIR_BLOCK_SHIFT + block);
 }
+
+// The pairs of a stretch of the tile's list that touch the subgroup's block, packed together, so that the loop over
+// them has neither gaps nor branches. Needs the buffers pair_order and pair_splat.
+const uint CHUNK = 128u;  // pairs looked at before those found are worked off
+shared uint hit_pair[THREADS / SUBGROUP_SIZE * CHUNK];
+shared uint hit_index[THREADS / SUBGROUP_SIZE * CHUNK];
+
+uint hits_base() {
+    return gl_SubgroupID * CHUNK;
+}
+
+// Fills the subgroup's lists from pairs [begin, end), at most CHUNK of them; returns how many hit.
+uint collect_hits(uint begin, uint end, uint bit) {
+    uint count = 0u;
+    for (uint batch = begin; batch < end; batch += SUBGROUP_SIZE) {
+        const uint j = batch + gl_SubgroupInvocationID;
+        uint pair = 0u;
+        if (j < end) pair = pair_splat[pair_order[j]];
+        const bool hit = (pair & bit) != 0u;
+        const uvec4 hits = subgroupBallot(hit);
+        if (hit) {
+            const uint at = hits_base() + count + subgroupBallotExclusiveBitCount(hits);
+            hit_pair[at] = pair & PAIR_SPLAT_MASK;
+            hit_index[at] = j;
+        }
+        count += subgroupBallotBitCount(hits);
+    }
+    subgroupMemoryBarrierShared();
+    subgroupBarrier();
+    return count;
+}
