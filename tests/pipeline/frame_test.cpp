@@ -1,0 +1,274 @@
+// The forward walk as a whole: lists against the host, ties, invariances, empty and overfull
+// frames, and sizes at the limits.
+#include <algorithm>
+#include <numeric>
+
+#include "engine/core/rng.h"
+#include "tests/support/device_walk.h"
+#include "tests/support/projected_frame.h"
+
+namespace darb::test {
+namespace {
+
+using Words = std::vector<std::uint32_t>;
+
+struct Frame {
+    Camera camera;
+    gpu::FrameStatus status;
+    std::vector<float> image;
+    std::vector<glm::uvec2> ranges;  // [T]
+    std::vector<Words> tiles;        // [T] splats in order of blending
+    std::uint64_t tile_pairs() const {
+        return std::accumulate(tiles.begin(), tiles.end(), std::uint64_t{0},
+                               [](std::uint64_t sum, const Words& t) { return sum + t.size(); });
+    }
+};
+
+Frame render_frame(const SplatModel& model, const Camera& camera, std::uint32_t pairs = 200'000) {
+    Device& device = shared_device();
+    GpuSplats splats(device, model, false);
+    Forward forward(device, forward_options(model, {}));
+    const gpu::CameraData data = camera_data(camera, model.origin);
+    const Buffer cameras = upload_cameras(device, {data});
+    forward.reserve(splats.count(), pairs, camera.width, camera.height);
+    Commands commands(device);
+    commands.begin();
+    forward.record(commands, splats, cameras, 0, data, model.sh_degree, glm::vec3(0.25f));
+    commands.submit_and_wait();
+    Frame f{camera, forward.read_status(), {}, {}, {}};
+    f.image = forward.image().download<float>(size_t(camera.width) * camera.height * 3);
+    const size_t tile_count = size_t{data.tiles_x} * data.tiles_y;
+    f.ranges = forward.tile_range().download<glm::uvec2>(tile_count);
+    const std::uint32_t stored = std::min(f.status.pairs, forward.pair_capacity());
+    const Words order = forward.pair_order().download<std::uint32_t>(stored);
+    const Words splat = forward.pair_splat().download<std::uint32_t>(stored);
+    for (const glm::uvec2& range : f.ranges) {
+        f.tiles.emplace_back();
+        for (std::uint32_t j = range.x; j < range.y; ++j)
+            f.tiles.back().push_back(splat.at(order.at(j)) & PAIR_SPLAT_MASK);
+    }
+    return f;
+}
+
+const SceneOptions kScene{.count = 400,
+                          .width = 140,
+                          .height = 90,
+                          .sh_degree = 1,
+                          .min_log_scale = -4,
+                          .max_log_scale = -1,
+                          .seed = 41};
+
+TEST(Frame, lists_match_the_covers_sorted_by_depth_on_the_host) {
+    const TestScene s = random_scene(kScene);
+    const Frame f = render_frame(s.model, s.camera);
+    const ProjectedFrame p = project_on_device(s.model, s.camera);
+    Words order;
+    for (std::uint32_t i = 0; i < s.model.size(); ++i)
+        if (p.visible[i] == 1) order.push_back(i);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return p.bound[a].z < p.bound[b].z; });
+    std::vector<Words> expected(f.tiles.size());
+    for (const std::uint32_t i : order)
+        for (const std::uint32_t tile : cover_tiles(p.cover[i], 9)) expected[tile].push_back(i);
+    EXPECT_GT(order.size(), 300U);
+    EXPECT_EQ(f.status.visible, order.size());
+    EXPECT_EQ(f.status.overflow, 0U);
+    EXPECT_EQ(f.tiles, expected);
+    EXPECT_EQ(f.status.pairs, f.tile_pairs());
+}
+
+TEST(Frame, equal_depths_keep_file_order) {
+    TestScene s = random_scene({.count = 300, .width = 64, .height = 64, .sh_degree = 0});
+    s.camera.rotation = glm::dmat3(1.0);
+    s.camera.translation = {0, 0, 3};
+    for (size_t i = 0; i < s.model.size(); ++i)
+        s.model.position[i * 3 + 2] = static_cast<float>(i % 3) * 0.25f;
+    const Frame f = render_frame(s.model, s.camera);
+    ASSERT_GT(f.status.visible, 200U);
+    for (const Words& tile : f.tiles)
+        for (size_t j = 1; j < tile.size(); ++j) {
+            const auto key = [&](std::uint32_t i) { return std::pair(i % 3, i); };
+            ASSERT_LT(key(tile[j - 1]), key(tile[j]));
+        }
+}
+
+SplatModel reordered(const SplatModel& model, const Words& order) {
+    SplatModel result = model;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float>& from = attribute_values(model, a);
+        const size_t stride = from.size() / model.size();
+        for (size_t i = 0; i < order.size(); ++i)
+            std::copy_n(
+                from.begin() + static_cast<std::ptrdiff_t>(order[i] * stride), stride,
+                attribute_values(result, a).begin() + static_cast<std::ptrdiff_t>(i * stride));
+    }
+    return result;
+}
+
+TEST(Frame, image_does_not_depend_on_the_order_in_the_file) {
+    const TestScene s = random_scene(kScene);
+    Words order(s.model.size());
+    std::iota(order.begin(), order.end(), 0U);
+    Pcg32 rng(3);
+    for (size_t i = order.size(); i > 1; --i)
+        std::swap(order[i - 1], order[rng.below(static_cast<std::uint32_t>(i))]);
+    EXPECT_EQ(render_frame(s.model, s.camera).image,
+              render_frame(reordered(s.model, order), s.camera).image);
+}
+
+TEST(Frame, splats_that_nobody_sees_change_no_bit) {
+    TestScene s = random_scene(kScene);
+    const std::vector<float> before = render_frame(s.model, s.camera).image;
+    const size_t n = s.model.size();
+    s.model.resize(n + 300);
+    for (size_t i = n; i < n + 300; ++i) {
+        const size_t twin = i - n;
+        for (int a = 0; a < kAttributeCount; ++a) {
+            std::vector<float>& values = attribute_values(s.model, a);
+            const size_t stride = values.size() / s.model.size();
+            for (size_t c = 0; c < stride; ++c) values[i * stride + c] = values[twin * stride + c];
+        }
+        if (i % 3 == 0) s.model.opacity[i] = -7;
+        if (i % 3 == 1) s.model.rotation[i * 4] = std::nanf("");
+        if (i % 3 == 2) s.model.position[i * 3] = 1e5f;
+    }
+    EXPECT_EQ(render_frame(s.model, s.camera).image, before);
+}
+
+// The principal point moves by whole tiles. Splats of 1 px, so that none which reaches the window
+// lies beyond the Jacobian's clamp, which depends on the image.
+TEST(Frame, tiles_rendered_apart_equal_the_whole) {
+    SceneOptions options = kScene;
+    options.count = 3000;
+    options.min_log_scale = -5;
+    options.max_log_scale = -3.8;
+    const TestScene s = random_scene(options);
+    const Frame whole = render_frame(s.model, s.camera);
+    Camera part = s.camera;
+    part.width = part.height = 32;
+    part.cx -= 48;
+    part.cy -= 32;
+    const Frame window = render_frame(s.model, part);
+    std::vector<float> expected;
+    for (size_t c = 0; c < 3; ++c)
+        for (size_t y = 0; y < 32; ++y)
+            for (size_t x = 0; x < 32; ++x)
+                expected.push_back(whole.image[(c * 90 + y + 32) * 140 + x + 48]);
+    EXPECT_GT(window.status.visible, 100U);
+    EXPECT_TRUE(compare("window", expected, window.image, tolerance("image_float32")));
+}
+
+void expect_background(const Frame& f) {
+    for (const float value : f.image) ASSERT_EQ(value, 0.25f);
+    EXPECT_EQ(f.status.visible, 0U);
+    EXPECT_EQ(f.status.pairs, 0U);
+    EXPECT_EQ(f.status.overflow, 0U);
+    for (const Words& tile : f.tiles) EXPECT_TRUE(tile.empty());
+}
+
+TEST(Frame, zero_splats_show_the_background) {
+    expect_background(render_frame({}, random_scene(kScene).camera));
+}
+
+TEST(Frame, zero_visible_splats_show_the_background) {
+    TestScene s = random_scene(kScene);
+    s.camera.translation.z = -30;
+    expect_background(render_frame(s.model, s.camera));
+    TestScene faint = random_scene(kScene);
+    for (float& logit : faint.model.opacity) logit = -8;
+    expect_background(render_frame(faint.model, faint.camera));
+}
+
+TEST(Frame, an_empty_frame_after_a_full_one_is_empty) {
+    Device& device = shared_device();
+    const TestScene s = random_scene(kScene);
+    GpuSplats splats(device, s.model, false);
+    Forward forward(device, forward_options(s.model, {}));
+    Camera away = s.camera;
+    away.translation.z = -30;
+    const std::vector<gpu::CameraData> data = {camera_data(s.camera, {}), camera_data(away, {})};
+    const Buffer cameras = upload_cameras(device, data);
+    forward.reserve(splats.count(), 100'000, s.camera.width, s.camera.height);
+    Commands commands(device);
+    commands.begin();
+    for (std::uint32_t i = 0; i < 2; ++i)
+        forward.record(commands, splats, cameras, i, data[i], 1, glm::vec3(0.25f));
+    commands.submit_and_wait();
+    EXPECT_EQ(forward.read_status().visible, 0U);
+    EXPECT_EQ(forward.read_status().culled[CULL_NEAR], splats.count());
+    for (const float value : forward.image().download<float>(140 * 90 * 3)) ASSERT_EQ(value, 0.25f);
+}
+
+TEST(Frame, one_splat_over_the_whole_image_is_in_every_tile) {
+    TestScene s = random_scene({.count = 1, .width = 700, .height = 500, .sh_degree = 0});
+    for (int c = 0; c < 3; ++c) {
+        s.model.position[c] = 0;
+        s.model.log_scale[c] = 3;
+    }
+    s.model.opacity[0] = 4;
+    const Frame f = render_frame(s.model, s.camera);
+    EXPECT_EQ(f.status.pairs, 44U * 32U);
+    for (const Words& tile : f.tiles) EXPECT_EQ(tile, Words{0});
+    for (size_t i = 0; i < size_t{700} * 500; ++i) ASSERT_NE(f.image[i], 0.25f);
+}
+
+TEST(Frame, pairs_beyond_the_capacity_raise_the_flag_and_keep_the_rest_in_bounds) {
+    TestScene s = random_scene({.count = 500, .width = 300, .height = 200, .sh_degree = 0});
+    const Frame full = render_frame(s.model, s.camera);
+    const Frame cut = render_frame(s.model, s.camera, 1);  // raised to the least capacity, 1,024
+    ASSERT_GT(full.status.pairs, 2000U);
+    EXPECT_EQ(full.status.overflow, 0U);
+    EXPECT_EQ(cut.status.overflow, 1U);
+    EXPECT_EQ(cut.status.pairs, full.status.pairs);
+    EXPECT_EQ(cut.tile_pairs(), 1024U);
+    for (const glm::uvec2& range : cut.ranges) EXPECT_LE(range.y, 1024U);
+}
+
+TEST(Frame, renderer_grows_and_repeats_until_everything_fits) {
+    TestScene s = random_scene({.count = 500, .width = 300, .height = 200, .sh_degree = 0});
+    const Frame full = render_frame(s.model, s.camera);
+    Renderer renderer(shared_device(), s.model);
+    const ImageF image = renderer.render(s.camera, glm::vec3(0.25f));
+    EXPECT_EQ(renderer.status().overflow, 0U);
+    EXPECT_EQ(renderer.status().pairs, full.status.pairs);
+    EXPECT_EQ(image.data, planes_to_image(full.image, 300, 200).data);
+}
+
+// 65,538 tiles: tile numbers take 17 bits. The splats lie in the last and in the first tiles.
+TEST(Frame, more_than_65536_tiles_are_told_apart) {
+    TestScene s = random_scene({.count = 2, .width = 17, .height = 524'290, .sh_degree = 0});
+    s.camera.rotation = glm::dmat3(1.0);
+    s.camera.translation = {0, 0, 3};
+    s.camera.fx = s.camera.fy = 30'000;
+    s.camera.cx = 8.5;
+    s.camera.cy = s.camera.height / 2.0;
+    for (size_t i = 0; i < 2; ++i) {
+        s.model.position[i * 3] = 0;
+        s.model.position[i * 3 + 1] = i == 0 ? -26.214f : 26.214f;
+        s.model.position[i * 3 + 2] = 0;
+        for (size_t c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = -8;
+        s.model.opacity[i] = 4;
+    }
+    const Frame f = render_frame(s.model, s.camera);
+    ASSERT_EQ(f.tiles.size(), 65'538U);
+    EXPECT_EQ(f.status.visible, 2U);
+    EXPECT_FALSE(f.tiles.front().empty());
+    EXPECT_FALSE(f.tiles.back().empty());
+    for (size_t t = 32; t + 32 < f.tiles.size(); ++t) ASSERT_TRUE(f.tiles[t].empty()) << t;
+}
+
+// Positions relative to an origin a thousand kilometres away: the camera moves, not the splats.
+TEST(Frame, an_origin_far_away_leaves_the_image_alone) {
+    TestScene s = random_scene(kScene);
+    const std::vector<float> near_zero = render_frame(s.model, s.camera).image;
+    s.model.origin = {1e6, -2e6, 5e5};
+    s.camera.translation -= s.camera.rotation * s.model.origin;
+    const std::vector<float> far = render_frame(s.model, s.camera).image;
+    double worst = 0;
+    for (size_t i = 0; i < far.size(); ++i)
+        worst = std::max(worst, double(std::abs(far[i] - near_zero[i])));
+    EXPECT_LT(worst, 1e-4);
+}
+
+}  // namespace
+}  // namespace darb::test
