@@ -16,25 +16,32 @@ namespace {
 constexpr int kShortRun = 200;          // iterations: over sooner than the measurement
 constexpr double kLongSeconds = 3'600;  // from here on a smaller -r is suggested
 constexpr double kMemoryShare = 0.85;   // of the device's memory that a run can hope to have
-constexpr int kSmallWidth = 400;        // px: no smaller photos are suggested
+constexpr int kSmallSide = 400;         // px: no smaller photos are suggested
 
 // The next -r that divides the photos' sides by two, where that leaves enough of them.
 std::optional<int> smaller_resolution(const std::vector<View>& views) {
     const View& view = views.front();
-    if (view.camera.width < 2 * kSmallWidth) return std::nullopt;
+    if (std::max(view.camera.width, view.camera.height) < 2 * kSmallSide) return std::nullopt;
     const double divisor = double(view.lens.width) / view.camera.width;
     for (const int r : {2, 4, 8})
         if (r > 1.5 * divisor) return r;
     return view.camera.width / 2;
 }
 
+// Two digits: more would promise what a rule of thumb cannot keep.
+std::string about(std::uint32_t count) {
+    std::uint32_t unit = 1;
+    while (count / unit >= 100) unit *= 10;
+    return fmt::format("about {}", std::uint64_t{(count + unit / 2) / unit} * unit);
+}
+
 std::string time_text(const Forecast& f, int iterations) {
-    if (f.seconds <= 0) return fmt::format("{} iterations", iterations);
-    const std::string first =
-        fmt::format("{:.1f} ms an iteration at {} splats", f.start_ms, f.start_splats);
-    return fmt::format(
-        "about {} for {} iterations ({}{})", format_duration(f.seconds), iterations, first,
-        f.splats > f.start_splats ? fmt::format(", {:.1f} ms at the end", f.end_ms) : "");
+    const bool grows = f.splats > f.start_splats;
+    const std::string end = grows ? about(f.splats) : std::to_string(f.splats);
+    if (f.seconds <= 0) return fmt::format("{} iterations, {} splats at the end", iterations, end);
+    const std::string later = grows ? fmt::format(", {:.1f} ms at {}", f.end_ms, end) : "";
+    return fmt::format("about {} for {} iterations, {:.1f} ms each at {} splats{}",
+                       format_duration(f.seconds), iterations, f.start_ms, f.start_splats, later);
 }
 
 void print_advice(const Device& device, const Dataset& dataset, const Forecast& f,
@@ -62,8 +69,7 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
     const std::uint64_t bytes = plan_memory(f.demand).total();
-    fmt::print(stderr, "forecast: {}, about {} splats at the end, {} of device memory\n",
-               time_text(f, flags.train.iterations), f.splats,
+    fmt::print(stderr, "forecast: {}; {} of device memory\n", time_text(f, flags.train.iterations),
                format_bytes(static_cast<double>(bytes)));
     print_advice(device, dataset, f, bytes);
 }
