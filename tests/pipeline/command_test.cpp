@@ -46,7 +46,10 @@ Outcome darb(const std::string& arguments) {
     const std::string out = scratch() / "stdout", err = scratch() / "stderr";
     const int status = std::system(
         fmt::format("'{}' {} > '{}' 2> '{}'", DARB_COMMAND, arguments, out, err).c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text_file(out), read_text_file(err)};
+    const Outcome o{WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text_file(out),
+                    read_text_file(err)};
+    EXPECT_EQ(o.err.find("vulkan validation:"), std::string::npos) << o.err;
+    return o;
 }
 
 struct BadCommand {
@@ -142,6 +145,15 @@ TEST(Command, info_refuses_a_point_cloud_and_reads_a_camera_list) {
     const json info = json::parse(darb("info --json " + inria + "/cameras.json").out);
     EXPECT_EQ(info["views"], 97);
     EXPECT_EQ(info["source"], "cameras.json");
+}
+
+TEST(Command, train_begins_with_a_forecast) {
+    const Outcome o = darb(
+        fmt::format("train {} -o {} -r 4 --iterations 1", kScene, (scratch() / "one").string()));
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("forecast: 1 iterations, 4000 splats at the end; "), std::string::npos)
+        << o.err;
+    EXPECT_NE(o.err.find("of device memory"), std::string::npos) << o.err;
 }
 
 // Photos without cameras, and a program named colmap that notes its calls and takes the scene's own
