@@ -87,19 +87,19 @@ Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
     return evaluation;
 }
 
-std::filesystem::path write_side_by_side(Trainer& trainer, const Dataset& dataset,
-                                         const std::vector<ImageU8>& photos,
-                                         const std::filesystem::path& folder) {
-    std::filesystem::path first;
+std::vector<std::filesystem::path> write_side_by_side(Trainer& trainer, const Dataset& dataset,
+                                                      const std::vector<ImageU8>& photos,
+                                                      const std::filesystem::path& folder) {
+    std::vector<std::filesystem::path> files;
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
         if (!view.is_test) continue;
         const auto path = folder / (file_stem(view.name) + ".png");
         write_png(path, side_by_side(composite(photos[i], trainer.background()),
                                      trainer.render(view.camera)));
-        if (first.empty()) first = path;
+        files.push_back(path);
     }
-    return first;
+    return files;
 }
 
 }  // namespace darb

@@ -26,9 +26,9 @@ void take_means(Evaluation& evaluation);
 Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
                              const std::vector<ImageU8>& photos);
 
-/// photo | render | absolute error x 4, a PNG a held-out view; returns the first one's path.
-std::filesystem::path write_side_by_side(Trainer& trainer, const Dataset& dataset,
-                                         const std::vector<ImageU8>& photos,
-                                         const std::filesystem::path& folder);
+/// photo | render | absolute error x 4, a PNG a held-out view, in the order of the views.
+std::vector<std::filesystem::path> write_side_by_side(Trainer& trainer, const Dataset& dataset,
+                                                      const std::vector<ImageU8>& photos,
+                                                      const std::filesystem::path& folder);
 
 }  // namespace darb

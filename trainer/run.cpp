@@ -92,7 +92,11 @@ void Run::evaluate(int iteration) {
     evaluation.splats = trainer_.splat_count();
     if (!evaluation.views.empty()) {
         const auto folder = run_.output / "held_out" / std::to_string(iteration);
-        summary_.picture = write_side_by_side(trainer_, dataset_, photos_, folder);
+        const auto files = write_side_by_side(trainer_, dataset_, photos_, folder);
+        summary_.pictures.clear();
+        for (size_t v = 0; v < files.size(); ++v)
+            summary_.pictures.push_back({evaluation.views[v].name, files[v],
+                                         evaluation.views[v].psnr_db, evaluation.views[v].ssim});
         progress_.note(fmt::format(
             "iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats",
             iteration, evaluation.psnr_db, evaluation.ssim, evaluation.views.size(),

@@ -13,6 +13,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "trainer/options.h"
+#include "trainer/report/report.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -44,8 +45,9 @@ struct RunSummary {
     int iteration = 0;
     bool interrupted = false;
     double seconds = 0;
-    std::filesystem::path model;    // the last PLY written
-    std::filesystem::path picture;  // a held-out view beside its photo, where there is one
+    std::filesystem::path model;  // the last PLY written
+    std::vector<ReportPicture>
+        pictures;  // held-out views beside their photos, of the last evaluation
     std::filesystem::path report;
 };
 

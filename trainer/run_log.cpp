@@ -128,6 +128,31 @@ void RunLog::evaluation(const Evaluation& evaluation) {
     write(evaluation_json(evaluation));
 }
 
+ReportData RunLog::report_data(const RunSummary& summary, const Json& metrics) const {
+    ReportData data;
+    data.title = start_.value("dataset", "");
+    data.device = start_.value("device", "") + ", " + start_.value("driver", "");
+    for (const Json& e : events_) {
+        const std::string kind = e.value("event", "");
+        if (kind == "iteration")
+            data.samples.push_back({e.value("iteration", 0), e.value("seconds", 0.0),
+                                    e.value("loss", 0.0), e.value("psnr_db", 0.0),
+                                    e.value("splats", 0u)});
+        if (kind == "evaluation" && !e["views"].empty())
+            data.evaluations.push_back({e.value("iteration", 0), e.value("seconds", 0.0),
+                                        e.value("psnr_db", 0.0), e.value("ssim", 0.0),
+                                        e.value("splats", 0u)});
+    }
+    for (const Json& p : metrics["passes_ms"])
+        data.passes.push_back({p.value("name", ""), p.value("ms", 0.0), std::nullopt});
+    for (const auto& [name, value] : start_["settings"].items())
+        data.settings.emplace_back(name,
+                                   value.is_string() ? value.get<std::string>() : value.dump());
+    data.pictures = summary.pictures;
+    for (const Json& note : start_["notes"]) data.notes.push_back(note.get<std::string>());
+    return data;
+}
+
 std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& trainer,
                                      const Device& device) {
     const TrainCounters& c = trainer.counters();
@@ -159,7 +184,9 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"culled_splat_frames", culled},
         {"evaluations", evaluations}};
     write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
-    return {};
+    const auto report = folder_ / "report.html";
+    write_report(report, report_data(summary, metrics));
+    return report;
 }
 
 }  // namespace darb

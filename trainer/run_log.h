@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "trainer/report/report.h"
 #include "trainer/run.h"
 
 namespace darb {
@@ -38,6 +39,7 @@ class RunLog {
 
   private:
     void write(const nlohmann::json& event);
+    ReportData report_data(const RunSummary& summary, const nlohmann::json& metrics) const;
 
     std::filesystem::path folder_;
     std::vector<nlohmann::json> events_;

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <sstream>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/data/colmap.h"
 #include "engine/data/source.h"
 
@@ -16,6 +18,27 @@ namespace {
 
 constexpr std::size_t kHoldOutEvery = 8;
 constexpr double kExtentMargin = 1.1;
+
+// A list of held-out photos beside a COLMAP model, one name a line, as several loaders of the field
+// read it.
+void mark_test_list(const fs::path& list, Dataset& dataset) {
+    if (!fs::is_regular_file(list)) return;
+    std::istringstream lines(read_text_file(list));
+    std::size_t unknown = 0;
+    for (std::string name; std::getline(lines, name);) {
+        while (!name.empty() && (name.back() == '\r' || name.back() == ' ')) name.pop_back();
+        if (name.empty()) continue;
+        const auto view = std::find_if(dataset.views.begin(), dataset.views.end(),
+                                       [&](const View& v) { return v.name == name; });
+        if (view == dataset.views.end())
+            ++unknown;
+        else
+            view->is_test = true;
+    }
+    if (unknown > 0)
+        dataset.notes.push_back(fmt::format("{} names {} that the model does not hold.",
+                                            list.string(), counted(unknown, "photo")));
+}
 
 Dataset load_source(const fs::path& path, const DatasetOptions& options) {
     if (!fs::exists(path)) throw Error(path.string(), "does not exist", "Check the path.");
@@ -30,6 +53,8 @@ Dataset load_source(const fs::path& path, const DatasetOptions& options) {
          {path / "sparse" / "0", path / "sparse", path, path / "colmap" / "sparse" / "0"}) {
         if (!is_colmap_model(model)) continue;
         Dataset dataset = load_colmap(path, model, options);
+        mark_test_list(path / "test.txt", dataset);
+        mark_test_list(model / "test.txt", dataset);
         if (transforms)
             dataset.notes.push_back(fmt::format(
                 "{} was read; name the transforms file itself to use that.", model.string()));

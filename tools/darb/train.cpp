@@ -51,7 +51,8 @@ void print_summary(const RunSummary& summary, const TrainFlags& flags) {
                    e.splats);
     }
     if (!summary.model.empty()) fmt::print("scene    {}\n", summary.model.string());
-    if (!summary.picture.empty()) fmt::print("picture  {}\n", summary.picture.string());
+    if (!summary.pictures.empty())
+        fmt::print("picture  {}\n", summary.pictures.front().file.string());
     if (!summary.report.empty()) fmt::print("report   {}\n", summary.report.string());
     if (summary.interrupted)
         fmt::print("interrupted; go on with: darb train --resume -o {}\n",

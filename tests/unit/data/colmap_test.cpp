@@ -192,6 +192,28 @@ TEST(ColmapProject, hold_out_takes_every_eighth_by_name) {
     EXPECT_EQ(dataset.views[16].name, "v116.png");
 }
 
+TEST(ColmapProject, test_list_beside_the_model_is_held_out_in_place_of_every_eighth) {
+    const auto folder = test_folder();
+    std::vector<View> views(9);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].name = "v" + std::to_string(i) + ".png";
+        views[i].camera.width = views[i].camera.height = 4;
+        views[i].camera.fx = views[i].camera.fy = 4;
+        write_png(folder / "images" / views[i].name, ImageU8(4, 4, 3));
+    }
+    write_colmap_binary(folder / "sparse" / "0", views, {});
+    write_file_atomic(folder / "test.txt", "v3.png\r\nv5.png\nnowhere.png\n");
+    for (const bool hold_out : {false, true}) {
+        DatasetOptions options;
+        options.hold_out = hold_out;
+        const Dataset dataset = load_dataset(folder, options);
+        for (std::size_t i = 0; i < 9; ++i)
+            EXPECT_EQ(dataset.views[i].is_test, i == 3 || i == 5) << i;
+        ASSERT_FALSE(dataset.notes.empty());
+        EXPECT_NE(dataset.notes[0].find("test.txt"), std::string::npos);
+    }
+}
+
 TEST(ColmapWrite, model_reads_back) {
     std::vector<View> views(3);
     for (std::size_t i = 0; i < 3; ++i) {
