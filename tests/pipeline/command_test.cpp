@@ -8,12 +8,15 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "engine/scene/ply.h"
 #include "tests/support/test_data.h"
 
 namespace darb {
@@ -145,6 +148,38 @@ TEST(Command, info_refuses_a_point_cloud_and_reads_a_camera_list) {
     const json info = json::parse(darb("info --json " + inria + "/cameras.json").out);
     EXPECT_EQ(info["views"], 97);
     EXPECT_EQ(info["source"], "cameras.json");
+}
+
+TEST(Command, info_warns_of_odd_splats) {
+    SplatModel model;
+    model.resize(6);
+    for (size_t i = 0; i < model.size(); ++i) {
+        model.rotation[4 * i] = 1;
+        model.position[3 * i] = static_cast<float>(i);
+        for (size_t a = 0; a < 3; ++a) model.log_scale[3 * i + a] = -4;
+    }
+    model.position[0] = std::numeric_limits<float>::quiet_NaN();
+    model.rotation[4] = 0;
+    model.log_scale[6] = 5;      // huge, and a needle
+    model.log_scale[9] = 0.65f;  // a needle
+    model.opacity[4] = 20;       // 1
+    model.opacity[5] = -20;      // 0
+    const std::string file = scratch() / "odd.ply", none = scratch() / "none.ply";
+    write_ply(file, model);
+    const json info = json::parse(darb("info --json " + file).out);
+    EXPECT_EQ(info["splats"], 5);
+    for (const auto& [key, count] : std::map<std::string, int>{{"dropped", 1},
+                                                               {"zero_rotations", 1},
+                                                               {"huge", 1},
+                                                               {"needles", 2},
+                                                               {"saturated", 1},
+                                                               {"invisible", 1}})
+        EXPECT_EQ(info[key], count) << key;
+    EXPECT_EQ(info["warnings"].size(), 6U);
+    write_ply(none, SplatModel{});
+    const Outcome empty = darb("info " + none);
+    EXPECT_EQ(empty.code, 0) << empty.err;
+    EXPECT_NE(empty.out.find("there are no splats"), std::string::npos) << empty.out;
 }
 
 TEST(Command, train_begins_with_a_forecast) {
