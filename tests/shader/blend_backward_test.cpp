@@ -163,5 +163,14 @@ TEST(BlendBackwardCases, skipping_blocks_that_are_not_touched_changes_no_bit) {
                           blend_on_device(scene, lists, true, d_image, true)));
 }
 
+// As in blend_test: the rounds of the loops over a tile's four blocks add up, so that gradients are
+// whole up to about 12,800 splats in a tile.
+TEST(BlendBackwardCases, a_list_of_12000_splats_is_not_cut) {
+    BlendScene scene = kCosine.scene();
+    scene.cutoff = 1e-7f;
+    for (int i = 0; i < 12'000; ++i) scene.add({8.5, 8.5}, {400, 0, 400}, 1e-5, {1, 0.5, 0.25});
+    expect_backward_matches(scene, tolerance("gradient_thin_layers"));
+}
+
 }  // namespace
 }  // namespace darb::test

@@ -33,6 +33,12 @@ constexpr Tolerance kTable[] = {
     {"gradient_thin_layers", 5e-4, 5e-3, 0, 1 - 1e-6, 1e-3,
      "for compare_scaled; as image_thin_layers, forward and back, and sums over the tile that "
      "cancel"},
+    {"project_gradient_float32", 5e-5, 1e-4, 0, 1 - 1e-8, 1e-4,
+     "for compare_scaled: one splat's sums through the factor, J W R and the quaternion, in units "
+     "of the splat's own largest entry"},
+    {"project_gradient_needles", 1e-2, 1e-2, 0, 1 - 1e-5, 1e-3,
+     "the same at axis ratios to 1e6: the long axis sums terms that are larger by the ratio on the "
+     "image"},
     {"loss_float32", 1e-6, 1e-5, 0, 1 - 1e-8, 1e-5,
      "SSIM's variances cancel: 11x11 sums of squares"},
     {"loss_gradient_float32", 1e-9, 1e-3, 0.001, 1 - 1e-7, 1e-4,

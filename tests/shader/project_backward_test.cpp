@@ -1,0 +1,168 @@
+// project_backward.comp alone, its gradients stored and not applied, against the reference for the
+// same sums of pairs.
+#include "tests/support/backward_pass.h"
+#include "tests/support/compare.h"
+#include "tests/support/random_scene.h"
+
+namespace darb::test {
+namespace {
+
+/// Every splat must be visible to the reference. Each is compared on its own scale: gradients of
+/// different splats differ by more than their rounding.
+void expect_gradients_match(const SplatModel& model, const Camera& camera, int sh_degree = 3,
+                            const char* allowed = "project_gradient_float32") {
+    const int degree = std::min(sh_degree, model.sh_degree);
+    const Partials partials = Partials::random(model.size(), 77);
+    const DoubleGradients expected = gradients_in_double(model, camera, degree, partials);
+    const PassState start = start_state(model);
+    const PassState after = run_backward_pass(model, camera, degree, false, start, partials);
+    EXPECT_EQ(after.parameters, start.parameters);
+    EXPECT_EQ(after.status.bad_gradients, 0U);
+    const auto got = stored_gradients(after);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const size_t stride = got[a].size() / model.size();
+        if (stride == 0) continue;
+        std::vector<double> truth, relative;  // in units of the splat's own largest entry
+        for (size_t i = 0; i < model.size(); ++i) {
+            double largest = 0;
+            for (size_t c = 0; c < stride; ++c)
+                largest = std::max(largest, std::abs(expected.d[a][i * stride + c]));
+            for (size_t c = 0; c < stride; ++c) {
+                const double unit = largest > 0 ? largest : 1;
+                truth.push_back(expected.d[a][i * stride + c] / unit);
+                relative.push_back(got[a][i * stride + c] / unit);
+            }
+        }
+        EXPECT_TRUE(compare_scaled(attribute_name(a), truth, relative, tolerance(allowed)));
+    }
+    std::vector<double> norms;
+    for (size_t i = 0; i < model.size(); ++i) {
+        norms.push_back(after.gradient_sum[i].x);
+        EXPECT_EQ(after.gradient_sum[i].y, partials.count[i] > 0 ? 1 : 0) << "splat " << i;
+    }
+    EXPECT_TRUE(compare_scaled("mean", expected.mean_ndc, norms, tolerance(allowed)));
+}
+
+TEST(ProjectBackward, every_kernel_and_footprint_matches_double) {
+    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+        for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
+            SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
+                         std::string(footprint_name(footprint)));
+            const TestScene s = random_scene({.count = 100,
+                                              .kernel = kernel,
+                                              .footprint = footprint,
+                                              .min_log_scale = -4,
+                                              .max_log_scale = 0,
+                                              .seed = 51});
+            expect_gradients_match(s.model, s.camera);
+        }
+}
+
+TEST(ProjectBackward, every_sh_degree_stored_and_used_matches_double) {
+    for (int stored = 0; stored <= 3; ++stored)
+        for (int used = 0; used <= stored; ++used) {
+            SCOPED_TRACE(fmt::format("stored {}, used {}", stored, used));
+            TestScene s = random_scene({.count = 100, .sh_degree = stored, .seed = 52});
+            for (float& value : s.model.sh_rest) value *= 5;  // some colours clamp at 0
+            expect_gradients_match(s.model, s.camera, used);
+        }
+}
+
+TEST(ProjectBackward, splats_beyond_the_jacobian_clamp_match_double) {
+    TestScene s = random_scene({.count = 200, .min_log_scale = -1, .max_log_scale = 1, .seed = 53});
+    s.camera.cx = 3;
+    s.camera.cy = 30;
+    size_t beyond = 0;
+    for (size_t i = 0; i < s.model.size(); ++i) {
+        for (int c = 0; c < 3; ++c) s.model.position[i * 3 + c] *= 4;
+        const glm::dvec3 world(s.model.position[i * 3], s.model.position[i * 3 + 1],
+                               s.model.position[i * 3 + 2]);
+        glm::dvec3 p = s.camera.rotation * world + s.camera.translation;
+        if (p.z < 0.3) {  // into the view's half space
+            p.z = 0.5 + std::abs(p.z);
+            const glm::dvec3 back = glm::transpose(s.camera.rotation) * (p - s.camera.translation);
+            for (int c = 0; c < 3; ++c) s.model.position[i * 3 + c] = static_cast<float>(back[c]);
+        }
+        const double x = s.camera.fx * p.x / p.z + s.camera.cx;
+        beyond += x < -0.15 * 32 || x > 1.15 * 32;
+    }
+    ASSERT_GT(beyond, 50U);
+    expect_gradients_match(s.model, s.camera);
+}
+
+TEST(ProjectBackward, quaternions_of_any_norm_match_double) {
+    for (const double norm : {2e-6, 1e-3, 1e5, 1e15}) {
+        SCOPED_TRACE(fmt::format("norm {}", norm));
+        TestScene s = random_scene({.count = 60, .seed = 54});
+        for (size_t i = 0; i < s.model.size(); ++i) {
+            double square = 0;
+            for (int c = 0; c < 4; ++c) square += std::pow(s.model.rotation[i * 4 + c], 2);
+            for (int c = 0; c < 4; ++c)
+                s.model.rotation[i * 4 + c] =
+                    static_cast<float>(s.model.rotation[i * 4 + c] * norm / std::sqrt(square));
+        }
+        expect_gradients_match(s.model, s.camera);
+    }
+}
+
+TEST(ProjectBackward, needles_and_discs_match_double) {
+    for (const double ratio : {1e2, 1e4, 1e6})
+        for (const bool disc : {false, true}) {
+            SCOPED_TRACE(fmt::format("ratio {} {}", ratio, disc ? "disc" : "needle"));
+            TestScene s = random_scene({.count = 60, .seed = 55});
+            const auto thin = static_cast<float>(-std::log(ratio));
+            for (size_t i = 0; i < s.model.size(); ++i)
+                for (int c = 0; c < 3; ++c)
+                    s.model.log_scale[i * 3 + c] = (c == 0) == disc ? thin : 0.0f;
+            expect_gradients_match(s.model, s.camera, 3, "project_gradient_needles");
+        }
+}
+
+TEST(ProjectBackward, parameters_beyond_their_limits_have_no_gradient) {
+    TestScene s = random_scene({.count = 8, .seed = 56});
+    for (size_t i = 0; i < 8; ++i) {
+        s.model.opacity[i] = i % 2 == 0 ? 1e4f : 31.0f;
+        s.model.log_scale[i * 3] = -50;
+    }
+    const Partials partials = Partials::random(8, 5);
+    const PassState after =
+        run_backward_pass(s.model, s.camera, 3, false, start_state(s.model), partials);
+    const auto d = stored_gradients(after);
+    for (size_t i = 0; i < 8; ++i) {
+        EXPECT_EQ(d[kOpacity][i], 0) << "splat " << i;
+        EXPECT_EQ(d[kLogScale][i * 3], 0) << "splat " << i;
+        EXPECT_EQ(d[kLogScale][i * 3 + 1] != 0, partials.count[i] > 0) << "splat " << i;
+    }
+    EXPECT_EQ(after.status.bad_gradients, 0U);
+}
+
+TEST(ProjectBackward, colours_clamped_at_zero_have_no_gradient) {
+    TestScene s = random_scene({.count = 3, .sh_degree = 1, .seed = 57});
+    s.model.sh_rest.assign(s.model.sh_rest.size(), 0.0f);
+    s.model.sh_dc = {-10, 1, 1, 1, -10, 1, 1, 1, -10};
+    const auto d = stored_gradients(run_backward_pass(
+        s.model, s.camera, 1, false, start_state(s.model), Partials::random(3, 6)));
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t c = 0; c < 3; ++c) {
+            EXPECT_EQ(d[kShDc][i * 3 + c] == 0, i == c) << "splat " << i << " channel " << c;
+            EXPECT_EQ(d[kShRest][i * 9 + c] == 0, i == c) << "splat " << i << " channel " << c;
+        }
+}
+
+// Every tile of the largest image that one buffer binding of 128 MiB holds.
+TEST(ProjectBackward, a_splat_with_43000_pairs_sums_all_of_them) {
+    const TestScene s = random_scene({.count = 1, .seed = 58});
+    Partials partials;
+    partials.begin = {0};
+    partials.count = {43'000};
+    partials.pairs.assign(43'000, {1, 0.5f, -0.25f, 1, 2, 1, 1, 1, 0.5f});
+    const DoubleGradients expected = gradients_in_double(s.model, s.camera, 3, partials);
+    const auto got = stored_gradients(
+        run_backward_pass(s.model, s.camera, 3, false, start_state(s.model), partials));
+    for (int a = 0; a < kAttributeCount; ++a)
+        EXPECT_TRUE(compare_scaled(attribute_name(a), expected.d[a], got[a],
+                                   tolerance("project_gradient_float32")));
+}
+
+}  // namespace
+}  // namespace darb::test

@@ -1,0 +1,173 @@
+// project_backward.comp alone: parameters and moments of a model on the device, sums of pairs set
+// by the test, and the reference's gradients for the same sums.
+#pragma once
+
+#include <array>
+
+#include "engine/core/rng.h"
+#include "engine/gpu/commands.h"
+#include "engine/reference/render.h"
+#include "engine/render/backward.h"
+#include "engine/render/groups.h"
+#include "engine/render/kernel_constants.h"
+#include "tests/support/guarded_buffer.h"
+#include "tests/support/shared_device.h"
+
+namespace darb::test {
+
+/// What blend_backward leaves for one pair: [0..3] sums of G x, G x dx, G x dy, G dy, [4]
+/// d_opacity, [5..7] d_colour, [8] sum of G dy dy.
+using PairPartials = std::array<float, 9>;
+
+/// The pairs of every splat, one after another.
+struct Partials {
+    std::vector<std::uint32_t> count, begin;  // [N]
+    std::vector<PairPartials> pairs;          // [K]
+
+    /// 0 to 5 pairs each; every fifth splat has none. The size of the sums differs by 1e4 between
+    /// splats, as it does in scenes.
+    static Partials random(size_t splats, std::uint64_t seed) {
+        Pcg32 rng(seed);
+        Partials p;
+        for (size_t i = 0; i < splats; ++i) {
+            p.begin.push_back(static_cast<std::uint32_t>(p.pairs.size()));
+            p.count.push_back(i % 5 == 4 ? 0 : 1 + rng.below(5));
+            const double size = std::pow(10.0, rng.uniform(-4, 0));
+            for (std::uint32_t k = 0; k < p.count.back(); ++k) {
+                p.pairs.emplace_back();
+                for (float& value : p.pairs.back())
+                    value = static_cast<float>(size * rng.uniform(-1, 1));
+            }
+        }
+        return p;
+    }
+};
+
+struct PassState {
+    std::array<std::vector<float>, kAttributeCount> parameters;
+    std::array<std::vector<float>, kAttributeCount> moments;  // [N][stride][2]
+    std::vector<glm::vec2> gradient_sum;
+    gpu::FrameStatus status;
+    bool operator==(const PassState& o) const {
+        return parameters == o.parameters && moments == o.moments &&
+               gradient_sum == o.gradient_sum &&
+               std::memcmp(&status, &o.status, sizeof status) == 0;
+    }
+};
+
+inline PassState start_state(const SplatModel& model) {
+    PassState s;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        s.parameters[a] = attribute_values(model, a);
+        s.moments[a].assign(s.parameters[a].size() * 2, 0.0f);
+    }
+    s.gradient_sum.assign(model.size(), glm::vec2(0));
+    s.status = {};
+    return s;
+}
+
+/// One run of the pass. update: Adam, else gradients into the first moments.
+inline PassState run_backward_pass(const SplatModel& model, const Camera& camera, int sh_degree,
+                                   bool update, const PassState& before, const Partials& partials,
+                                   const AdamStep& step = {}) {
+    Device& device = shared_device();
+    const auto n = static_cast<std::uint32_t>(model.size());
+    SpecConstants constants = kernel_constants(model.kernel, model.footprint);
+    constants["THREADS"] = SPLAT_GROUP;
+    constants["SH_DEGREE"] = sh_degree;
+    constants["SH_STORED"] = model.sh_degree;
+    constants["UPDATE"] = update ? 1 : 0;
+    const Pipeline pipeline(device, "project_backward", constants);
+    std::vector<float> sums, rest;
+    for (const PairPartials& pair : partials.pairs) {
+        sums.insert(sums.end(), pair.begin(), pair.begin() + 8);
+        rest.push_back(pair[8]);
+    }
+    const auto& b = before;
+    const GuardedBuffer cameras(device, "cameras", std::vector{camera_data(camera, model.origin)});
+    const GuardedBuffer p[] = {
+        {device, "position", b.parameters[0]}, {device, "log_scale", b.parameters[1]},
+        {device, "rotation", b.parameters[2]}, {device, "opacity", b.parameters[3]},
+        {device, "sh_dc", b.parameters[4]},    {device, "sh_rest", b.parameters[5]}};
+    const GuardedBuffer m[] = {
+        {device, "m position", b.moments[0]}, {device, "m log_scale", b.moments[1]},
+        {device, "m rotation", b.moments[2]}, {device, "m opacity", b.moments[3]},
+        {device, "m sh_dc", b.moments[4]},    {device, "m sh_rest", b.moments[5]}};
+    const GuardedBuffer count(device, "pair count", partials.count),
+        begin(device, "pair begin", partials.begin), sum(device, "partials", sums),
+        rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
+        status(device, "status", std::vector{b.status});
+    const gpu::ProjectBackwardArgs args{n,
+                                        0,
+                                        static_cast<float>(LOW_PASS_DEFAULT),
+                                        step.position,
+                                        step.scale,
+                                        step.rotation,
+                                        step.opacity,
+                                        step.sh_dc,
+                                        step.sh_rest,
+                                        step.inverse_sqrt_correction2};
+    Commands commands(device);
+    commands.begin();
+    const Groups g = groups_for(n);
+    commands.dispatch(pipeline, args,
+                      {cameras, p[0], p[1], p[2], p[3], p[4], p[5], m[0], m[1], m[2], m[3], m[4],
+                       m[5], count, begin, sum, rests, gradient, status},
+                      g.x, g.y);
+    commands.submit_and_wait();
+    PassState after;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        EXPECT_TRUE(p[a].intact());
+        EXPECT_TRUE(m[a].intact());
+        after.parameters[a] = p[a].read<float>();
+        after.moments[a] = m[a].read<float>();
+    }
+    EXPECT_TRUE(gradient.intact() && status.intact() && sum.intact() && rests.intact());
+    after.gradient_sum = gradient.read<glm::vec2>();
+    after.status = status.read<gpu::FrameStatus>()[0];
+    return after;
+}
+
+/// What the first moments hold after a run without update.
+inline std::array<std::vector<float>, kAttributeCount> stored_gradients(const PassState& state) {
+    std::array<std::vector<float>, kAttributeCount> d;
+    for (int a = 0; a < kAttributeCount; ++a)
+        for (size_t i = 0; i < state.moments[a].size(); i += 2) d[a].push_back(state.moments[a][i]);
+    return d;
+}
+
+struct DoubleGradients {
+    std::array<std::vector<double>, kAttributeCount> d;
+    std::vector<double> mean_ndc;  // [N]
+};
+
+inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera& camera,
+                                           int sh_degree, const Partials& partials) {
+    reference::RenderSettings settings;
+    settings.sh_degree = sh_degree;
+    const auto splats = reference::make_splats<double>(model);
+    const auto& kernel = reference::kernel_table(model.kernel, model.footprint);
+    reference::SplatGradients<double> out;
+    out.resize_like(splats);
+    DoubleGradients result;
+    for (size_t i = 0; i < model.size(); ++i) {
+        const auto s = reference::project(splats, i, camera, settings, kernel);
+        double sum[9] = {};
+        for (std::uint32_t e = 0; e < partials.count[i]; ++e)
+            for (int c = 0; c < 9; ++c) sum[c] += partials.pairs[partials.begin[i] + e][c];
+        const reference::ProjectedGradient<double> g{
+            {2 * s.l11 * sum[0], 2 * (s.l21 * sum[0] + s.l22 * s.l22 * sum[3])},
+            2 * sum[1],
+            2 * sum[2],
+            2 * s.l22 * sum[8],
+            sum[4],
+            {sum[5], sum[6], sum[7]}};
+        reference::project_backward(splats, i, camera, settings, kernel, s, g, out);
+        result.mean_ndc.push_back(
+            std::hypot(g.d_mean_px.x * camera.width / 2, g.d_mean_px.y * camera.height / 2));
+    }
+    result.d = {out.position, out.log_scale, out.rotation, out.opacity, out.sh_dc, out.sh_rest};
+    return result;
+}
+
+}  // namespace darb::test
