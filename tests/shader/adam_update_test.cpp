@@ -1,0 +1,184 @@
+// The Adam step inside project_backward.comp against Adam in double, and what it must leave alone.
+#include "engine/reference/adam.h"
+#include "tests/support/backward_pass.h"
+#include "tests/support/compare.h"
+#include "tests/support/random_scene.h"
+
+namespace darb::test {
+namespace {
+
+constexpr AdamStep kRates{2e-3f, 5e-3f, 1e-3f, 0.025f, 2.5e-3f, 1.25e-4f};
+
+double rate_of(int attribute) {
+    const float rates[] = {kRates.position, kRates.scale, kRates.rotation,
+                           kRates.opacity,  kRates.sh_dc, kRates.sh_rest};
+    return rates[attribute];
+}
+
+struct Training {
+    TestScene scene;
+    Partials partials;
+
+    explicit Training(size_t count = 50, std::uint64_t seed = 61)
+        : scene(random_scene({.count = count, .seed = seed})),
+          partials(Partials::random(count, seed + 1)) {}
+
+    PassState gradient(const PassState& state) const {
+        return run_backward_pass(scene.model, scene.camera, 3, false, state, partials);
+    }
+    PassState update(const PassState& state, int t, int degree = 3) const {
+        return run_backward_pass(scene.model, scene.camera, degree, true, state, partials,
+                                 adam_step(kRates, t));
+    }
+};
+
+/// Adam in double on the device's own gradient. Moves are compared in units of the learning rate.
+void expect_step_matches(const PassState& before, const PassState& gradient, const PassState& after,
+                         int t) {
+    const auto g32 = stored_gradients(gradient);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        std::vector<double> x(before.parameters[a].begin(), before.parameters[a].end());
+        std::vector<double> first, second, move, got_move, got_first, got_second;
+        for (size_t i = 0; i < x.size(); ++i) {
+            first.push_back(before.moments[a][2 * i]);
+            second.push_back(before.moments[a][2 * i + 1]);
+            got_first.push_back(after.moments[a][2 * i]);
+            got_second.push_back(after.moments[a][2 * i + 1]);
+        }
+        const std::vector<double> g(g32[a].begin(), g32[a].end());
+        reference::adam_step<double>(x, g, first, second, rate_of(a), t);
+        for (size_t i = 0; i < x.size(); ++i) {
+            const double was = before.parameters[a][i];
+            move.push_back((x[i] - was) / rate_of(a));
+            got_move.push_back((double(after.parameters[a][i]) - was) / rate_of(a));
+            // The parameter itself is rounded: that much of the move is nobody's fault.
+            const double rounding = std::abs(was) * 0x1p-23 / rate_of(a);
+            EXPECT_NEAR(got_move[i], move[i], 2e-5 * (1 + std::abs(move[i])) + rounding)
+                << attribute_name(a) << " " << i << ", step " << t;
+        }
+        EXPECT_TRUE(compare(fmt::format("{} first moment", attribute_name(a)), first, got_first,
+                            tolerance("adam_float32")));
+        EXPECT_TRUE(compare(fmt::format("{} second moment", attribute_name(a)), second, got_second,
+                            tolerance("adam_float32")));
+    }
+}
+
+TEST(AdamUpdate, steps_match_double_while_gradients_change) {
+    Training training;
+    PassState state = start_state(training.scene.model);
+    for (int t = 1; t <= 6; ++t) {
+        training.partials = Partials::random(50, 100 + static_cast<std::uint64_t>(t));
+        for (int a = 0; a < kAttributeCount; ++a)
+            attribute_values(training.scene.model, a) = state.parameters[a];
+        const PassState after = training.update(state, t);
+        expect_step_matches(state, training.gradient(state), after, t);
+        EXPECT_NE(after.parameters, state.parameters);
+        state = after;
+    }
+}
+
+TEST(AdamUpdate, late_steps_match_double) {
+    for (const int t : {100, 1000, 30'000}) {
+        Training training;
+        PassState state = start_state(training.scene.model);
+        Pcg32 rng(static_cast<std::uint64_t>(t));
+        for (auto& moments : state.moments)
+            for (size_t i = 0; i < moments.size(); i += 2) {
+                moments[i] = static_cast<float>(rng.uniform(-1e-3, 1e-3));
+                moments[i + 1] = static_cast<float>(rng.uniform(1e-8, 1e-5));
+            }
+        expect_step_matches(state, training.gradient(state), training.update(state, t), t);
+    }
+}
+
+TEST(AdamUpdate, unseen_splats_decay_and_move_on) {
+    Training training(20);
+    training.partials.count.assign(20, 0);
+    PassState state = start_state(training.scene.model);
+    for (auto& moments : state.moments)
+        for (size_t i = 0; i < moments.size(); i += 2) {
+            moments[i] = 0.5f;
+            moments[i + 1] = 0.25f;
+        }
+    const PassState after = training.update(state, 10);
+    for (int a = 0; a < kAttributeCount; ++a)
+        for (size_t i = 0; i < after.parameters[a].size(); ++i) {
+            EXPECT_FLOAT_EQ(after.moments[a][2 * i], 0.45f);
+            EXPECT_FLOAT_EQ(after.moments[a][2 * i + 1], 0.24975f);
+            EXPECT_NE(after.parameters[a][i], state.parameters[a][i]);
+        }
+    EXPECT_EQ(after.gradient_sum, state.gradient_sum) << "unseen frames do not count";
+}
+
+TEST(AdamUpdate, zero_moments_and_zero_gradient_move_nothing) {
+    Training training(20);
+    training.partials.count.assign(20, 0);
+    const PassState state = start_state(training.scene.model);
+    EXPECT_EQ(training.update(state, 3000), state);
+}
+
+TEST(AdamUpdate, an_overflowed_frame_changes_nothing) {
+    Training training;
+    PassState state = training.update(start_state(training.scene.model), 1);
+    state.status.overflow = 1;
+    EXPECT_EQ(training.update(state, 2), state);
+    EXPECT_EQ(training.gradient(state), state);
+}
+
+TEST(AdamUpdate, gradient_sum_adds_up_over_frames) {
+    Training training;
+    PassState state = start_state(training.scene.model);
+    const PassState once = training.gradient(state);
+    state.gradient_sum = once.gradient_sum;
+    const PassState twice = training.gradient(state);
+    int seen = 0;
+    for (size_t i = 0; i < 50; ++i) {
+        EXPECT_FLOAT_EQ(twice.gradient_sum[i].x, 2 * once.gradient_sum[i].x);
+        EXPECT_EQ(twice.gradient_sum[i].y, training.partials.count[i] > 0 ? 2 : 0);
+        seen += once.gradient_sum[i].x > 0;
+    }
+    EXPECT_EQ(seen, 40);
+}
+
+TEST(AdamUpdate, a_gradient_that_is_not_finite_is_counted_and_skipped) {
+    const float infinity = std::numeric_limits<float>::infinity();
+    for (const float bad : {std::nanf(""), infinity, -infinity})
+        for (size_t value = 0; value < 9; ++value) {
+            SCOPED_TRACE(fmt::format("{} in partial {}", bad, value));
+            Training training(10);
+            const PassState start = start_state(training.scene.model);
+            PassState expected = training.update(start, 1);
+            ASSERT_GT(training.partials.count[3], 0U);
+            training.partials.pairs[training.partials.begin[3]][value] = bad;
+            const PassState after = training.update(start, 1);
+            EXPECT_EQ(after.status.bad_gradients, 1U);
+            expected.status.bad_gradients = 1;
+            expected.gradient_sum[3] = start.gradient_sum[3];
+            for (int a = 0; a < kAttributeCount; ++a) {  // splat 3 as it was
+                const size_t stride = start.parameters[a].size() / 10;
+                for (size_t i = 3 * stride; i < 4 * stride; ++i)
+                    expected.parameters[a][i] = start.parameters[a][i];
+                for (size_t i = 6 * stride; i < 8 * stride; ++i)
+                    expected.moments[a][i] = start.moments[a][i];
+            }
+            EXPECT_EQ(after, expected);
+        }
+}
+
+TEST(AdamUpdate, bands_above_the_degree_in_use_stay_as_they_are) {
+    Training training;
+    const PassState start = start_state(training.scene.model);
+    const PassState after = training.update(start, 1, 1);
+    size_t moved = 0;
+    for (size_t i = 0; i < start.parameters[kShRest].size(); ++i) {
+        const bool used = i % 45 < 9;  // degree 1 of 3: three coefficients of three channels
+        const bool same = after.parameters[kShRest][i] == start.parameters[kShRest][i] &&
+                          after.moments[kShRest][2 * i] == 0;
+        EXPECT_TRUE(used || same) << i;
+        moved += !same;
+    }
+    EXPECT_GT(moved, 200U);
+}
+
+}  // namespace
+}  // namespace darb::test
