@@ -23,6 +23,7 @@ build    ccache               quick rebuilds
 build    glslang-tools        GLSL to SPIR-V
 build    libvulkan-dev        Vulkan headers and loader
 build    libglm-dev           vectors and matrices
+build    libnanoflann-dev     nearest neighbours
 build    libfmt-dev           text
 build    libcli11-dev         command line
 build    nlohmann-json3-dev   JSON
