@@ -1,0 +1,175 @@
+// Training runs of a few dozen iterations: they repeat bit by bit, go on from a checkpoint as if
+// never stopped, survive frames that need more room, and bring the loss down.
+#include "engine/data/metrics.h"
+#include "tests/support/tiny_training.h"
+#include "trainer/checkpoint.h"
+
+namespace darb::test {
+namespace {
+
+void run_to(Trainer& trainer, int iteration) {
+    while (trainer.iteration() < iteration) trainer.step();
+}
+
+TEST(Training, the_same_seed_gives_the_same_bits) {
+    const TinyTraining t = tiny_training();
+    Trainer one = t.trainer(), two = t.trainer();
+    run_to(one, 60);
+    run_to(two, 60);
+    EXPECT_TRUE(same_state(one, two));
+    EXPECT_GT(one.counters().cloned_or_split, 10U) << "density control must take part";
+    EXPECT_GT(one.counters().pruned, 0U);
+}
+
+TEST(Training, another_seed_gives_other_bits) {
+    TinyTraining t = tiny_training();
+    Trainer one = t.trainer();
+    run_to(one, 20);
+    t.options.seed = 6;
+    Trainer two = t.trainer();
+    run_to(two, 20);
+    EXPECT_FALSE(same_state(one, two));
+}
+
+// Stops right before, at and after density control and the opacity reset, and in between.
+TEST(Training, a_resumed_run_equals_one_that_never_stopped) {
+    TinyTraining t = tiny_training();
+    t.options.white_background = true;  // resets opacities once more
+    Trainer whole = t.trainer();
+    run_to(whole, 60);
+    for (const int stop : {1, 19, 20, 25, 33, 59}) {
+        SCOPED_TRACE(fmt::format("stopped at {}", stop));
+        const auto path = std::filesystem::path(testing::TempDir()) /
+                          fmt::format("darb_resume_{}_{}", ::getpid(), stop);
+        {
+            Trainer first = t.trainer();
+            run_to(first, stop);
+            write_checkpoint(path, {first.state(), settings_text(t.options),
+                                    dataset_fingerprint(t.dataset), 1.0});
+        }
+        const Checkpoint checkpoint = read_checkpoint(path);
+        check_resumable(checkpoint, path, t.options, t.dataset);
+        Trainer second = t.trainer();
+        second.restore(checkpoint.state);
+        EXPECT_EQ(second.iteration(), stop);
+        run_to(second, 60);
+        EXPECT_TRUE(same_state(whole, second));
+        EXPECT_EQ(second.counters().cloned_or_split, whole.counters().cloned_or_split);
+        EXPECT_EQ(second.counters().pruned, whole.counters().pruned);
+        EXPECT_EQ(second.counters().culled, whole.counters().culled);
+        std::filesystem::remove(path);
+    }
+}
+
+TEST(Training, looking_at_pictures_meanwhile_changes_nothing) {
+    const TinyTraining t = tiny_training();
+    Trainer one = t.trainer(), two = t.trainer();
+    run_to(one, 30);
+    while (two.iteration() < 30) {
+        two.step();
+        two.render(t.dataset.views[two.iteration() % 6].camera);
+        if (two.iteration() % 7 == 0) two.state();
+    }
+    EXPECT_TRUE(same_state(one, two));
+}
+
+/// Wide splats and a close-up, so that one view wants more pairs than the first room of 1,024.
+TinyTraining overflowing() {
+    TinyTraining t = tiny_training({.width = 320, .height = 200, .splats = 24, .close_up = 3});
+    t.options.densify_grad_threshold = 2e-4f;
+    t.options.iterations = 30;
+    return t;
+}
+
+TEST(Training, frames_that_overflow_are_done_again_and_leave_no_trace) {
+    const TinyTraining t = overflowing();
+    Trainer tight = t.trainer(), roomy = t.trainer();
+    for (const View& view : t.dataset.views) roomy.render(view.camera);  // grows its buffers
+    std::vector<IterationResult> results[2];
+    tight.on_result = [&](const IterationResult& r) { results[0].push_back(r); };
+    roomy.on_result = [&](const IterationResult& r) { results[1].push_back(r); };
+    run_to(tight, 30);
+    run_to(roomy, 30);
+    EXPECT_TRUE(same_state(tight, roomy));
+    EXPECT_GT(tight.counters().redone_iterations, 0U);
+    EXPECT_EQ(roomy.counters().redone_iterations, 0U) << "the comparison must not overflow";
+    tight.drain();
+    roomy.drain();
+    for (const auto& r : results) ASSERT_EQ(r.size(), 30U);
+    std::uint32_t most = 0;
+    for (int i = 0; i < 30; ++i) {
+        EXPECT_EQ(results[0][i].iteration, i + 1) << "each iteration once and in order";
+        EXPECT_EQ(results[0][i].loss, results[1][i].loss) << i;
+        EXPECT_EQ(results[0][i].pairs, results[1][i].pairs) << i;
+        most = std::max(most, results[0][i].pairs);
+    }
+    EXPECT_GT(most, 1024U);
+    EXPECT_EQ(tight.counters().culled, roomy.counters().culled);
+}
+
+TEST(Training, held_out_picture_gets_closer_to_the_photo) {
+    TinyTraining t = tiny_training();
+    t.options.iterations = 300;
+    t.options.densify_until = 0;
+    Trainer trainer = t.trainer();
+    const double before = evaluate_held_out(trainer, t.dataset, t.photos).views[0].psnr_db;
+    run_to(trainer, 300);
+    const double after = evaluate_held_out(trainer, t.dataset, t.photos).views[0].psnr_db;
+    EXPECT_GT(after, before + 3) << "from " << before << " dB";
+}
+
+TEST(Training, a_model_that_lost_every_splat_trains_on) {
+    TinyTraining t = tiny_training();
+    t.options.prune_opacity = 2;  // nothing survives the first density control
+    Trainer trainer = t.trainer();
+    run_to(trainer, 40);
+    EXPECT_EQ(trainer.splat_count(), 0U);
+    EXPECT_EQ(trainer.model().size(), 0U);
+    for (const float value : trainer.render(t.dataset.views[1].camera).data) ASSERT_EQ(value, 0);
+}
+
+TEST(Training, one_splat_is_a_model) {
+    TinyTraining t = tiny_training();
+    t.dataset.points.position.resize(3);
+    t.dataset.points.colour.resize(3);
+    Trainer trainer = t.trainer();
+    ASSERT_EQ(trainer.splat_count(), 1U);
+    run_to(trainer, 30);
+    for (const float value : trainer.model().position) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(Training, splats_stop_growing_at_the_limit) {
+    TinyTraining t = tiny_training();
+    t.options.max_splats = 70;
+    t.options.prune_opacity = 0;
+    t.options.prune_extent = 100;
+    Trainer trainer = t.trainer();
+    run_to(trainer, 60);
+    EXPECT_EQ(trainer.splat_count(), 70U);
+    EXPECT_GT(trainer.counters().cloned_or_split, 5U);
+}
+
+TEST(Training, every_kernel_and_footprint_brings_the_loss_down) {
+    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+        for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
+            SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
+                         std::string(footprint_name(footprint)));
+            TinyTraining t = tiny_training();
+            t.options.kernel = kernel;
+            t.options.footprint = footprint;
+            t.options.densify_until = 0;
+            t.options.sh_degree = 0;
+            std::vector<double> losses;
+            Trainer trainer = t.trainer();
+            trainer.on_result = [&](const IterationResult& r) { losses.push_back(r.loss); };
+            run_to(trainer, 60);
+            trainer.drain();
+            double first = 0, last = 0;  // of two epochs of five views
+            for (int i = 0; i < 10; ++i) first += losses[i], last += losses[50 + i];
+            EXPECT_LT(last, 0.9 * first);
+            EXPECT_EQ(trainer.counters().bad_gradients, 0U);
+        }
+}
+
+}  // namespace
+}  // namespace darb::test
