@@ -170,7 +170,7 @@ std::string settings_text(const TrainOptions& o) {
                 {"sh_interval", o.sh_interval},
                 {"white_background", o.white_background},
                 {"lambda_dssim", o.lambda_dssim},
-                {"position_lr", {o.position_lr_init, o.position_lr_final}},
+                {"position_lr", {o.position_lr_start(), o.position_lr_end()}},
                 {"scale_lr", o.scale_lr},
                 {"rotation_lr", o.rotation_lr},
                 {"opacity_lr", o.opacity_lr},
@@ -182,7 +182,7 @@ std::string settings_text(const TrainOptions& o) {
                 {"clone_split_extent", o.clone_split_extent},
                 {"prune_opacity", o.prune_opacity},
                 {"prune_extent", o.prune_extent},
-                {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to}},
+                {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
                 {"max_splats", o.max_splats},
                 {"initial_opacity", o.initial_opacity},
                 {"random_points", o.random_points}}

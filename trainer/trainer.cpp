@@ -92,8 +92,8 @@ int Trainer::view_for(int iteration) {
 
 AdamStep Trainer::rates(int iteration) const {
     const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
-    const double position = std::exp((1 - t) * std::log(options_.position_lr_init) +
-                                     t * std::log(options_.position_lr_final));
+    const double position = std::exp((1 - t) * std::log(options_.position_lr_start()) +
+                                     t * std::log(options_.position_lr_end()));
     AdamStep step;
     step.position = static_cast<float>(position * extent_);
     step.scale = options_.scale_lr;
@@ -219,7 +219,7 @@ void Trainer::density_control(int iteration) {
         backward_.clear_gradient_sum(commands);
         commands.submit_and_wait();
     }
-    if (reset) density_.reset_opacity(splats_, options_.opacity_reset_to);
+    if (reset) density_.reset_opacity(splats_, options_.opacity_reset_to());
 }
 
 SplatModel Trainer::model() {

@@ -62,11 +62,11 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
     command.add_option("--lambda-dssim", t.lambda_dssim, "weight of 1 - SSIM in the loss")
         ->capture_default_str()
         ->check(CLI::Range(0.0, 1.0));
-    command.add_option("--position-lr-init", t.position_lr_init)
-        ->capture_default_str()
+    command
+        .add_option("--position-lr-init", t.position_lr_init,
+                    "default 1.6e-4, times sqrt(30000 / iterations) in shorter runs")
         ->check(CLI::PositiveNumber);
-    command.add_option("--position-lr-final", t.position_lr_final)
-        ->capture_default_str()
+    command.add_option("--position-lr-final", t.position_lr_final, "default 1.6e-6, likewise")
         ->check(CLI::PositiveNumber);
     command.add_option("--scaling-lr", t.scale_lr)
         ->capture_default_str()
@@ -105,6 +105,9 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
                     "share of the scene extent above which a splat splits rather than clones")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
+    command.add_option("--prune-opacity", t.prune_opacity, "splats below this opacity go")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
     command
         .add_option("--cap-max,--max-splats,--budget", t.max_splats,
                     "growth stops at this many splats")
