@@ -16,8 +16,9 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kMagic[8] = {'D', 'A', 'R', 'B', 'C', 'K', 'P', 'T'};
-constexpr std::uint32_t kVersion = 1;
-constexpr size_t kHeadBytes = sizeof kMagic + 4 + 8;
+constexpr std::uint32_t kVersion = 2;
+// Magic, version, CRC-32 of everything behind itself, bytes of the JSON header.
+constexpr size_t kCrcAt = sizeof kMagic + 4, kSizeAt = kCrcAt + 4, kHeadBytes = kSizeAt + 8;
 constexpr std::uint64_t kMaxSplats = 1u << 30;
 
 // The arrays of a state in file order.
@@ -38,7 +39,7 @@ std::uint32_t checksum(std::span<const std::byte> bytes) {
     return static_cast<std::uint32_t>(crc);
 }
 
-Json header_of(const Checkpoint& c, std::uint32_t crc) {
+Json header_of(const Checkpoint& c) {
     const SplatModel& m = c.state.model;
     const TrainCounters& n = c.state.counters;
     return Json{{"iteration", c.state.iteration},
@@ -52,8 +53,7 @@ Json header_of(const Checkpoint& c, std::uint32_t crc) {
                 {"settings", c.settings},
                 {"dataset", c.dataset},
                 {"counters", {n.redone_iterations, n.bad_gradients, n.cloned_or_split, n.pruned}},
-                {"culled", n.culled},
-                {"crc32", crc}};
+                {"culled", n.culled}};
 }
 
 void read_header(const Json& h, Checkpoint& c, const std::string& where) {
@@ -103,15 +103,17 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
         const auto bytes = std::as_bytes(std::span(values));
         payload.insert(payload.end(), bytes.begin(), bytes.end());
     });
-    const std::string header = header_of(checkpoint, checksum(payload)).dump();
+    const std::string header = header_of(checkpoint).dump();
     const std::uint64_t header_bytes = header.size();
     std::vector<std::byte> file(kHeadBytes + header.size() + payload.size());
     std::memcpy(file.data(), kMagic, sizeof kMagic);
     std::memcpy(file.data() + 8, &kVersion, 4);
-    std::memcpy(file.data() + 12, &header_bytes, 8);
+    std::memcpy(file.data() + kSizeAt, &header_bytes, 8);
     std::memcpy(file.data() + kHeadBytes, header.data(), header.size());
     if (!payload.empty())
         std::memcpy(file.data() + kHeadBytes + header.size(), payload.data(), payload.size());
+    const std::uint32_t crc = checksum(std::span(file).subspan(kSizeAt));
+    std::memcpy(file.data() + kCrcAt, &crc, 4);
     write_file_atomic(path, file);
 }
 
@@ -119,24 +121,23 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     const auto fail = [&](const std::string& what) {
         return Error(where, what, "Start from another checkpoint, or without --resume.");
     };
-    std::uint32_t version = 0;
+    std::uint32_t version = 0, crc = 0;
     std::uint64_t header_bytes = 0;
     if (file.size() < kHeadBytes || std::memcmp(file.data(), kMagic, sizeof kMagic) != 0)
         throw fail("this is no darb checkpoint");
     std::memcpy(&version, file.data() + 8, 4);
-    std::memcpy(&header_bytes, file.data() + 12, 8);
+    std::memcpy(&crc, file.data() + kCrcAt, 4);
+    std::memcpy(&header_bytes, file.data() + kSizeAt, 8);
     if (version != kVersion)
         throw fail(fmt::format("version {}, this program reads {}", version, kVersion));
     if (header_bytes > file.size() - kHeadBytes) throw fail("truncated in the header");
     const auto* text = reinterpret_cast<const char*>(file.data() + kHeadBytes);
     Checkpoint c;
     std::uint64_t splats = 0;
-    std::uint32_t crc = 0;
     try {
         const Json header = Json::parse(text, text + header_bytes);
         read_header(header, c, where);
         splats = header.at("splats").get<std::uint64_t>();
-        crc = header.at("crc32").get<std::uint32_t>();
     } catch (const Json::exception& e) {
         throw fail(std::string("the header cannot be read: ") + e.what());
     }
@@ -145,7 +146,8 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     if (payload.size() != expected)
         throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
                                payload.size(), splats, expected));
-    if (checksum(payload) != crc) throw fail("damaged: the checksum of the data does not match");
+    if (checksum(file.subspan(kSizeAt)) != crc)
+        throw fail("damaged: the checksum does not match the content");
     size_arrays(c, splats);
     size_t at = 0;
     for_each_array(c.state, [&](std::vector<float>& values) {

@@ -1,5 +1,5 @@
-// Checkpoints: everything a run needs to go on bit-equal. One file: "DARBCKPT", version, a JSON
-// header with the sizes, the settings and a CRC-32 of what follows, then float32 arrays. Written
+// Checkpoints: everything a run needs to go on bit-equal. One file: "DARBCKPT", version, a
+// CRC-32 of the rest, a JSON header with the sizes and the settings, float32 arrays. Written
 // atomically.
 #pragma once
 
