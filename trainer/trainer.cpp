@@ -149,8 +149,7 @@ std::uint32_t Trainer::finish(Flight& flight) {
     if (status.overflow != 0) return status.pairs;
 
     for (size_t r = 0; r < counters_.culled.size(); ++r) counters_.culled[r] += status.culled[r];
-    counters_.bad_gradients =
-        std::max<std::uint64_t>(counters_.bad_gradients, status.bad_gradients);
+    counters_.bad_gradients += status.bad_gradients;
     for (const PassTime& pass : flight.commands.pass_times()) {
         const auto known = std::find_if(pass_totals_.begin(), pass_totals_.end(),
                                         [&](const PassTotal& p) { return p.name == pass.name; });

@@ -160,9 +160,8 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
     DARB_CHECK(n <= splat_capacity_ && std::uint64_t(data.width) * data.height <= pixel_capacity_,
                "{} splats of {}, {} x {} px", n, splat_capacity_, data.width, data.height);
     commands.pass("project");
-    commands.fill(
-        BufferRange(status_, offsetof(gpu::FrameStatus, culled), sizeof(gpu::FrameStatus::culled)),
-        0);
+    constexpr std::uint64_t of_frame = offsetof(gpu::FrameStatus, bad_gradients);
+    commands.fill(BufferRange(status_, of_frame, sizeof(gpu::FrameStatus) - of_frame), 0);
     if (n > 0) {
         const gpu::ProjectArgs args{n, camera_index, static_cast<float>(LOW_PASS_DEFAULT)};
         const Groups g = groups_for(n);

@@ -62,7 +62,7 @@ class Forward {
     const Buffer& image() const { return image_; }    // float [3][H][W], not clamped
     const Buffer& status() const { return status_; }  // gpu::FrameStatus
     gpu::FrameStatus read_status() const;
-    /// Overflow and bad-gradient counters to zero. The queue must be idle.
+    /// The overflow flag and all counters to zero. The queue must be idle.
     void clear_status();
 
     // For the backward pass.

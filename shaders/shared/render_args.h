@@ -10,8 +10,9 @@
 #define MAX_GROUPS 65535u  // the portable limit of one dispatch dimension
 #define CULL_REASONS 8     // see CULL_* below
 
-// A pair names its splat in the low bits and, in the high ones, which of the tile's four 8 x 8 blocks its
-// ellipse touches: bit 0 the top left, 1 the top right, 2 the bottom left, 3 the bottom right.
+// A pair names its splat in the low bits and, in the high ones, which of the tile's four 8 x 8
+// blocks its ellipse touches: bit 0 the top left, 1 the top right, 2 the bottom left, 3 the bottom
+// right.
 #define PAIR_BLOCK_SHIFT 28
 #define PAIR_SPLAT_MASK 0x0FFFFFFFu
 
@@ -50,7 +51,7 @@ struct FrameStatus {
     uint visible;        // V
     uint pairs;          // K as wanted, may exceed the capacity
     uint overflow;       // 1: pairs exceeded the capacity; sticky until the host clears it
-    uint bad_gradients;  // splats whose gradient was not finite, since the host cleared it
+    uint bad_gradients;  // splats whose gradient was not finite
     uint culled[CULL_REASONS];
 };
 
