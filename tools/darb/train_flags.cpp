@@ -68,15 +68,10 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::PositiveNumber);
     command.add_option("--position-lr-final", t.position_lr_final, "default 1.6e-6, likewise")
         ->check(CLI::PositiveNumber);
-    command.add_option("--scaling-lr", t.scale_lr)
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
-    command.add_option("--rotation-lr", t.rotation_lr)
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
-    command.add_option("--opacity-lr", t.opacity_lr)
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
+    for (auto [name, rate] : {std::pair{"--scaling-lr", &t.scale_lr},
+                              {"--rotation-lr", &t.rotation_lr},
+                              {"--opacity-lr", &t.opacity_lr}})
+        command.add_option(name, *rate)->capture_default_str()->check(CLI::NonNegativeNumber);
     command
         .add_option("--feature-lr", t.sh_dc_lr,
                     "of the colour; its view-dependent part learns at a 20th")
