@@ -2,6 +2,8 @@
 // double-precision reference, for every kernel, footprint and evaluation.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "engine/core/rng.h"
 #include "engine/reference/render.h"
 #include "tests/support/device_walk.h"
@@ -116,6 +118,14 @@ TEST_P(WalkDegree, dense_scene_matches_double) {
 }
 
 INSTANTIATE_TEST_SUITE_P(sh, WalkDegree, testing::Range(0, 4));
+
+// The runs at other vector widths are worth something only where the width takes effect.
+TEST(Subgroup, size_is_that_of_the_vector_width) {
+    const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");
+    if (width == nullptr || !shared_device().is_lavapipe()) return;
+    EXPECT_EQ(shared_device().info().subgroup_size, std::stoul(width) / 32);
+    EXPECT_EQ(blend_subgroup(shared_device()), std::stoul(width) / 32);
+}
 
 }  // namespace
 }  // namespace darb::test
