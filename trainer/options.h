@@ -25,8 +25,8 @@ struct TrainOptions {
 
     // Learning rates of Adam; position is log-linear over the run and in units of the scene extent.
     // Position rates <= 0: 1.6e-4 to 1.6e-6, times sqrt(30,000 / iterations) in shorter runs, which
-    // else end before positions settle (fox at 200 px, 4,000 iterations: 27.8 dB without, 28.2
-    // with).
+    // else end before positions settle (fox at 200 px, after 2,500 of 4,000: 27.95 dB with, 27.81
+    // without).
     float position_lr_init = 0, position_lr_final = 0;
     float scale_lr = 5e-3f, rotation_lr = 1e-3f, opacity_lr = 0.05f;
     float sh_dc_lr = 2.5e-3f, sh_rest_lr = 1.25e-4f;
@@ -35,7 +35,9 @@ struct TrainOptions {
     int densify_from = 500, densify_until = -1, densify_interval = 100;
     float densify_grad_threshold = 2e-4f;  // NDC units
     float clone_split_extent = 0.01f;      // share of the scene extent
-    // 3DGS prunes below 0.005; 0.1 leaves a quarter fewer splats and .7 dB more on held-out photos.
+    // 3DGS prunes below 0.005, at an opacity rate of 0.025. These two leave 59,192 rather than
+    // 80,811 splats on fox at 200 px after 2,000 iterations, and 27.47 rather than 26.75 dB on
+    // held-out views.
     float prune_opacity = 0.1f;
     float prune_extent = 0.1f;  // share of the scene extent, after the first opacity reset
     int opacity_reset_interval = 3'000;
