@@ -33,6 +33,11 @@ int largest(const Dataset& dataset, int Camera::*side) {
 
 }  // namespace
 
+Trainer::Flight::Flight(Device& device)
+    : loss(device, "loss result", sizeof(gpu::LossResult), Memory::host),
+      status(device, "status result", sizeof(gpu::FrameStatus), Memory::host),
+      commands(device) {}
+
 Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
                  const SplatModel& start, const TrainOptions& options)
     : device_(&device),
@@ -44,12 +49,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       backward_(device, forward_options(options), BackwardResult::update),
       loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height)),
       density_(device, options.kernel),
-      flights_{Flight{Commands(device),
-                      Buffer(device, "loss result", sizeof(gpu::LossResult), Memory::host),
-                      Buffer(device, "status result", sizeof(gpu::FrameStatus), Memory::host), 0},
-               Flight{Commands(device),
-                      Buffer(device, "loss result", sizeof(gpu::LossResult), Memory::host),
-                      Buffer(device, "status result", sizeof(gpu::FrameStatus), Memory::host), 0}} {
+      flights_{Flight(device), Flight(device)} {
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
                dataset.views.size());
     std::uint64_t pixels = 1;

@@ -86,10 +86,11 @@ class Trainer {
 
   private:
     struct Flight {
-        Commands commands;
+        explicit Flight(Device& device);
         Buffer loss;        // gpu::LossResult, host
         Buffer status;      // gpu::FrameStatus, host
         int iteration = 0;  // 0: empty
+        Commands commands;  // last: they are waited for before anything that they use goes
     };
     int view_for(int iteration);
     void launch(int iteration);

@@ -130,6 +130,16 @@ TEST(Training, gradients_that_are_not_finite_are_counted_over_the_whole_run) {
     EXPECT_EQ(a.bad_gradients, b.bad_gradients);
 }
 
+// As an exception leaves it; validation tells whether the device still used anything.
+TEST(Training, a_trainer_dropped_in_flight_waits_for_the_device) {
+    const TinyTraining t = tiny_training();
+    for (const int iterations : {1, 2, 3}) {
+        Trainer trainer = t.trainer();
+        run_to(trainer, iterations);
+    }
+    EXPECT_EQ(shared_device().validation_message_count(), 0U);
+}
+
 TEST(Training, held_out_picture_gets_closer_to_the_photo) {
     TinyTraining t = tiny_training();
     t.options.iterations = 300;
