@@ -58,9 +58,23 @@ ImageU8 to_8bit(const ImageF& image) {
 }
 
 ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
-                         const glm::vec3& background) {
-    const ImageF truth = composite(photo, background);
-    return {name, psnr(render, truth), ssim(render, truth)};
+                         const glm::vec3& background, bool alpha_is_mask) {
+    ImageF truth = composite(photo, background);
+    if (!alpha_is_mask) return {name, psnr(render, truth), ssim(render, truth)};
+    ImageF shown = render;
+    const size_t pixels = size_t(photo.width) * photo.height;
+    size_t counted = 0;
+    for (size_t p = 0; p < pixels; ++p) {
+        const bool counts = photo.data[p * 4 + 3] >= 128;
+        counted += counts ? 1 : 0;
+        for (size_t c = 0; c < 3; ++c) {
+            truth.data[p * 3 + c] = counts ? photo.data[p * 4 + c] / 255.0f : 0.0f;
+            if (!counts) shown.data[p * 3 + c] = 0.0f;
+        }
+    }
+    const double share = static_cast<double>(counted) / static_cast<double>(pixels);
+    return {name, psnr(shown, truth) + 10.0 * std::log10(std::max(share, 1e-12)),
+            ssim(shown, truth)};
 }
 
 void take_means(Evaluation& evaluation) {
@@ -81,7 +95,8 @@ Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
         const View& view = dataset.views[i];
         if (view.is_test)
             evaluation.views.push_back(compare_view(view.name, trainer.render(view.camera),
-                                                    photos[i], trainer.background()));
+                                                    photos[i], trainer.background(),
+                                                    dataset.alpha_is_mask));
     }
     take_means(evaluation);
     return evaluation;

@@ -16,9 +16,11 @@ ImageF composite(const ImageU8& photo, const glm::vec3& background);
 /// Clamped to [0, 1] and rounded to 8 bits.
 ImageU8 to_8bit(const ImageF& image);
 
-/// PSNR and SSIM of a render, clamped to [0, 1], against the photo over the same background.
+/// PSNR and SSIM of a render, clamped to [0, 1], against the photo over the same background. Where
+/// alpha is a mask, pixels below 128 are black in both, as the loss sees them, and PSNR is over the
+/// others alone.
 ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
-                         const glm::vec3& background);
+                         const glm::vec3& background, bool alpha_is_mask = false);
 /// Mean of the views into evaluation.psnr_db and ssim.
 void take_means(Evaluation& evaluation);
 

@@ -47,7 +47,8 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       splats_(device, start, true),
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options), BackwardResult::update),
-      loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height)),
+      loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height),
+            LossOptions{.use_mask = dataset.alpha_is_mask}),
       density_(device, options.kernel),
       flights_{Flight(device), Flight(device)} {
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
@@ -160,7 +161,7 @@ std::uint32_t Trainer::finish(Flight& flight) {
     }
     ++timed_iterations_;
     if (on_result) {
-        const double mse = std::max(double(loss.mse), 1e-12);
+        const double mse = std::max(double(loss.mse) / std::max(double(loss.weight), 1e-12), 1e-12);
         on_result({iteration, Loss::value(loss, options_.lambda_dssim), -10.0 * std::log10(mse),
                    splats_.count(), status.visible, status.pairs});
     }

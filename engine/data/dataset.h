@@ -42,6 +42,7 @@ struct Dataset {
     std::vector<View> views;         // by name, ascending
     PointCloud points;               // may be empty
     bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
+    bool alpha_is_mask = false;      // alpha comes from masks or gaps alone: pixels to leave out
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
 };
 

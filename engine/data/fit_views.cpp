@@ -18,6 +18,7 @@ constexpr int kDefaultWidth = 1600;  // px; wider photos are scaled down unless 
 
 /// What happened to how many photos, for the notes.
 struct Tally {
+    bool own_alpha = false;  // some photo has an alpha channel of its own
     std::size_t resized = 0, unturned = 0, undistorted = 0, downscaled = 0;
     std::string resize_example;
 };
@@ -38,7 +39,9 @@ int choose_orientation(const ImageInfo& info, const LensModel& lens) {
 
 void fit_lens(View& view, Dataset& dataset, Tally& tally) {
     const ImageInfo info = read_image_info(view.photo);
-    dataset.has_alpha |= info.channels == 2 || info.channels == 4 || !view.mask.empty();
+    const bool own_alpha = info.channels == 2 || info.channels == 4;
+    tally.own_alpha |= own_alpha;
+    dataset.has_alpha |= own_alpha || !view.mask.empty();
     if (view.orientation == 1) view.orientation = choose_orientation(info, view.lens);
     if (view.orientation != info.orientation) ++tally.unturned;
     const bool swap = view.orientation >= 5;
@@ -127,6 +130,7 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
         if (view.lens.distorted()) ++tally.undistorted;
         set_intrinsics(view, at->second, options.resolution, tally);
     }
+    dataset.alpha_is_mask = dataset.has_alpha && !tally.own_alpha;
     add_notes(tally, options, dataset);
 }
 

@@ -5,7 +5,6 @@
 
 #include "engine/core/check.h"
 #include "engine/render/groups.h"
-#include "engine/render/kernel_constants.h"
 
 namespace darb {
 
@@ -24,8 +23,7 @@ AdamStep adam_step(const AdamStep& rates, int t) {
 
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
     : device_(&device), options_(options), result_(result) {
-    SpecConstants blend = kernel_constants(options.kernel, options.footprint, options.evaluation,
-                                           options.polynomial_degree, options.alpha_cutoff);
+    SpecConstants blend = kernel_constants(options);
     const std::uint32_t subgroup = blend_subgroup(device);
     blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
     blend["THREADS"] = static_cast<std::int32_t>(subgroup);
@@ -35,9 +33,7 @@ Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult
 Pipeline& Backward::project_pipeline(int sh_degree) {
     const auto found = project_.find(sh_degree);
     if (found != project_.end()) return found->second;
-    SpecConstants constants =
-        kernel_constants(options_.kernel, options_.footprint, options_.evaluation,
-                         options_.polynomial_degree, options_.alpha_cutoff);
+    SpecConstants constants = kernel_constants(options_);
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = options_.sh_stored;

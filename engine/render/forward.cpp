@@ -25,6 +25,11 @@ int bits_for(std::uint32_t count) {
 
 }  // namespace
 
+SpecConstants kernel_constants(const ForwardOptions& options) {
+    return kernel_constants(options.kernel, options.footprint, options.evaluation,
+                            options.polynomial_degree, options.alpha_cutoff);
+}
+
 gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, float near_plane) {
     gpu::CameraData d{};
     const glm::dmat3 rows = glm::transpose(camera.rotation);  // glm columns of the transpose = rows
@@ -69,8 +74,7 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     groups_pairs_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 1}}, false);
     emit_ = Pipeline(device, "emit", per_item);
     tile_ranges_ = Pipeline(device, "tile_ranges", per_item);
-    SpecConstants blend = kernel_constants(options.kernel, options.footprint, options.evaluation,
-                                           options.polynomial_degree, options.alpha_cutoff);
+    SpecConstants blend = kernel_constants(options);
     blend["MIN_TRANSMITTANCE"] = options.transmittance_stop;
     blend["STORE_FOR_BACKWARD"] = options.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = blend_subgroup(device);
@@ -91,9 +95,7 @@ Forward::Forward(Device& device, const ForwardOptions& options)
 Pipeline& Forward::project_pipeline(int sh_degree) {
     const auto found = project_.find(sh_degree);
     if (found != project_.end()) return found->second;
-    SpecConstants constants =
-        kernel_constants(options_.kernel, options_.footprint, options_.evaluation,
-                         options_.polynomial_degree, options_.alpha_cutoff);
+    SpecConstants constants = kernel_constants(options_);
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = options_.sh_stored;

@@ -32,6 +32,9 @@ struct ForwardOptions {
     bool store_for_backward = false;
 };
 
+/// The kernel's constants for these options, which every pass that evaluates the kernel needs.
+SpecConstants kernel_constants(const ForwardOptions& options);
+
 /// A camera as the shaders read it. origin: SplatModel::origin, taken out of the pose in double.
 gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin,
                             float near_plane = static_cast<float>(NEAR_DEFAULT));

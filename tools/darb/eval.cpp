@@ -70,7 +70,8 @@ int eval(EvalFlags flags) {
     Evaluation evaluation;
     for (const View& view : views)
         evaluation.views.push_back(compare_view(view.name, renderer.render(view.camera, background),
-                                                load_photo(view), background));
+                                                load_photo(view), background,
+                                                dataset.alpha_is_mask));
     take_means(evaluation);
     print_table(evaluation);
     if (!flags.json.empty())

@@ -169,6 +169,7 @@ TEST(ColmapProject, masks_become_alpha) {
         write_png(folder / name, mask);
         const Dataset dataset = load_dataset(folder);
         EXPECT_TRUE(dataset.has_alpha);
+        EXPECT_TRUE(dataset.alpha_is_mask);
         const ImageU8 photo = load_photo(dataset.views[0]);
         EXPECT_EQ(photo.at(3, 0, 3), 0);
         EXPECT_EQ(photo.at(3, 1, 3), 255);

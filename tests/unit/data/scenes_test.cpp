@@ -43,6 +43,7 @@ TEST_P(RealScene, load_has_documented_counts_and_sizes) {
     EXPECT_EQ(dataset.views.size(), scene.views);
     EXPECT_EQ(dataset.points.size(), scene.points);
     EXPECT_EQ(dataset.has_alpha, scene.alpha);
+    EXPECT_FALSE(dataset.alpha_is_mask);
     std::size_t tests = 0;
     for (const View& view : dataset.views) {
         EXPECT_EQ(view.camera.width, scene.width) << view.name;
