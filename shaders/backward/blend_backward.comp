@@ -46,7 +46,7 @@ struct Pixels {
 
 // Sums over the thread's pixels; G = opacity dL/dalpha dw/dq without the opacity.
 struct Sums {
-    float gx, gxdx, gxdy, gdy, gdydy, opacity;
+    float gx, gxx, gxdy, gdy, gdydy, opacity;
     vec3 colour;
 };
 
@@ -86,7 +86,7 @@ Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint
         const float d_alpha = counts && raw < ALPHA_MAX ? before * ahead : 0.0;
         const float g = d_alpha * slope, gx = g * x, gdy = g * to_mean.y;
         s.gx += gx;
-        s.gxdx += gx * to_mean.x;
+        s.gxx += gx * x;
         s.gxdy += gx * to_mean.y;
         s.gdy += gdy;
         s.gdydy += gdy * to_mean.y;
@@ -123,7 +123,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
             const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
                                          subgroupBroadcast(number, lane));
             float parts[PARTIALS] =
-                float[](sums.gx * c.w, sums.gxdx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
+                float[](sums.gx * c.w, sums.gxx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
                         sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
             add_to_slot(subgroupBroadcast(slot, lane), parts, sums.gdydy * c.w);
         } while (lane > 0u);

@@ -11,23 +11,31 @@ struct SplatGradient {
 };
 
 struct Partial {
-    vec4 a;               // sums over pixels of G x, G x dx, G x dy, G dy; G = opacity dL/dalpha dw/dq
+    vec4 a;               // sums over pixels of G x, G x x, G x dy, G dy; G = opacity dL/dalpha dw/dq
     float b;              // G dy dy
     float d_opacity;
     vec3 d_colour;
 };
 
-// dL/d(r1), dL/d(r2), the rows of M, and dL/dmean.
-void factor_gradient(Factor f, Partial p, vec3 r1, vec3 r2, out vec3 d_r1, out vec3 d_r2, out vec2 d_mean) {
-    const float l11 = f.l11, l21 = f.l21, l22 = f.l22;
-    d_mean = 2.0 * vec2(l11 * p.a.x, l21 * p.a.x + l22 * l22 * p.a.w);
-    const float d_l11 = 2.0 * p.a.y, d_l21 = 2.0 * p.a.z, d_l22 = 2.0 * l22 * p.b;
-    const float d_a = -0.5 * l11 * l11 * (l11 * d_l11 + l21 * d_l21);
-    const float d_b = -l11 * (l11 * l21 * d_l11 + (l21 * l21 + l22 * l22) * d_l21);
-    const float d_c = -0.5 * (l11 * l21 * l21 * d_l11 + l21 * (2.0 * l22 * l22 + l21 * l21) * d_l21 +
-                              l22 * l22 * l22 * d_l22);
-    d_r1 = 2.0 * d_a * r1 + d_b * r2;
-    d_r2 = 2.0 * d_c * r2 + d_b * r1;
+// The rows of N = L M, L the factor [[l11, l21], [0, l22]], M with the rows r1 and r2: (x, y) = L d, so a change
+// of M moves q by -2 (x, y) L dM N^T (x, y)^T. Entries are at most 1 whatever the splat's shape.
+// l11 r1 + l21 r2 cancels on needles; the same by r2 x (r1 x r2) = |r2|^2 r1 - (r1 r2) r2 does not.
+void whitened_rows(Factor f, vec3 r1, vec3 r2, out vec3 n1, out vec3 n2) {
+    n1 = (cross(r2, cross(r1, r2)) + args.low_pass * r1) * (f.l11 / f.c);
+    n2 = f.l22 * r2;
+}
+
+// dL/d(r1), dL/d(r2), the rows of M; dL/d(log scale), which is d_r1 r1 + d_r2 r2 without its cancellation; dL/dmean.
+void factor_gradient(Factor f, Partial p, vec3 r1, vec3 r2, out vec3 d_r1, out vec3 d_r2,
+                     out vec3 d_log_scale, out vec2 d_mean) {
+    d_mean = 2.0 * vec2(f.l11 * p.a.x, f.l21 * p.a.x + f.l22 * f.l22 * p.a.w);
+    vec3 n1, n2;
+    whitened_rows(f, r1, r2, n1, n2);
+    const float xx = p.a.y, xy = f.l22 * p.a.z, yy = f.l22 * f.l22 * p.b;  // sums of G (x, y)^T (x, y)
+    const vec3 p1 = -2.0 * (xx * n1 + xy * n2), p2 = -2.0 * (xy * n1 + yy * n2);
+    d_log_scale = p1 * n1 + p2 * n2;
+    d_r1 = f.l11 * p1;
+    d_r2 = f.l21 * p1 + f.l22 * p2;
 }
 
 // dL/dq of a unit quaternion from dL/d(columns of its matrix).
@@ -78,10 +86,11 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const mat3 axes = rotation_matrix(unit);
     const vec3 t0 = to_world(camera, j0), t1 = to_world(camera, j1);
     const vec3 r1 = (t0 * axes) * s, r2 = (t1 * axes) * s;
-    vec3 d_r1, d_r2;
-    factor_gradient(cholesky_factor(r1, r2, args.low_pass), sums, r1, r2, d_r1, d_r2, g.mean);
+    vec3 d_r1, d_r2, d_log_scale;
+    factor_gradient(cholesky_factor(r1, r2, args.low_pass), sums, r1, r2, d_r1, d_r2, d_log_scale,
+                    g.mean);
 
-    g.log_scale = outside_is_zero(d_r1 * r1 + d_r2 * r2, raw_scale, LOG_SCALE_LIMIT);
+    g.log_scale = outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT);
     const vec3 e1 = d_r1 * s, e2 = d_r2 * s;
     const mat3 d_axes = mat3(e1.x * t0 + e2.x * t1, e1.y * t0 + e2.y * t1, e1.z * t0 + e2.z * t1);
     const vec4 d_unit = quaternion_gradient(unit, d_axes);

@@ -119,6 +119,24 @@ TEST_P(WalkDegree, dense_scene_matches_double) {
 
 INSTANTIATE_TEST_SUITE_P(sh, WalkDegree, testing::Range(0, 4));
 
+TEST(WalkCases, needles_and_discs_match_double) {
+    for (const double ratio : {1e2, 1e4, 1e6})
+        for (const bool disc : {false, true}) {
+            SCOPED_TRACE(fmt::format("ratio {} {}", ratio, disc ? "disc" : "needle"));
+            TestScene s = random_scene({.count = 60,
+                                        .width = 121,
+                                        .height = 83,
+                                        .kernel = KERNEL_SINC,
+                                        .sh_degree = 0,
+                                        .seed = 55});
+            const auto thin = static_cast<float>(-std::log(ratio));
+            for (size_t i = 0; i < s.model.size(); ++i)
+                for (int c = 0; c < 3; ++c)
+                    s.model.log_scale[i * 3 + c] = (c == 0) == disc ? thin : 0.0f;
+            expect_walk_matches(s, {}, tolerance("gradient_scaled_float32"));
+        }
+}
+
 // The runs at other vector widths are worth something only where the width takes effect.
 TEST(Subgroup, size_is_that_of_the_vector_width) {
     const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");

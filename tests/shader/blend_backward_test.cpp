@@ -14,9 +14,10 @@ Pairs gradients_of(const BlendScene& scene, const reference::TileLists& lists,
     for (size_t k = 0; k < lists.pair_count(); ++k) {
         const auto& s = scene.splats[lists.splats[k]];
         const PairSums& p = out.pairs[k];
+        const double d_l21 = 2.0 * p.gx_dy;
         pairs.push_back({{2 * s.l11 * p.gx, 2 * (s.l21 * p.gx + s.l22 * s.l22 * p.g_dy)},
-                         2.0 * p.gx_dx,
-                         2.0 * p.gx_dy,
+                         (2.0 * p.gxx - s.l21 * d_l21) / s.l11,  // x = l11 dx + l21 dy
+                         d_l21,
                          2 * s.l22 * p.g_dy_dy,
                          p.d_opacity,
                          glm::dvec3(p.d_colour)});
@@ -134,7 +135,7 @@ TEST(BlendBackwardCases, pairs_behind_the_stop_get_zero) {
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
     for (size_t k = 5; k < 100; ++k) {
         const PairSums& p = r.out.pairs[k];
-        EXPECT_EQ(glm::vec4(p.gx, p.gx_dx, p.gx_dy, p.g_dy), glm::vec4(0)) << "pair " << k;
+        EXPECT_EQ(glm::vec4(p.gx, p.gxx, p.gx_dy, p.g_dy), glm::vec4(0)) << "pair " << k;
         EXPECT_EQ(glm::vec4(p.d_colour, p.g_dy_dy), glm::vec4(0)) << "pair " << k;
         EXPECT_EQ(p.d_opacity, 0) << "pair " << k;
     }

@@ -245,6 +245,7 @@ TEST(TileRanges, runs_begin_and_end_where_the_tile_changes) {
 TEST(TileRanges, only_pairs_in_use_count) {
     EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 0), (Words{0, 0, 0, 0, 0, 0}));
     EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 2), (Words{0, 1, 1, 2, 0, 0}));
+    EXPECT_EQ(tile_ranges({0, 1, 1}, 3, 2), (Words{0, 1, 1, 2, 0, 0}));
 }
 
 TEST(TileRanges, a_long_random_list_matches_the_host) {

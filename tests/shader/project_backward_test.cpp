@@ -9,8 +9,8 @@ namespace {
 
 /// Every splat must be visible to the reference. Each is compared on its own scale: gradients of
 /// different splats differ by more than their rounding.
-void expect_gradients_match(const SplatModel& model, const Camera& camera, int sh_degree = 3,
-                            const char* allowed = "project_gradient_float32") {
+void expect_gradients_match(const SplatModel& model, const Camera& camera, int sh_degree = 3) {
+    const Tolerance& allowed = tolerance("project_gradient_float32");
     const int degree = std::min(sh_degree, model.sh_degree);
     const Partials partials = Partials::random(model.size(), 77);
     const DoubleGradients expected = gradients_in_double(model, camera, degree, partials);
@@ -33,14 +33,14 @@ void expect_gradients_match(const SplatModel& model, const Camera& camera, int s
                 relative.push_back(got[a][i * stride + c] / unit);
             }
         }
-        EXPECT_TRUE(compare_scaled(attribute_name(a), truth, relative, tolerance(allowed)));
+        EXPECT_TRUE(compare_scaled(attribute_name(a), truth, relative, allowed));
     }
     std::vector<double> norms;
     for (size_t i = 0; i < model.size(); ++i) {
         norms.push_back(after.gradient_sum[i].x);
         EXPECT_EQ(after.gradient_sum[i].y, partials.count[i] > 0 ? 1 : 0) << "splat " << i;
     }
-    EXPECT_TRUE(compare_scaled("mean", expected.mean_ndc, norms, tolerance(allowed)));
+    EXPECT_TRUE(compare_scaled("mean", expected.mean_ndc, norms, allowed));
 }
 
 TEST(ProjectBackward, every_kernel_and_footprint_matches_double) {
@@ -114,7 +114,7 @@ TEST(ProjectBackward, needles_and_discs_match_double) {
             for (size_t i = 0; i < s.model.size(); ++i)
                 for (int c = 0; c < 3; ++c)
                     s.model.log_scale[i * 3 + c] = (c == 0) == disc ? thin : 0.0f;
-            expect_gradients_match(s.model, s.camera, 3, "project_gradient_needles");
+            expect_gradients_match(s.model, s.camera);
         }
 }
 

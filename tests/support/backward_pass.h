@@ -15,7 +15,7 @@
 
 namespace darb::test {
 
-/// What blend_backward leaves for one pair: [0..3] sums of G x, G x dx, G x dy, G dy, [4]
+/// What blend_backward leaves for one pair: [0..3] sums of G x, G x x, G x dy, G dy, [4]
 /// d_opacity, [5..7] d_colour, [8] sum of G dy dy.
 using PairPartials = std::array<float, 9>;
 
@@ -157,7 +157,7 @@ inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera
             for (int c = 0; c < 9; ++c) sum[c] += partials.pairs[partials.begin[i] + e][c];
         const reference::ProjectedGradient<double> g{
             {2 * s.l11 * sum[0], 2 * (s.l21 * sum[0] + s.l22 * s.l22 * sum[3])},
-            2 * sum[1],
+            2 * (sum[1] - s.l21 * sum[2]) / s.l11,  // x = l11 dx + l21 dy
             2 * sum[2],
             2 * s.l22 * sum[8],
             sum[4],

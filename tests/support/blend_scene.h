@@ -113,7 +113,7 @@ inline std::vector<BlendVariant> every_blend_variant() {
 /// Sums over the pixels of a tile that a pair's gradients follow from; G = opacity dL/dalpha dw/dq,
 /// d = mean - pixel centre, x = l11 dx + l21 dy.
 struct PairSums {
-    float gx, gx_dx, gx_dy, g_dy, d_opacity;
+    float gx, gxx, gx_dy, g_dy, d_opacity;
     glm::vec3 d_colour;
     float g_dy_dy;
 };
