@@ -62,7 +62,11 @@ class Command {
 class KilledRun : public testing::Test {
   protected:
     void SetUp() override { fs::create_directories(folder_); }
-    void TearDown() override { fs::remove_all(folder_); }
+    void TearDown() override {
+        const std::string text = fs::exists(log()) ? read_text_file(log()) : "";
+        EXPECT_EQ(text.find("vulkan validation:"), std::string::npos) << text;
+        fs::remove_all(folder_);
+    }
 
     static std::vector<std::string> training(const fs::path& output) {
         return {"train", std::string(DARB_SOURCE_DIR) + "/assets/scene",

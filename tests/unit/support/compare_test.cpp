@@ -112,6 +112,32 @@ TEST(Compare, FloatsAgainstDoubles_Compare) {
     EXPECT_TRUE(compare("mixed", std::vector{0.5}, std::vector{0.5F}, tolerance("exact")));
 }
 
+TEST(CompareScaled, AbsIsInUnitsOfTheRootMeanSquare) {
+    const Tolerance allowed{"test", 1e-3};
+    for (const double size : {1e-9, 1.0, 1e9}) {
+        auto expected = random_values(1000, 7);
+        for (double& value : expected) {
+            value *= size;
+        }
+        auto got = expected;
+        got[500] += 0.9e-3 * size;
+        EXPECT_TRUE(compare_scaled("within", expected, got, allowed)) << size;
+        got[500] += 0.2e-3 * size;
+        EXPECT_FALSE(compare_scaled("outside", expected, got, allowed)) << size;
+    }
+}
+
+TEST(CompareScaled, ZerosAndDifferentLengths_AreNotScaledAway) {
+    const std::vector<double> zeros(10, 0.0);
+    EXPECT_TRUE(compare_scaled("zeros", zeros, zeros, tolerance("gradient_scaled_float32")));
+    EXPECT_FALSE(compare_scaled("something", zeros, std::vector<double>(10, 1e-3),
+                                tolerance("gradient_scaled_float32")));
+    EXPECT_FALSE(compare_scaled("shorter", zeros, std::vector<double>(9, 0.0),
+                                tolerance("gradient_scaled_float32")));
+    EXPECT_FALSE(compare_scaled("nothing", std::vector<double>(), std::vector<double>(),
+                                tolerance("gradient_scaled_float32")));
+}
+
 TEST(ToleranceTable, EveryRow_IsFoundByNameAndHasAReason) {
     for (const char* name : {"exact", "difference", "image_float32", "gradient_float32"}) {
         EXPECT_EQ(tolerance(name).name, name);
