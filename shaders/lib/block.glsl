@@ -36,6 +36,7 @@ uint hits_base() {
 
 // Fills the subgroup's lists from pairs [begin, end), at most CHUNK of them; returns how many hit.
 uint collect_hits(uint begin, uint end, uint bit) {
+    subgroupBarrier();  // the lists may still be read
     uint count = 0u;
     for (uint batch = begin; batch < end; batch += SUBGROUP_SIZE) {
         const uint j = batch + gl_SubgroupInvocationID;
