@@ -85,6 +85,10 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"eval a.ply b --split no_such", "--split"},
                     {"render a.ply -o b", "--cameras"},
                     {"info", "path"},
+                    {"check --reference", "--dump"},
+                    {"check --scene a.ply", "belong together"},
+                    {"check --json a --scene a.ply --cameras b --dump c", "--json"},
+                    {"check --device no_such_device", "no_such_device"},
                     {"devices --device no_such_device", "no_such_device"}});
 }
 
@@ -114,7 +118,7 @@ TEST(Command, features_that_are_not_there_say_so) {
 
 TEST(Command, help_and_version_are_exit_code_0) {
     for (const char* arguments : {"--help", "train --help", "eval --help", "render --help",
-                                  "info --help", "devices --help", "--version"})
+                                  "info --help", "devices --help", "check --help", "--version"})
         EXPECT_EQ(darb(arguments).code, 0) << arguments;
 }
 
@@ -123,6 +127,17 @@ TEST(Command, devices_marks_the_chosen_one) {
     EXPECT_EQ(o.code, 0) << o.err;
     EXPECT_NE(o.out.find("* 0"), std::string::npos) << o.out;
     EXPECT_NE(o.out.find("chosen: 0"), std::string::npos) << o.out;
+}
+
+TEST(Command, check_passes_on_this_device_slow) {
+    const std::string file = scratch() / "check.json";
+    const Outcome o = darb("check --json " + file);
+    EXPECT_EQ(o.code, 0) << o.out;
+    EXPECT_NE(o.out.find(", 0 failed: PASS"), std::string::npos) << o.out;
+    const json check = json::parse(read_text_file(file));
+    EXPECT_EQ(check["failed"], 0);
+    EXPECT_GT(check["checks"].size(), 100U);
+    for (const char* key : {"version", "device", "driver"}) EXPECT_NE(check[key], "") << key;
 }
 
 TEST(Command, info_describes_a_data_set) {
@@ -309,6 +324,21 @@ TEST_F(TrainedCommand, eval_takes_the_split_asked_for) {
     cameras["frames"][0]["file_path"] = kScene + "/images/view_00.png";
     write_file_atomic(single + "/transforms.json", cameras.dump());
     expect_refused({{fmt::format("eval {} {} --split train", ply(), single), "split 'train'"}});
+}
+
+TEST_F(TrainedCommand, check_dumps_a_view) {
+    const std::string dump = scratch() / "dump";
+    const std::string command =
+        fmt::format("check --scene {} --cameras {}/cameras.json --dump {}", ply(), output(), dump);
+    EXPECT_EQ(darb(command + " --view 2").code, 0);
+    EXPECT_EQ(darb(command + "/double --view 2 --reference").code, 0);
+    for (const char* name :
+         {"image", "d_xyz", "d_f_dc", "d_f_rest", "d_opacity", "d_scale", "d_rot"}) {
+        const fs::path file = fs::path(dump) / (std::string(name) + ".npy");
+        const fs::path reference = fs::path(dump) / "double" / (std::string(name) + ".npy");
+        EXPECT_EQ(fs::file_size(reference) - 128, 2 * (fs::file_size(file) - 128)) << name;
+    }
+    expect_refused({{command + " --view 48", "--view takes 0 to 47"}});
 }
 
 TEST_F(TrainedCommand, render_takes_every_kind_of_cameras) {

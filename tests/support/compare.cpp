@@ -4,43 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
-#include "engine/core/check.h"
-
 namespace darb::test {
+
+using reference::allowed_error;
+using reference::comparison_failures;
+using reference::error_ratio;
+
 namespace {
 
 constexpr size_t kPrintedFailures = 5;
-
-double allowed_error(double expected, const Tolerance& tolerance) {
-    return tolerance.abs + tolerance.rel * std::abs(expected);
-}
-
-/// Error over allowed error: above 1 fails.
-double error_ratio(double expected, double got, const Tolerance& tolerance) {
-    const double error = std::abs(got - expected);
-    if (error == 0) {
-        return 0;
-    }
-    const double ratio = error / allowed_error(expected, tolerance);
-    return std::isfinite(got) && !std::isnan(ratio) ? ratio
-                                                    : std::numeric_limits<double>::infinity();
-}
-
-double cosine_of(std::span<const double> a, std::span<const double> b) {
-    double aa = 0, bb = 0, ab = 0;
-    for (size_t i = 0; i < a.size(); ++i) {
-        aa += a[i] * a[i];
-        bb += b[i] * b[i];
-        ab += a[i] * b[i];
-    }
-    if (aa == 0 && bb == 0) {
-        return 1;
-    }
-    return aa == 0 || bb == 0 ? 0 : ab / (std::sqrt(aa) * std::sqrt(bb));
-}
 
 std::string describe(std::span<const double> expected, std::span<const double> got,
                      const Tolerance& tolerance, size_t inner, size_t i) {
@@ -53,27 +27,6 @@ std::string describe(std::span<const double> expected, std::span<const double> g
 
 }  // namespace
 
-ComparisonStats comparison_stats(std::span<const double> expected, std::span<const double> got,
-                                 const Tolerance& tolerance) {
-    DARB_CHECK(expected.size() == got.size(), "{} and {}", expected.size(), got.size());
-    ComparisonStats stats;
-    stats.count = expected.size();
-    double signed_sum = 0, size_sum = 0;
-    for (size_t i = 0; i < expected.size(); ++i) {
-        const double ratio = error_ratio(expected[i], got[i], tolerance);
-        stats.failures += ratio > 1 ? 1 : 0;
-        if (ratio > stats.worst_ratio) {
-            stats.worst_ratio = ratio;
-            stats.worst_index = i;
-        }
-        signed_sum += got[i] - expected[i];
-        size_sum += std::abs(expected[i]);
-    }
-    stats.cosine = cosine_of(expected, got);
-    stats.signed_bias = signed_sum == 0 ? 0 : signed_sum / size_sum;
-    return stats;
-}
-
 testing::AssertionResult compare_doubles(std::string_view case_name,
                                          std::span<const double> expected,
                                          std::span<const double> got, const Tolerance& tolerance,
@@ -83,21 +36,7 @@ testing::AssertionResult compare_doubles(std::string_view case_name,
                                                           case_name, expected.size(), got.size());
     }
     const ComparisonStats stats = comparison_stats(expected, got, tolerance);
-    const double fail_ratio =
-        static_cast<double>(stats.failures) / static_cast<double>(stats.count);
-    std::string reasons;
-    if (fail_ratio > tolerance.max_fail_ratio) {
-        reasons += fmt::format("\n  {} of {} values outside, {} allowed", stats.failures,
-                               stats.count, tolerance.max_fail_ratio);
-    }
-    if (!(stats.cosine >= tolerance.min_cosine)) {
-        reasons += fmt::format("\n  cosine 1 - {:.3g}, at least 1 - {:.3g}", 1 - stats.cosine,
-                               1 - tolerance.min_cosine);
-    }
-    if (!(std::abs(stats.signed_bias) <= tolerance.max_signed_bias)) {
-        reasons += fmt::format("\n  signed bias {:.3g}, at most {:.3g}", stats.signed_bias,
-                               tolerance.max_signed_bias);
-    }
+    std::string reasons = comparison_failures(stats, tolerance);
     if (reasons.empty()) {
         return testing::AssertionSuccess();
     }
@@ -117,15 +56,12 @@ testing::AssertionResult compare_scaled_doubles(const std::string& case_name,
                                                 std::span<const double> expected,
                                                 std::span<const double> got,
                                                 const Tolerance& tolerance) {
-    double square = 0, worst = 0;
-    for (size_t i = 0; i < std::min(expected.size(), got.size()); ++i) {
-        square += expected[i] * expected[i];
+    double worst = 0;
+    for (size_t i = 0; i < std::min(expected.size(), got.size()); ++i)
         worst = std::max(worst, std::abs(got[i] - expected[i]));
-    }
-    const double rms = std::sqrt(square / static_cast<double>(std::max<size_t>(got.size(), 1)));
+    const double rms = reference::root_mean_square(expected);
     testing::Test::RecordProperty(case_name, fmt::format("{:.2e}", rms > 0 ? worst / rms : worst));
-    Tolerance scaled = tolerance;
-    if (rms > 0) scaled.abs *= rms;
+    const Tolerance scaled = reference::scaled_tolerance(tolerance, expected);
     return compare_doubles(case_name, expected, got, scaled, 1);
 }
 

@@ -9,22 +9,13 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/reference/comparison.h"
 #include "tests/support/tolerance.h"
 
 namespace darb::test {
 
-struct ComparisonStats {
-    size_t count = 0;
-    size_t failures = 0;     // values outside abs + rel |expected|
-    size_t worst_index = 0;  // by error over allowed error
-    double worst_ratio = 0;  // that error over allowed error; infinite where got is not finite
-    double cosine = 1;       // 1 where both are zero, 0 where one is
-    double signed_bias = 0;  // sum(got - expected) / sum |expected|
-};
-
-/// Both of the same length.
-ComparisonStats comparison_stats(std::span<const double> expected, std::span<const double> got,
-                                 const Tolerance& tolerance);
+using reference::comparison_stats;
+using reference::ComparisonStats;
 
 /// Fails on different lengths, on nothing to compare, and where the tolerance says so. The message
 /// names the first failures with their index as [i / inner][i % inner].

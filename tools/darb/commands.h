@@ -16,5 +16,6 @@ void add_eval(CLI::App& app, Action& action);
 void add_render(CLI::App& app, Action& action);
 void add_info(CLI::App& app, Action& action);
 void add_devices(CLI::App& app, Action& action);
+void add_check(CLI::App& app, Action& action);
 
 }  // namespace darb

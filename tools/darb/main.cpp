@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
     darb::add_render(app, action);
     darb::add_info(app, action);
     darb::add_devices(app, action);
+    darb::add_check(app, action);
     if (!arguments.empty() && !arguments[0].starts_with('-') &&
         app.get_subcommands([&](CLI::App* one) { return one->check_name(arguments[0]); }).empty())
         throw darb::Error("darb " + arguments[0], "no such subcommand", "darb --help lists them.");

@@ -1,8 +1,8 @@
-#include "tests/support/tolerance.h"
+#include "engine/reference/tolerance.h"
 
 #include "engine/core/check.h"
 
-namespace darb::test {
+namespace darb::reference {
 namespace {
 
 constexpr Tolerance kTable[] = {
@@ -33,6 +33,8 @@ constexpr Tolerance kTable[] = {
     {"gradient_thin_layers", 5e-4, 5e-3, 0, 1 - 1e-6, 1e-3,
      "for compare_scaled; as image_thin_layers, forward and back, and sums over the tile that "
      "cancel"},
+    {"gradient_thin_layers_walk", 3e-3, 1e-2, 0.001, 1 - 1e-5, 2e-3,
+     "as gradient_thin_layers, on to the parameters: the shape's sums cancel once more"},
     {"project_gradient_float32", 5e-5, 1e-4, 0, 1 - 1e-8, 1e-4,
      "for compare_scaled: one splat's sums through the factor, J W R and the quaternion, in units "
      "of the splat's own largest entry"},
@@ -58,4 +60,4 @@ const Tolerance& tolerance(std::string_view name) {
     return kTable[0];
 }
 
-}  // namespace darb::test
+}  // namespace darb::reference

@@ -1,10 +1,10 @@
-#include "tests/support/random_scene.h"
+#include "engine/reference/random_scene.h"
 
 #include <cmath>
 
 #include "engine/core/rng.h"
 
-namespace darb::test {
+namespace darb::reference {
 namespace {
 
 constexpr double kDistance = 3;  // camera to the cube's centre, world units
@@ -63,4 +63,4 @@ TestScene random_scene(const SceneOptions& options) {
     return scene;
 }
 
-}  // namespace darb::test
+}  // namespace darb::reference

@@ -1,0 +1,187 @@
+// The parts of run_checks that are no whole walk: kernels, scan and sort, loss.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "engine/check/check.h"
+#include "engine/core/rng.h"
+#include "engine/gpu/commands.h"
+#include "engine/kernels/kernel_coefficients.h"
+#include "engine/reference/loss.h"
+#include "engine/render/kernel_constants.h"
+#include "engine/render/loss.h"
+#include "engine/render/radix_sort.h"
+#include "engine/render/scan.h"
+#include "shaders/shared/kernel_probe_args.h"
+
+namespace darb::check {
+
+namespace {
+
+constexpr double kCutoff = 1 / 255.0;
+constexpr double kRounding = 3e-7;  // of float32 arithmetic, on w; as in KERNELS
+constexpr double kSlopeRounding = 2e-6;
+
+struct Probe {
+    float q, opacity;
+};
+struct Answer {
+    float value, slope, reach, covariance_scale;
+};
+
+std::vector<Answer> probe(Device& device, int kernel, Footprint footprint,
+                          const std::vector<Probe>& probes) {
+    const Pipeline pipeline(device, "kernel_probe", kernel_constants(kernel, footprint));
+    Buffer input(device, "probes", probes.size() * sizeof(Probe));
+    Buffer output(device, "answers", probes.size() * sizeof(Answer));
+    input.upload(probes);
+    Commands commands(device);
+    commands.begin();
+    const auto count = static_cast<std::uint32_t>(probes.size());
+    commands.dispatch(pipeline, gpu::KernelProbeArgs{count}, {input, output},
+                      (count + KERNEL_PROBE_GROUP - 1) / KERNEL_PROBE_GROUP);
+    commands.submit_and_wait();
+    return output.download<Answer>(probes.size());
+}
+
+// q over the support and just around its edge.
+std::vector<Probe> ramp(int kernel) {
+    const double support = kernel_support(kernel);
+    const double extent = std::isfinite(support) ? support : 20;
+    std::vector<Probe> probes;
+    for (int i = 0; i < 4000; ++i) probes.push_back({static_cast<float>(extent * i / 4000), 1});
+    for (const double off : {-1e-6, -1e-7, 0.0, 1e-7, 1e-6})
+        probes.push_back({static_cast<float>(extent * (1 + off)), 1});
+    return probes;
+}
+
+Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
+    const std::string name = fmt::format("{} {}", kernel_name(kernel), footprint_name(footprint));
+    const KernelCoefficients& k = kernel_coefficients(kernel, footprint, kFullDegree);
+    const std::vector<Probe> probes = ramp(kernel);
+    const std::vector<Answer> answers = probe(device, kernel, footprint, probes);
+    const double support = std::isfinite(kernel_support(kernel)) ? kernel_support(kernel) : 1;
+    std::vector<double> value, slope, got_value, got_slope;
+    for (size_t i = 0; i < probes.size(); ++i) {
+        const double q = probes[i].q, w = kernel_value(kernel, footprint, q);
+        // A kernel with a jump may be on either side of its edge within the rounding of q.
+        if (kernel_profile(kernel).edge_order != 0 || std::abs(q / support - 1) > 2e-7) {
+            value.push_back(w);
+            got_value.push_back(answers[i].value);
+        }
+        // Slopes that grow without bound at the edge matter only above the cut-off.
+        if (w < kCutoff || (k.line_integral && 1 - q / support < 1e-3)) continue;
+        if (std::abs(q / support - 1) < 2e-6) continue;
+        slope.push_back(kernel_slope(kernel, footprint, q) * support);
+        got_slope.push_back(answers[i].slope * support);
+    }
+    reference::Tolerance allowed;
+    allowed.name = "kernel";
+    allowed.abs = 1.1 * k.value_error + kRounding;
+    const Row row = compare_row("kernels", name + " value", value, got_value, allowed);
+    allowed.abs = 1.2 * k.slope_error + kSlopeRounding;
+    allowed.rel = kSlopeRounding;
+    slope_row = compare_row("kernels", name + " slope", slope, got_slope, allowed);
+    return row;
+}
+
+Row scan_row(Device& device, std::uint32_t n) {
+    Pcg32 rng(n);
+    std::vector<std::uint32_t> counts(n), expected(n);
+    for (std::uint32_t& c : counts) c = rng.below(1000);
+    std::exclusive_scan(counts.begin(), counts.end(), expected.begin(), 0u);
+    Buffer in(device, "counts", n * 4u), out(device, "offsets", n * 4u), count(device, "n", 4),
+        total(device, "total", 4);
+    in.upload(counts);
+    count.upload(std::vector<std::uint32_t>{n});
+    Scan scan(device, n);
+    Commands commands(device);
+    commands.begin();
+    scan.record(commands, in, out, count, 0, total);
+    commands.submit_and_wait();
+    return compare_row("scan and sort", fmt::format("scan of {}", n), expected,
+                       out.download<std::uint32_t>(n), "exact");
+}
+
+Row sort_row(Device& device, std::uint32_t n, RadixSort::Strategy strategy, const char* name) {
+    Pcg32 rng(n + 1);
+    std::vector<std::uint32_t> keys(n), order(n);
+    for (std::uint32_t& k : keys) k = rng.next() & 0xFF00FFu;  // many are equal
+    std::iota(order.begin(), order.end(), 0u);
+    Buffer key(device, "keys", n * 4u), value(device, "values", n * 4u), count(device, "n", 4);
+    key.upload(keys);
+    value.upload(order);
+    count.upload(std::vector<std::uint32_t>{n});
+    RadixSort sort(device, n, strategy);
+    Commands commands(device);
+    commands.begin();
+    sort.record(commands, key, value, count, 0, 32);
+    commands.submit_and_wait();
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+    return compare_row("scan and sort", fmt::format("stable sort of {}, {}", n, name), order,
+                       value.download<std::uint32_t>(n), "exact");
+}
+
+}  // namespace
+
+std::vector<Row> check_kernels(Device& device) {
+    std::vector<Row> rows;
+    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+        for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
+            Row slope;
+            rows.push_back(value_row(device, kernel, footprint, slope));
+            rows.push_back(slope);
+        }
+    return rows;
+}
+
+std::vector<Row> check_scan_and_sort(Device& device) {
+    std::vector<Row> rows;
+    for (const std::uint32_t n : {1u, 257u, 100'003u}) rows.push_back(scan_row(device, n));
+    for (const std::uint32_t n : {1u, 4097u, 100'003u}) {
+        rows.push_back(sort_row(device, n, RadixSort::Strategy::columns, "columns"));
+        rows.push_back(sort_row(device, n, RadixSort::Strategy::ballot, "ballot"));
+    }
+    return rows;
+}
+
+std::vector<Row> check_loss(Device& device) {
+    constexpr int kWidth = 67, kHeight = 43;
+    constexpr size_t kPixels = size_t{kWidth} * kHeight;
+    Pcg32 rng(5);
+    Image<double> image(kWidth, kHeight, 3), photo(kWidth, kHeight, 3);
+    std::vector<float> planes(kPixels * 3);
+    std::vector<std::uint32_t> packed(kPixels, 0xFF000000u);
+    for (size_t p = 0; p < kPixels; ++p)
+        for (size_t c = 0; c < 3; ++c) {
+            const double wave = 0.5 + 0.4 * std::sin(0.21 * double(p % kWidth) + double(c));
+            const std::uint32_t byte = static_cast<std::uint32_t>(
+                std::lround(255 * std::clamp(wave + 0.1 * rng.normal(), 0.0, 1.0)));
+            packed[p] |= byte << (8 * c);
+            photo.data[p * 3 + c] = byte / 255.0;
+            const auto x = static_cast<float>(wave + 0.15 * rng.normal());
+            image.data[p * 3 + c] = x;
+            planes[c * kPixels + p] = x;
+        }
+    const auto truth = reference::loss(image, photo);
+    Buffer rendered(device, "image", kPixels * 12), ground(device, "photo", kPixels * 4),
+        d_image(device, "d_image", kPixels * 12), result(device, "loss", sizeof(gpu::LossResult));
+    rendered.upload(planes);
+    ground.upload(packed);
+    Loss loss(device, kWidth, kHeight);
+    Commands commands(device);
+    commands.begin();
+    loss.record(commands, rendered, ground, d_image, result, 0, kWidth, kHeight, glm::vec3(0));
+    commands.submit_and_wait();
+    const auto got = result.download<gpu::LossResult>(1)[0];
+    const auto d = d_image.download<float>(kPixels * 3);
+    std::vector<double> expected(kPixels * 3);
+    for (size_t p = 0; p < kPixels; ++p)
+        for (size_t c = 0; c < 3; ++c) expected[c * kPixels + p] = truth.d_image.data[p * 3 + c];
+    return {compare_row("loss", "L1 and SSIM", std::vector<double>{truth.l1, truth.ssim},
+                        std::vector<double>{got.l1, got.ssim}, "loss_float32"),
+            compare_row("loss", "gradient", expected, d, "loss_gradient_float32")};
+}
+
+}  // namespace darb::check

@@ -1,0 +1,71 @@
+#include "engine/check/device_walk.h"
+
+#include "engine/render/renderer.h"
+
+namespace darb::check {
+
+ForwardOptions forward_options(const SplatModel& model, const WalkSettings& settings) {
+    ForwardOptions options;
+    options.kernel = model.kernel;
+    options.footprint = model.footprint;
+    options.evaluation = settings.evaluation;
+    options.alpha_cutoff = settings.alpha_cutoff;
+    options.transmittance_stop = settings.transmittance_stop;
+    options.sh_stored = model.sh_degree;
+    options.store_for_backward = true;
+    return options;
+}
+
+std::vector<float> to_planes(const Image<double>& image) {
+    const size_t pixels = image.data.size() / 3;
+    std::vector<float> planes(pixels * 3);
+    for (size_t i = 0; i < pixels; ++i)
+        for (size_t c = 0; c < 3; ++c)
+            planes[c * pixels + i] = static_cast<float>(image.data[i * 3 + c]);
+    return planes;
+}
+
+DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera& camera,
+                          const Image<double>& d_image, const WalkSettings& settings) {
+    const ForwardOptions options = forward_options(model, settings);
+    const int degree = std::min(settings.sh_degree, model.sh_degree);
+    GpuSplats splats(device, model, true);
+    Forward forward(device, options);
+    Backward backward(device, options, BackwardResult::store_gradient);
+    const gpu::CameraData data = camera_data(camera, model.origin);
+    const Buffer cameras = upload_cameras(device, {data});
+    const size_t floats = size_t(camera.width) * camera.height * 3;
+    Buffer d_planes(device, "d_image", floats * sizeof(float));
+    if (!d_image.data.empty()) d_planes.upload(to_planes(d_image));
+    forward.reserve(splats.count(), settings.pairs, camera.width, camera.height);
+
+    Commands commands(device);
+    DeviceWalk walk;
+    for (;;) {
+        if (!d_image.data.empty()) backward.reserve(splats.count(), forward.pair_capacity());
+        commands.begin();
+        forward.record(commands, splats, cameras, 0, data, degree, settings.background);
+        if (!d_image.data.empty())
+            backward.record(commands, forward, splats, d_planes, cameras, 0, data, degree,
+                            settings.background, AdamStep{});
+        commands.submit_and_wait();
+        walk.status = forward.read_status();
+        if (walk.status.overflow == 0) break;
+        forward.reserve(splats.count(), walk.status.pairs, camera.width, camera.height);
+        forward.clear_status();
+    }
+    walk.image =
+        planes_to_image(forward.image().download<float>(floats), camera.width, camera.height);
+    if (d_image.data.empty()) return walk;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const size_t n = size_t{splats.count()} * splats.stride(a);
+        const auto moments =
+            n > 0 ? splats.moments(a).download<float>(n * 2) : std::vector<float>{};
+        for (size_t i = 0; i < n; ++i) walk.d[a].push_back(moments[2 * i]);
+    }
+    const auto sums = backward.gradient_sum().download<float>(size_t{splats.count()} * 2);
+    for (size_t i = 0; i < splats.count(); ++i) walk.mean_gradient_ndc.push_back(sums[2 * i]);
+    return walk;
+}
+
+}  // namespace darb::check

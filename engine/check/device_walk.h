@@ -1,0 +1,40 @@
+// One forward and backward pass of a scene on the device, read back: what the device makes of the
+// walk that engine/reference computes in double.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/render/backward.h"
+#include "engine/render/gpu_splats.h"
+
+namespace darb::check {
+
+struct DeviceWalk {
+    gpu::FrameStatus status{};
+    ImageF image;                                       // [H][W][3]
+    std::array<std::vector<float>, kAttributeCount> d;  // dL/d(attribute), layout of SplatModel
+    std::vector<float> mean_gradient_ndc;               // [N] |dL/dmean|
+};
+
+struct WalkSettings {
+    int evaluation = EVALUATION_POLYNOMIAL;
+    float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
+    float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
+    glm::vec3 background{0.0f};
+    int sh_degree = 3;              // in use, at most the model's
+    std::uint32_t pairs = 100'000;  // capacity at first; it grows
+};
+
+ForwardOptions forward_options(const SplatModel& model, const WalkSettings& settings);
+
+/// Interleaved [H][W][3] to planes [3][H][W].
+std::vector<float> to_planes(const Image<double>& image);
+
+/// Forward alone, and backward where d_image [H][W][3] is not empty. A frame that did not fit is
+/// repeated.
+DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera& camera,
+                          const Image<double>& d_image, const WalkSettings& settings);
+
+}  // namespace darb::check

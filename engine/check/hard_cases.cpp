@@ -1,0 +1,241 @@
+#include "engine/check/hard_cases.h"
+
+#include <cmath>
+#include <limits>
+
+#include "engine/core/rng.h"
+
+namespace darb::check {
+
+namespace {
+
+using reference::random_scene;
+using reference::SceneOptions;
+using reference::TestScene;
+
+// A camera that looks along z from the origin of coordinates, and splats at depth 2 unless said
+// otherwise, so that places in the image can be chosen.
+struct Stage {
+    TestScene scene;
+
+    Stage(int kernel, Footprint footprint, int width, int height) {
+        Camera& c = scene.camera;
+        c.width = width;
+        c.height = height;
+        c.fx = c.fy = 64;
+        c.cx = width / 2.0;
+        c.cy = height / 2.0;
+        scene.model.kernel = kernel;
+        scene.model.footprint = footprint;
+    }
+    // x, y in px; scale: about the standard deviation in px; not round, so that the rotation has a
+    // gradient.
+    void add(double x, double y, double scale, double logit, glm::vec3 colour, double depth = 2) {
+        SplatModel& m = scene.model;
+        const Camera& c = scene.camera;
+        const size_t i = m.size();
+        m.resize(i + 1);
+        m.position[3 * i] = static_cast<float>((x - c.cx) / c.fx * depth);
+        m.position[3 * i + 1] = static_cast<float>((y - c.cy) / c.fy * depth);
+        m.position[3 * i + 2] = static_cast<float>(depth);
+        const float turn[] = {0.9f, 0.1f, -0.3f, 0.2f}, stretch[] = {1, 0.8f, 1.25f};
+        for (size_t a = 0; a < 4; ++a) m.rotation[4 * i + a] = turn[(a + i) % 4];
+        m.opacity[i] = static_cast<float>(logit);
+        for (size_t a = 0; a < 3; ++a) {
+            // The centre of the camera has no scale of its own.
+            const double world = scale / c.fx * std::max(std::abs(depth), 0.01);
+            m.log_scale[3 * i + a] = static_cast<float>(std::log(world)) + std::log(stretch[a]);
+            m.sh_dc[3 * i + a] = (colour[static_cast<int>(a)] - 0.5f) / 0.28209479f;
+        }
+    }
+};
+
+double logit(double opacity) {
+    return std::log(opacity / (1 - opacity));
+}
+
+HardCase make(const char* name, const char* what, TestScene scene) {
+    HardCase c;
+    c.name = name;
+    c.what = what;
+    c.scene = std::move(scene);
+    return c;
+}
+
+class Cases {
+  public:
+    Cases(int kernel, Footprint footprint) : kernel_(kernel), footprint_(footprint) {
+        if (footprint == Footprint::exact &&
+            (kernel == KERNEL_INVERSE_QUADRATIC || kernel == KERNEL_INVERSE_MULTIQUADRIC))
+            gradient_ = "gradient_steep_float32";
+    }
+    std::vector<HardCase> all() {
+        projection();
+        parameters();
+        blending();
+        frames();
+        return std::move(cases_);
+    }
+
+  private:
+    TestScene random(size_t count, std::uint64_t seed, int width = 96, int height = 64,
+                     int sh_degree = 3) const {
+        return random_scene({.count = count,
+                             .width = width,
+                             .height = height,
+                             .kernel = kernel_,
+                             .footprint = footprint_,
+                             .sh_degree = sh_degree,
+                             .seed = seed});
+    }
+    HardCase& add(const char* name, const char* what, TestScene scene) {
+        cases_.push_back(make(name, what, std::move(scene)));
+        cases_.back().gradient_tolerance = gradient_;
+        return cases_.back();
+    }
+    Stage stage(int width = 48, int height = 32) const {
+        return {kernel_, footprint_, width, height};
+    }
+
+    void projection();
+    void parameters();
+    void blending();
+    void frames();
+
+    int kernel_;
+    Footprint footprint_;
+    const char* gradient_ = "gradient_scaled_float32";
+    std::vector<HardCase> cases_;
+};
+
+void Cases::projection() {
+    Stage near = stage(96, 64);
+    const float plane = static_cast<float>(NEAR_DEFAULT);
+    const double depths[] = {-1,   0,    plane / 2, std::nextafter(plane, 0.0f), plane,
+                             0.21, 0.25, 0.3,       std::nextafter(plane, 1.0f), 2};
+    for (int i = 0; i < 80; ++i)
+        near.add(4 + i * 7 % 88, 4 + i * 11 % 56, 2 + i % 3, 0.5,
+                 {float(i % 2), 0.5f, float(i % 5) / 4}, depths[i % 10]);
+    for (size_t a = 0; a < 3; ++a) near.scene.model.position[a] = 0;  // the camera's centre
+    add("near_plane", "division by a depth of zero, fans", std::move(near.scene));
+
+    TestScene wide = random(80, 102);
+    wide.camera.cx *= 0.3;  // off-centre
+    for (size_t i = 0; i < wide.model.position.size(); ++i) wide.model.position[i] *= 3;
+    for (float& s : wide.model.log_scale) s += 1.2f;
+    add("jacobian_clamp", "backward ignores the clamp; principal point ignored", std::move(wide));
+
+    for (const bool disc : {false, true}) {
+        TestScene thin = random(60, 103, 96, 64, 0);
+        for (size_t i = 0; i < thin.model.size(); ++i)
+            for (size_t a = 0; a < 3; ++a)
+                thin.model.log_scale[3 * i + a] =
+                    (a == 0) == disc ? (i % 3 == 0 ? -20.0f : -13.8f) : 0.0f;
+        add(disc ? "discs" : "needles", "q negative or 5 % wrong", std::move(thin));
+    }
+
+    TestScene points = random(80, 104);
+    for (size_t i = 0; i < points.model.log_scale.size(); ++i)
+        points.model.log_scale[i] = -19.5f + 0.5f * static_cast<float>(i % 3);
+    for (float& o : points.model.opacity) o = 3;
+    add("tiny_determinant", "infinite conic", std::move(points));
+
+    TestScene far = random(80, 105);
+    far.model.origin = {431'000.25, 5'412'000.5, 812.125};
+    far.camera.translation -= far.camera.rotation * far.model.origin;
+    add("map_coordinates", "float32 loses millimetres at 1e6", std::move(far));
+}
+
+void Cases::parameters() {
+    TestScene turned = random(60, 206);
+    for (size_t i = 0; i < turned.model.size(); ++i) {
+        const float norms[] = {0.05f, 1, 20};
+        for (size_t a = 0; a < 4; ++a) turned.model.rotation[4 * i + a] *= norms[i % 3];
+    }
+    add("quaternion_norms", "gradient of the normalisation missing", std::move(turned));
+
+    TestScene extreme = random(60, 107);
+    for (size_t i = 0; i < extreme.model.size(); ++i) {
+        const float factors[] = {0, 1e-15f, 1e-3f, 1e15f};
+        if (i % 2 == 0)
+            for (size_t a = 0; a < 4; ++a) extreme.model.rotation[4 * i + a] *= factors[i / 2 % 4];
+    }
+    add("quaternion_extremes", "NaN covariance", std::move(extreme)).gradient = false;
+
+    TestScene limits = random(60, 108);
+    for (size_t i = 0; i < limits.model.size(); ++i) {
+        if (i % 4 == 0) limits.model.log_scale[3 * i] = -50;
+        if (i % 12 == 1)
+            for (size_t a = 0; a < 3; ++a) limits.model.log_scale[3 * i + a] = 50;
+        if (i % 4 == 2) limits.model.opacity[i] = 1e4f;
+        if (i % 4 == 3) limits.model.opacity[i] = -1e4f;
+    }
+    add("parameter_limits", "overflow of exp", std::move(limits));
+
+    // A needle of ratio 1e9: the picture is right, its gradients in float32 are not.
+    TestScene longest = random(60, 108);
+    for (size_t i = 0; i < longest.model.size(); i += 12) longest.model.log_scale[3 * i + 1] = 50;
+    add("longest_needle", "overflow of exp", std::move(longest)).gradient = false;
+}
+
+void Cases::blending() {
+    Stage centres = stage();
+    for (int i = 0; i < 12; ++i)
+        centres.add(4.5 + 3 * i, 8.5 + i % 4, 0.5 + 0.25 * i, 1, {0.9f, 0.5f, 0.1f * float(i)});
+    add("mean_on_a_pixel_centre", "NaN in the raised cosine, transparent pixel in sinc",
+        std::move(centres.scene));
+
+    Stage opaque = stage();
+    for (int i = 0; i < 2000; ++i)
+        opaque.add(8 + i % 30, 8 + i % 16, 6, i % 2 ? 1e4 : logit(0.985),
+                   {float(i % 2), float(1 - i % 2), 0.5f}, 2 + 0.001 * i);
+    add("opaque_layers", "division by 1 - alpha, underflow of the transmittance",
+        std::move(opaque.scene));
+
+    Stage layers = stage(16, 16);
+    for (int i = 0; i < 10'000; ++i)
+        layers.add(8, 8, 30, logit(3e-4), {float(i % 7) / 7, float(i % 3) / 3, 0.5f}, 2 + 1e-4 * i);
+    HardCase& thin =
+        add("thin_layers", "prefix sums of the gradient 3 % wrong", std::move(layers.scene));
+    thin.settings.alpha_cutoff = 1e-6f;
+    thin.image_tolerance = "image_thin_layers";
+    thin.gradient_tolerance = "gradient_thin_layers_walk";
+
+    Stage ties = stage();
+    for (int i = 0; i < 200; ++i)
+        ties.add(6 + i * 7 % 36, 5 + i * 5 % 24, 3, 0.5, {float(i % 2), 0.5f, float(i % 3) / 2});
+    add("equal_depths", "image depends on the order in memory", std::move(ties.scene));
+
+    Stage one = stage(700, 500);
+    one.add(350, 250, 300, 3, {0.8f, 0.5f, 0.2f});
+    one.add(20, 250, 3, 3, {0.1f, 0.9f, 0.2f});
+    add("huge_splat", "time-out, overflow", std::move(one.scene));
+}
+
+void Cases::frames() {
+    add("no_splats", "crash of densifiers", random(0, 109)).expects_splats = false;
+    add("one_splat", "crash of densifiers", random(1, 110));
+    TestScene away = random(30, 111);
+    away.camera.translation.z = -30;
+    add("none_visible", "crash of densifiers", std::move(away)).expects_splats = false;
+    TestScene faint = random(30, 112);
+    for (float& o : faint.model.opacity) o = -8;
+    add("all_too_faint", "crash of densifiers", std::move(faint)).expects_splats = false;
+    for (const auto& [width, height] : {std::pair{1, 1}, {1, 1024}, {1023, 3}, {17, 5}}) {
+        TestScene odd = random(120, 113, 64, 64);
+        odd.camera.cx += (width - 64) / 2.0;
+        odd.camera.cy += (height - 64) / 2.0;
+        odd.camera.width = width;
+        odd.camera.height = height;
+        add("odd_sizes", "reads and writes out of bounds", std::move(odd)).name +=
+            fmt::format(" {}x{}", width, height);
+    }
+}
+
+}  // namespace
+
+std::vector<HardCase> hard_cases(int kernel, Footprint footprint) {
+    return Cases(kernel, footprint).all();
+}
+
+}  // namespace darb::check

@@ -1,0 +1,47 @@
+// What `darb check` finds: a row a quantity, its worst error against its tolerance.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/reference/comparison.h"
+
+namespace darb::check {
+
+struct Row {
+    std::string group, name;
+    double error = 0;    // at the value that is worst by error over allowed error
+    double allowed = 0;  // there: abs + rel |expected|
+    size_t count = 0;    // values compared
+    size_t outside = 0;  // of them beyond what is allowed: a boundary band, which is bounded too
+    size_t band = 0;     // how many may be
+    bool pass = false;
+    std::string detail;  // why it failed; empty where it passed
+    double seconds = 0;
+};
+
+/// Called with each row as it is ready.
+using OnRow = std::function<void(const Row&)>;
+
+/// scaled: the absolute tolerance, and the error in the row, are in units of the root mean square
+/// of the expected values.
+Row compare_row(const std::string& group, const std::string& name, std::span<const double> expected,
+                std::span<const double> got, const reference::Tolerance& tolerance,
+                bool scaled = false);
+/// The same of any container of numbers.
+template <class Expected, class Got>
+Row compare_row(const std::string& group, const std::string& name, const Expected& expected,
+                const Got& got, const char* tolerance, bool scaled = false) {
+    const std::vector<double> a(std::begin(expected), std::end(expected));
+    const std::vector<double> b(std::begin(got), std::end(got));
+    return compare_row(group, name, std::span(a), std::span(b), reference::tolerance(tolerance),
+                       scaled);
+}
+
+/// A row that holds or does not; detail says what did not.
+Row fact_row(const std::string& group, const std::string& name, bool holds,
+             const std::string& detail);
+
+}  // namespace darb::check

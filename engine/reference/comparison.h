@@ -1,0 +1,40 @@
+// Comparison of float32 results with double: worst error against a tolerance, cosine and bias.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/reference/tolerance.h"
+
+namespace darb::reference {
+
+struct ComparisonStats {
+    size_t count = 0;
+    size_t failures = 0;     // values outside abs + rel |expected|
+    size_t worst_index = 0;  // by error over allowed error
+    double worst_ratio = 0;  // that error over allowed error; infinite where got is not finite
+    double worst_error = 0;  // the largest |got - expected|
+    double cosine = 1;       // 1 where both are zero, 0 where one is
+    double signed_bias = 0;  // sum(got - expected) / sum |expected|
+};
+
+/// abs + rel |expected|.
+double allowed_error(double expected, const Tolerance& tolerance);
+/// Error over allowed error: above 1 fails; infinite where got is not finite.
+double error_ratio(double expected, double got, const Tolerance& tolerance);
+
+/// Both of the same length.
+ComparisonStats comparison_stats(std::span<const double> expected, std::span<const double> got,
+                                 const Tolerance& tolerance);
+
+/// A line for each way in which the tolerance is broken; empty: passed.
+std::string comparison_failures(const ComparisonStats& stats, const Tolerance& tolerance);
+
+double root_mean_square(std::span<const double> values);
+
+/// The tolerance with its absolute part in units of the root mean square of the expected values:
+/// for sums that cancel, whose rounding goes with their terms.
+Tolerance scaled_tolerance(const Tolerance& tolerance, std::span<const double> expected);
+
+}  // namespace darb::reference

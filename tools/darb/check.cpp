@@ -1,0 +1,139 @@
+// darb check: the numerical checks on the user's own device; and a view of a scene as arrays.
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "engine/check/check.h"
+#include "engine/check/dump.h"
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/data/camera_list.h"
+#include "tools/darb/commands.h"
+#include "tools/darb/scene_file.h"
+
+namespace darb {
+
+namespace {
+
+struct CheckFlags {
+    std::string device;
+    std::filesystem::path json, scene, cameras, dump;
+    int view = 0;
+    bool reference = false;
+    DatasetOptions data;
+    check::CheckOptions checks;
+};
+
+nlohmann::json row_json(const check::Row& row) {
+    return {{"group", row.group},     {"name", row.name},       {"error", row.error},
+            {"allowed", row.allowed}, {"values", row.count},    {"outside", row.outside},
+            {"band", row.band},       {"seconds", row.seconds}, {"pass", row.pass},
+            {"detail", row.detail}};
+}
+
+void print_row(const check::Row& row, std::string& group) {
+    if (row.group != group) fmt::print("\n{}\n", group = row.group);
+    const std::string outside =
+        row.outside > 0 || row.band > 0
+            ? fmt::format("{} of {} outside, {} may be", row.outside, row.count, row.band)
+            : "";
+    fmt::print("  {:<44} {:>9.2e} {:>9.2e}  {}  {}{}\n", row.name, row.error, row.allowed,
+               row.pass ? "pass" : "FAIL", outside, row.detail);
+    std::fflush(stdout);
+}
+
+int check_device(Device& device, const CheckFlags& flags) {
+    const DeviceInfo& info = device.info();
+    fmt::print("darb {}\ndevice   {}\ndriver   {}\nsubgroup {} lanes\n", DARB_VERSION, info.name,
+               info.driver, info.subgroup_size);
+    fmt::print("  {:<44} {:>9} {:>9}\n", "", "error", "allowed");
+    const auto start = std::chrono::steady_clock::now();
+    std::string group;
+    const std::vector<check::Row> rows = check::run_checks(
+        device, flags.checks, [&](const check::Row& row) { print_row(row, group); });
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    size_t failed = 0;
+    nlohmann::json list = nlohmann::json::array();
+    for (const check::Row& row : rows) {
+        failed += row.pass ? 0 : 1;
+        list.push_back(row_json(row));
+    }
+    fmt::print("\n{} checks in {:.1f} s, {} failed: {}\n", rows.size(), seconds.count(), failed,
+               failed == 0 ? "PASS" : "FAIL");
+    if (!flags.json.empty())
+        write_file_atomic(flags.json, nlohmann::json{{"version", DARB_VERSION},
+                                                     {"device", info.name},
+                                                     {"driver", info.driver},
+                                                     {"subgroup_size", info.subgroup_size},
+                                                     {"seconds", seconds.count()},
+                                                     {"failed", failed},
+                                                     {"checks", list}}
+                                              .dump(2) +
+                                          "\n");
+    return failed == 0 ? 0 : 1;
+}
+
+int dump_view(const CheckFlags& flags) {
+    if (flags.scene.empty() || flags.cameras.empty() || flags.dump.empty())
+        throw Error("darb check", "--scene, --cameras and --dump belong together",
+                    "darb check --scene S.ply --cameras cameras.json --view 0 --dump DIR");
+    if (!flags.json.empty())
+        throw Error("darb check --json", "has nothing to say of --dump", "Leave one of them out.");
+    const SplatModel model = load_scene(flags.scene);
+    const std::vector<View> views = load_cameras(flags.cameras, flags.data);
+    if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())
+        throw Error(flags.cameras.string(), fmt::format("there is no view {}", flags.view),
+                    fmt::format("--view takes 0 to {}.", views.size() - 1));
+    const View& view = views[static_cast<size_t>(flags.view)];
+    std::string from = "the reference in double";
+    if (flags.reference) {
+        check::dump_from_reference(model, view.camera, flags.dump);
+    } else {
+        DeviceOptions options;
+        options.select = flags.device;
+        Device device(options);
+        check::dump_from_device(device, model, view.camera, flags.dump);
+        from = device.info().name;
+    }
+    fmt::print("{}: image and gradients of view {} ({}), {} splats, {} x {} px, from {}\n",
+               flags.dump.string(), flags.view, view.name, model.size(), view.camera.width,
+               view.camera.height, from);
+    return 0;
+}
+
+int check_command(const CheckFlags& flags) {
+    if (!flags.scene.empty() || !flags.cameras.empty() || !flags.dump.empty())
+        return dump_view(flags);
+    if (flags.reference)
+        throw Error("darb check --reference", "is for a view of a scene",
+                    "Add --scene, --cameras and --dump.");
+    DeviceOptions options;
+    options.select = flags.device;
+    Device device(options);
+    return check_device(device, flags);
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<CheckFlags>();
+    CLI::App* command = app.add_subcommand(
+        "check", "Check a device and its driver against double precision; exit code 1: failed");
+    command->add_option("--json", flags->json, "write every row to this file too");
+    command->add_flag("--every-kernel", flags->checks.every_kernel,
+                      "walks and hard cases in every kernel and footprint: minutes, not seconds");
+    command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    command->add_option("--scene", flags->scene, "a PLY file whose view --dump writes");
+    command->add_option("--cameras", flags->cameras, "a cameras.json, transforms.json or data set");
+    command->add_option("--view", flags->view, "number of the view, from 0")->capture_default_str();
+    command->add_option("--dump", flags->dump,
+                        "write image and gradients of sum(image * linspace(0, 1)) to this folder");
+    command->add_flag("--reference", flags->reference,
+                      "--dump from the double-precision reference, not from the device");
+    command->callback([flags, &action] { action = [flags] { return check_command(*flags); }; });
+}
+
+}  // namespace darb
