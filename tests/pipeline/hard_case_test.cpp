@@ -1,6 +1,5 @@
-// Every hard case on the device against double, image and gradients, in two kernels each; `darb
-// check
-// --every-kernel` runs all.
+// Every hard case on the device against double, image and gradients, in two kernels each.
+// `darb check --every-kernel` runs all.
 #include <gtest/gtest.h>
 
 #include "engine/check/hard_cases.h"
