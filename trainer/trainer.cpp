@@ -140,14 +140,14 @@ void Trainer::launch(int iteration) {
     commands.submit();
 }
 
-std::uint32_t Trainer::finish(Flight& flight) {
+gpu::FrameStatus Trainer::finish(Flight& flight) {
     flight.commands.wait();
     const int iteration = std::exchange(flight.iteration, 0);
     gpu::FrameStatus status;
     gpu::LossResult loss;
     std::memcpy(&status, flight.status.mapped(), sizeof status);
     std::memcpy(&loss, flight.loss.mapped(), sizeof loss);
-    if (status.overflow != 0) return status.pairs;
+    if (status.overflow != 0) return status;
 
     for (size_t r = 0; r < counters_.culled.size(); ++r) counters_.culled[r] += status.culled[r];
     counters_.bad_gradients += status.bad_gradients;
@@ -165,7 +165,7 @@ std::uint32_t Trainer::finish(Flight& flight) {
         on_result({iteration, Loss::value(loss, options_.lambda_dssim), -10.0 * std::log10(mse),
                    splats_.count(), status.visible, status.pairs});
     }
-    return 0;
+    return status;
 }
 
 // The overflow flag is sticky: whatever was submitted after the iteration that overflowed changed
@@ -173,18 +173,17 @@ std::uint32_t Trainer::finish(Flight& flight) {
 void Trainer::settle(Flight& flight) {
     if (flight.iteration == 0) return;
     const int first = flight.iteration;
-    std::uint32_t pairs = finish(flight);
-    if (pairs == 0) return;
+    gpu::FrameStatus status = finish(flight);
+    if (status.overflow == 0) return;
     for (Flight& later : flights_)
         if (std::exchange(later.iteration, 0) != 0) later.commands.wait();
     for (int i = first; i <= iteration_; ++i) {
         do {
             ++counters_.redone_iterations;
-            if (pairs > 0) forward_.reserve(splats_.count(), pairs + pairs / 2, 1, 1);
-            forward_.clear_status();
+            forward_.make_room(status);
             launch(i);
-            pairs = finish(flights_[i & 1]);
-        } while (pairs > 0);
+            status = finish(flights_[i & 1]);
+        } while (status.overflow != 0);
     }
 }
 
@@ -232,16 +231,13 @@ ImageF Trainer::render(const Camera& camera) {
     const gpu::CameraData data = camera_data(camera, splats_.origin());
     const Buffer cameras = upload_cameras(*device_, {data});
     Commands& commands = flights_[0].commands;
-    std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
+    const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
+    forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
     for (;;) {
-        forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
         commands.begin();
         forward_.record(commands, splats_, cameras, 0, data, sh_degree(), background_);
         commands.submit_and_wait();
-        const gpu::FrameStatus status = forward_.read_status();
-        if (status.overflow == 0) break;
-        pairs = status.pairs + status.pairs / 2;
-        forward_.clear_status();
+        if (!forward_.make_room(forward_.read_status())) break;
     }
     return planes_to_image(
         forward_.image().download<float>(size_t(camera.width) * camera.height * 3), camera.width,

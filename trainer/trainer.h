@@ -94,8 +94,8 @@ class Trainer {
     };
     int view_for(int iteration);
     void launch(int iteration);
-    std::uint32_t finish(Flight& flight);  // 0, or the pairs that the iteration wanted
-    void settle(Flight& flight);           // finish, and do again what overflowed
+    gpu::FrameStatus finish(Flight& flight);  // where it overflowed nothing was changed
+    void settle(Flight& flight);              // finish, and do again what overflowed
     void density_control(int iteration);
     std::uint32_t growth_limit() const;
     AdamStep rates(int iteration) const;

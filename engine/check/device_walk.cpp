@@ -50,9 +50,7 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
                             settings.background, AdamStep{});
         commands.submit_and_wait();
         walk.status = forward.read_status();
-        if (walk.status.overflow == 0) break;
-        forward.reserve(splats.count(), walk.status.pairs, camera.width, camera.height);
-        forward.clear_status();
+        if (!forward.make_room(walk.status)) break;
     }
     walk.image =
         planes_to_image(forward.image().download<float>(floats), camera.width, camera.height);

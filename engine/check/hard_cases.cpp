@@ -201,6 +201,15 @@ void Cases::blending() {
     thin.image_tolerance = "image_thin_layers";
     thin.gradient_tolerance = "gradient_thin_layers_walk";
 
+    Stage list = stage(16, 16);
+    for (int i = 0; i < 20'000; ++i)
+        list.add(8, 8, 30, logit(1.5e-4), {float(i % 7) / 7, float(i % 3) / 3, 0.5f}, 2 + 1e-4 * i);
+    HardCase& longest =
+        add("long_list", "a driver ends long loops, the rest is missing", std::move(list.scene));
+    longest.settings.alpha_cutoff = 1e-6f;
+    longest.image_tolerance = "image_thin_layers";
+    longest.gradient_tolerance = "gradient_thin_layers_walk";
+
     Stage ties = stage();
     for (int i = 0; i < 200; ++i)
         ties.add(6 + i * 7 % 36, 5 + i * 5 % 24, 3, 0.5, {float(i % 2), 0.5f, float(i % 3) / 2});

@@ -23,11 +23,18 @@ AdamStep adam_step(const AdamStep& rates, int t) {
 
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
     : device_(&device), options_(options), result_(result) {
-    SpecConstants blend = kernel_constants(options);
-    const std::uint32_t subgroup = blend_subgroup(device);
+    make_blend(false);
+    behind_ = Buffer(device, "behind", 4);
+}
+
+void Backward::make_blend(bool segmented) {
+    SpecConstants blend = kernel_constants(options_);
+    const std::uint32_t subgroup = blend_subgroup(*device_);
     blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
     blend["THREADS"] = static_cast<std::int32_t>(subgroup);
-    blend_ = Pipeline(device, "blend_backward", blend, true, subgroup);
+    blend["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
+    blend_ = Pipeline(*device_, "blend_backward", blend, true, subgroup);
+    segmented_ = segmented;
 }
 
 Pipeline& Backward::project_pipeline(int sh_degree) {
@@ -55,6 +62,25 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
     }
 }
 
+// Long lists take several dispatches, the last part of every list first.
+void Backward::record_blend(Commands& commands, const Forward& forward, const Buffer& d_image,
+                            const gpu::CameraData& data, const glm::vec3& background) {
+    const std::uint32_t segments = forward.list_segments();
+    if (segments > 1 && !segmented_) make_blend(true);
+    if (segments > 1 && behind_.bytes() < forward.final_transmittance().bytes())
+        behind_ = Buffer(*device_, "behind", forward.final_transmittance().bytes());
+    for (std::uint32_t segment = segments; segment-- > 0;) {
+        const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x, background.r,
+                                   background.g, background.b, segment,      segments};
+        commands.dispatch(
+            blend_, blend,
+            {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
+             forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
+             forward.final_transmittance(), forward.last_pair(), partials_, partial_rest_, behind_},
+            data.tiles_x, data.tiles_y);
+    }
+}
+
 void Backward::record(Commands& commands, const Forward& forward, GpuSplats& splats,
                       const Buffer& d_image, const Buffer& cameras, std::uint32_t camera_index,
                       const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
@@ -63,14 +89,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
     commands.pass("blend backward");
     commands.fill(partials_, 0);
     commands.fill(partial_rest_, 0);
-    const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x,
-                               background.r, background.g, background.b};
-    commands.dispatch(
-        blend_, blend,
-        {forward.tile_range(), forward.pair_order(), forward.pair_splat(), forward.splat_shape(),
-         forward.splat_light(), forward.splat_bound(), d_image, forward.final_transmittance(),
-         forward.last_pair(), partials_, partial_rest_},
-        data.tiles_x, data.tiles_y);
+    record_blend(commands, forward, d_image, data, background);
 
     if (splats.count() == 0) return;
     commands.pass("project backward");

@@ -40,11 +40,16 @@ class Backward {
 
   private:
     Pipeline& project_pipeline(int sh_degree);
+    void make_blend(bool segmented);
+    void record_blend(Commands& commands, const Forward& forward, const Buffer& d_image,
+                      const gpu::CameraData& data, const glm::vec3& background);
 
     Device* device_;
     ForwardOptions options_;
     BackwardResult result_;
     Pipeline blend_;
+    bool segmented_ = false;  // whether blend_ takes segments
+    Buffer behind_;           // pixels' state between its dispatches
     std::map<int, Pipeline> project_;
     std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0;
     Buffer partials_, partial_rest_, gradient_sum_;

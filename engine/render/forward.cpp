@@ -74,13 +74,8 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     groups_pairs_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 1}}, false);
     emit_ = Pipeline(device, "emit", per_item);
     tile_ranges_ = Pipeline(device, "tile_ranges", per_item);
-    SpecConstants blend = kernel_constants(options);
-    blend["MIN_TRANSMITTANCE"] = options.transmittance_stop;
-    blend["STORE_FOR_BACKWARD"] = options.store_for_backward ? 1 : 0;
-    const std::uint32_t subgroup = blend_subgroup(device);
-    blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
-    blend["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
-    blend_ = Pipeline(device, "blend", blend, true, subgroup);
+    list_lengths_ = Pipeline(device, "list_lengths", per_item);
+    make_blend(1);
 
     status_ = Buffer(device, "frame status", sizeof(gpu::FrameStatus));
     groups_ = Buffer(device, "frame groups", sizeof(gpu::FrameGroups));
@@ -90,6 +85,40 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     pairs_total_ = Buffer(device, "pairs total", 4);
     pairs_in_use_ = Buffer(device, "pairs in use", 4);
     clear_status();
+}
+
+void Forward::make_blend(std::uint32_t segments) {
+    SpecConstants blend = kernel_constants(options_);
+    blend["MIN_TRANSMITTANCE"] = options_.transmittance_stop;
+    blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
+    const std::uint32_t subgroup = blend_subgroup(*device_);
+    blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    blend["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
+    blend["SEGMENT"] = segments > 1 ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
+    blend_ = Pipeline(*device_, "blend", blend, true, subgroup);
+    list_segments_ = segments;
+}
+
+bool Forward::make_room(const gpu::FrameStatus& status) {
+    if (status.overflow == 0) return false;
+    const std::uint32_t most = max_pairs(*device_);
+    const std::uint32_t wanted =
+        (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.pairs;
+    if (wanted > most)
+        throw Error("splat-tile pairs",
+                    fmt::format("a frame needs {}{} pairs, this device's buffers hold {}",
+                                wanted == 0xFFFFFFFFu ? "more than " : "", wanted, most),
+                    "Lower the resolution (-r) or the number of splats (--cap-max).");
+    if ((status.overflow & OVERFLOW_PAIRS) != 0)
+        reserve(splat_capacity_, std::min(wanted + wanted / 2, most), 1, 1);
+    const std::uint32_t segments = (status.longest_list + LIST_SEGMENT - 1) / LIST_SEGMENT;
+    if (segments > list_segments_) {
+        make_blend(segments + segments / 4);
+        if (!options_.store_for_backward)  // where the pixels' state is kept between dispatches
+            final_transmittance_ = Buffer(*device_, "final transmittance", pixel_capacity_ * 4);
+    }
+    clear_status();
+    return true;
 }
 
 Pipeline& Forward::project_pipeline(int sh_degree) {
@@ -149,9 +178,10 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
     if (pixels > pixel_capacity_) {
         pixel_capacity_ = pixels;
         image_ = Buffer(d, "image", pixels * 12);
-        const std::uint64_t stored = options_.store_for_backward ? pixels * 4 : 4;
-        final_transmittance_ = Buffer(d, "final transmittance", stored);
-        last_pair_ = Buffer(d, "last pair", stored);
+        const bool store = options_.store_for_backward;
+        final_transmittance_ =
+            Buffer(d, "final transmittance", store || list_segments_ > 1 ? pixels * 4 : 4);
+        last_pair_ = Buffer(d, "last pair", store ? pixels * 4 : 4);
     }
 }
 
@@ -176,19 +206,25 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
     }
     record_depth_order(commands, n);
     record_pairs(commands, data, n);
+    record_blend(commands, data, background);
+}
 
+void Forward::record_blend(Commands& commands, const gpu::CameraData& data,
+                           const glm::vec3& background) {
     commands.pass("blend");
-    const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x,
-                               background.r, background.g, background.b};
-    commands.dispatch(blend_, blend,
-                      {tile_range_, pair_order(), pair_splat_, splat_shape_, splat_light_,
-                       splat_bound_, image_, final_transmittance_, last_pair_},
-                      data.tiles_x, data.tiles_y);
+    for (std::uint32_t segment = 0; segment < list_segments_; ++segment) {
+        const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x, background.r,
+                                   background.g, background.b, segment,      list_segments_};
+        commands.dispatch(blend_, blend,
+                          {tile_range_, pair_order(), pair_splat_, splat_shape_, splat_light_,
+                           splat_bound_, image_, final_transmittance_, last_pair_},
+                          data.tiles_x, data.tiles_y);
+    }
 }
 
 void Forward::record_depth_order(Commands& commands, std::uint32_t n) {
     const gpu::SplatArgs args{n};
-    const gpu::PairArgs pair_args{pair_capacity_, 0, 0};
+    const gpu::PairArgs pair_args{pair_capacity_, 0, 0, 0};
     const Groups g = groups_for(n);
     commands.pass("compact");
     commands.fill(splat_total_, n);
@@ -204,7 +240,8 @@ void Forward::record_depth_order(Commands& commands, std::uint32_t n) {
 
 void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t n) {
     const std::uint32_t tile_count = data.tiles_x * data.tiles_y;
-    const gpu::PairArgs args{pair_capacity_, data.tiles_x, tile_count};
+    const gpu::PairArgs args{pair_capacity_, data.tiles_x, tile_count,
+                             list_segments_ * LIST_SEGMENT};
     commands.pass("emit");
     commands.dispatch_indirect(gather_counts_, gpu::SplatArgs{n},
                                {status_, depth_order_, pair_count_, pair_count_sorted_}, groups_,
@@ -224,6 +261,8 @@ void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std:
     commands.fill(tile_range_, 0);
     commands.dispatch_indirect(tile_ranges_, args, {pairs_in_use_, pair_tile_, tile_range_},
                                groups_, offsetof(gpu::FrameGroups, pairs_x));
+    const Groups g = groups_for(tile_count);
+    commands.dispatch(list_lengths_, args, {status_, tile_range_}, g.x, g.y);
 }
 
 const Buffer& Forward::pair_order() const {

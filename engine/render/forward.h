@@ -52,6 +52,12 @@ class Forward {
     /// Makes the buffers fit: never shrinks. The queue must be idle.
     void reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height);
     std::uint32_t pair_capacity() const { return pair_capacity_; }
+    /// How many dispatches the blend passes take, LIST_SEGMENT pairs of every tile's list each.
+    std::uint32_t list_segments() const { return list_segments_; }
+    /// After a frame whose status is given: false where it is whole. Else makes room for what it
+    /// wanted and clears the status; the frame must then be recorded again. Throws Error where it
+    /// can never fit. The queue must be idle.
+    bool make_room(const gpu::FrameStatus& status);
     /// The most pairs that this device's buffer bindings allow.
     static std::uint32_t max_pairs(const Device& device);
 
@@ -85,15 +91,19 @@ class Forward {
     Pipeline& project_pipeline(int sh_degree);
     void record_depth_order(Commands& commands, std::uint32_t splat_count);
     void record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t splat_count);
+    void record_blend(Commands& commands, const gpu::CameraData& data, const glm::vec3& background);
+    void make_blend(std::uint32_t segments);
 
     Device* device_;
     ForwardOptions options_;
     std::map<int, Pipeline> project_;  // by SH degree in use
-    Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_, blend_;
+    Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
+        list_lengths_, blend_;
     std::optional<Scan> scan_;
     std::optional<RadixSort> depth_sort_, tile_sort_;
     std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0, tile_capacity_ = 0;
     std::uint64_t pixel_capacity_ = 0;
+    std::uint32_t list_segments_ = 0;
 
     Buffer status_, groups_, splat_total_, visible_total_, visible_in_use_, pairs_total_,
         pairs_in_use_;

@@ -33,16 +33,14 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
     const Buffer cameras = upload_cameras(*device_, {data});
     const int degree =
         sh_degree < 0 ? splats_.sh_degree() : std::min(sh_degree, splats_.sh_degree());
-    std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
+    const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
+    forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
     for (;;) {
-        forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
         commands_.begin();
         forward_.record(commands_, splats_, cameras, 0, data, degree, background);
         commands_.submit_and_wait();
         status_ = forward_.read_status();
-        if (status_.overflow == 0) break;
-        pairs = status_.pairs + status_.pairs / 4;
-        forward_.clear_status();
+        if (!forward_.make_room(status_)) break;
     }
     pass_times_ = commands_.pass_times();
     const size_t floats = size_t(camera.width) * camera.height * 3;

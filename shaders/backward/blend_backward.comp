@@ -5,7 +5,8 @@
 // dotted with dL/dcolour, is a convex combination, so nothing cancels.
 // Work: one subgroup a tile, its blocks one after another, pixels dealt as in blend.comp; the lanes' sums are
 // reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.
-// Reads what the forward pass stored; slots must be zero before.
+// Reads what the forward pass stored; slots must be zero before. Lists too long for one dispatch are worked off
+// SEGMENT pairs at a time, the last ones first; final_transmittance and behind hold the pixels' state in between.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,6 +20,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 8;  // SUBGROUP_SIZE
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
+layout(constant_id = 4) const uint SEGMENT = 0;  // pairs of a list a dispatch; 0: all of them
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
@@ -29,10 +31,11 @@ layout(set = 0, binding = 3, scalar) readonly buffer SplatShape { vec4 splat_sha
 layout(set = 0, binding = 4, scalar) readonly buffer SplatLight { vec4 splat_light[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
-layout(set = 0, binding = 7, scalar) readonly buffer FinalT { float final_transmittance[]; };
+layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer LastPair { uint last_pair[]; };
 layout(set = 0, binding = 9, scalar) buffer Partials { float partials[]; };      // [K][PARTIALS]
 layout(set = 0, binding = 10, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 11, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
 
 #include "lib/block.glsl"
 #include "lib/reduce.glsl"
@@ -130,21 +133,40 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
     }
 }
 
+// What is behind the pairs of this dispatch, from and for the other dispatches.
+void load_behind(inout Pixels px, uvec2 first) {
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uvec2 at = first + slot_offset(k);
+        if (at.x < args.width && at.y < args.height) px.behind[k] = behind[at.y * args.width + at.x];
+    }
+}
+void store_state(Pixels px, uvec2 first) {
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uvec2 at = first + slot_offset(k);
+        if (at.x >= args.width || at.y >= args.height) continue;
+        final_transmittance[at.y * args.width + at.x] = px.transmittance[k];
+        behind[at.y * args.width + at.x] = px.behind[k];
+    }
+}
+
 void blend_block(uint block, uvec2 tile, uvec2 range) {
     const uvec2 first = tile * TILE_SIZE + first_pixel(block, gl_SubgroupInvocationID);
     Pixels px;
-    const uint end = subgroupMax(load_pixels(first, px));
+    const uint last = subgroupMax(load_pixels(first, px));
+    const uint end = min(last, range.y);
     if (end <= range.x) return;
+    if (SEGMENT > 0u && last > range.y) load_behind(px, first);
     for (uint chunk = range.x + (end - 1u - range.x) / CHUNK * CHUNK;; chunk -= CHUNK) {
         const uint count = collect_hits(chunk, min(chunk + CHUNK, end), block_bit(block));
         if (count > 0u) blend_hits(px, vec2(first) + 0.5, count);
         if (chunk == range.x) break;
     }
+    if (SEGMENT > 0u && args.segment > 0u) store_state(px, first);
 }
 
 void main() {
     const uvec2 tile = gl_WorkGroupID.xy;
-    const uvec2 range = tile_range[tile.y * args.tiles_x + tile.x];
+    const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
     if (range.x >= range.y) return;
     for (uint block = 0u; block < BLOCKS; ++block) blend_block(block, tile, range);
 }

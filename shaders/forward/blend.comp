@@ -4,7 +4,8 @@
 // Work: one workgroup a tile, one subgroup a block of it, PIXELS pixels a thread in registers. Each lane loads one
 // pair of the tile's list; those whose ellipse touches the block are broadcast in turn. No shared memory, no
 // barrier. Reads pairs and projected splats; writes the image and, for the backward pass, the final
-// transmittance and where each pixel ended.
+// transmittance and where each pixel ended. Lists too long for one dispatch are worked off SEGMENT pairs at a time;
+// between the dispatches the outputs hold the pixels' state.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,6 +20,7 @@ layout(constant_id = 0) const uint THREADS = 32;       // BLOCKS * SUBGROUP_SIZE
 layout(constant_id = 1) const int STORE_FOR_BACKWARD = 0;
 layout(constant_id = 2) const float MIN_TRANSMITTANCE = TRANSMITTANCE_STOP;
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
+layout(constant_id = 4) const uint SEGMENT = 0;  // pairs of a list a dispatch; 0: all of them
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
@@ -28,9 +30,9 @@ layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat
 layout(set = 0, binding = 3, scalar) readonly buffer SplatShape { vec4 splat_shape[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer SplatLight { vec4 splat_light[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer ImageOut { float image[]; };  // [3][H][W]
-layout(set = 0, binding = 7, scalar) writeonly buffer FinalT { float final_transmittance[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer LastPair { uint last_pair[]; };
+layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W]
+layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
+layout(set = 0, binding = 8, scalar) buffer LastPair { uint last_pair[]; };
 
 #include "lib/block.glsl"
 
@@ -85,8 +87,23 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
     return subgroupAny(alive > 0.0);
 }
 
+// The state that the dispatch before this one left.
+void load(inout Pixels px, uvec2 first) {
+    const uint plane = args.width * args.height;
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uvec2 at = first + slot_offset(k);
+        if (at.x >= args.width || at.y >= args.height) continue;
+        const uint o = at.y * args.width + at.x;
+        px.transmittance[k] = final_transmittance[o];
+        px.colour[k] = vec3(image[o], image[plane + o], image[2u * plane + o]);
+        if (STORE_FOR_BACKWARD == 1) px.last[k] = last_pair[o];
+    }
+}
+
 void store(Pixels px, uvec2 first) {
-    const vec3 background = vec3(args.background_r, args.background_g, args.background_b);
+    const bool more = SEGMENT > 0u && args.segment + 1u < args.segments;
+    const vec3 background =
+        more ? vec3(0.0) : vec3(args.background_r, args.background_g, args.background_b);
     const uint plane = args.width * args.height;
     for (uint k = 0u; k < PIXELS; ++k) {
         const uvec2 at = first + slot_offset(k);
@@ -97,16 +114,15 @@ void store(Pixels px, uvec2 first) {
         image[o] = colour.r;
         image[plane + o] = colour.g;
         image[2u * plane + o] = colour.b;
-        if (STORE_FOR_BACKWARD == 1) {
-            final_transmittance[o] = transmittance;
-            last_pair[o] = px.last[k];
-        }
+        if (STORE_FOR_BACKWARD == 1) last_pair[o] = px.last[k];
+        if (STORE_FOR_BACKWARD == 1 || SEGMENT > 0u)
+            final_transmittance[o] = more ? px.transmittance[k] : transmittance;
     }
 }
 
 void main() {
     const uvec2 tile = gl_WorkGroupID.xy;
-    const uvec2 range = tile_range[tile.y * args.tiles_x + tile.x];
+    const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
     const uint bit = block_bit(gl_SubgroupID);
     const uvec2 first = tile * TILE_SIZE + first_pixel(gl_SubgroupID, gl_SubgroupInvocationID);
     const vec2 centre = vec2(first) + 0.5;
@@ -118,6 +134,7 @@ void main() {
         px.colour[k] = vec3(0.0);
         px.last[k] = 0u;
     }
+    if (SEGMENT > 0u && args.segment > 0u) load(px, first);
     for (uint chunk = range.x; chunk < range.y; chunk += CHUNK) {
         const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bit);
         if (!blend_hits(px, centre, count)) break;

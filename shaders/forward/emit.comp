@@ -14,7 +14,7 @@ layout(constant_id = 0) const uint THREADS = 64;
 #include "lib/tile.glsl"
 
 layout(push_constant, scalar) uniform Push { PairArgs args; };
-layout(set = 0, binding = 0, scalar) readonly buffer Status { FrameStatus status; };
+layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 1, scalar) readonly buffer DepthOrder { uint depth_order[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer PairOffset { uint pair_offset[]; };  // by rank
 layout(set = 0, binding = 3, scalar) readonly buffer Cover { uvec4 cover[]; };
@@ -64,6 +64,12 @@ void main() {
     const Ellipse e = Ellipse(splat_shape[splat], splat_bound[splat].xy);
     uint slot = pair_offset[rank];
     pair_begin[splat] = slot;
+    // Offsets only grow, unless their sum left 32 bits.
+    if ((rank + 1u < status.visible ? pair_offset[rank + 1u] : status.pairs) < slot) {
+        atomicOr(status.overflow, OVERFLOW_TOTAL);
+        atomicMax(status.pairs, 0xFFFFFFFFu);
+    }
+    if (slot >= args.pair_capacity) return;  // the frame is repeated
     for (uint bits = c.bits.x; bits != 0u; bits &= bits - 1u)
         slot = emit_cell(c, uint(findLSB(bits)), splat, e, slot);
     for (uint bits = c.bits.y; bits != 0u; bits &= bits - 1u)

@@ -36,7 +36,7 @@ void main() {
     } else {
         const uint stored = min(total, args.pair_capacity);
         status.pairs = total;
-        if (total > args.pair_capacity) status.overflow = 1u;
+        if (total > args.pair_capacity) status.overflow |= OVERFLOW_PAIRS;
         in_use = stored;
         const uvec2 n = split_groups(stored);
         groups.pairs_x = n.x;

@@ -24,6 +24,14 @@ uint block_bit(uint block) {
     return 1u << (PAIR_BLOCK_SHIFT + block);
 }
 
+// The stretch of a tile's list that a dispatch works off. Needs the specialization constant SEGMENT: pairs of a
+// stretch, or 0 for whole lists in one dispatch.
+uvec2 list_part(uvec2 range) {
+    if (SEGMENT == 0u) return range;
+    const uint begin = min(range.x + args.segment * SEGMENT, range.y);
+    return uvec2(begin, min(begin + SEGMENT, range.y));
+}
+
 // The pairs of a stretch of the tile's list that touch the subgroup's block, packed together, so that the loop over
 // them has neither gaps nor branches. Needs the buffers pair_order and pair_splat.
 const uint CHUNK = 128u;  // pairs looked at before those found are worked off

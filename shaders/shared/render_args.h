@@ -16,6 +16,17 @@
 #define PAIR_BLOCK_SHIFT 28
 #define PAIR_SPLAT_MASK 0x0FFFFFFFu
 
+// Pairs of one tile's list that a dispatch of a blend pass works off; longer lists take several.
+// The lavapipe of Mesa 22.3 ends every loop of a subgroup once all of them together made 65,535
+// rounds, which cuts a list after 51,000 pairs forward and 10,700 backward; and a GPU may end a
+// dispatch that takes seconds.
+#define LIST_SEGMENT 8192u
+
+// What did not fit into a frame; bits of FrameStatus.overflow.
+#define OVERFLOW_PAIRS 1u  // more pairs than their buffers hold
+#define OVERFLOW_LISTS 2u  // a tile's list is longer than the blend dispatches take on
+#define OVERFLOW_TOTAL 4u  // the number of pairs exceeds 32 bits
+
 // Why a splat takes no part in a frame; index into FrameStatus.culled.
 #define CULL_NEAR 0        // not in front of the near plane, or position not finite
 #define CULL_ROTATION 1    // quaternion of no direction
@@ -50,9 +61,10 @@ struct CameraData {
 struct FrameStatus {
     uint visible;        // V
     uint pairs;          // K as wanted, may exceed the capacity
-    uint overflow;       // 1: pairs exceeded the capacity; sticky until the host clears it
+    uint overflow;       // OVERFLOW_*: the frame is to be repeated; sticky until the host clears it
     uint bad_gradients;  // splats whose gradient was not finite
     uint culled[CULL_REASONS];
+    uint longest_list;  // pairs of the tile that has most
 };
 
 // VkDispatchIndirectCommand of the passes over V and over K.
@@ -71,10 +83,11 @@ struct SplatArgs {     // compact, gather_counts
     uint splat_count;  // N
 };
 
-struct PairArgs {  // frame_groups, emit, tile_ranges
+struct PairArgs {  // frame_groups, emit, tile_ranges, list_lengths
     uint pair_capacity;
     uint tiles_x;
     uint tile_count;
+    uint list_capacity;  // pairs of one tile that the blend dispatches take on
 };
 
 struct BlendArgs {
@@ -82,11 +95,13 @@ struct BlendArgs {
     uint height;  // px
     uint tiles_x;
     float background_r, background_g, background_b;
+    uint segment;   // of every list that this dispatch works off, where SEGMENT > 0
+    uint segments;  // in all
 };
 
 #ifdef __cplusplus
 static_assert(sizeof(CameraData) == 112);
-static_assert(sizeof(FrameStatus) == 48);
+static_assert(sizeof(FrameStatus) == 52);
 static_assert(sizeof(FrameGroups) == 24);
 }  // namespace darb::gpu
 #endif

@@ -234,6 +234,33 @@ TEST(Frame, renderer_grows_and_repeats_until_everything_fits) {
     EXPECT_EQ(image.data, planes_to_image(full.image, 300, 200).data);
 }
 
+// The second round takes the list in parts, with and without the state for the backward pass.
+TEST(Frame, a_list_of_20000_splats_is_shown_to_its_end) {
+    TestScene s = random_scene({.count = 20'000, .width = 16, .height = 16, .sh_degree = 0});
+    s.camera.rotation = glm::dmat3(1.0);
+    for (size_t i = 0; i < s.model.size(); ++i) {
+        const bool last = i + 1 == s.model.size();
+        for (size_t c = 0; c < 3; ++c) {
+            s.model.position[i * 3 + c] = c < 2 ? 0 : last ? 1 : 0;
+            s.model.log_scale[i * 3 + c] = 0;
+        }
+        s.model.opacity[i] = last ? 6.0f : -5.54f;  // just below the cut-off, but for the last one
+    }
+    for (size_t i = 0; i < 9000; ++i) s.model.opacity[i] = -5.5f;
+    WalkSettings settings;
+    settings.alpha_cutoff = 1e-5f;
+    settings.transmittance_stop = 1e-30f;
+    const DeviceWalk walk = walk_on_device(s.model, s.camera, {}, settings);
+    EXPECT_EQ(walk.status.longest_list, 20'000U);
+    EXPECT_EQ(walk.status.overflow, 0U);
+    ForwardOptions options;
+    options.alpha_cutoff = settings.alpha_cutoff;
+    options.transmittance_stop = settings.transmittance_stop;
+    Renderer renderer(shared_device(), s.model, options);
+    EXPECT_EQ(renderer.render(s.camera).data, walk.image.data);
+    EXPECT_EQ(renderer.render(s.camera).data, walk.image.data) << "the second frame";
+}
+
 // 65,538 tiles: tile numbers take 17 bits. The splats lie in the last and in the first tiles.
 TEST(Frame, more_than_65536_tiles_are_told_apart) {
     TestScene s = random_scene({.count = 2, .width = 17, .height = 524'290, .sh_degree = 0});

@@ -109,7 +109,6 @@ INSTANTIATE_TEST_SUITE_P(every_kernel, BlendBackward, testing::ValuesIn(every_bl
 
 const BlendVariant kCosine{KERNEL_RAISED_COSINE, Footprint::psi, EVALUATION_POLYNOMIAL};
 
-// Mesa 22.3 cuts lists of more than 12,800 splats, 10,700 at four lanes: see blend_test.
 TEST(BlendBackwardCases, ten_thousand_thin_layers_match_double) {
     BlendScene scene = kCosine.scene();
     scene.cutoff = 1e-6f;
@@ -163,6 +162,26 @@ TEST(BlendBackwardCases, skipping_blocks_that_are_not_touched_changes_no_bit) {
     const reference::TileLists lists = scene.lists();
     EXPECT_TRUE(same_bits(blend_on_device(scene, lists, true, d_image),
                           blend_on_device(scene, lists, true, d_image, true)));
+}
+
+TEST(BlendBackwardCases, lists_worked_off_in_parts_change_no_bit) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.add_random(2000, 4, 0.01, 0.3);
+    const std::vector<float> d_image(53 * 37 * 3, 0.3f);
+    const reference::TileLists lists = scene.lists();
+    const BlendOutput whole = blend_on_device(scene, lists, true, d_image);
+    scene.segment = 128;
+    EXPECT_TRUE(same_bits(blend_on_device(scene, lists, true, d_image), whole));
+}
+
+// Mesa 22.3 would cut a dispatch after 12,800 splats, 10,700 at four lanes: see blend_test.
+TEST(BlendBackwardCases, twenty_five_thousand_layers_match_double) {
+    BlendScene scene = kCosine.scene();
+    scene.cutoff = 1e-6f;
+    scene.segment = LIST_SEGMENT;
+    for (int i = 0; i < 25'000; ++i)
+        scene.add({8.5, 8.5}, {400, 0, 400}, 1e-4, {i % 7 / 7.0, i % 3 / 3.0, 0.5});
+    expect_backward_matches(scene, tolerance("gradient_thin_layers_walk"));
 }
 
 }  // namespace

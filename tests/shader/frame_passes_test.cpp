@@ -73,7 +73,7 @@ GroupsOutcome frame_groups(int stage, std::uint32_t total, std::uint32_t capacit
     const GuardedBuffer status(device, "status", before),
         groups(device, "groups", sizeof(gpu::FrameGroups)), sum(device, "total", Words{total}),
         in_use(device, "in use", 4);
-    run("frame_groups", gpu::PairArgs{capacity, 1, 1}, {status, groups, sum, in_use}, 1,
+    run("frame_groups", gpu::PairArgs{capacity, 1, 1, 0}, {status, groups, sum, in_use}, 1,
         {{"STAGE", stage}}, true);
     EXPECT_TRUE(status.intact() && groups.intact() && in_use.intact());
     return {status.read<gpu::FrameStatus>()[0], groups.read<gpu::FrameGroups>()[0],
@@ -137,6 +137,7 @@ struct EmitInput {
 
 struct Emitted {
     Words tile, splat, begin;
+    gpu::FrameStatus status;
 };
 
 Emitted emit(const EmitInput& in, std::uint32_t capacity) {
@@ -144,15 +145,17 @@ Emitted emit(const EmitInput& in, std::uint32_t capacity) {
     const auto visible = static_cast<std::uint32_t>(in.order.size());
     std::vector<gpu::FrameStatus> counts(1);
     counts[0].visible = visible;
+    counts[0].pairs = in.pairs;
     const GuardedBuffer status(device, "status", counts), order(device, "order", in.order),
         offset(device, "offset", in.offset), cover(device, "cover", in.frame.cover),
         tile(device, "pair tile", capacity * 4), splat(device, "pair splat", capacity * 4),
         begin(device, "pair begin", in.frame.visible.size() * 4),
         shape(device, "shape", in.frame.shape), bound(device, "bound", in.frame.bound);
-    run("emit", gpu::PairArgs{capacity, in.tiles_x, 0},
+    run("emit", gpu::PairArgs{capacity, in.tiles_x, 0, 0},
         {status, order, offset, cover, tile, splat, begin, shape, bound}, visible);
     EXPECT_TRUE(tile.intact() && splat.intact() && begin.intact());
-    return {tile.read<std::uint32_t>(), splat.read<std::uint32_t>(), begin.read<std::uint32_t>()};
+    return {tile.read<std::uint32_t>(), splat.read<std::uint32_t>(), begin.read<std::uint32_t>(),
+            status.read<gpu::FrameStatus>()[0]};
 }
 
 const SceneOptions kEmitScene{.count = 120,
@@ -179,6 +182,24 @@ TEST(Emit, pairs_follow_depth_and_cover) {
         }
     }
     EXPECT_EQ(slot, in.pairs);
+    EXPECT_EQ(out.status.overflow, 0U);
+    EXPECT_EQ(out.status.pairs, in.pairs);
+}
+
+// The sum of the counts leaves 32 bits between two splats, or after the last one.
+TEST(Emit, a_total_beyond_32_bits_is_noted) {
+    for (const bool last : {false, true}) {
+        EmitInput in(kEmitScene);
+        if (last) {
+            in.offset.back() = 0xffffff00U;
+            in.pairs = 0xffffff00U + 0x200U;  // wraps to 0x100
+        } else {
+            in.offset[50] = 5;
+        }
+        const Emitted out = emit(in, 1000);
+        EXPECT_EQ(out.status.overflow, OVERFLOW_TOTAL) << last;
+        EXPECT_EQ(out.status.pairs, 0xffffffffU) << last;
+    }
 }
 
 // Against every pixel: a block that the bits leave out holds no pixel above the cut-off, and one
@@ -230,7 +251,7 @@ Words tile_ranges(const Words& tiles, std::uint32_t tile_count, std::uint32_t in
     Device& device = shared_device();
     const GuardedBuffer count(device, "pairs in use", Words{in_use}), tile(device, "tiles", tiles),
         range(device, "range", Words(tile_count * size_t{2}, 0));
-    run("tile_ranges", gpu::PairArgs{1000, 1, tile_count}, {count, tile, range}, 1000);
+    run("tile_ranges", gpu::PairArgs{1000, 1, tile_count, 0}, {count, tile, range}, 1000);
     EXPECT_TRUE(range.intact());
     return range.read<std::uint32_t>();
 }
@@ -259,6 +280,24 @@ TEST(TileRanges, a_long_random_list_matches_the_host) {
         expected[tiles[j] * 2 + 1] = j + 1;
     }
     EXPECT_EQ(tile_ranges(tiles, 300, 1000), expected);
+}
+
+TEST(ListLengths, the_longest_is_found_and_lists_beyond_the_capacity_are_noted) {
+    Device& device = shared_device();
+    for (const std::uint32_t tiles : {1U, 64U, 1000U}) {
+        std::vector<glm::uvec2> ranges(tiles);
+        for (std::uint32_t t = 0; t < tiles; ++t) ranges[t] = {t * 500, t * 500 + t % 97};
+        ranges[tiles / 2].y = ranges[tiles / 2].x + 300;
+        for (const std::uint32_t capacity : {299U, 300U}) {
+            std::vector<gpu::FrameStatus> before(1);
+            before[0].overflow = OVERFLOW_PAIRS;
+            const GuardedBuffer status(device, "status", before), range(device, "ranges", ranges);
+            run("list_lengths", gpu::PairArgs{0, 1, tiles, capacity}, {status, range}, tiles);
+            const auto after = status.read<gpu::FrameStatus>()[0];
+            EXPECT_EQ(after.longest_list, 300U);
+            EXPECT_EQ(after.overflow, OVERFLOW_PAIRS | (capacity < 300 ? OVERFLOW_LISTS : 0U));
+        }
+    }
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ struct BlendScene {
     int evaluation = EVALUATION_POLYNOMIAL;
     float cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     glm::vec3 background{0.0f};
+    std::uint32_t segment = 0;                              // pairs of a list a dispatch; 0: all
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first
 
     /// Mean in px, S' = [[xx, xy], [xy, yy]] in px^2. Everything is rounded to float, so that both
@@ -170,6 +171,7 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     const auto subgroup = static_cast<std::int32_t>(blend_subgroup(device));
     SpecConstants constants =
         kernel_constants(scene.kernel, scene.footprint, scene.evaluation, 5, scene.cutoff);
+    constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
     constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
     constants["SUBGROUP_SIZE"] = subgroup;
     constants["THREADS"] = subgroup * 4;
@@ -189,33 +191,42 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         order(device, "pair order", shuffled.order), splats(device, "pairs", shuffled.pair_splat),
         shapes(device, "shape", shape), lights(device, "light", light),
         bounds(device, "bound", bound), image(device, "image", pixels * 12),
-        final_t(device, "final T", store ? pixels * 4 : 4),
+        final_t(device, "final T", store || scene.segment > 0 ? pixels * 4 : 4),
+        behind(device, "behind", scene.segment > 0 ? pixels * 4 : 4),
         last(device, "last pair", store ? pixels * 4 : 4), d_images(device, "d_image", d_image),
         partials(device, "partials", std::vector<float>(pairs * 8, 0.0f)),
         rest(device, "partial rest", std::vector<float>(pairs, 0.0f));
-    const gpu::BlendArgs args{static_cast<std::uint32_t>(scene.width),
-                              static_cast<std::uint32_t>(scene.height),
-                              static_cast<std::uint32_t>(lists.tiles_x),
-                              scene.background.r,
-                              scene.background.g,
-                              scene.background.b};
+    std::uint32_t longest = 0;
+    for (const glm::uvec2& r : shuffled.ranges) longest = std::max(longest, r.y - r.x);
+    gpu::BlendArgs args{static_cast<std::uint32_t>(scene.width),
+                        static_cast<std::uint32_t>(scene.height),
+                        static_cast<std::uint32_t>(lists.tiles_x),
+                        scene.background.r,
+                        scene.background.g,
+                        scene.background.b,
+                        0,
+                        1};
+    if (scene.segment > 0) args.segments = longest / scene.segment + 1;
     const auto groups_x = static_cast<std::uint32_t>(lists.tiles_x);
     const auto groups_y = static_cast<std::uint32_t>(lists.tiles_y);
     Commands commands(device);
     commands.begin();
-    commands.dispatch(blend, args,
-                      {ranges, order, splats, shapes, lights, bounds, image, final_t, last},
-                      groups_x, groups_y);
-    if (!d_image.empty())
+    for (; args.segment < args.segments; ++args.segment)
+        commands.dispatch(blend, args,
+                          {ranges, order, splats, shapes, lights, bounds, image, final_t, last},
+                          groups_x, groups_y);
+    commands.submit_and_wait();
+    BlendOutput out{image.read<float>(), final_t.read<float>(), last.read<std::uint32_t>(), {}};
+    commands.begin();
+    while (args.segment-- > 0 && !d_image.empty())
         commands.dispatch(backward, args,
                           {ranges, order, splats, shapes, lights, bounds, d_images, final_t, last,
-                           partials, rest},
+                           partials, rest, behind},
                           groups_x, groups_y);
     commands.submit_and_wait();
     for (const GuardedBuffer* buffer : {&ranges, &order, &splats, &shapes, &lights, &bounds, &image,
-                                        &final_t, &last, &partials, &rest})
+                                        &final_t, &last, &partials, &rest, &behind})
         EXPECT_TRUE(buffer->intact());
-    BlendOutput out{image.read<float>(), final_t.read<float>(), last.read<std::uint32_t>(), {}};
     const auto sums = partials.read<float>(), rests = rest.read<float>();
     for (size_t j = 0; j < pairs; ++j) {
         const float* p = &sums[shuffled.order[j] * size_t{8}];
