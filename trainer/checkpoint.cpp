@@ -171,12 +171,14 @@ std::string settings_text(const TrainOptions& o) {
                 {"sh_degree", o.sh_degree},
                 {"sh_interval", o.sh_interval},
                 {"white_background", o.white_background},
+                {"random_background", o.random_background},
                 {"lambda_dssim", o.lambda_dssim},
                 {"position_lr", {o.position_lr_start(), o.position_lr_end()}},
                 {"scale_lr", o.scale_lr},
                 {"rotation_lr", o.rotation_lr},
                 {"opacity_lr", o.opacity_lr},
                 {"sh_lr", {o.sh_dc_lr, o.sh_rest_lr}},
+                {"final_lr_share", o.final_lr_share},
                 {"densify_from", o.densify_from},
                 {"densify_until", o.densify_end()},
                 {"densify_interval", o.densify_interval},
@@ -186,6 +188,7 @@ std::string settings_text(const TrainOptions& o) {
                 {"prune_extent", o.prune_extent},
                 {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
                 {"max_splats", o.max_splats},
+                {"regularisers", {o.opacity_weight, o.scale_weight}},
                 {"initial_opacity", o.initial_opacity},
                 {"random_points", o.random_points}}
         .dump();

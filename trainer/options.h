@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <vector>
 
 #include "engine/kernels/kernel_family.h"
 
@@ -20,7 +19,9 @@ struct TrainOptions {
     int evaluation = EVALUATION_POLYNOMIAL;
     int sh_degree = 3;  // one more every sh_interval iterations
     int sh_interval = 1'000;
-    bool white_background = false;
+    bool white_background = false;  // what pictures are compared over; black otherwise
+    bool random_background = true;  // train over another colour each iteration: no surface can
+                                    // stay half transparent to borrow the background's colour
     float lambda_dssim = 0.2f;
 
     // Learning rates of Adam; position is log-linear over the run and in units of the scene extent.
@@ -30,6 +31,11 @@ struct TrainOptions {
     float position_lr_init = 0, position_lr_final = 0;
     float scale_lr = 5e-3f, rotation_lr = 1e-3f, opacity_lr = 0.05f;
     float sh_dc_lr = 2.5e-3f, sh_rest_lr = 1.25e-4f;
+    // Over the second half the other rates fall to this share, log-linear; 3DGS keeps them. On
+    // photos it steadies what is there: fox at 200 px, 4,000 iterations: 28.0 dB with 1, 29.1 with
+    // 0.1. A rendered scene without noise loses a little: 31.17 dB with 1, 30.98 with 0.3, 30.76
+    // with 0.1.
+    double final_lr_share = 0.3;
 
     // Density control (adc). densify_until -1: half of the run, at most 15,000.
     int densify_from = 500, densify_until = -1, densify_interval = 100;
@@ -42,6 +48,11 @@ struct TrainOptions {
     float prune_extent = 0.1f;  // share of the scene extent, after the first opacity reset
     int opacity_reset_interval = 3'000;
     std::uint32_t max_splats = std::numeric_limits<std::uint32_t>::max();
+
+    // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
+    // extents) in the loss. They take from splats what no photo holds up: a quarter fewer on
+    // monstree at 200 px, at equal quality.
+    float opacity_weight = 0.01f, scale_weight = 0.01f;
 
     // Start.
     float initial_opacity = 0.1f;

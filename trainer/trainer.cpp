@@ -91,18 +91,31 @@ int Trainer::view_for(int iteration) {
     return order_[(iteration - 1) % count];
 }
 
+glm::vec3 Trainer::background_for(int iteration) const {
+    if (!options_.random_background) return background_;
+    Pcg32 random(options_.seed, 0x6261636Bull << 32 | static_cast<std::uint32_t>(iteration));
+    glm::vec3 colour;
+    for (int c = 0; c < 3; ++c) colour[c] = static_cast<float>(random.uniform());
+    return colour;
+}
+
 AdamStep Trainer::rates(int iteration) const {
     const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
     const double position = std::exp((1 - t) * std::log(options_.position_lr_start()) +
                                      t * std::log(options_.position_lr_end()));
+    const auto late =
+        static_cast<float>(std::pow(options_.final_lr_share, std::max(0.0, 2 * t - 1)));
     AdamStep step;
     step.position = static_cast<float>(position * extent_);
-    step.scale = options_.scale_lr;
-    step.rotation = options_.rotation_lr;
-    step.opacity = options_.opacity_lr;
-    step.sh_dc = options_.sh_dc_lr;
-    step.sh_rest = options_.sh_rest_lr;
-    return adam_step(step, iteration);
+    step.scale = options_.scale_lr * late;
+    step.rotation = options_.rotation_lr * late;
+    step.opacity = options_.opacity_lr * late;
+    step.sh_dc = options_.sh_dc_lr * late;
+    step.sh_rest = options_.sh_rest_lr * late;
+    step = adam_step(step, iteration);
+    step.opacity_weight = options_.opacity_weight;
+    step.scale_weight = options_.scale_weight / static_cast<float>(extent_);
+    return step;
 }
 
 void Trainer::step() {
@@ -130,12 +143,13 @@ void Trainer::launch(int iteration) {
     Commands& commands = flight.commands;
     const int degree = std::min(options_.sh_degree, iteration / std::max(options_.sh_interval, 1));
     commands.begin();
+    const glm::vec3 behind = background_for(iteration);
     forward_.record(commands, splats_, cameras_, static_cast<std::uint32_t>(view), data, degree,
-                    background_);
+                    behind);
     loss_.record(commands, forward_.image(), photos_[view], d_image_, flight.loss, 0, width, height,
-                 background_, options_.lambda_dssim);
+                 behind, options_.lambda_dssim);
     backward_.record(commands, forward_, splats_, d_image_, cameras_,
-                     static_cast<std::uint32_t>(view), data, degree, background_, rates(iteration));
+                     static_cast<std::uint32_t>(view), data, degree, behind, rates(iteration));
     commands.copy(forward_.status(), flight.status, sizeof(gpu::FrameStatus));
     commands.submit();
 }
@@ -196,12 +210,12 @@ void Trainer::density_control(int iteration) {
     const bool refine =
         iteration > options_.densify_from && iteration % options_.densify_interval == 0;
     const bool reset = iteration % options_.opacity_reset_interval == 0 ||
-                       (options_.white_background && iteration == options_.densify_from);
+                       (options_.white_background && !options_.random_background &&
+                        iteration == options_.densify_from);
     if (!refine && !reset) return;
     drain();
     if (refine) {
         gpu::DensifyArgs args{};
-        args.growth_limit = growth_limit();
         args.gradient_threshold = options_.densify_grad_threshold;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * extent_);
         args.prune_opacity = options_.prune_opacity;
@@ -209,7 +223,8 @@ void Trainer::density_control(int iteration) {
                                ? static_cast<float>(options_.prune_extent * extent_)
                                : 0.0f;
         args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
-        const DensityResult result = density_.run(splats_, backward_.gradient_sum(), args);
+        const DensityResult result =
+            density_.run(splats_, backward_.gradient_sum(), args, growth_limit());
         counters_.cloned_or_split += result.grown;
         counters_.pruned += result.pruned;
         backward_.reserve(splats_.count(), 0);

@@ -64,6 +64,7 @@ class Trainer {
 
     /// A picture of the current splats, RGB not clamped. Drains.
     ImageF render(const Camera& camera);
+    /// Behind the splats where pictures are compared: black or white.
     glm::vec3 background() const { return background_; }
 
     std::function<void(const IterationResult&)> on_result;
@@ -98,6 +99,7 @@ class Trainer {
     void settle(Flight& flight);              // finish, and do again what overflowed
     void density_control(int iteration);
     std::uint32_t growth_limit() const;
+    glm::vec3 background_for(int iteration) const;
     AdamStep rates(int iteration) const;
 
     Device* device_;

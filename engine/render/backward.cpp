@@ -93,6 +93,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
+    const auto n = static_cast<float>(splats.count());
     const gpu::ProjectBackwardArgs args{splats.count(),
                                         camera_index,
                                         static_cast<float>(LOW_PASS_DEFAULT),
@@ -102,7 +103,9 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                         step.opacity,
                                         step.sh_dc,
                                         step.sh_rest,
-                                        step.inverse_sqrt_correction2};
+                                        step.inverse_sqrt_correction2,
+                                        step.opacity_weight / n,
+                                        step.scale_weight / (3.0f * n)};
     const Groups g = groups_for(splats.count());
     commands.dispatch(
         project_pipeline(sh_degree), args,

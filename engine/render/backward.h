@@ -13,6 +13,8 @@ namespace darb {
 struct AdamStep {
     float position = 0, scale = 0, rotation = 0, opacity = 0, sh_dc = 0, sh_rest = 0;
     float inverse_sqrt_correction2 = 1;
+    float opacity_weight = 0,
+          scale_weight = 0;  // of the mean opacity and the mean scale in the loss
 };
 /// rates: plain learning rates; t: the number of this step, from 1.
 AdamStep adam_step(const AdamStep& rates, int t);

@@ -127,5 +127,10 @@ void main() {
         const vec2 ndc = g.mean * 0.5 * vec2(camera.width, camera.height);
         gradient_sum[i] += vec2(length(ndc), 1.0);
     }
+    if (UPDATE == 1) {  // the regularisers: weight / N of the sum of opacities, weight / 3N of that of scales
+        const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
+        g.opacity_logit += args.opacity_weight * o * (1.0 - o);
+        for (uint c = 0u; c < 3u; ++c) g.log_scale[c] += args.scale_weight * exp(log_scale[3u * i + c]);
+    }
     update_splat(i, g);
 }

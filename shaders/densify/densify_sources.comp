@@ -24,8 +24,7 @@ void main() {
     if (i >= args.splat_count) return;
     const uint what = action[i];
     if (what == DENSIFY_PRUNE) return;
-    const uint room = args.growth_limit - min(args.growth_limit, args.splat_count);
-    const bool grows = what != DENSIFY_KEEP && grow_offset[i] < room;
+    const bool grows = what != DENSIFY_KEEP;
     const bool splits = grows && what == DENSIFY_SPLIT;
     sources[keep_offset[i]] = uvec2(i, splits ? DENSIFY_SPLIT : DENSIFY_KEEP);
     if (grows) sources[keep_total + grow_offset[i]] = uvec2(i, what);

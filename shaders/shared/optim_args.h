@@ -15,6 +15,8 @@ struct ProjectBackwardArgs {
     // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
     float rate_position, rate_scale, rate_rotation, rate_opacity, rate_dc, rate_rest;
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
+    // Regularisers (UPDATE = 1): weights of the sum of opacities and of the sum of scales.
+    float opacity_weight, scale_weight;
 };
 
 // What density control does with a splat; see densify_decide.comp.
@@ -26,7 +28,6 @@ struct ProjectBackwardArgs {
 
 struct DensifyArgs {
     uint splat_count;          // N before
-    uint growth_limit;         // no clone or split beyond this count; 0xFFFFFFFF = none
     float gradient_threshold;  // NDC units, on the mean over the frames that saw the splat
     float clone_split_scale;   // world: largest standard deviation below clones, above splits
     float prune_opacity;       // below it a splat goes
@@ -46,7 +47,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 40);
+static_assert(sizeof(ProjectBackwardArgs) == 48);
 }  // namespace darb::gpu
 #endif
 #endif

@@ -117,6 +117,29 @@ TEST(AdamUpdate, zero_moments_and_zero_gradient_move_nothing) {
     EXPECT_EQ(training.update(state, 3000), state);
 }
 
+// An unseen splat: its gradient is the regularisers' alone, weight o (1 - o) and weight s.
+TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
+    Training training(20);
+    training.partials.count.assign(20, 0);
+    const PassState state = start_state(training.scene.model);
+    AdamStep step = adam_step(kRates, 1);
+    step.opacity_weight = 0.3f;
+    step.scale_weight = 0.7f;
+    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
+                                              state, training.partials, step);
+    for (size_t i = 0; i < 20; ++i) {
+        const double o = 1 / (1 + std::exp(-double(state.parameters[kOpacity][i])));
+        EXPECT_NEAR(after.moments[kOpacity][2 * i], 0.1 * 0.3 * o * (1 - o), 1e-6);
+        EXPECT_LT(after.parameters[kOpacity][i], state.parameters[kOpacity][i]);
+    }
+    for (size_t i = 0; i < 60; ++i) {
+        const double scale = std::exp(double(state.parameters[kLogScale][i]));
+        EXPECT_NEAR(after.moments[kLogScale][2 * i], 0.1 * 0.7 * scale, 1e-6 * (1 + scale));
+        EXPECT_LT(after.parameters[kLogScale][i], state.parameters[kLogScale][i]);
+    }
+    EXPECT_EQ(after.parameters[kPosition], state.parameters[kPosition]);
+}
+
 TEST(AdamUpdate, an_overflowed_frame_changes_nothing) {
     Training training;
     PassState state = training.update(start_state(training.scene.model), 1);

@@ -21,6 +21,8 @@ struct Generation {
     std::array<std::vector<float>, kAttributeCount> moments;
 };
 
+constexpr std::uint32_t kNoLimit = 0xffffffff;
+
 struct Population {
     SplatModel model;
     std::vector<glm::vec2> gradient_sum;  // sum of norms, frames
@@ -43,14 +45,14 @@ struct Population {
 
     /// Moments are 1, 2, 3, ... so that every one is known again.
     Generation run(const gpu::DensifyArgs& args, DensityResult& result,
-                   int kernel = KERNEL_GAUSSIAN) const {
+                   int kernel = KERNEL_GAUSSIAN, std::uint32_t max_splats = kNoLimit) const {
         Device& device = shared_device();
         GpuSplats splats(device, model, true);
         for (int a = 0; a < kAttributeCount; ++a) splats.moments(a).upload(moments_before(a));
         Buffer sums(device, "gradient sum", std::max<size_t>(model.size(), 1) * 8);
         if (!gradient_sum.empty()) sums.upload(gradient_sum);
         DensityControl density(device, kernel);
-        result = density.run(splats, sums, args);
+        result = density.run(splats, sums, args, max_splats);
         Generation g{splats.download(), {}};
         for (int a = 0; a < kAttributeCount; ++a)
             g.moments[a] = splats.moments(a).download<float>(g.model.size() * stride(a) * 2);
@@ -75,11 +77,8 @@ struct Population {
     }
 };
 
-constexpr std::uint32_t kNoLimit = 0xffffffff;
-
 gpu::DensifyArgs args_for(const reference::DensitySettings& s) {
     gpu::DensifyArgs args{};
-    args.growth_limit = kNoLimit;
     args.gradient_threshold = static_cast<float>(s.gradient_threshold);
     args.clone_split_scale = static_cast<float>(s.split_scale_share * s.scene_extent);
     args.prune_opacity = static_cast<float>(s.min_opacity);
@@ -165,26 +164,19 @@ TEST(Densify, nothing_to_do_leaves_every_bit) {
     expect_generation(population, sources_of(std::vector(100, DensityAction::keep)), after);
 }
 
-TEST(Densify, growth_stops_at_the_limit_in_file_order) {
+TEST(Densify, growth_stops_at_the_limit_largest_gradients_first) {
     const Population population(1000);
     reference::DensitySettings settings;
     settings.scene_extent = 5;
-    for (const std::uint32_t limit : {0U, 999U, 1000U, 1001U, 1100U}) {
+    const auto unlimited = reference::count_after(population.actions(settings));
+    for (const std::uint32_t limit : {1U, 700U, 1000U, 1050U}) {
         SCOPED_TRACE(limit);
-        std::vector<DensityAction> actions = population.actions(settings);
-        std::uint32_t room = limit - std::min(limit, 1000U);
-        for (DensityAction& action : actions) {
-            if (action != DensityAction::clone && action != DensityAction::split) continue;
-            if (room > 0)
-                --room;
-            else
-                action = DensityAction::keep;
-        }
-        gpu::DensifyArgs args = args_for(settings);
-        args.growth_limit = limit;
+        settings.max_splats = limit;
+        const std::vector<DensityAction> actions = population.actions(settings);
+        ASSERT_LT(reference::count_after(actions), unlimited) << "the limit must bite";
         DensityResult result;
-        const Generation after = population.run(args, result);
-        EXPECT_LE(result.after, std::max(limit, 1000U));
+        const Generation after = population.run(args_for(settings), result, KERNEL_GAUSSIAN, limit);
+        EXPECT_EQ(result.after, reference::count_after(actions));
         expect_generation(population, sources_of(actions), after);
     }
 }

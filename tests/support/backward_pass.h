@@ -106,7 +106,9 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
                                         step.opacity,
                                         step.sh_dc,
                                         step.sh_rest,
-                                        step.inverse_sqrt_correction2};
+                                        step.inverse_sqrt_correction2,
+                                        step.opacity_weight,
+                                        step.scale_weight};
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);

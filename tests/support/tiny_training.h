@@ -80,6 +80,7 @@ inline TinyTraining tiny_training(const TinyOptions& tiny = {}) {
     o.densify_interval = 10;
     o.densify_grad_threshold = 2e-5f;
     o.opacity_reset_interval = 25;
+    o.random_background = false;  // the photos show it
     o.initial_opacity = o.prune_opacity = 0.3f;
     return t;
 }

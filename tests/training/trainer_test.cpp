@@ -32,10 +32,27 @@ TEST(Training, another_seed_gives_other_bits) {
     EXPECT_FALSE(same_state(one, two));
 }
 
+/// Photos of nothing: what is trained over the colour that pictures are compared over may stay as
+/// it is, what is trained over other colours must become opaque to hide them.
+TEST(Training, a_random_background_makes_surfaces_opaque) {
+    TinyTraining t = tiny_training();
+    t.options.densify_until = 0;
+    t.options.opacity_weight = 0;
+    const auto darkness = [&](bool random) {
+        t.options.random_background = random;
+        Trainer trainer = t.trainer();
+        run_to(trainer, 60);
+        double opacity = 0;
+        for (const float logit : trainer.model().opacity) opacity += 1 / (1 + std::exp(-logit));
+        return opacity;
+    };
+    EXPECT_GT(darkness(true), 1.1 * darkness(false));
+}
+
 // Stops right before, at and after density control and the opacity reset, and in between.
 TEST(Training, a_resumed_run_equals_one_that_never_stopped) {
     TinyTraining t = tiny_training();
-    t.options.white_background = true;  // resets opacities once more
+    t.options.white_background = true;  // over a fixed background: resets opacities once more
     Trainer whole = t.trainer();
     run_to(whole, 60);
     for (const int stop : {1, 19, 20, 25, 33, 59}) {

@@ -33,7 +33,10 @@ void add_data_flags(CLI::App& command, TrainFlags& f) {
     command.add_flag("--eval", f.data.hold_out,
                      "hold out every 8th view, or the source's own test views");
     command.add_flag("-w,--white-background", f.train.white_background,
-                     "white behind alpha, not black");
+                     "compare pictures over white, not black");
+    command.add_flag("--random-background,!--fixed-background", f.train.random_background,
+                     "train over another background colour each iteration (default), or over the "
+                     "one that pictures are compared over");
     command.add_flag("--sequential", f.sequential,
                      "photos without cameras: match neighbours in name order only");
 }
@@ -73,42 +76,16 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
                               {"--opacity-lr", &t.opacity_lr}})
         command.add_option(name, *rate)->capture_default_str()->check(CLI::NonNegativeNumber);
     command
+        .add_option("--final-lr-share", t.final_lr_share,
+                    "over the second half of the run every rate but the position's falls to this "
+                    "share of itself, log-linear; 1: constant rates, as 3DGS")
+        ->capture_default_str()
+        ->check(CLI::Range(1e-6, 1.0));
+    command
         .add_option("--feature-lr", t.sh_dc_lr,
                     "of the colour; its view-dependent part learns at a 20th")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
-}
-
-void add_density_flags(CLI::App& command, TrainFlags& f) {
-    TrainOptions& t = f.train;
-    command.add_option("--densify-grad-threshold", t.densify_grad_threshold)
-        ->capture_default_str()
-        ->check(CLI::PositiveNumber);
-    command.add_option("--densification-interval", t.densify_interval)
-        ->capture_default_str()
-        ->check(CLI::PositiveNumber);
-    command.add_option("--densify-from-iter", t.densify_from)
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
-    command.add_option("--densify-until-iter", t.densify_until,
-                       "default: half of the run, at most 15,000");
-    command.add_option("--opacity-reset-interval", t.opacity_reset_interval)
-        ->capture_default_str()
-        ->check(CLI::PositiveNumber);
-    command
-        .add_option("--percent-dense", t.clone_split_extent,
-                    "share of the scene extent above which a splat splits rather than clones")
-        ->capture_default_str()
-        ->check(CLI::PositiveNumber);
-    command.add_option("--prune-opacity", t.prune_opacity, "splats below this opacity go")
-        ->capture_default_str()
-        ->check(CLI::Range(0.0, 1.0));
-    command
-        .add_option("--cap-max,--max-splats,--budget", t.max_splats,
-                    "growth stops at this many splats")
-        ->check(CLI::PositiveNumber);
-    command.add_option("--random-points", t.random_points,
-                       "splats to start from where the data set has no points");
 }
 
 }  // namespace
@@ -116,7 +93,7 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
 void add_train_flags(CLI::App& command, TrainFlags& f) {
     add_data_flags(command, f);
     add_schedule_flags(command, f);
-    add_density_flags(command, f);
+    add_density_flags(command, f.train);
     command
         .add_option(
             "--kernel", f.kernel,

@@ -27,6 +27,9 @@ struct TrainFlags {
 /// Adds every option to the subcommand; values land in flags, which must outlive the parse.
 void add_train_flags(CLI::App& command, TrainFlags& flags);
 
+/// The part of it that concerns density control.
+void add_density_flags(CLI::App& command, TrainOptions& options);
+
 /// Names to ids, lists to their defaults, contradictions to an Error.
 void finish_train_flags(TrainFlags& flags);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "engine/core/check.h"
 #include "engine/render/groups.h"
@@ -10,7 +11,23 @@ namespace darb {
 
 namespace {
 constexpr int kQuantiles = 256;
+
+// Takes growth back, smallest mean gradients first, until `room` splats grow. gradient_sum: (sum,
+// frames) of each; action and grow: as densify_decide wrote them.
+void limit_growth(const std::vector<glm::vec2>& gradient_sum, std::uint32_t room,
+                  std::vector<std::uint32_t>& action, std::vector<std::uint32_t>& grow) {
+    std::vector<std::uint32_t> growing;
+    for (std::uint32_t i = 0; i < grow.size(); ++i)
+        if (grow[i] != 0) growing.push_back(i);
+    const auto mean = [&](std::uint32_t i) { return gradient_sum[i].x / gradient_sum[i].y; };
+    std::stable_sort(growing.begin(), growing.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return mean(a) > mean(b); });
+    for (size_t k = room; k < growing.size(); ++k) {
+        action[growing[k]] = DENSIFY_KEEP;
+        grow[growing[k]] = 0;
+    }
 }
+}  // namespace
 
 DensityControl::DensityControl(Device& device, int kernel) : device_(&device), commands_(device) {
     const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
@@ -28,7 +45,7 @@ DensityControl::DensityControl(Device& device, int kernel) : device_(&device), c
 }
 
 DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
-                                  gpu::DensifyArgs args) {
+                                  gpu::DensifyArgs args, std::uint32_t max_splats) {
     const std::uint32_t n = args.splat_count = splats.count();
     DensityResult result{n, n, 0, 0};
     if (n == 0) return result;
@@ -51,16 +68,28 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
                        g.x, g.y);
     scan.record(commands_, keep, keep_offset, count, 0, keep_total);
     scan.record(commands_, grow, grow_offset, count, 0, grow_total);
-    commands_.dispatch(sources_, args, {action, keep_offset, grow_offset, keep_total, sources}, g.x,
-                       g.y);
     commands_.submit_and_wait();
 
     const std::uint32_t kept = keep_total.download<std::uint32_t>(1)[0];
-    const std::uint32_t room = args.growth_limit - std::min(args.growth_limit, n);
-    result.grown = std::min(grow_total.download<std::uint32_t>(1)[0], room);
+    const std::uint32_t room = max_splats - std::min(max_splats, kept);
+    result.grown = grow_total.download<std::uint32_t>(1)[0];
     result.pruned = n - kept;
-    result.after = kept + result.grown;
-    if (result.pruned == 0 && result.grown == 0) return result;
+    result.after = kept + std::min(result.grown, room);
+    if (result.after == n && result.pruned == 0) return result;
+
+    commands_.begin();
+    commands_.pass("densify");
+    if (result.grown > room) {
+        auto actions = action.download<std::uint32_t>(n), grows = grow.download<std::uint32_t>(n);
+        limit_growth(gradient_sum.download<glm::vec2>(n), room, actions, grows);
+        action.upload(actions);
+        grow.upload(grows);
+        result.grown = room;
+        scan.record(commands_, grow, grow_offset, count, 0, grow_total);
+    }
+    commands_.dispatch(sources_, args, {action, keep_offset, grow_offset, keep_total, sources}, g.x,
+                       g.y);
+    commands_.submit_and_wait();
 
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::uint32_t stride = splats.stride(a);

@@ -22,9 +22,10 @@ class DensityControl {
     DensityControl(Device& device, int kernel);
 
     /// One round. gradient_sum: [N][2] of Backward. The queue must be idle. args.splat_count is set
-    /// here. New buffers replace the old ones one attribute at a time, so the peak is one attribute
-    /// above the total.
-    DensityResult run(GpuSplats& splats, const Buffer& gradient_sum, gpu::DensifyArgs args);
+    /// here. Beyond max_splats nothing grows, the largest mean gradients go first. New buffers
+    /// replace the old ones one attribute at a time, so the peak is one attribute above the total.
+    DensityResult run(GpuSplats& splats, const Buffer& gradient_sum, gpu::DensifyArgs args,
+                      std::uint32_t max_splats);
 
     /// Every opacity down to at most `opacity`, its moments to zero.
     void reset_opacity(GpuSplats& splats, float opacity);
