@@ -29,6 +29,9 @@ build    libcli11-dev         command line
 build    nlohmann-json3-dev   JSON
 build    libstb-dev           PNG and JPEG
 build    zlib1g-dev           checksums and compression
+build    libzstd-dev          SPZ files
+build    libzip-dev           SOG files
+build    libwebp-dev          SOG files
 run      mesa-vulkan-drivers  lavapipe, the CPU device, and the GPU drivers of Mesa
 tests    libgtest-dev         tests
 tests    vulkan-validationlayers  synchronization validation

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <nanoflann.hpp>
 
 #include "engine/core/rng.h"
 
@@ -12,21 +11,7 @@ namespace darb {
 namespace {
 
 constexpr double kShC0 = 0.28209479177387814;
-constexpr double kMinDistance2 = 1e-7;
 constexpr double kRecentreBeyond = 1e4;  // float32 keeps a millimetre up to there
-
-struct CloudView {
-    const std::vector<double>& position;
-    size_t kdtree_get_point_count() const { return position.size() / 3; }
-    double kdtree_get_pt(size_t i, size_t axis) const { return position[3 * i + axis]; }
-    template <class Box>
-    bool kdtree_get_bbox(Box&) const {
-        return false;
-    }
-};
-
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, CloudView>,
-                                                 CloudView, 3>;
 
 struct Region {
     glm::dvec3 centre;
@@ -91,25 +76,6 @@ glm::dvec3 choose_origin(const PointCloud& points) {
 }
 
 }  // namespace
-
-std::vector<double> neighbour_distance2(const std::vector<double>& position) {
-    const CloudView view{position};
-    const size_t count = view.kdtree_get_point_count();
-    std::vector<double> result(count, kMinDistance2);
-    if (count < 2) return result;
-    Tree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(10));
-    tree.buildIndex();
-    const size_t wanted = std::min<size_t>(4, count);  // the point itself comes first
-    for (size_t i = 0; i < count; ++i) {
-        std::uint32_t index[4];
-        double distance2[4];
-        const size_t found = tree.knnSearch(&position[3 * i], wanted, index, distance2);
-        double sum = 0.0;
-        for (size_t k = 1; k < found; ++k) sum += distance2[k];
-        result[i] = std::max(kMinDistance2, sum / static_cast<double>(found - 1));
-    }
-    return result;
-}
 
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     const PointCloud drawn =

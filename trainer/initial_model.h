@@ -2,7 +2,7 @@
 // cameras look.
 #pragma once
 
-#include "engine/data/dataset.h"
+#include "engine/data/point_splats.h"
 #include "engine/scene/splat_model.h"
 #include "trainer/options.h"
 
@@ -14,9 +14,5 @@ namespace darb {
 /// wide as the photos show there, or in the box of the cameras where the axes are parallel. The
 /// model's origin is set where coordinates are large.
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options);
-
-/// Mean squared distance of each point to its 3 nearest neighbours (fewer where there are fewer),
-/// at least 1e-7. position: [P][3]. O(P log P).
-std::vector<double> neighbour_distance2(const std::vector<double>& position);
 
 }  // namespace darb

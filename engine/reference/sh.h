@@ -5,10 +5,9 @@
 #include <array>
 
 #include "engine/reference/splats.h"
+#include "engine/scene/sh_basis.h"
 
 namespace darb::reference {
-
-constexpr int kMaxShCoefficients = 16;
 
 template <class T>
 using ShBasis = std::array<T, kMaxShCoefficients>;

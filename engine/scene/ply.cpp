@@ -10,13 +10,15 @@
 #include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/scene/compressed_ply.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/ply_comments.h"
 #include "engine/scene/ply_table.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb {
 
 namespace {
-
-constexpr double kRecentreBeyond = 1e4;  // float32 resolves 1e-3 there
 
 /// Column of every parameter in the vertex element.
 struct Columns {
@@ -30,9 +32,7 @@ int need(const PlyElement& vertex, const std::string& name, const std::string& w
     const int column = vertex.find(name);
     if (column < 0 || vertex.properties[static_cast<std::size_t>(column)].is_list)
         throw Error(where, fmt::format("element vertex lacks the property {}", name),
-                    vertex.find("packed_position") >= 0
-                        ? "This is a compressed PLY: convert it to a plain one first."
-                        : "A splat scene is needed, not a point cloud or mesh.");
+                    "A splat scene is needed, not a point cloud or mesh.");
     return column;
 }
 
@@ -53,34 +53,6 @@ Columns find_columns(const PlyElement& vertex, const std::string& where) {
             where,
             fmt::format("has {} f_rest properties; SH degree 0, 1, 2, 3 has 0, 9, 24, 45", count));
     return columns;
-}
-
-/// "Key: value" or "Key value".
-std::string_view comment_value(const PlyHeader& header, std::string_view key) {
-    for (const std::string& comment : header.comments) {
-        std::string_view text = comment;
-        if (!text.starts_with(key)) continue;
-        text.remove_prefix(key.size());
-        if (text.empty() || (text[0] != ':' && text[0] != ' ')) continue;
-        const std::size_t begin = text.find_first_not_of(": \t");
-        return begin == std::string_view::npos ? std::string_view{} : text.substr(begin);
-    }
-    return {};
-}
-
-void read_comments(const PlyHeader& header, const std::string& where, SplatModel& model) {
-    if (const std::string_view name = comment_value(header, "SplatKernel"); !name.empty()) {
-        const std::optional<int> kernel = kernel_from_name(name);
-        if (!kernel) throw Error(where, fmt::format("names the unknown SplatKernel '{}'", name));
-        model.kernel = *kernel;
-    }
-    if (const std::string_view name = comment_value(header, "SplatFootprint"); !name.empty()) {
-        const std::optional<Footprint> footprint = footprint_from_name(name);
-        if (!footprint)
-            throw Error(where, fmt::format("names the unknown SplatFootprint '{}'", name));
-        model.footprint = *footprint;
-    }
-    model.antialias = comment_value(header, "SplatRenderMode") == "mip";
 }
 
 bool all_finite(const double* values, const Columns& columns) {
@@ -111,22 +83,6 @@ void store_splat(const double* values, const Columns& columns, std::size_t at, S
     }
 }
 
-/// Positions relative to a whole-numbered origin where any lies far out, as they are elsewhere.
-void store_positions(const std::vector<double>& positions, SplatModel& model) {
-    glm::dvec3 low(1e300), high(-1e300);
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-        const int axis = static_cast<int>(i % 3);
-        low[axis] = std::min(low[axis], positions[i]);
-        high[axis] = std::max(high[axis], positions[i]);
-    }
-    for (int axis = 0; axis < 3 && !positions.empty(); ++axis)
-        if (std::max(std::abs(low[axis]), std::abs(high[axis])) > kRecentreBeyond)
-            model.origin[axis] = std::round(0.5 * low[axis] + 0.5 * high[axis]);
-    for (std::size_t i = 0; i < positions.size(); ++i)
-        model.position[i] =
-            static_cast<float>(positions[i] - model.origin[static_cast<int>(i % 3)]);
-}
-
 bool needs_double(const SplatModel& model) {
     if (model.origin == glm::dvec3(0.0)) return false;
     for (std::size_t i = 0; i < model.position.size(); ++i) {
@@ -137,12 +93,8 @@ bool needs_double(const SplatModel& model) {
 }
 
 std::string make_header(const SplatModel& model, bool double_positions) {
-    std::string text = fmt::format(
-        "ply\nformat binary_little_endian 1.0\ncomment SplatKernel: {}\ncomment SplatFootprint: "
-        "{}\n"
-        "comment SplatRenderMode: {}\nelement vertex {}\n",
-        kernel_name(model.kernel), footprint_name(model.footprint),
-        model.antialias ? "mip" : "default", model.size());
+    std::string text = fmt::format("ply\nformat binary_little_endian 1.0\n{}element vertex {}\n",
+                                   ply_comments(model), model.size());
     for (const char* name : {"x", "y", "z"})
         text += fmt::format("property {} {}\n", double_positions ? "double" : "float", name);
     for (const char* name : {"nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
@@ -161,15 +113,6 @@ std::byte* put(std::byte* to, const T* values, std::size_t count) {
     return to + count * sizeof(T);
 }
 
-void check_shapes(const SplatModel& model) {
-    const std::size_t n = model.size();
-    DARB_CHECK(model.sh_degree >= 0 && model.sh_degree <= 3, "degree {}", model.sh_degree);
-    DARB_CHECK(model.position.size() == n * 3 && model.log_scale.size() == n * 3 &&
-                   model.rotation.size() == n * 4 && model.sh_dc.size() == n * 3 &&
-                   model.sh_rest.size() == n * static_cast<std::size_t>(model.rest_count()),
-               "N = {}, rest {}", n, model.sh_rest.size());
-}
-
 }  // namespace
 
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
@@ -177,12 +120,13 @@ SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
     const PlyHeader header = parse_ply_header(file, where);
     const PlyElement* vertex = header.find("vertex");
     if (!vertex) throw Error(where, "has no element vertex", "A splat scene is needed.");
+    if (is_compressed_ply(header)) return parse_compressed_ply(file, header, where, dropped);
     const Columns columns = find_columns(*vertex, where);
     check_ply_size(file, header, *vertex, where);
 
     SplatModel model;
     model.sh_degree = static_cast<int>(std::lround(std::sqrt(columns.rest.size() / 3 + 1))) - 1;
-    read_comments(header, where, model);
+    read_ply_comments(header, where, model);
     model.resize(vertex->count);
     std::vector<double> positions;
     positions.reserve(vertex->count * 3);
@@ -194,7 +138,7 @@ SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
     });
     if (dropped) *dropped = vertex->count - kept;
     model.resize(kept);
-    store_positions(positions, model);
+    set_positions(positions, model);
     return model;
 }
 
@@ -203,7 +147,7 @@ SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped) {
 }
 
 std::vector<std::byte> encode_ply(const SplatModel& model) {
-    check_shapes(model);
+    check_splat_shapes(model);
     const bool doubles = needs_double(model);
     const std::string header = make_header(model, doubles);
     const std::size_t rest = static_cast<std::size_t>(model.rest_count()), per_channel = rest / 3;

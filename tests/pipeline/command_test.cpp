@@ -2,8 +2,6 @@
 // info and devices put out.
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -17,57 +15,16 @@
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/scene/ply.h"
+#include "tests/support/run_command.h"
 #include "tests/support/test_data.h"
 
 namespace darb {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
+using namespace test;
 
 const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
-
-// One a process: ctest may run the cases at once.
-fs::path scratch() {
-    const fs::path folder = fs::path(testing::TempDir()) / fmt::format("darb_{}", ::getpid());
-    fs::create_directories(folder);
-    return folder;
-}
-
-class RemoveScratch : public testing::Environment {
-    void TearDown() override { fs::remove_all(scratch()); }
-};
-const testing::Environment* const kRemoveScratch =
-    testing::AddGlobalTestEnvironment(new RemoveScratch);
-
-struct Outcome {
-    int code = -1;  // -1: killed by a signal
-    std::string out, err;
-};
-
-Outcome darb(const std::string& arguments) {
-    const std::string out = scratch() / "stdout", err = scratch() / "stderr";
-    const int status = std::system(
-        fmt::format("'{}' {} > '{}' 2> '{}'", DARB_COMMAND, arguments, out, err).c_str());
-    const Outcome o{WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text_file(out),
-                    read_text_file(err)};
-    EXPECT_EQ(o.err.find("vulkan validation:"), std::string::npos) << o.err;
-    return o;
-}
-
-struct BadCommand {
-    std::string arguments, message;  // a part of what stderr says
-};
-
-void expect_refused(const std::vector<BadCommand>& commands) {
-    for (const BadCommand& bad : commands) {
-        const Outcome o = darb(bad.arguments);
-        EXPECT_EQ(o.code, 2) << "darb " << bad.arguments << "\n" << o.err;
-        EXPECT_NE(o.err.find(bad.message), std::string::npos)
-            << "darb " << bad.arguments << ": no '" << bad.message << "' in\n"
-            << o.err;
-    }
-}
 
 TEST(Command, bad_usage_is_exit_code_2) {
     const std::string out = " -o " + (scratch() / "unused").string() + " ";
@@ -100,7 +57,7 @@ TEST(Command, missing_files_are_named) {
                     {"eval " + none + ".ply " + kScene, none + ".ply"},
                     {"render " + none + ".ply --cameras " + kScene + " -o " + none, none + ".ply"},
                     {"info " + none + ".ply", none + ".ply"},
-                    {"info " + std::string(DARB_SOURCE_DIR) + "/README.md", "no PLY"},
+                    {"info " + std::string(DARB_SOURCE_DIR) + "/README.md", "no splat file"},
                     {"info " + std::string(DARB_SOURCE_DIR) + "/assets", "holds no cameras"}});
     EXPECT_FALSE(fs::exists(none + "_out"));
 }
@@ -117,8 +74,9 @@ TEST(Command, features_that_are_not_there_say_so) {
 }
 
 TEST(Command, help_and_version_are_exit_code_0) {
-    for (const char* arguments : {"--help", "train --help", "eval --help", "render --help",
-                                  "info --help", "devices --help", "check --help", "--version"})
+    for (const char* arguments :
+         {"--help", "train --help", "eval --help", "render --help", "info --help", "convert --help",
+          "devices --help", "check --help", "--version"})
         EXPECT_EQ(darb(arguments).code, 0) << arguments;
 }
 
@@ -144,14 +102,14 @@ TEST(Command, info_describes_a_data_set) {
     const Outcome text = darb("info " + kScene);
     EXPECT_EQ(text.code, 0) << text.err;
     EXPECT_NE(text.out.find("COLMAP binary"), std::string::npos) << text.out;
-    const json info = json::parse(darb("info --json -r 2 " + kScene).out);
+    const json info = json::parse(darb("info --json - -r 2 " + kScene).out);
     EXPECT_EQ(info["views"], 48);
     EXPECT_EQ(info["points"], 4000);
     EXPECT_EQ(info["sizes"], json::parse(R"([{"width": 100, "height": 75, "views": 48}])"));
     EXPECT_EQ(info["lenses"][0]["model"], "PINHOLE");
     EXPECT_EQ(info["lenses"][0]["width"], 200);
     EXPECT_GT(info["extent"].get<double>(), 1.0);
-    EXPECT_EQ(json::parse(darb("info --json " + kScene + "/transforms_train.json").out)["views"],
+    EXPECT_EQ(json::parse(darb("info --json - " + kScene + "/transforms_train.json").out)["views"],
               40);
 }
 
@@ -159,8 +117,8 @@ TEST(Command, info_refuses_a_point_cloud_and_reads_a_camera_list) {
     const auto data = test::test_data_folder();
     if (!data) GTEST_SKIP() << test::kNoTestData;
     const std::string inria = *data / "fixtures" / "inria_miku_output";
-    expect_refused({{"info " + inria + "/input.ply", "not a point cloud"}});
-    const json info = json::parse(darb("info --json " + inria + "/cameras.json").out);
+    expect_refused({{"info " + inria + "/input.ply", "is a point cloud"}});
+    const json info = json::parse(darb("info --json - " + inria + "/cameras.json").out);
     EXPECT_EQ(info["views"], 97);
     EXPECT_EQ(info["source"], "cameras.json");
 }
@@ -181,7 +139,7 @@ TEST(Command, info_warns_of_odd_splats) {
     model.opacity[5] = -20;      // 0
     const std::string file = scratch() / "odd.ply", none = scratch() / "none.ply";
     write_ply(file, model);
-    const json info = json::parse(darb("info --json " + file).out);
+    const json info = json::parse(darb("info --json - " + file).out);
     EXPECT_EQ(info["splats"], 5);
     for (const auto& [key, count] : std::map<std::string, int>{{"dropped", 1},
                                                                {"zero_rotations", 1},
@@ -383,7 +341,7 @@ TEST_F(TrainedCommand, info_describes_the_scene) {
     const Outcome text = darb("info " + output());
     EXPECT_EQ(text.code, 0) << text.err;
     EXPECT_NE(text.out.find("gaussian, footprint psi"), std::string::npos) << text.out;
-    const json info = json::parse(darb("info --json " + ply()).out);
+    const json info = json::parse(darb("info --json - " + ply()).out);
     EXPECT_EQ(info["splats"], 4000);
     EXPECT_EQ(info["bytes"], fs::file_size(ply()));
     EXPECT_EQ(info["sh_degree"], 3);

@@ -59,7 +59,7 @@ void print_table(const Evaluation& evaluation) {
 
 int eval(EvalFlags flags) {
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
-    const SplatModel model = load_scene(flags.scene);
+    const SplatModel model = load_scene_to_render(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
     const std::vector<View> views = views_of(dataset, flags);
     DeviceOptions device_options;
@@ -87,7 +87,7 @@ int eval(EvalFlags flags) {
 void add_eval(CLI::App& app, Action& action) {
     auto flags = std::make_shared<EvalFlags>();
     CLI::App* command = app.add_subcommand("eval", "Measure a scene against photos: PSNR and SSIM");
-    command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train")
+    command->add_option("scene", flags->scene, "splat file, or the output folder of darb train")
         ->required();
     command->add_option("dataset", flags->dataset, "photos with cameras, as darb train takes them")
         ->required();

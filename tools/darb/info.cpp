@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "engine/core/files.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/dataset_info.h"
 #include "tools/darb/info_text.h"
@@ -15,26 +16,29 @@ namespace darb {
 namespace {
 
 struct InfoFlags {
-    std::filesystem::path path;
-    bool json = false;
+    std::filesystem::path path, json;
     DatasetOptions data;
 };
 
 bool is_dataset(const std::filesystem::path& path) {
+    if (is_sog_folder(path)) return false;
     if (std::filesystem::is_directory(path)) return !std::filesystem::exists(path / "point_cloud");
-    return path.extension() == ".json";
+    return path.extension() == ".json" && path.filename() != "meta.json";
 }
 
 int info(const InfoFlags& flags) {
     const bool dataset = is_dataset(flags.path);
     const nlohmann::json facts =
         dataset ? dataset_info(flags.path, flags.data) : scene_info(find_scene(flags.path));
-    if (flags.json)  // names may hold any bytes
-        fmt::print("{}\n", facts.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
-    else if (dataset)
-        print_dataset_info(facts);
-    else
-        print_scene_info(facts);
+    // Names may hold any bytes.
+    const std::string text =
+        facts.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    if (flags.json == "-") {
+        fmt::print("{}", text);
+        return 0;
+    }
+    dataset ? print_dataset_info(facts) : print_scene_info(facts);
+    if (!flags.json.empty()) write_file_atomic(flags.json, text);
     return 0;
 }
 
@@ -45,9 +49,10 @@ void add_info(CLI::App& app, Action& action) {
     CLI::App* command = app.add_subcommand("info", "Describe a scene or a data set");
     command
         ->add_option("path", flags->path,
-                     "PLY file, output folder of darb train, data set, or cameras.json")
+                     "splat file, output folder of darb train, data set, or cameras.json")
         ->required();
-    command->add_flag("--json", flags->json, "print JSON");
+    command->add_option("--json", flags->json,
+                        "write the facts to this file too; - prints them, and nothing else");
     command
         ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
         ->capture_default_str();

@@ -39,6 +39,12 @@ std::string percentiles_text(const json& values) {
 void print_scene_info(const json& info) {
     row("scene", fmt::format("{}, {}", info["path"].get<std::string>(),
                              format_bytes(info["bytes"].get<double>())));
+    const std::string details = info["details"].get<std::string>();
+    row("format",
+        info["format"].get<std::string>() +
+            (info["version"].is_null() ? ""
+                                       : fmt::format(" version {}", info["version"].get<int>())) +
+            (details.empty() ? "" : " (" + details + ")"));
     row("splats", fmt::format("{}", info["splats"].get<size_t>()));
     row("kernel",
         fmt::format("{}, footprint {}, render mode {}", info["kernel"].get<std::string>(),

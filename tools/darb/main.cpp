@@ -37,6 +37,7 @@ int run(int argc, char** argv) {
     darb::add_eval(app, action);
     darb::add_render(app, action);
     darb::add_info(app, action);
+    darb::add_convert(app, action);
     darb::add_devices(app, action);
     darb::add_check(app, action);
     if (!arguments.empty() && !arguments[0].starts_with('-') &&

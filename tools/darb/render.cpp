@@ -66,7 +66,7 @@ double median(std::vector<double> values) {
 }
 
 int render(const RenderFlags& flags) {
-    const SplatModel model = load_scene(flags.scene);
+    const SplatModel model = load_scene_to_render(flags.scene);
     std::vector<View> views = load_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
     if (is_list)
@@ -97,7 +97,7 @@ int render(const RenderFlags& flags) {
 void add_render(CLI::App& app, Action& action) {
     auto flags = std::make_shared<RenderFlags>();
     CLI::App* command = app.add_subcommand("render", "Render a scene to PNG files");
-    command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train")
+    command->add_option("scene", flags->scene, "splat file, or the output folder of darb train")
         ->required();
     command
         ->add_option("--cameras", flags->cameras,

@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "engine/core/error.h"
-#include "engine/scene/ply.h"
 
 namespace darb {
 
@@ -30,7 +29,7 @@ long iteration_of(const fs::path& folder) {
 }  // namespace
 
 fs::path find_scene(const fs::path& path) {
-    if (!fs::is_directory(path)) return path;
+    if (!fs::is_directory(path) || is_sog_folder(path)) return path;
     fs::path found;
     long latest = -1;
     std::error_code none;  // no such folder: no entries
@@ -42,23 +41,33 @@ fs::path find_scene(const fs::path& path) {
         found = scene;
     }
     if (found.empty())
-        throw Error(path.string(), "is a folder without point_cloud/iteration_N/point_cloud.ply",
-                    "Name a PLY file, or the output folder of darb train.");
+        throw Error(path.string(),
+                    "is a folder without point_cloud/iteration_N/point_cloud.ply and without the "
+                    "meta.json of a SOG scene",
+                    "Name a splat file, a SOG folder, or the output folder of darb train.");
     return found;
 }
 
-SplatModel load_scene(const fs::path& path) {
+SplatModel load_scene(const fs::path& path, SplatFile* facts) {
     const fs::path file = find_scene(path);
-    std::size_t dropped = 0;
-    SplatModel model = read_ply(file, &dropped);
-    if (dropped > 0)
+    SplatFile unused;
+    SplatFile& said = facts ? *facts : unused;
+    SplatModel model = load_splats(file, &said);
+    if (said.dropped > 0)
         fmt::print(stderr, "warning: {}: {} splats with NaN or infinity were dropped\n",
-                   file.string(), dropped);
+                   file.string(), said.dropped);
+    for (const std::string& note : said.notes)
+        fmt::print(stderr, "warning: {}: {}\n", file.string(), note);
+    return model;
+}
+
+SplatModel load_scene_to_render(const fs::path& path) {
+    SplatModel model = load_scene(path);
     if (model.antialias)
         fmt::print(stderr,
                    "warning: {}: was trained with anti-aliasing (SplatRenderMode mip), which this "
                    "version does not render\n",
-                   file.string());
+                   find_scene(path).string());
     return model;
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/scene/ply.h"
+#include "engine/scene/splat_file.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {
@@ -92,7 +92,7 @@ void add_splats(const SplatModel& model, json& info) {
 }
 
 void add_warnings(json& info) {
-    json warnings = json::array();
+    json warnings = info["notes"];
     const double splats = std::max(1.0, info["splats"].get<double>());
     const auto warn = [&](const char* key, double least_share, const char* what) {
         const auto count = info[key].get<size_t>();
@@ -112,12 +112,16 @@ void add_warnings(json& info) {
 }  // namespace
 
 json scene_info(const std::filesystem::path& path) {
-    size_t dropped = 0;
-    const SplatModel model = read_ply(path, &dropped);
+    SplatFile file;
+    const SplatModel model = load_splats(path, &file);
     json info = {{"path", path.string()},
-                 {"bytes", std::filesystem::file_size(path)},
+                 {"format", format_name(file.format)},
+                 {"version", file.version == 0 ? json() : json(file.version)},
+                 {"details", file.details},
+                 {"bytes", file.bytes},
                  {"splats", model.size()},
-                 {"dropped", dropped},
+                 {"dropped", file.dropped},
+                 {"notes", file.notes},
                  {"kernel", kernel_name(model.kernel)},
                  {"footprint", footprint_name(model.footprint)},
                  {"render_mode", model.antialias ? "mip" : "default"},

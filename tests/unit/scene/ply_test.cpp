@@ -247,16 +247,5 @@ TEST(Ply, real_scenes_round_trip_bit_equal) {
     }
 }
 
-TEST(Ply, compressed_file_is_refused_with_advice) {
-    const auto folder = test::test_data_folder();
-    if (!folder) GTEST_SKIP() << test::kNoTestData;
-    try {
-        read_ply(*folder / "splats" / "guitar.compressed.ply");
-        FAIL();
-    } catch (const Error& error) {
-        EXPECT_NE(error.hint.find("compressed"), std::string::npos);
-    }
-}
-
 }  // namespace
 }  // namespace darb

@@ -1,0 +1,32 @@
+// PlayCanvas's compressed PLY, as SuperSplat and splat-transform write it. Element chunk: bounds of
+// position, log scale and colour (the last may be missing) of 256 splats each; element vertex: four
+// uint32 a splat, relative to its chunk; element sh (may be missing): one byte a coefficient.
+//   packed_position, packed_scale   11, 10, 11 bits for x, y, z
+//   packed_rotation                 2 bits: the largest of w x y z; 10 bits for each of the others
+//   packed_color                    8 bits for r, g, b and opacity
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/scene/ply_table.h"
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+bool is_compressed_ply(const PlyHeader& header);
+
+/// Same contract as parse_ply (ply.h), which calls it.
+SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader& header,
+                                const std::string& where, std::size_t* dropped);
+
+/// Splats in Morton order, so that those of a chunk lie close together. Per chunk, the error of a
+/// position is at most its size / 4094 (y: 2046), of a log scale the range / 4094 (2046), of a
+/// colour the range / 510, of opacity 1/510, of a quaternion's component 7e-4, of a harmonic 1/32
+/// within [-4, 4], beyond which it is cut. Comments keep kernel, footprint and render mode.
+std::vector<std::byte> encode_compressed_ply(const SplatModel& model);
+
+}  // namespace darb

@@ -1,0 +1,103 @@
+#include "engine/scene/dot_splat.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "engine/core/error.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/quantise.h"
+#include "engine/scene/splat_shapes.h"
+#include "shaders/shared/limits.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::size_t kRecord = 32;    // bytes
+constexpr std::size_t kProbed = 1000;  // records
+constexpr double kNormSlack = 0.05;    // of a rotation's length; rounding takes up to 0.016
+constexpr float kLargestScale = 1e6f;  // of what looks like a .splat, world
+
+std::array<float, 4> rotation_of_record(std::span<const std::byte> record) {
+    std::array<float, 4> q{};
+    for (std::size_t i = 0; i < 4; ++i) q[i] = (static_cast<float>(record[28 + i]) - 128) / 128;
+    return q;
+}
+
+void store_record(std::span<const std::byte> record, std::size_t at, SplatModel& model) {
+    for (std::size_t i = 0; i < 3; ++i) {
+        model.position[3 * at + i] = load_le<float>(record, 4 * i);
+        const auto scale = load_le<float>(record, 12 + 4 * i);  // the logarithm of < 0 is NaN
+        model.log_scale[3 * at + i] =
+            scale == 0 ? -static_cast<float>(LOG_SCALE_LIMIT) : std::log(scale);
+        model.sh_dc[3 * at + i] =
+            static_cast<float>(dc_of_colour(static_cast<double>(record[24 + i]) / 255));
+    }
+    model.opacity[at] = logit_of_byte(static_cast<std::uint8_t>(record[27]));
+    const std::array<float, 4> q = rotation_of_record(record);
+    std::copy(q.begin(), q.end(), &model.rotation[4 * at]);
+}
+
+}  // namespace
+
+bool looks_like_dot_splat(std::span<const std::byte> file) {
+    if (file.empty() || file.size() % kRecord != 0) return false;
+    for (std::size_t i = 0; i < std::min(file.size() / kRecord, kProbed); ++i) {
+        const auto record = file.subspan(i * kRecord, kRecord);
+        float square = 0;
+        for (const float part : rotation_of_record(record)) square += part * part;
+        if (std::abs(std::sqrt(square) - 1) > kNormSlack) return false;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto scale = load_le<float>(record, 12 + 4 * k);
+            if (!std::isfinite(load_le<float>(record, 4 * k)) || !(scale >= 0) ||
+                scale > kLargestScale)
+                return false;
+        }
+    }
+    return true;
+}
+
+SplatModel parse_dot_splat(std::span<const std::byte> file, const std::string& where,
+                           std::size_t* dropped) {
+    if (file.size() % kRecord != 0)
+        throw Error(
+            where,
+            fmt::format("has {} bytes; a .splat file has 32 for each splat, and {} are left "
+                        "after record {}",
+                        file.size(), file.size() % kRecord, file.size() / kRecord),
+            "The file is cut off or no .splat file: export or copy it again.");
+    SplatModel model;
+    model.resize(file.size() / kRecord);
+    for (std::size_t i = 0; i < model.size(); ++i)
+        store_record(file.subspan(i * kRecord, kRecord), i, model);
+    const std::size_t gone = drop_non_finite(model);
+    if (dropped) *dropped = gone;
+    return model;
+}
+
+std::vector<std::byte> encode_dot_splat(const SplatModel& model) {
+    check_splat_shapes(model);
+    std::vector<std::byte> file(model.size() * kRecord);
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        std::byte* record = &file[i * kRecord];
+        const glm::dvec3 p = position_of(model, i);
+        const float* q = &model.rotation[4 * i];
+        const double length = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] +
+                                        double{q[2]} * q[2] + double{q[3]} * q[3]);
+        for (std::size_t k = 0; k < 3; ++k) {
+            const float values[2] = {static_cast<float>(p[static_cast<int>(k)]),
+                                     std::exp(model.log_scale[3 * i + k])};
+            std::memcpy(record + 4 * k, &values[0], 4);
+            std::memcpy(record + 12 + 4 * k, &values[1], 4);
+            record[24 + k] = std::byte{nearest_byte(255 * colour_of_dc(model.sh_dc[3 * i + k]))};
+        }
+        record[27] = std::byte{byte_of_logit(model.opacity[i])};
+        for (std::size_t k = 0; k < 4; ++k)
+            record[28 + k] = std::byte{nearest_byte(128 + (length > 0 ? 128 * q[k] / length : 0))};
+    }
+    return file;
+}
+
+}  // namespace darb

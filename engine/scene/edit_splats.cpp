@@ -1,0 +1,163 @@
+#include "engine/scene/edit_splats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/scene/sh_rotation.h"
+
+namespace darb {
+
+namespace {
+
+constexpr double kRecentreBeyond = 1e4;  // float32 resolves 1e-3 there
+
+// A reflection is the one of x followed by a proper rotation. It takes the rotation of a splat to
+// its conjugate, which turns the other way about the y and z axes.
+void turn_rotations(const glm::dmat3& turn, std::vector<float>& rotation) {
+    glm::dmat3 proper = turn;
+    const double mirrored = glm::determinant(turn) < 0 ? -1 : 1;
+    proper[0] *= mirrored;
+    const glm::dquat by = glm::normalize(glm::quat_cast(proper));
+    for (std::size_t i = 0; i < rotation.size(); i += 4) {
+        const glm::dquat q(rotation[i], rotation[i + 1], mirrored * rotation[i + 2],
+                           mirrored * rotation[i + 3]);
+        const glm::dquat turned = by * q;
+        rotation[i] = static_cast<float>(turned.w);
+        rotation[i + 1] = static_cast<float>(turned.x);
+        rotation[i + 2] = static_cast<float>(turned.y);
+        rotation[i + 3] = static_cast<float>(turned.z);
+    }
+}
+
+void move_row(std::vector<float>& values, std::size_t from, std::size_t to, std::size_t width) {
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(from * width), width,
+                values.begin() + static_cast<std::ptrdiff_t>(to * width));
+}
+
+bool row_is_finite(const std::vector<float>& values, std::size_t row, std::size_t width) {
+    const auto begin = values.begin() + static_cast<std::ptrdiff_t>(row * width);
+    return std::all_of(begin, begin + static_cast<std::ptrdiff_t>(width),
+                       [](float value) { return std::isfinite(value); });
+}
+
+}  // namespace
+
+void transform_splats(const Similarity& similarity, SplatModel& model) {
+    DARB_CHECK(similarity.scale > 0, "scale {}", similarity.scale);
+    std::vector<double> positions(model.position.size());
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        const glm::dvec3 moved =
+            similarity.scale * (similarity.turn * position_of(model, i)) + similarity.translation;
+        for (int axis = 0; axis < 3; ++axis)
+            positions[3 * i + static_cast<std::size_t>(axis)] = moved[axis];
+    }
+    set_positions(positions, model);
+    const double grown = std::log(similarity.scale);
+    for (float& value : model.log_scale) value = static_cast<float>(value + grown);
+    if (similarity.turn == glm::dmat3(1.0)) return;
+    turn_rotations(similarity.turn, model.rotation);
+    rotate_sh(sh_rotation(similarity.turn), model.sh_degree, model.sh_rest);
+}
+
+void set_positions(const std::vector<double>& positions, SplatModel& model) {
+    glm::dvec3 low(1e300), high(-1e300);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        const int axis = static_cast<int>(i % 3);
+        low[axis] = std::min(low[axis], positions[i]);
+        high[axis] = std::max(high[axis], positions[i]);
+    }
+    model.origin = glm::dvec3(0.0);
+    for (int axis = 0; axis < 3 && !positions.empty(); ++axis)
+        if (std::max(std::abs(low[axis]), std::abs(high[axis])) > kRecentreBeyond)
+            model.origin[axis] = std::round(0.5 * low[axis] + 0.5 * high[axis]);
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        model.position[i] =
+            static_cast<float>(positions[i] - model.origin[static_cast<int>(i % 3)]);
+}
+
+glm::dvec3 position_of(const SplatModel& model, std::size_t splat) {
+    const float* p = &model.position[3 * splat];
+    return model.origin + glm::dvec3(p[0], p[1], p[2]);
+}
+
+std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model) {
+    const auto rest = static_cast<std::size_t>(model.rest_count());
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        if (!keep(i)) continue;
+        if (kept != i) {
+            move_row(model.position, i, kept, 3);
+            move_row(model.log_scale, i, kept, 3);
+            move_row(model.rotation, i, kept, 4);
+            move_row(model.opacity, i, kept, 1);
+            move_row(model.sh_dc, i, kept, 3);
+            move_row(model.sh_rest, i, kept, rest);
+        }
+        ++kept;
+    }
+    const std::size_t gone = model.size() - kept;
+    model.resize(kept);
+    return gone;
+}
+
+std::size_t drop_non_finite(SplatModel& model) {
+    const auto rest = static_cast<std::size_t>(model.rest_count());
+    return keep_splats(
+        [&](std::size_t i) {
+            return row_is_finite(model.position, i, 3) && row_is_finite(model.log_scale, i, 3) &&
+                   row_is_finite(model.rotation, i, 4) && row_is_finite(model.opacity, i, 1) &&
+                   row_is_finite(model.sh_dc, i, 3) && row_is_finite(model.sh_rest, i, rest);
+        },
+        model);
+}
+
+std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model) {
+    return keep_splats(
+        [&](std::size_t i) {
+            const glm::dvec3 p = position_of(model, i);
+            return glm::all(glm::lessThanEqual(low, p)) && glm::all(glm::lessThanEqual(p, high));
+        },
+        model);
+}
+
+std::size_t prune_opacity(double least, SplatModel& model) {
+    return keep_splats(
+        [&](std::size_t i) { return 1 / (1 + std::exp(-double{model.opacity[i]})) >= least; },
+        model);
+}
+
+void limit_sh_degree(int degree, SplatModel& model) {
+    if (degree >= model.sh_degree) return;
+    const auto before = static_cast<std::size_t>(model.rest_count());
+    model.sh_degree = degree;
+    const auto after = static_cast<std::size_t>(model.rest_count());
+    for (std::size_t i = 0; i < model.size(); ++i)
+        std::copy_n(model.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * before), after,
+                    model.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * after));
+    model.sh_rest.resize(model.size() * after);
+}
+
+glm::dmat3 turn_of_up_axis(const std::string& axis) {
+    // Columns: where x, y and z go.
+    const glm::dvec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+    if (axis == "-y") return glm::dmat3(1.0);
+    if (axis == "y") return {-x, -y, z};
+    if (axis == "x") return {-y, x, z};
+    if (axis == "-x") return {y, -x, z};
+    if (axis == "z") return {x, z, -y};
+    if (axis == "-z") return {x, -z, y};
+    throw Error("--up", "'" + axis + "' is no axis", "Use x, y, z, -x, -y or -z.");
+}
+
+glm::dmat3 turn_of_degrees(const glm::dvec3& degrees) {
+    const glm::dvec3 half = glm::radians(degrees) / 2.0;
+    const glm::dquat x(std::cos(half.x), std::sin(half.x), 0, 0);
+    const glm::dquat y(std::cos(half.y), 0, std::sin(half.y), 0);
+    const glm::dquat z(std::cos(half.z), 0, 0, std::sin(half.z));
+    return glm::mat3_cast(z * y * x);
+}
+
+}  // namespace darb

@@ -1,0 +1,48 @@
+// Changes to a whole scene: similarities with their effect on rotations and harmonics, and choices
+// of splats. All keep the order of the splats that stay.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+/// world -> scale * turn * world + translation; scale > 0, turn orthogonal (a reflection where its
+/// determinant is -1).
+struct Similarity {
+    double scale = 1;
+    glm::dmat3 turn{1.0};
+    glm::dvec3 translation{0.0};  // world
+};
+
+/// Positions, log scales, rotations and harmonics; float32 rounding alone.
+void transform_splats(const Similarity& similarity, SplatModel& model);
+
+/// positions: [N][3] world. Stored relative to a whole-numbered origin on axes where any lies
+/// beyond 1e4 from 0, where float32 resolves 1e-3; as they are on the others.
+void set_positions(const std::vector<double>& positions, SplatModel& model);
+/// World position of a splat.
+glm::dvec3 position_of(const SplatModel& model, std::size_t splat);
+
+/// Keeps the splats for which keep(i) is true; returns the count of those that went.
+std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model);
+/// Drops splats with a NaN or infinite parameter.
+std::size_t drop_non_finite(SplatModel& model);
+/// Drops splats whose centre is outside the box, world.
+std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model);
+/// Drops splats of lower opacity (of the sigmoid, 0 to 1).
+std::size_t prune_opacity(double least, SplatModel& model);
+/// Leaves out the bands above `degree`.
+void limit_sh_degree(int degree, SplatModel& model);
+
+/// The turn that takes the axis named x, y, z, -x, -y or -z to -y, which is up in scenes as they
+/// are stored (y down): about x for z and -z, about z for the others. Throws Error for other names.
+glm::dmat3 turn_of_up_axis(const std::string& axis);
+/// About x, then y, then z; degrees, right-handed.
+glm::dmat3 turn_of_degrees(const glm::dvec3& degrees);
+
+}  // namespace darb

@@ -1,0 +1,81 @@
+// What the small splat formats share: numbers of few bits, bytes of opacity and colour, quaternions
+// without their largest component.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "engine/scene/sh_basis.h"
+
+namespace darb {
+
+/// Nearest of 0 .. 255.
+inline std::uint8_t nearest_byte(double value) {
+    return static_cast<std::uint8_t>(std::clamp(std::round(value), 0.0, 255.0));
+}
+
+/// The opacity byte / 255, as a logit. 0 and 255 stand for 1/512 and 1 - 1/512: both lie in what
+/// rounds to them, and the logit stays finite.
+inline float logit_of_byte(std::uint8_t byte) {
+    const double alpha = std::clamp(byte / 255.0, 1.0 / 512, 1 - 1.0 / 512);
+    return static_cast<float>(std::log(alpha / (1 - alpha)));
+}
+inline std::uint8_t byte_of_logit(double logit) {
+    return nearest_byte(255 / (1 + std::exp(-logit)));
+}
+
+/// Colour in [0, 1] of a dc coefficient.
+inline double colour_of_dc(double dc) {
+    return 0.5 + kShBand0 * dc;
+}
+inline double dc_of_colour(double colour) {
+    return (colour - 0.5) / kShBand0;
+}
+
+/// A quaternion of length 1 without its largest component, which is taken positive.
+struct SmallestThree {
+    std::size_t largest = 0;
+    std::array<double, 3> others{};  // in order, each in [-sqrt(1/2), sqrt(1/2)]
+};
+
+/// q: in any fixed order of components; the identity of first component 1 where it has no length.
+inline SmallestThree smallest_three(const std::array<double, 4>& q) {
+    SmallestThree result;
+    double square = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+        square += q[i] * q[i];
+        if (std::abs(q[i]) > std::abs(q[result.largest])) result.largest = i;
+    }
+    if (!(square > 0)) return result;
+    const double scale = (q[result.largest] < 0 ? -1 : 1) / std::sqrt(square);
+    for (std::size_t i = 0, at = 0; i < 4; ++i)
+        if (i != result.largest) result.others[at++] = q[i] * scale;
+    return result;
+}
+
+inline std::array<double, 4> whole_quaternion(const SmallestThree& three) {
+    std::array<double, 4> q{};
+    double square = 0;
+    for (std::size_t i = 0, at = 0; i < 4; ++i) {
+        if (i == three.largest) continue;
+        q[i] = three.others[at++];
+        square += q[i] * q[i];
+    }
+    q[three.largest] = std::sqrt(std::max(0.0, 1 - square));
+    return q;
+}
+
+/// Little-endian value at byte `at`; the caller checks the length.
+template <class T>
+T load_le(std::span<const std::byte> bytes, std::size_t at) {
+    T value;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    return value;
+}
+
+}  // namespace darb

@@ -1,0 +1,98 @@
+#include "engine/scene/sog_archive.h"
+
+#include <fmt/format.h>
+#include <webp/decode.h>
+#include <zip.h>
+
+#include <memory>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/scene/inflate.h"
+
+namespace darb {
+
+namespace {
+
+constexpr const char* kCopyAgain = "The file is damaged or cut off: export or copy it again.";
+
+struct CloseArchive {
+    void operator()(zip_t* archive) const { zip_discard(archive); }
+};
+struct CloseEntry {
+    void operator()(zip_file_t* entry) const { zip_fclose(entry); }
+};
+
+std::shared_ptr<zip_t> open_archive(std::span<const std::byte> zip, const std::string& where) {
+    zip_error_t error;
+    zip_error_init(&error);
+    zip_source_t* source = zip_source_buffer_create(zip.data(), zip.size(), 0, &error);
+    zip_t* archive = source ? zip_open_from_source(source, ZIP_RDONLY, &error) : nullptr;
+    if (!archive) {
+        const std::string reason = zip_error_strerror(&error);
+        zip_source_free(source);
+        zip_error_fini(&error);
+        throw Error(where, "the zip cannot be opened: " + reason, kCopyAgain);
+    }
+    zip_error_fini(&error);
+    return {archive, CloseArchive{}};
+}
+
+std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::size_t zip_bytes,
+                                  const std::string& where) {
+    const std::string place = where + ", entry " + name;
+    zip_stat_t stat;
+    zip_stat_init(&stat);
+    if (zip_stat(archive, name.c_str(), 0, &stat) != 0 || !(stat.valid & ZIP_STAT_SIZE))
+        throw Error(place, "the zip has no such entry", kCopyAgain);
+    check_expansion(zip_bytes, stat.size, place);
+    const std::unique_ptr<zip_file_t, CloseEntry> entry(zip_fopen(archive, name.c_str(), 0));
+    if (!entry)
+        throw Error(place, std::string("cannot be read: ") + zip_strerror(archive), kCopyAgain);
+    std::vector<std::byte> bytes(stat.size);
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+        const zip_int64_t got = zip_fread(entry.get(), bytes.data() + done, bytes.size() - done);
+        if (got <= 0)
+            throw Error(place, fmt::format("ends after {} of {} bytes", done, bytes.size()),
+                        kCopyAgain);
+        done += static_cast<std::size_t>(got);
+    }
+    return bytes;
+}
+
+}  // namespace
+
+SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where) {
+    return [archive = open_archive(zip, where), size = zip.size(), where](const std::string& name) {
+        return read_entry(archive.get(), name, size, where);
+    };
+}
+
+SogPart open_sog_folder(const std::filesystem::path& folder) {
+    return [folder](const std::string& name) {
+        if (name.empty() || std::filesystem::path(name).filename() != name || name == "..")
+            throw Error((folder / "meta.json").string(),
+                        "names '" + name + "', which is no file of its folder",
+                        "Put all files of the scene into one folder.");
+        return read_file(folder / name);
+    };
+}
+
+SogImage decode_webp(std::span<const std::byte> bytes, std::size_t most, const std::string& where) {
+    const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+    int width = 0, height = 0;
+    if (!WebPGetInfo(data, bytes.size(), &width, &height))
+        throw Error(where, "is no WebP picture", kCopyAgain);
+    SogImage image{static_cast<std::size_t>(width), static_cast<std::size_t>(height), {}};
+    if (image.width * image.height > most)
+        throw Error(
+            where, fmt::format("is {} x {} px; the splats need {} px at most", width, height, most),
+            kCopyAgain);
+    image.rgba.resize(4 * image.width * image.height);
+    if (!WebPDecodeRGBAInto(data, bytes.size(), image.rgba.data(), image.rgba.size(), 4 * width))
+        throw Error(where, "the WebP picture is damaged", kCopyAgain);
+    return image;
+}
+
+}  // namespace darb

@@ -1,0 +1,213 @@
+#include "engine/scene/splat_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/scene/compressed_ply.h"
+#include "engine/scene/dot_splat.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/ply.h"
+#include "engine/scene/ply_table.h"
+#include "engine/scene/quantise.h"
+#include "engine/scene/sog.h"
+#include "engine/scene/spz.h"
+
+namespace darb {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Bytes = std::span<const std::byte>;
+
+bool starts_with(Bytes bytes, std::string_view text) {
+    return bytes.size() >= text.size() &&
+           std::equal(text.begin(), text.end(), bytes.begin(),
+                      [](char c, std::byte b) { return std::byte(c) == b; });
+}
+
+std::string lower(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return text;
+}
+
+std::string encoding_of(const PlyHeader& header) {
+    if (header.format == PlyFormat::ascii) return "ascii";
+    return header.format == PlyFormat::big_endian ? "binary, big-endian" : "binary, little-endian";
+}
+
+SplatModel load_ply(Bytes bytes, const std::string& where, SplatFile& file) {
+    const PlyHeader header = parse_ply_header(bytes, where);
+    file.format = is_compressed_ply(header) ? SplatFormat::compressed_ply : SplatFormat::ply;
+    file.details = encoding_of(header);
+    if (is_point_cloud(bytes))
+        throw Error(where, "is a point cloud: its vertices have no opacity, scale and rotation",
+                    "darb train starts from it where it lies beside the cameras; a viewer shows it "
+                    "as points.");
+    return parse_ply(bytes, where, &file.dropped);
+}
+
+SplatModel load_spz(Bytes bytes, const std::string& where, SplatFile& file) {
+    SpzFacts facts;
+    SplatModel model = parse_spz(bytes, where, &facts);
+    file.format = SplatFormat::spz;
+    file.version = facts.version;
+    if (facts.sh_degree > model.sh_degree)
+        file.notes.push_back(fmt::format("harmonics of degree {} were left out", facts.sh_degree));
+    if (facts.extensions > 0) file.details = fmt::format("{} extensions", facts.extensions);
+    file.dropped = drop_non_finite(model);  // version 1 stores float16
+    return model;
+}
+
+void take(const SogFacts& facts, SplatFile& file) {
+    file.format = SplatFormat::sog;
+    file.version = facts.version;
+    file.dropped = facts.dropped;
+    file.notes = facts.notes;
+    file.details += facts.generator.empty() ? "" : ", by " + facts.generator;
+}
+
+SplatModel load_sog(Bytes bytes, const std::string& where, SplatFile& file) {
+    SogFacts facts;
+    SplatModel model = parse_sog(bytes, where, &facts);
+    file.details = "zip";
+    take(facts, file);
+    return model;
+}
+
+SplatModel load_folder(const fs::path& folder, SplatFile& file) {
+    SogFacts facts;
+    SplatModel model = read_sog_folder(folder, &facts);
+    file.details = "folder";
+    take(facts, file);
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+        if (entry.is_regular_file()) file.bytes += entry.file_size();
+    return model;
+}
+
+SplatModel load_dot_splat(Bytes bytes, const std::string& where, SplatFile& file) {
+    file.format = SplatFormat::dot_splat;
+    return parse_dot_splat(bytes, where, &file.dropped);
+}
+
+std::size_t count_colours_outside(const SplatModel& model) {
+    std::size_t count = 0;
+    for (const float dc : model.sh_dc) {
+        const double colour = colour_of_dc(dc);
+        count += colour < -1 / 510.0 || colour > 1 + 1 / 510.0;
+    }
+    return count;
+}
+
+}  // namespace
+
+std::string_view format_name(SplatFormat format) {
+    switch (format) {
+        case SplatFormat::ply:
+            return "PLY";
+        case SplatFormat::compressed_ply:
+            return "compressed PLY";
+        case SplatFormat::dot_splat:
+            return ".splat";
+        case SplatFormat::spz:
+            return "SPZ";
+        case SplatFormat::sog:
+            return "SOG";
+    }
+    return "";
+}
+
+bool is_sog_folder(const fs::path& path) {
+    std::error_code none;
+    return fs::is_regular_file(path / "meta.json", none);
+}
+
+bool is_point_cloud(Bytes bytes) {
+    if (!starts_with(bytes, "ply")) return false;
+    const PlyHeader header = parse_ply_header(bytes, "PLY");
+    const PlyElement* vertex = header.find("vertex");
+    return vertex && vertex->find("x") >= 0 && vertex->find("opacity") < 0 &&
+           vertex->find("scale_0") < 0 && vertex->find("f_dc_0") < 0 && !is_compressed_ply(header);
+}
+
+SplatModel parse_splats(Bytes bytes, const std::string& where, SplatFile* file) {
+    SplatFile unused;
+    SplatFile& facts = file ? *file : unused;
+    facts.bytes = bytes.size();
+    if (starts_with(bytes, "ply\n") || starts_with(bytes, "ply\r"))
+        return load_ply(bytes, where, facts);
+    if (looks_like_spz(bytes)) return load_spz(bytes, where, facts);
+    if (looks_like_zip(bytes)) return load_sog(bytes, where, facts);
+    if (lower(where).ends_with(".splat") || looks_like_dot_splat(bytes))
+        return load_dot_splat(bytes, where, facts);
+    throw Error(
+        where,
+        bytes.empty() ? "is empty" : "is no splat file: no PLY, compressed PLY, .splat, SPZ or SOG",
+        "Check the path, or export the scene in one of these formats.");
+}
+
+SplatModel load_splats(const fs::path& path, SplatFile* file) {
+    SplatFile unused;
+    SplatFile& facts = file ? *file : unused;
+    facts = {};
+    if (is_sog_folder(path)) return load_folder(path, facts);
+    if (path.filename() == "meta.json")
+        return load_folder(path.has_parent_path() ? path.parent_path() : fs::path("."), facts);
+    return parse_splats(read_file(path), path.string(), &facts);
+}
+
+std::optional<SplatFormat> format_to_write(const fs::path& path) {
+    const std::string name = lower(path.filename().string());
+    if (name.ends_with(".compressed.ply")) return SplatFormat::compressed_ply;
+    if (name.ends_with(".ply")) return SplatFormat::ply;
+    if (name.ends_with(".splat")) return SplatFormat::dot_splat;
+    if (name.ends_with(".spz")) return SplatFormat::spz;
+    return std::nullopt;
+}
+
+std::vector<std::string> losses_of(SplatFormat format, const SplatModel& model) {
+    std::vector<std::string> losses;
+    if (format == SplatFormat::ply) return losses;
+    const std::string_view name = format_name(format);
+    const bool has_comments = format == SplatFormat::compressed_ply;
+    if (!has_comments && model.kernel != KERNEL_GAUSSIAN)
+        losses.push_back(
+            fmt::format("{} has no place for the kernel {} ({}): it will be drawn with "
+                        "Gaussians",
+                        name, kernel_name(model.kernel), footprint_name(model.footprint)));
+    if (format == SplatFormat::dot_splat) {
+        if (model.antialias)
+            losses.push_back(".splat has no place for anti-aliasing (render mode mip)");
+        if (model.sh_degree > 0)
+            losses.push_back(fmt::format(".splat has no place for harmonics: degree {} becomes 0",
+                                         model.sh_degree));
+        if (const std::size_t count = count_colours_outside(model); count > 0)
+            losses.push_back(fmt::format("{} colours outside 0 to 1 are cut to it", count));
+    }
+    if (model.origin != glm::dvec3(0.0))
+        losses.push_back(fmt::format("{} has no place for double positions: they are rounded to {}",
+                                     name, format == SplatFormat::spz ? "24 bits" : "float32"));
+    return losses;
+}
+
+std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model) {
+    DARB_CHECK(format != SplatFormat::sog);
+    if (format == SplatFormat::ply) return encode_ply(model);
+    SplatModel finite = model;
+    drop_non_finite(finite);
+    if (format == SplatFormat::compressed_ply) return encode_compressed_ply(finite);
+    if (format == SplatFormat::dot_splat) return encode_dot_splat(finite);
+    return encode_spz(finite);
+}
+
+void save_splats(const fs::path& path, SplatFormat format, const SplatModel& model) {
+    write_file_atomic(path, encode_splats(format, model));
+}
+
+}  // namespace darb

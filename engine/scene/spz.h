@@ -1,0 +1,45 @@
+// SPZ, Niantic's format (github.com/nianticlabs/spz). Versions 1 to 3: one gzip stream of a 16-byte
+// header and the attributes one after the other; version 4: a 32-byte header in the open, extension
+// records, a table of sizes and one Zstandard frame an attribute. Attributes, in order:
+//   position     3 x 24-bit fixed point with fractionalBits (version 1: 3 x float16)
+//   opacity      uint8 / 255          colour  3 x uint8: dc = (c / 255 - 0.5) / 0.15
+//   log scale    3 x uint8 / 16 - 10
+//   rotation     x y z w: 3 x int8 of x y z with w >= 0 (versions 1, 2); the smallest three with 2
+//   +
+//                3 x (sign, 9 bits) from version 3 on
+//   harmonics    (byte - 128) / 128, coefficient-major, rgb innermost; degree 0 to 4
+// Axes are x right, y up, z backward, or what the extension 0xADBE0003 names; scenes in memory have
+// x right, y down, z forward, as PLY has.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+/// Begins like SPZ: the letters NGSP, or gzip.
+bool looks_like_spz(std::span<const std::byte> file);
+
+struct SpzFacts {
+    int version = 0;
+    int sh_degree = 0;  // as stored; harmonics of degree 4 are left out of the model
+    int extensions = 0;
+};
+
+/// Throws Error naming what is wrong; declared counts are checked against the file before
+/// allocating.
+SplatModel parse_spz(std::span<const std::byte> file, const std::string& where,
+                     SpzFacts* facts = nullptr);
+
+/// Version 4. The error of a position is at most 2^-(b+1) with b = 12 fractional bits, more for
+/// scenes under 32 across, fewer for those above 2048; of a log scale 1/32 within [-10, 5.9]; of
+/// opacity 1/510; of dc 1/76.5 within [-3.33, 3.33]; of a quaternion's component 7e-4; of a
+/// harmonic 1/32 (degree 1) or 1/16 within [-1, 1]. Keeps the render mode; kernel and footprint
+/// have no place. Throws Error where positions do not fit 24 bits.
+std::vector<std::byte> encode_spz(const SplatModel& model);
+
+}  // namespace darb

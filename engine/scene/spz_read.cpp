@@ -1,0 +1,283 @@
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "engine/core/error.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/inflate.h"
+#include "engine/scene/quantise.h"
+#include "engine/scene/spz.h"
+#include "engine/scene/spz_layout.h"
+
+namespace darb {
+
+namespace {
+
+using Bytes = std::span<const std::byte>;
+
+constexpr const char* kCopyAgain = "The file is damaged or cut off: export or copy it again.";
+constexpr int kMostFractionalBits = 24;
+constexpr std::size_t kMostExtensionBytes = std::size_t{1} << 20;
+
+struct Header {
+    std::uint32_t version = 0, count = 0;
+    int degree = 0, fractional_bits = 0;
+    std::uint8_t flags = 0, streams = 0;
+};
+
+Header read_header(Bytes bytes, const std::string& where) {
+    if (bytes.size() < spz::kOldHeader)
+        throw Error(
+            where,
+            fmt::format("holds {} bytes; the SPZ header has {}", bytes.size(), spz::kOldHeader),
+            kCopyAgain);
+    if (load_le<std::uint32_t>(bytes, 0) != spz::kMagic)
+        throw Error(where, "the content is no SPZ: it does not begin with NGSP",
+                    "Unpack a gzip file of another kind first.");
+    Header header;
+    header.version = load_le<std::uint32_t>(bytes, 4);
+    header.count = load_le<std::uint32_t>(bytes, 8);
+    header.degree = static_cast<int>(bytes[12]);
+    header.fractional_bits = static_cast<int>(bytes[13]);
+    header.flags = static_cast<std::uint8_t>(bytes[14]);
+    header.streams = static_cast<std::uint8_t>(bytes[15]);
+    if (header.version < 1 || header.version > 4)
+        throw Error(where, fmt::format("is SPZ version {}; 1 to 4 are known", header.version),
+                    "Export it in one of these versions.");
+    if (header.degree > 4)
+        throw Error(where, fmt::format("header: SH degree {}; 0 to 4 are known", header.degree),
+                    kCopyAgain);
+    if (header.fractional_bits > kMostFractionalBits)
+        throw Error(where, fmt::format("header: {} fractional bits of 24", header.fractional_bits),
+                    kCopyAgain);
+    return header;
+}
+
+/// The attributes, uncompressed, in the order of the file; where versions 1 to 3 have extensions,
+/// what follows the attributes.
+struct Content {
+    Header header;
+    std::vector<std::byte> whole;  // versions 1 to 3
+    std::array<std::vector<std::byte>, 6> parts;
+    std::array<Bytes, 6> attributes;
+    Bytes extensions;
+};
+
+void split_old(Content& content, const std::string& where) {
+    const spz::Strides strides =
+        spz::strides(static_cast<int>(content.header.version), content.header.degree);
+    const std::uint64_t size = std::uint64_t{content.header.count} * strides.total();
+    const Bytes all = content.whole;
+    if (all.size() - spz::kOldHeader < size)
+        throw Error(
+            where,
+            fmt::format("declares {} splats of {} bytes, but holds {} bytes for them",
+                        content.header.count, strides.total(), all.size() - spz::kOldHeader),
+            kCopyAgain);
+    std::size_t at = spz::kOldHeader;
+    for (std::size_t i = 0; i < 6; ++i) {
+        const std::size_t bytes = strides.bytes[i] * content.header.count;
+        content.attributes[i] = all.subspan(at, bytes);
+        at += bytes;
+    }
+    content.extensions = all.subspan(at);
+}
+
+void read_old(Bytes file, bool is_gzip, Content& content, const std::string& where) {
+    if (is_gzip) {
+        content.header = read_header(gunzip(file, spz::kOldHeader, where), where);
+        const std::uint64_t size =
+            spz::strides(static_cast<int>(content.header.version), content.header.degree).total() *
+            std::uint64_t{content.header.count};
+        check_expansion(file.size(), size, where);
+        // A byte more than needed: zlib then reaches the end of the stream and checks its sum.
+        const bool extended = content.header.flags & spz::kFlagExtensions;
+        content.whole =
+            gunzip(file, spz::kOldHeader + size + (extended ? kMostExtensionBytes : 1), where);
+    } else {
+        content.whole.assign(file.begin(), file.end());
+    }
+    split_old(content, where);
+}
+
+constexpr std::array<const char*, 6> kNames = {"positions", "opacities", "colours",
+                                               "scales",    "rotations", "harmonics"};
+
+void read_streams(Bytes file, Content& content, const std::string& where) {
+    if (file.size() < spz::kHeader)
+        throw Error(where,
+                    fmt::format("holds {} bytes; the SPZ header has {}", file.size(), spz::kHeader),
+                    kCopyAgain);
+    const std::size_t toc = load_le<std::uint32_t>(file, 16);
+    const std::size_t begin = toc + content.header.streams * spz::kTocEntry;
+    if (toc < spz::kHeader || begin > file.size())
+        throw Error(where,
+                    fmt::format("header: a table of {} streams at byte {} of a file of {}",
+                                content.header.streams, toc, file.size()),
+                    kCopyAgain);
+    content.extensions = file.subspan(spz::kHeader, toc - spz::kHeader);
+    const spz::Strides strides = spz::strides(4, content.header.degree);
+    check_expansion(file.size(), std::uint64_t{content.header.count} * strides.total(), where);
+    std::size_t at = begin, stream = 0;
+    for (std::size_t i = 0; i < 6; ++i) {
+        const std::size_t size = strides.bytes[i] * content.header.count;
+        if (size == 0) continue;  // attributes without bytes have no stream
+        if (stream == content.header.streams)
+            throw Error(where, fmt::format("has no stream of {}", kNames[i]), kCopyAgain);
+        const auto packed = load_le<std::uint64_t>(file, toc + stream * spz::kTocEntry);
+        const auto declared = load_le<std::uint64_t>(file, toc + stream * spz::kTocEntry + 8);
+        if (declared != size || packed > file.size() - at)
+            throw Error(
+                where,
+                fmt::format("the stream of {} declares {} bytes, packed to {}; {} bytes are "
+                            "needed and {} are left in the file",
+                            kNames[i], declared, packed, size, file.size() - at),
+                kCopyAgain);
+        content.parts[i] = unzstd(file.subspan(at, packed), size, where);
+        content.attributes[i] = content.parts[i];
+        at += packed;
+        ++stream;
+    }
+    if (stream != content.header.streams)
+        throw Error(where,
+                    fmt::format("has {} streams; {} are known", content.header.streams, stream),
+                    kCopyAgain);
+}
+
+/// Columns: the axes of the file in the frame of the model (x right, y down, z forward). Numbers 1
+/// to 16 as the reference library has them: with n - 1 in bits, bit 0 is right against left; the
+/// second axis is down or up (bit 1) and the third back or front (bit 2), or, with bit 3, the
+/// second front or back (bit 2) and the third down or up (bit 1).
+glm::dmat3 frame_of(std::uint32_t system) {
+    const std::uint32_t bits = system - 1;
+    const bool rotated = bits & 8;
+    const glm::dvec3 x(bits & 1 ? 1 : -1, 0, 0);
+    const glm::dvec3 vertical(0, bits & 2 ? -1 : 1, 0);
+    const glm::dvec3 depth(0, 0, bool(bits & 4) != rotated ? 1 : -1);
+    return rotated ? glm::dmat3(x, depth, vertical) : glm::dmat3(x, vertical, depth);
+}
+
+constexpr std::uint32_t kRightUpBack = 4;
+
+std::uint32_t read_extensions(Bytes records, const std::string& where, int& count) {
+    std::uint32_t system = kRightUpBack;
+    for (count = 0; records.size() >= 8; ++count) {
+        const auto type = load_le<std::uint32_t>(records, 0);
+        const auto size = load_le<std::uint32_t>(records, 4);
+        records = records.subspan(8);
+        if (size > records.size())
+            throw Error(where,
+                        fmt::format("extension record {} declares {} bytes, {} are left", count,
+                                    size, records.size()),
+                        kCopyAgain);
+        if (type == spz::kCoordinateSystem && size >= 4) {
+            system = load_le<std::uint32_t>(records, 0);
+            if (system > 16)
+                throw Error(where, fmt::format("names the unknown coordinate system {}", system),
+                            "Export it with the axes right, up, back.");
+            if (system == 0) system = kRightUpBack;  // unspecified
+        }
+        records = records.subspan(size);
+    }
+    return system;
+}
+
+float half_to_float(std::uint16_t bits) {
+    const int exponent = (bits >> 10) & 31, mantissa = bits & 1023;
+    const double sign = bits & 0x8000 ? -1 : 1;
+    if (exponent == 31) return static_cast<float>(mantissa ? NAN : sign * INFINITY);
+    return static_cast<float>(exponent ? sign * std::ldexp(1024 + mantissa, exponent - 25)
+                                       : sign * std::ldexp(mantissa, -24));
+}
+
+void read_positions(const Content& content, SplatModel& model) {
+    const Bytes bytes = content.attributes[0];
+    for (std::size_t i = 0; i < model.position.size(); ++i) {
+        if (content.header.version == 1) {
+            model.position[i] = half_to_float(load_le<std::uint16_t>(bytes, 2 * i));
+            continue;
+        }
+        std::uint32_t value = 0;
+        for (std::size_t k = 0; k < 3; ++k)
+            value |= static_cast<std::uint32_t>(bytes[3 * i + k]) << (8 * k + 8);
+        const int fixed = static_cast<std::int32_t>(value) >> 8;  // with its sign
+        model.position[i] = static_cast<float>(std::ldexp(fixed, -content.header.fractional_bits));
+    }
+}
+
+/// x y z w
+std::array<double, 4> rotation_of(const Content& content, std::size_t i) {
+    const Bytes bytes = content.attributes[4];
+    if (content.header.version >= 3) {
+        const auto packed = load_le<std::uint32_t>(bytes, 4 * i);
+        SmallestThree three{packed >> 30, {}};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::uint32_t part = packed >> (20 - 10 * k);
+            const double size = (part & 511) / 511.0 * (1 / std::numbers::sqrt2);
+            three.others[k] = part & 512 ? -size : size;
+        }
+        return whole_quaternion(three);
+    }
+    SmallestThree xyz{3, {}};  // w is left out, largest or not
+    for (std::size_t k = 0; k < 3; ++k)
+        xyz.others[k] = static_cast<double>(bytes[3 * i + k]) / 127.5 - 1;
+    return whole_quaternion(xyz);
+}
+
+SplatModel decode(const Content& content) {
+    SplatModel model;
+    model.sh_degree = std::min(content.header.degree, kMaxShDegree);
+    model.antialias = content.header.flags & spz::kFlagAntialias;
+    model.resize(content.header.count);
+    read_positions(content, model);
+    const auto& at = content.attributes;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        model.opacity[i] = logit_of_byte(static_cast<std::uint8_t>(at[1][i]));
+        const std::array<double, 4> q = rotation_of(content, i);
+        for (std::size_t k = 0; k < 4; ++k)
+            model.rotation[4 * i + k] = static_cast<float>(q[(k + 3) % 4]);
+    }
+    for (std::size_t i = 0; i < 3 * model.size(); ++i) {
+        model.sh_dc[i] =
+            static_cast<float>((static_cast<double>(at[2][i]) / 255 - 0.5) / spz::kColourScale);
+        model.log_scale[i] = static_cast<float>(at[3][i]) / 16 - 10;
+    }
+    const std::size_t stored = spz::strides(4, content.header.degree).bytes[5];
+    const auto rest = static_cast<std::size_t>(model.rest_count());
+    for (std::size_t i = 0; i < model.size(); ++i)
+        for (std::size_t c = 0; c < rest; ++c)
+            model.sh_rest[i * rest + c] = (static_cast<float>(at[5][i * stored + c]) - 128) / 128;
+    return model;
+}
+
+bool is_gzip(Bytes file) {
+    return file.size() >= 2 && file[0] == std::byte{0x1f} && file[1] == std::byte{0x8b};
+}
+
+}  // namespace
+
+bool looks_like_spz(Bytes file) {
+    return is_gzip(file) || (file.size() >= 4 && load_le<std::uint32_t>(file, 0) == spz::kMagic);
+}
+
+SplatModel parse_spz(Bytes file, const std::string& where, SpzFacts* facts) {
+    Content content;
+    if (!is_gzip(file)) content.header = read_header(file, where);
+    if (content.header.version == 4)
+        read_streams(file, content, where);
+    else
+        read_old(file, is_gzip(file), content, where);
+    int extensions = 0;
+    std::uint32_t system = kRightUpBack;
+    if (content.header.flags & spz::kFlagExtensions)
+        system = read_extensions(content.extensions, where, extensions);
+    SplatModel model = decode(content);
+    transform_splats({1, frame_of(system), glm::dvec3(0.0)}, model);
+    if (facts)
+        *facts = {static_cast<int>(content.header.version), content.header.degree, extensions};
+    return model;
+}
+
+}  // namespace darb

@@ -1,0 +1,120 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/core/error.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/inflate.h"
+#include "engine/scene/quantise.h"
+#include "engine/scene/splat_shapes.h"
+#include "engine/scene/spz.h"
+#include "engine/scene/spz_layout.h"
+
+namespace darb {
+
+namespace {
+
+using Stream = std::vector<std::byte>;
+
+constexpr int kUsualBits = 12;     // fractional; 0.24 mm where the unit is a metre
+constexpr int kLeastSteps = 17;    // 2^17 of them across the largest coordinate, where they fit
+constexpr int kSteps = 23;         // 24 bits with sign
+constexpr int kStepOfDegree1 = 8;  // of a harmonic's byte; what the reference writer keeps
+constexpr int kStepOfHigher = 16;
+
+const glm::dmat3 kToRightUpBack(1, 0, 0, 0, -1, 0, 0, 0, -1);
+
+int choose_fractional_bits(const SplatModel& model) {
+    double largest = 0;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        const glm::dvec3 p = glm::abs(position_of(model, i));
+        largest = std::max({largest, p.x, p.y, p.z});
+    }
+    if (largest == 0) return kUsualBits;
+    const int exponent = std::ilogb(largest);  // 2^exponent <= largest < 2^(exponent + 1)
+    const int fitting = kSteps - 1 - exponent;
+    if (fitting < 0)
+        throw Error("SPZ", fmt::format("positions reach {:g}, beyond 24 bits", largest),
+                    "Move the scene to the origin with --translate, or write a PLY.");
+    return std::min({fitting, std::max(kUsualBits, kLeastSteps - exponent), kSteps});
+}
+
+void append(std::uint64_t value, std::size_t bytes, Stream& to) {
+    for (std::size_t i = 0; i < bytes; ++i)
+        to.push_back(static_cast<std::byte>(value >> (8 * i) & 255));
+}
+
+std::uint32_t pack_rotation(const float* q) {  // w x y z
+    const SmallestThree three = smallest_three({q[1], q[2], q[3], q[0]});
+    auto packed = static_cast<std::uint32_t>(three.largest);
+    for (const double part : three.others) {
+        const auto size =
+            static_cast<std::uint32_t>(std::round(std::abs(part) * std::numbers::sqrt2 * 511));
+        packed = packed << 10 | (part < 0 ? 512u : 0u) | std::min(size, 511u);
+    }
+    return packed;
+}
+
+std::uint8_t pack_harmonic(float value, int step) {
+    return nearest_byte(std::round((value + 1.0) * 128 / step) * step);
+}
+
+std::array<Stream, 6> pack(const SplatModel& model, int fractional_bits) {
+    std::array<Stream, 6> streams;
+    const auto rest = static_cast<std::size_t>(model.rest_count());
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        const glm::dvec3 p = position_of(model, i);
+        streams[1].push_back(std::byte{byte_of_logit(model.opacity[i])});
+        append(pack_rotation(&model.rotation[4 * i]), 4, streams[4]);
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::size_t at = 3 * i + static_cast<std::size_t>(axis);
+            const double most = (1 << kSteps) - 1;
+            const double steps =
+                std::clamp(std::round(std::ldexp(p[axis], fractional_bits)), -most, most);
+            append(static_cast<std::uint32_t>(static_cast<std::int32_t>(steps)), 3, streams[0]);
+            streams[2].push_back(
+                std::byte{nearest_byte(255 * (model.sh_dc[at] * spz::kColourScale + 0.5))});
+            streams[3].push_back(std::byte{nearest_byte((model.log_scale[at] + 10) * 16)});
+        }
+        for (std::size_t c = 0; c < rest; ++c)
+            streams[5].push_back(std::byte{pack_harmonic(model.sh_rest[i * rest + c],
+                                                         c < 9 ? kStepOfDegree1 : kStepOfHigher)});
+    }
+    return streams;
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_spz(const SplatModel& scene) {
+    check_splat_shapes(scene);
+    SplatModel model = scene;
+    transform_splats({1, kToRightUpBack, glm::dvec3(0.0)}, model);
+    const int fractional_bits = choose_fractional_bits(model);
+    Stream toc, packed;
+    std::uint8_t streams = 0;
+    for (const Stream& stream : pack(model, fractional_bits)) {
+        if (stream.empty()) continue;
+        const Stream frame = zstd(stream);
+        append(frame.size(), 8, toc);
+        append(stream.size(), 8, toc);
+        packed.insert(packed.end(), frame.begin(), frame.end());
+        ++streams;
+    }
+    Stream file;
+    append(spz::kMagic, 4, file);
+    append(4, 4, file);  // version
+    append(model.size(), 4, file);
+    append(static_cast<std::uint64_t>(model.sh_degree), 1, file);
+    append(static_cast<std::uint64_t>(fractional_bits), 1, file);
+    append(model.antialias ? spz::kFlagAntialias : 0, 1, file);
+    append(streams, 1, file);
+    append(spz::kHeader, 4, file);  // where the table begins
+    file.resize(spz::kHeader);
+    file.insert(file.end(), toc.begin(), toc.end());
+    file.insert(file.end(), packed.begin(), packed.end());
+    return file;
+}
+
+}  // namespace darb

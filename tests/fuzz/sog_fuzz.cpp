@@ -1,0 +1,17 @@
+// Any bytes as a SOG zip: a model or an Error, never a crash; its arrays fit together.
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "engine/core/error.h"
+#include "engine/scene/sog.h"
+#include "engine/scene/splat_shapes.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    const auto file = std::as_bytes(std::span(data, size));
+    try {
+        darb::check_splat_shapes(darb::parse_sog(file, "fuzz"));
+    } catch (const darb::Error&) {
+    }
+    return 0;
+}

@@ -1,0 +1,18 @@
+// Any bytes as any splat file: a model or an Error, never a crash; its arrays fit together.
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "engine/core/error.h"
+#include "engine/scene/splat_file.h"
+#include "engine/scene/splat_shapes.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    const auto file = std::as_bytes(std::span(data, size));
+    try {
+        darb::is_point_cloud(file);
+        darb::check_splat_shapes(darb::parse_splats(file, "fuzz"));
+    } catch (const darb::Error&) {
+    }
+    return 0;
+}

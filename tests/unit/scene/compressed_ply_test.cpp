@@ -1,0 +1,168 @@
+#include "engine/scene/compressed_ply.h"
+
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/ply.h"
+#include "tests/support/splat_files.h"
+
+namespace darb::test {
+namespace {
+
+const Reader kRead = [](std::span<const std::byte> file) { return parse_ply(file, "test"); };
+
+/// One chunk with bounds 0 to 1 for x, 0 to 2 for y, 0 to 4 for z; scales -8 to 0; and one splat.
+FileBytes one_splat(bool colours, bool sh) {
+    std::string header = "ply\nformat binary_little_endian 1.0\nelement chunk 1\n";
+    const auto bounds = [&](const char* names) {
+        for (const char* end : {"min_", "max_"})
+            for (const char* n = names; *n; ++n)
+                header += std::string("property float ") + end + *n + "\n";
+    };
+    bounds("xyz");
+    for (const char* end : {"min_scale_", "max_scale_"})
+        for (const char* n = "xyz"; *n; ++n)
+            header += std::string("property float ") + end + *n + "\n";
+    if (colours) bounds("rgb");
+    header += "element vertex 1\n";
+    for (const char* name : {"position", "rotation", "scale", "color"})
+        header += std::string("property uint packed_") + name + "\n";
+    if (sh) {
+        header += "element sh 1\n";
+        for (int i = 0; i < 9; ++i) header += "property uchar f_rest_" + std::to_string(i) + "\n";
+    }
+    FileBytes file;
+    append_text(header + "end_header\n", file);
+    for (const float v : {0.f, 0.f, 0.f, 1.f, 2.f, 4.f, -8.f, -8.f, -8.f, 0.f, 0.f, 0.f})
+        append_value(v, file);
+    if (colours)
+        for (const float v : {0.f, 0.f, 0.f, 0.5f, 1.f, 2.f}) append_value(v, file);
+    append_value<std::uint32_t>(2047u << 21 | 0u << 11 | 1024u, file);  // x 1, y 0, z 4 * 1024/2047
+    append_value<std::uint32_t>(1u << 30 | 1023u << 20 | 0u << 10 | 511u, file);
+    append_value<std::uint32_t>(0u << 21 | 1023u << 11 | 2047u, file);  // -8, 0, 0
+    append_value<std::uint32_t>(255u << 24 | 51u << 16 | 0u << 8 | 204u, file);
+    if (sh)
+        for (int i = 0; i < 9; ++i)
+            file.push_back(static_cast<std::byte>(i == 0 ? 0 : std::min(128 + 16 * i, 255)));
+    return file;
+}
+
+TEST(CompressedPly, one_splat_decoded_by_hand) {
+    const SplatModel model = kRead(one_splat(true, true));
+    ASSERT_EQ(model.size(), 1u);
+    EXPECT_EQ(model.sh_degree, 1);
+    EXPECT_EQ(model.position[0], 1.f);
+    EXPECT_EQ(model.position[1], 0.f);
+    EXPECT_NEAR(model.position[2], 4 * 1024 / 2047.0, 1e-6);
+    EXPECT_EQ(model.log_scale, (std::vector<float>{-8, 0, 0}));
+    // Colours 1 * 0.5, 0.2 * 1 and 0; opacity 0.8, its logit ln 4.
+    EXPECT_NEAR(model.sh_dc[0], 0, 1e-6);
+    EXPECT_NEAR(model.sh_dc[1], (0.2 - 0.5) / 0.28209479, 1e-6);
+    EXPECT_NEAR(model.sh_dc[2], -0.5 / 0.28209479, 1e-5);
+    EXPECT_NEAR(model.opacity[0], std::log(4.0), 1e-5);
+    // x is the largest; w = sqrt(1/2), y = -sqrt(1/2), z = (511/1023 - 1/2) sqrt 2; nothing is
+    // left.
+    EXPECT_NEAR(model.rotation[0], std::sqrt(0.5), 1e-6);
+    EXPECT_NEAR(model.rotation[1], 0, 1e-6);
+    EXPECT_NEAR(model.rotation[2], -std::sqrt(0.5), 1e-6);
+    EXPECT_NEAR(model.rotation[3], -0.5 / 1023 * std::sqrt(2.0), 1e-6);
+    // File: three reds, three greens, three blues. Model: rgb of one coefficient after the other.
+    EXPECT_EQ(model.sh_rest[0], -4.f);                               // byte 0
+    EXPECT_NEAR(model.sh_rest[1], ((176.5 / 256) - 0.5) * 8, 1e-6);  // byte 3, green
+    EXPECT_NEAR(model.sh_rest[3], ((144.5 / 256) - 0.5) * 8, 1e-6);  // byte 1, red
+    EXPECT_EQ(model.sh_rest[8], 4.f);                                // byte 8, blue: 255
+}
+
+TEST(CompressedPly, without_bounds_of_colour_they_are_0_to_1) {
+    const SplatModel model = kRead(one_splat(false, false));
+    EXPECT_EQ(model.sh_degree, 0);
+    EXPECT_NEAR(model.sh_dc[0], 0.5 / 0.28209479, 1e-5);
+}
+
+/// The splat of `written` nearest to each of `model`.
+size_t nearest(const SplatModel& model, size_t i, const SplatModel& written) {
+    size_t best = 0;
+    for (size_t j = 1; j < written.size(); ++j)
+        if (glm::distance(position_of(model, i), position_of(written, j)) <
+            glm::distance(position_of(model, i), position_of(written, best)))
+            best = j;
+    return best;
+}
+
+TEST(CompressedPly, every_degree_round_trips_within_the_stated_errors) {
+    for (int degree = 0; degree <= 3; ++degree) {
+        SplatModel model = sample_model(degree, 700);
+        model.kernel = KERNEL_RAISED_COSINE;
+        model.footprint = Footprint::exact;
+        model.antialias = true;
+        const SplatModel read = kRead(encode_compressed_ply(model));
+        ASSERT_EQ(read.size(), model.size());
+        EXPECT_EQ(read.sh_degree, degree);
+        EXPECT_EQ(read.kernel, KERNEL_RAISED_COSINE);
+        EXPECT_EQ(read.footprint, Footprint::exact);
+        EXPECT_TRUE(read.antialias);
+        const auto rest = static_cast<size_t>(model.rest_count());
+        for (size_t i = 0; i < model.size(); ++i) {
+            const size_t j = nearest(model, i, read);
+            for (size_t k = 0; k < 3; ++k) {
+                // A chunk spans 2 at most; scales 7, colours 2 * 0.282.
+                const double steps = k == 1 ? 2046 : 4094;
+                EXPECT_NEAR(read.position[3 * j + k], model.position[3 * i + k], 2.001 / steps);
+                EXPECT_NEAR(read.log_scale[3 * j + k], model.log_scale[3 * i + k], 7.001 / steps);
+                EXPECT_NEAR(read.sh_dc[3 * j + k], model.sh_dc[3 * i + k], 2.001 / 510);
+            }
+            EXPECT_NEAR(opacity_of(read.opacity[j]), opacity_of(model.opacity[i]), 1.001 / 510);
+            EXPECT_GT(same_rotation(read, j, model, i), 1 - 2e-6);
+            for (size_t c = 0; c < rest; ++c)
+                EXPECT_NEAR(read.sh_rest[rest * j + c], model.sh_rest[rest * i + c], 1.001 / 64);
+        }
+    }
+}
+
+TEST(CompressedPly, written_again_the_bytes_stay) {
+    // The order is by position, which moves by less than a step of the order.
+    const SplatModel once = kRead(encode_compressed_ply(sample_model(2, 300)));
+    const SplatModel twice = kRead(encode_compressed_ply(once));
+    const auto sorted = [](std::vector<float> values) {
+        std::sort(values.begin(), values.end());
+        return values;
+    };
+    EXPECT_EQ(sorted(twice.opacity), sorted(once.opacity));
+    EXPECT_EQ(sorted(twice.sh_rest), sorted(once.sh_rest));
+}
+
+TEST(CompressedPly, no_splats_and_equal_splats_round_trip) {
+    EXPECT_EQ(kRead(encode_compressed_ply(SplatModel{})).size(), 0u);
+    SplatModel model = sample_model(0, 1);
+    for (auto* values :
+         {&model.position, &model.log_scale, &model.rotation, &model.opacity, &model.sh_dc})
+        values->insert(values->end(), values->begin(), values->end());
+    const SplatModel read = kRead(encode_compressed_ply(model));
+    EXPECT_EQ(read.position, model.position);  // the bounds are exact
+}
+
+TEST(CompressedPly, truncated_or_damaged_is_an_error) {
+    const FileBytes file = encode_compressed_ply(sample_model(1, 3));
+    expect_truncation_is_refused(file, kRead);
+    expect_damage_is_survived(file, kRead, 2000);
+}
+
+TEST(CompressedPly, counts_that_do_not_fit_are_refused) {
+    const FileBytes file = one_splat(true, true);
+    const std::string text(reinterpret_cast<const char*>(file.data()), file.size());
+    for (const char* element : {"chunk", "vertex", "sh"})
+        for (const char* count : {"2147483648", "9223372036854775808", "0", "2"}) {
+            std::string changed = text;
+            const std::string line = std::string("element ") + element + " ";
+            changed.replace(changed.find(line) + line.size(), 1, count);
+            FileBytes bytes;
+            append_text(changed, bytes);
+            EXPECT_NE(error_of([&] { kRead(bytes); }), "no error") << element << " " << count;
+        }
+    std::string changed = text;
+    changed.replace(changed.find("uint packed_scale"), 4, "int ");
+    FileBytes bytes;
+    append_text(changed, bytes);
+    EXPECT_NE(error_of([&] { kRead(bytes); }).find("packed_scale"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace darb::test

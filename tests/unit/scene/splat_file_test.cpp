@@ -1,0 +1,192 @@
+#include "engine/scene/splat_file.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <limits>
+
+#include "engine/core/files.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/inflate.h"
+#include "engine/scene/ply.h"
+#include "tests/support/splat_files.h"
+#include "tests/support/test_data.h"
+
+namespace darb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(SplatFile, formats_are_told_apart_by_content) {
+    const SplatModel model = sample_model(0, 40);
+    for (const SplatFormat format : {SplatFormat::ply, SplatFormat::compressed_ply,
+                                     SplatFormat::dot_splat, SplatFormat::spz}) {
+        SplatFile file;
+        EXPECT_EQ(parse_splats(encode_splats(format, model), "no name", &file).size(), 40u);
+        EXPECT_EQ(file.format, format);
+        EXPECT_GT(file.bytes, 0u);
+    }
+}
+
+TEST(SplatFile, other_content_is_refused_by_name) {
+    const auto error = [](const std::string& text) {
+        FileBytes bytes;
+        append_text(text, bytes);
+        return error_of([&] { parse_splats(bytes, "test"); });
+    };
+    EXPECT_NE(error("").find("empty"), std::string::npos);
+    EXPECT_NE(error(std::string(64, 'x')).find("no splat file"), std::string::npos);
+    EXPECT_NE(error("PK\3\4").find("zip"), std::string::npos);
+    FileBytes text;
+    append_text("something else", text);
+    EXPECT_NE(error_of([&] { parse_splats(gzip(text), "test"); }).find("test"), std::string::npos);
+    EXPECT_NE(error_of([] { load_splats("/no/such/file.spz"); }).find("/no/such/file.spz"),
+              std::string::npos);
+}
+
+TEST(SplatFile, a_point_cloud_is_named_as_one) {
+    const std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+        "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+        "end_header\n1 2 3 4 5 6\n";
+    FileBytes bytes;
+    append_text(text, bytes);
+    EXPECT_TRUE(is_point_cloud(bytes));
+    EXPECT_NE(error_of([&] { parse_splats(bytes, "test"); }).find("is a point cloud"),
+              std::string::npos);
+    EXPECT_FALSE(is_point_cloud(encode_ply(sample_model(0, 1))));
+    EXPECT_FALSE(is_point_cloud(encode_splats(SplatFormat::compressed_ply, sample_model(0, 1))));
+}
+
+TEST(SplatFile, names_choose_what_is_written) {
+    EXPECT_EQ(format_to_write("a/b.ply"), SplatFormat::ply);
+    EXPECT_EQ(format_to_write("b.Compressed.PLY"), SplatFormat::compressed_ply);
+    EXPECT_EQ(format_to_write("b.splat"), SplatFormat::dot_splat);
+    EXPECT_EQ(format_to_write("b.SPZ"), SplatFormat::spz);
+    EXPECT_FALSE(format_to_write("b.sog"));
+    EXPECT_FALSE(format_to_write("ply"));
+}
+
+TEST(SplatFile, what_a_format_has_no_place_for_is_said) {
+    SplatModel model = sample_model(2, 5);
+    for (float& dc : model.sh_dc) dc = 0;
+    EXPECT_TRUE(losses_of(SplatFormat::spz, model).empty());
+    EXPECT_EQ(losses_of(SplatFormat::dot_splat, model).size(), 1u);  // harmonics
+    model.kernel = KERNEL_SINC;
+    model.antialias = true;
+    model.sh_dc[0] = 3;
+    EXPECT_TRUE(losses_of(SplatFormat::ply, model).empty());
+    EXPECT_TRUE(losses_of(SplatFormat::compressed_ply, model).empty());
+    ASSERT_EQ(losses_of(SplatFormat::spz, model).size(), 1u);
+    EXPECT_NE(losses_of(SplatFormat::spz, model)[0].find("sinc"), std::string::npos);
+    EXPECT_EQ(losses_of(SplatFormat::dot_splat, model).size(), 4u);
+    model.origin.x = 1e6;
+    EXPECT_EQ(losses_of(SplatFormat::spz, model).size(), 2u);
+}
+
+TEST(SplatFile, files_are_written_whole_and_nan_is_left_out) {
+    const fs::path path = fs::path(testing::TempDir()) / fmt::format("darb_{}.spz", ::getpid());
+    SplatModel model = sample_model(1, 6);
+    model.opacity[2] = std::numeric_limits<float>::quiet_NaN();
+    save_splats(path, SplatFormat::spz, model);
+    SplatFile file;
+    EXPECT_EQ(load_splats(path, &file).size(), 5u);
+    EXPECT_EQ(file.version, 4);
+    EXPECT_EQ(file.bytes, fs::file_size(path));
+    EXPECT_FALSE(fs::exists(path.string() + ".tmp"));
+    fs::remove(path);
+    EXPECT_NE(error_of([&] {
+                  save_splats("/proc/none/x.spz", SplatFormat::spz, model);
+              }).find("cannot be written"),
+              std::string::npos);
+}
+
+struct RealScene {
+    const char* path;
+    SplatFormat format;
+    int version;
+    size_t splats;
+    int sh_degree;
+};
+
+TEST(SplatFile, real_scenes_of_every_format_are_read) {
+    const auto folder = test_data_folder();
+    if (!folder) GTEST_SKIP() << kNoTestData;
+    const RealScene scenes[] = {
+        {"biker.compressed.ply", SplatFormat::compressed_ply, 0, 152746, 0},
+        {"toy-cat.compressed.ply", SplatFormat::compressed_ply, 0, 23261, 3},
+        {"grimlock.compressed.ply", SplatFormat::compressed_ply, 0, 224112, 0},
+        {"biker.spz", SplatFormat::spz, 4, 152746, 0},
+        {"gs_Skull_redux.splat", SplatFormat::dot_splat, 0, 86818, 0},
+        {"Unicorn_Stuffy_cleaned.sog", SplatFormat::sog, 2, 49602, 3},
+        {"playbot_sog", SplatFormat::sog, 2, 125000, 2},
+        {"playbot_sog/meta.json", SplatFormat::sog, 2, 125000, 2}};
+    for (const RealScene& scene : scenes) {
+        SplatFile file;
+        const SplatModel model = load_splats(*folder / "splats" / scene.path, &file);
+        EXPECT_EQ(file.format, scene.format) << scene.path;
+        EXPECT_EQ(file.version, scene.version) << scene.path;
+        EXPECT_EQ(model.size(), scene.splats) << scene.path;
+        EXPECT_EQ(model.sh_degree, scene.sh_degree) << scene.path;
+        EXPECT_EQ(file.dropped, 0u) << scene.path;
+        EXPECT_TRUE(file.notes.empty()) << scene.path;
+    }
+}
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+// The decoded file was expanded by another program.
+TEST(SplatFile, compressed_ply_agrees_with_an_independent_expansion) {
+    const auto folder = test_data_folder();
+    if (!folder) GTEST_SKIP() << kNoTestData;
+    for (const char* name : {"biker", "toy-cat"}) {
+        const fs::path base = *folder / "splats" / name;
+        const SplatModel a = load_splats(base.string() + ".compressed.ply");
+        const SplatModel b = load_splats(base.string() + ".decoded.ply");
+        ASSERT_EQ(a.size(), b.size());
+        ASSERT_EQ(a.sh_degree, b.sh_degree);
+        const auto near = [&](const std::vector<float>& x, const std::vector<float>& y,
+                              double most) {
+            double worst = 0;
+            for (size_t i = 0; i < x.size(); ++i)
+                worst = std::max(worst, std::abs(double{x[i]} - y[i]));
+            EXPECT_LE(worst, most) << name;
+        };
+        near(a.position, b.position, 1e-6);
+        near(a.log_scale, b.log_scale, 2e-6);
+        near(a.opacity, b.opacity, 1e-5);
+        near(a.sh_dc, b.sh_dc, 1e-5);
+        // It takes byte / 255 where the writers of the format take the middle of a 256th.
+        near(a.sh_rest, b.sh_rest, 8 * 0.5 / 256 + 1e-6);
+        for (size_t i = 0; i < a.size(); ++i)
+            ASSERT_GT(same_rotation(a, i, b, i), 1 - 1e-6) << name << " " << i;
+    }
+}
+
+TEST(SplatFile, biker_is_the_same_in_two_formats) {
+    const auto folder = test_data_folder();
+    if (!folder) GTEST_SKIP() << kNoTestData;
+    const SplatModel a = load_splats(*folder / "splats/biker.compressed.ply");
+    const SplatModel b = load_splats(*folder / "splats/biker.spz");
+    ASSERT_EQ(a.size(), b.size());
+    std::vector<double> distance, shape;
+    for (size_t i = 0; i < a.size(); ++i) {
+        distance.push_back(glm::distance(position_of(a, i), position_of(b, i)));
+        const glm::dmat3 p = covariance_of(a, i), q = covariance_of(b, i);
+        double square = 0, size = 0;
+        for (int k = 0; k < 3; ++k) {
+            square += glm::dot(p[k] - q[k], p[k] - q[k]);
+            size += glm::dot(p[k], p[k]);
+        }
+        shape.push_back(std::sqrt(square / size));
+    }
+    EXPECT_LT(median(distance), 2e-4);  // 1/4096 a step
+    EXPECT_LT(median(shape), 0.05);     // 1/32 in a log scale is 6 % of a variance
+}
+
+}  // namespace
+}  // namespace darb::test

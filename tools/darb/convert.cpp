@@ -1,0 +1,89 @@
+// darb convert IN OUT: another format, frame, kernel, degree or part of a scene.
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "engine/core/error.h"
+#include "engine/data/camera_list.h"
+#include "engine/scene/gaussian_scene.h"
+#include "tools/darb/commands.h"
+#include "tools/darb/compare_scenes.h"
+#include "tools/darb/scene_edits.h"
+#include "tools/darb/scene_file.h"
+
+namespace darb {
+
+namespace {
+
+struct ConvertFlags {
+    std::filesystem::path input, output, cameras;
+    std::string kernel, device;
+    SceneEdits edits;
+    bool compare = false;
+};
+
+void print_difference(const char* what, const SplatModel& scene, const SplatModel& other,
+                      const ConvertFlags& flags) {
+    const std::vector<View> views =
+        flags.cameras.empty() ? orbit_views(scene) : load_cameras(flags.cameras);
+    if (views.empty())
+        throw Error(flags.cameras.string(), "holds no cameras", "Name another list or data set.");
+    const SceneDifference d = compare_scenes(scene, other, views, flags.device);
+    fmt::print("{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what, d.mean_psnr_db,
+               views.size(), d.worst_psnr_db, d.worst_view);
+}
+
+int convert(const ConvertFlags& flags) {
+    const std::optional<SplatFormat> format = format_to_write(flags.output);
+    if (!format)
+        throw Error(flags.output.string(), "names no format that can be written",
+                    "Let it end in .ply, .compressed.ply, .splat or .spz.");
+    SplatModel model = load_scene(flags.input);
+    edit_scene(flags.edits, model);
+    if (flags.kernel == "gaussian" && model.kernel != KERNEL_GAUSSIAN) {
+        GaussianEquivalent fit{};
+        const SplatModel gaussians = as_gaussians(model, false, &fit);
+        fmt::print(
+            "kernel {} to gaussian: covariance x {:.4f}, opacity x {:.4f}, profile off by "
+            "{:.2f} % (relative L2)\n",
+            kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
+        print_difference("renders of both kernels", model, gaussians, flags);
+        model = gaussians;
+    }
+    for (const std::string& loss : losses_of(*format, model))
+        fmt::print(stderr, "warning: {}: {}\n", flags.output.string(), loss);
+    save_splats(flags.output, *format, model);
+    fmt::print("{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
+               model.size(), std::filesystem::file_size(flags.output));
+    if (flags.compare)
+        print_difference("the file against the scene", model, load_splats(flags.output), flags);
+    return 0;
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<ConvertFlags>();
+    CLI::App* command = app.add_subcommand(
+        "convert", "Write a scene in another format, frame, kernel, degree, or a part of it");
+    command->add_option("input", flags->input, "splat file, or the output folder of darb train")
+        ->required();
+    command->add_option("output", flags->output, "ends in .ply, .compressed.ply, .splat or .spz")
+        ->required();
+    command
+        ->add_option("--kernel", flags->kernel,
+                     "gaussian: the nearest Gaussians of a scene of another kernel; prints how far "
+                     "renders of both differ")
+        ->check(CLI::IsMember({"gaussian"}));
+    add_edit_options(*command, flags->edits);
+    command->add_flag("--compare", flags->compare,
+                      "read the file again and print how far its renders differ from the scene's");
+    command->add_option("--cameras", flags->cameras,
+                        "cameras of the comparisons, as darb render takes them (default: 8 around "
+                        "the scene)");
+    command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    command->callback([flags, &action] { action = [flags] { return convert(*flags); }; });
+}
+
+}  // namespace darb
