@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Include arrows, file length and layout of every source file; prints each violation.
+# Include arrows, guards of the hard cases, file length and layout of every source file; prints each violation.
 #   tools/check_style.sh [--fix] [ROOT]      --fix: let clang-format rewrite the files
 set -uo pipefail
 
@@ -12,6 +12,7 @@ cpp_cap=500 command_cap=150 glsl_cap=250 # lines
 failed=0
 
 python3 "$here/check_includes.py" . || failed=1
+[[ ! -f tools/guards.py ]] || python3 tools/guards.py check || failed=1
 
 folders=()
 for folder in engine trainer viewer tools tests shaders; do

@@ -53,7 +53,9 @@ Json header_of(const Checkpoint& c) {
                 {"settings", c.settings},
                 {"dataset", c.dataset},
                 {"counters", {n.redone_iterations, n.bad_gradients, n.cloned_or_split, n.pruned}},
-                {"culled", n.culled}};
+                {"culled", n.culled},
+                {"overflows", n.overflows},
+                {"longest_list", n.longest_list}};
 }
 
 void read_header(const Json& h, Checkpoint& c, const std::string& where) {
@@ -79,6 +81,8 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     n.bad_gradients = h.at("counters").at(1).get<std::uint64_t>();
     n.cloned_or_split = h.at("counters").at(2).get<std::uint64_t>();
     n.pruned = h.at("counters").at(3).get<std::uint64_t>();
+    n.overflows = h.value("overflows", std::uint64_t{0});  // absent in earlier files
+    n.longest_list = h.value("longest_list", 0u);
     n.culled = h.at("culled").get<decltype(n.culled)>();
 }
 

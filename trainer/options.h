@@ -48,6 +48,7 @@ struct TrainOptions {
     float prune_extent = 0.1f;  // share of the scene extent, after the first opacity reset
     int opacity_reset_interval = 3'000;
     std::uint32_t max_splats = std::numeric_limits<std::uint32_t>::max();
+    std::uint64_t max_memory_bytes = 0;  // of device memory: growth stops before it; 0: no budget
 
     // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
     // extents) in the loss. They take from splats what no photo holds up: a quarter fewer on

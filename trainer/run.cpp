@@ -44,6 +44,8 @@ class Run {
     void evaluate(int iteration);
     void save_model(int iteration);
     void save_checkpoint(const std::filesystem::path& path);
+    void train(const std::atomic<bool>* stop);
+    void report_troubles();
     double seconds() const {
         return seconds_ +
                (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
@@ -80,7 +82,7 @@ void Run::resume() {
 }
 
 void Run::on_result(const IterationResult& result) {
-    log_.iteration(result, seconds());
+    log_.iteration(result, trainer_.counters(), seconds());
     progress_.update(result, device_);
 }
 
@@ -130,9 +132,34 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     if (!run_.resume_from.empty()) resume();
     log_.start(device_, dataset_, options_, trainer_.splat_count());
 
+    try {
+        train(stop);
+    } catch (const Error& e) {
+        log_.failure(trainer_.iteration(), e.what());
+        throw;
+    }
+    summary_.interrupted = trainer_.iteration() < options_.iterations;
+    if (summary_.interrupted) {
+        save_checkpoint(latest);
+        save_model(trainer_.iteration());
+        stopwatch(false);
+    }
+    report_troubles();
+    progress_.finish();
+    summary_.iteration = trainer_.iteration();
+    summary_.seconds = seconds_;
+    summary_.report = log_.finish(summary_, trainer_, device_);
+    return summary_;
+}
+
+void Run::train(const std::atomic<bool>* stop) {
+    const std::filesystem::path latest = run_.output / "checkpoint.darb";
+    std::uint32_t stopped = 0;
     stopwatch(true);
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         trainer_.step();
+        if (const std::uint32_t n = trainer_.stopped_by_memory(); n != 0 && stopped == 0)
+            progress_.note(fmt::format("growth stops at {} splats: --max-memory", stopped = n));
         const int i = trainer_.iteration();
         const bool last = i == options_.iterations;
         if (last || contains(run_.test_iterations, i)) evaluate(i);
@@ -144,17 +171,11 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     }
     trainer_.drain();
     stopwatch(false);
-    summary_.interrupted = trainer_.iteration() < options_.iterations;
-    if (summary_.interrupted) {
-        save_checkpoint(latest);
-        save_model(trainer_.iteration());
-        stopwatch(false);
-    }
-    progress_.finish();
-    summary_.iteration = trainer_.iteration();
-    summary_.seconds = seconds_;
-    summary_.report = log_.finish(summary_, trainer_, device_);
-    return summary_;
+}
+
+void Run::report_troubles() {
+    if (const std::uint64_t bad = trainer_.counters().bad_gradients; bad > 0)
+        progress_.note(fmt::format("{} gradients of splats were not finite and were skipped", bad));
 }
 
 }  // namespace

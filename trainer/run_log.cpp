@@ -29,6 +29,13 @@ Json evaluation_json(const Evaluation& e) {
             {"views", views}};
 }
 
+Json culled_json(const TrainCounters& counters) {
+    Json culled = Json::object();
+    for (int r = 0; r < CULL_REASONS; ++r)
+        if (kCullNames[r][0] != 0) culled[kCullNames[r]] = counters.culled[r];
+    return culled;
+}
+
 double peak_host_bytes() {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
@@ -107,7 +114,11 @@ void RunLog::start(const Device& device, const Dataset& dataset, const TrainOpti
     write(start_);
 }
 
-void RunLog::iteration(const IterationResult& r, double seconds) {
+void RunLog::failure(int iteration, const std::string& what) {
+    write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
+}
+
+void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, double seconds) {
     loss_sum_ += r.loss;
     psnr_sum_ += r.psnr_db;
     ++summed_;
@@ -119,7 +130,11 @@ void RunLog::iteration(const IterationResult& r, double seconds) {
            {"psnr_db", psnr_sum_ / summed_},
            {"splats", r.splats},
            {"visible", r.visible},
-           {"pairs", r.pairs}});
+           {"pairs", r.pairs},
+           {"bad_gradients", counters.bad_gradients},
+           {"overflows", counters.overflows},
+           {"redone_iterations", counters.redone_iterations},
+           {"culled_splat_frames", culled_json(counters)}});
     loss_sum_ = psnr_sum_ = 0;
     summed_ = 0;
 }
@@ -161,9 +176,6 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         passes.push_back(
             {{"name", p.name},
              {"ms", p.ms / std::max<double>(1.0, double(trainer.timed_iterations()))}});
-    Json culled = Json::object();
-    for (int r = 0; r < CULL_REASONS; ++r)
-        if (kCullNames[r][0] != 0) culled[kCullNames[r]] = c.culled[r];
     Json evaluations = Json::array();
     for (const Json& e : events_)
         if (e.value("event", "") == "evaluation") evaluations.push_back(e);
@@ -178,10 +190,13 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"peak_device_bytes", device.peak_bytes()},
         {"peak_host_bytes", peak_host_bytes()},
         {"redone_iterations", c.redone_iterations},
+        {"overflows", c.overflows},
+        {"longest_list", c.longest_list},
+        {"splats_stopped_by_memory", trainer.stopped_by_memory()},
         {"bad_gradients", c.bad_gradients},
         {"cloned_or_split", c.cloned_or_split},
         {"pruned", c.pruned},
-        {"culled_splat_frames", culled},
+        {"culled_splat_frames", culled_json(c)},
         {"evaluations", evaluations}};
     write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
     const auto report = folder_ / "report.html";

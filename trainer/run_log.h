@@ -28,8 +28,10 @@ class RunLog {
 
     void start(const Device& device, const Dataset& dataset, const TrainOptions& options,
                std::uint32_t splats);
-    void iteration(const IterationResult& result,
-                   double seconds);  // keeps one line in kLogInterval
+    /// Keeps one line in kLogInterval. counters: of the run so far.
+    void iteration(const IterationResult& result, const TrainCounters& counters, double seconds);
+    /// What ended the run before its time.
+    void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);
     /// metrics.json and report.html; returns the report's path.
     std::filesystem::path finish(const RunSummary& summary, const Trainer& trainer,

@@ -25,6 +25,9 @@ ForwardOptions forward_options(const TrainOptions& options) {
     return f;
 }
 
+// More splats than this share with a gradient that is not finite: something is broken.
+constexpr std::uint64_t kBadGradientShare = 1'000;
+
 int largest(const Dataset& dataset, int Camera::*side) {
     int most = 1;
     for (const View& v : dataset.views) most = std::max(most, v.camera.*side);
@@ -51,6 +54,8 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
             LossOptions{.use_mask = dataset.alpha_is_mask}),
       density_(device, options.kernel),
       flights_{Flight(device), Flight(device)} {
+    if (options_.max_memory_bytes > 0) device.set_memory_budget(options_.max_memory_bytes);
+    add_photos(dataset.views, demand_);
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
                dataset.views.size());
     std::uint64_t pixels = 1;
@@ -165,6 +170,8 @@ gpu::FrameStatus Trainer::finish(Flight& flight) {
 
     for (size_t r = 0; r < counters_.culled.size(); ++r) counters_.culled[r] += status.culled[r];
     counters_.bad_gradients += status.bad_gradients;
+    counters_.longest_list = std::max(counters_.longest_list, status.longest_list);
+    check_gradients(iteration, status);
     for (const PassTime& pass : flight.commands.pass_times()) {
         const auto known = std::find_if(pass_totals_.begin(), pass_totals_.end(),
                                         [&](const PassTotal& p) { return p.name == pass.name; });
@@ -193,6 +200,7 @@ void Trainer::settle(Flight& flight) {
         if (std::exchange(later.iteration, 0) != 0) later.commands.wait();
     for (int i = first; i <= iteration_; ++i) {
         do {
+            counters_.overflows += status.overflow != 0 ? 1 : 0;
             ++counters_.redone_iterations;
             forward_.make_room(status);
             launch(i);
@@ -201,8 +209,29 @@ void Trainer::settle(Flight& flight) {
     }
 }
 
-std::uint32_t Trainer::growth_limit() const {
-    return std::min(options_.max_splats, GpuSplats::max_count(*device_, options_.sh_degree, true));
+void Trainer::check_gradients(int iteration, const gpu::FrameStatus& status) const {
+    const std::uint64_t splats = std::max<std::uint64_t>(splats_.count(), kBadGradientShare);
+    if (status.bad_gradients * kBadGradientShare <= splats) return;
+    throw Error(fmt::format("iteration {}", iteration),
+                fmt::format("the gradients of {} of {} splats are not finite, more than 1 in {}",
+                            status.bad_gradients, splats_.count(), kBadGradientShare),
+                "The last checkpoint is intact. Check the device (darb check), then the photos and "
+                "the learning rates.");
+}
+
+// With as many pairs a splat as the buffers hold now, and what is in use beyond the plan.
+std::uint32_t Trainer::splats_within_memory() const {
+    if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
+    MemoryDemand demand = demand_;
+    demand.splats = splats_.count();
+    demand.pairs = forward_.pair_capacity();
+    demand.sh_degree = options_.sh_degree;
+    const MemoryPlan plan = plan_memory(demand);
+    const std::uint64_t in_use = device_->allocated_bytes();
+    const std::uint64_t extra = in_use - std::min(in_use, plan.total() - plan.densify);
+    const std::uint64_t budget = options_.max_memory_bytes;
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(
+        splats_within(demand, budget - std::min(budget, extra)), 0xFFFFFFFFu));
 }
 
 void Trainer::density_control(int iteration) {
@@ -216,6 +245,10 @@ void Trainer::density_control(int iteration) {
     drain();
     if (refine) {
         gpu::DensifyArgs args{};
+        const std::uint32_t within_memory = splats_within_memory();
+        const std::uint32_t limit =
+            std::min({options_.max_splats, within_memory,
+                      GpuSplats::max_count(*device_, options_.sh_degree, true)});
         args.gradient_threshold = options_.densify_grad_threshold;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * extent_);
         args.prune_opacity = options_.prune_opacity;
@@ -223,8 +256,9 @@ void Trainer::density_control(int iteration) {
                                ? static_cast<float>(options_.prune_extent * extent_)
                                : 0.0f;
         args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
-        const DensityResult result =
-            density_.run(splats_, backward_.gradient_sum(), args, growth_limit());
+        const DensityResult result = density_.run(splats_, backward_.gradient_sum(), args, limit);
+        if (within_memory == limit && result.after >= within_memory)
+            stopped_by_memory_ = within_memory;
         counters_.cloned_or_split += result.grown;
         counters_.pruned += result.pruned;
         backward_.reserve(splats_.count(), 0);

@@ -18,6 +18,7 @@
 #include "engine/render/forward.h"
 #include "engine/render/loss.h"
 #include "trainer/densify/density_control.h"
+#include "trainer/memory_plan.h"
 #include "trainer/options.h"
 
 namespace darb {
@@ -32,7 +33,8 @@ struct IterationResult {
 
 /// Counts over the whole run.
 struct TrainCounters {
-    std::uint64_t redone_iterations = 0;
+    std::uint64_t redone_iterations = 0, overflows = 0;  // an overflow redoes one or two iterations
+    std::uint32_t longest_list = 0;                      // pairs of one tile, most in any frame
     std::uint64_t bad_gradients = 0;
     std::uint64_t cloned_or_split = 0, pruned = 0;
     std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason
@@ -73,6 +75,8 @@ class Trainer {
     std::vector<PassTotal> pass_totals() const { return pass_totals_; }
     std::uint64_t timed_iterations() const { return timed_iterations_; }
     double extent() const { return extent_; }
+    /// The splats at which TrainOptions::max_memory_bytes stopped the growth; 0: it did not.
+    std::uint32_t stopped_by_memory() const { return stopped_by_memory_; }
 
     /// The state beside the model that a checkpoint holds. moments: [attribute][2 N stride].
     struct State {
@@ -98,8 +102,9 @@ class Trainer {
     gpu::FrameStatus finish(Flight& flight);  // where it overflowed nothing was changed
     void settle(Flight& flight);              // finish, and do again what overflowed
     void density_control(int iteration);
-    std::uint32_t growth_limit() const;
     glm::vec3 background_for(int iteration) const;
+    std::uint32_t splats_within_memory() const;
+    void check_gradients(int iteration, const gpu::FrameStatus& status) const;
     AdamStep rates(int iteration) const;
 
     Device* device_;
@@ -121,6 +126,8 @@ class Trainer {
     Buffer d_image_;
     std::array<Flight, 2> flights_;
     int iteration_ = 0;
+    MemoryDemand demand_;  // its photos
+    std::uint32_t stopped_by_memory_ = 0;
     TrainCounters counters_;
     std::vector<PassTotal> pass_totals_;
     std::uint64_t timed_iterations_ = 0;

@@ -65,11 +65,12 @@ void check_limits(const Device::State& state, const std::string& name, std::uint
                     "Use smaller images or fewer splats, or choose another device (darb devices).");
     const std::uint64_t budget = state.budget, in_use = state.allocated;
     if (budget != 0 && in_use + bytes > budget)
-        throw Error(what,
-                    fmt::format("out of device memory: {:.1f} MiB are in use of a budget of {:.1f}",
-                                static_cast<double>(in_use) / (1 << 20),
-                                static_cast<double>(budget) / (1 << 20)),
-                    "Raise the memory budget, or use smaller images or fewer splats.");
+        throw Error(
+            what,
+            fmt::format("out of device memory: {:.1f} MiB are in use of a budget of {:.1f}",
+                        static_cast<double>(in_use) / (1 << 20),
+                        static_cast<double>(budget) / (1 << 20)),
+            "Raise the memory budget (--max-memory), or use smaller images or fewer splats.");
     if (state.faults.fails_allocation(name)) check_vulkan(VK_ERROR_OUT_OF_DEVICE_MEMORY, what);
 }
 

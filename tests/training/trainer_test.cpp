@@ -1,5 +1,6 @@
 // Training runs of a few dozen iterations: they repeat bit by bit, go on from a checkpoint as if
 // never stopped, survive frames that need more room, and bring the loss down.
+#include "engine/core/error.h"
 #include "engine/data/metrics.h"
 #include "tests/support/tiny_training.h"
 #include "trainer/checkpoint.h"
@@ -197,6 +198,62 @@ TEST(Training, splats_stop_growing_at_the_limit) {
     run_to(trainer, 60);
     EXPECT_EQ(trainer.splat_count(), 70U);
     EXPECT_GT(trainer.counters().cloned_or_split, 5U);
+}
+
+TEST(Training, growth_stops_before_the_memory_budget) {
+    TinyTraining t = tiny_training({.splats = 600});
+    t.options.prune_opacity = 0;
+    t.options.prune_extent = 100;
+    t.options.densify_grad_threshold = 1e-7f;
+    t.options.opacity_reset_interval = 1000;
+    Device& device = shared_device();
+    std::uint64_t before = 0, after = 0;
+    std::uint32_t unlimited = 0;
+    {
+        Trainer trainer = t.trainer();
+        run_to(trainer, 15);
+        before = device.allocated_bytes();
+        run_to(trainer, 60);
+        after = device.allocated_bytes();
+        unlimited = trainer.splat_count();
+    }
+    ASSERT_GT(unlimited, 2000U);
+    t.options.max_memory_bytes = before + (after - before) / 2;
+    Trainer trainer = t.trainer();
+    run_to(trainer, 60);
+    EXPECT_LT(trainer.splat_count(), unlimited);
+    EXPECT_GT(trainer.splat_count(), 600U);
+    EXPECT_GE(trainer.stopped_by_memory(), 600U);
+    EXPECT_LE(device.allocated_bytes(), t.options.max_memory_bytes);
+    device.set_memory_budget(0);
+}
+
+TEST(Training, a_budget_below_the_start_is_an_error_that_names_it) {
+    TinyTraining t = tiny_training();
+    t.options.max_memory_bytes = 100'000;
+    try {
+        t.trainer();
+        ADD_FAILURE() << "no error";
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("--max-memory"), std::string::npos) << e.what();
+    }
+    shared_device().set_memory_budget(0);
+}
+
+// A colour whose square is beyond float32: SSIM's windows there have no finite gradient.
+TEST(Training, more_bad_gradients_than_one_in_a_thousand_stop_the_run) {
+    const TinyTraining t = tiny_training({.splats = 600});
+    SplatModel start = t.start();
+    start.sh_dc[0] = 1e28f;
+    Trainer trainer(shared_device(), t.dataset, t.photos, start, t.options);
+    try {
+        run_to(trainer, 20);
+        trainer.drain();
+        ADD_FAILURE() << "no error";
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("more than 1 in 1000"), std::string::npos) << e.what();
+        EXPECT_NE(std::string(e.what()).find("darb check"), std::string::npos) << e.what();
+    }
 }
 
 TEST(Training, every_kernel_and_footprint_brings_the_loss_down) {

@@ -38,6 +38,10 @@ void add_density_flags(CLI::App& command, TrainOptions& t) {
         .add_option("--cap-max,--max-splats,--budget", t.max_splats,
                     "growth stops at this many splats")
         ->check(CLI::PositiveNumber);
+    command
+        .add_option("--max-memory", t.max_memory_bytes,
+                    "budget of device memory, as 2GB or 800MB: growth stops before it")
+        ->transform(CLI::AsSizeValue(true));
     command.add_option("--random-points", t.random_points,
                        "splats to start from where the data set has no points");
 }

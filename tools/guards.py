@@ -1,0 +1,284 @@
+#!/usr/bin/env python3
+"""The guards of the hard cases: which line of the sources holds each, and which test watches it.
+
+    tools/guards.py check               strings and tests exist, docs/hard_cases.md says the same
+    tools/guards.py docs [CHECK.json]   rewrites the tables of docs/hard_cases.md; CHECK.json is what
+                                        `darb check --every-kernel --json` wrote
+    tools/guards.py run [NAME...]       disables each guard in turn in a copy of the sources (build-guards)
+                                        and fails unless the named test turns red; minutes
+"""
+
+import filecmp
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+DOCS = "docs/hard_cases.md"
+COPY = "build-guards"
+
+PROJECT = "shaders/forward/project.comp"
+COVARIANCE = "shaders/lib/covariance.glsl"
+GRADIENT = "shaders/backward/project_gradient.glsl"
+BLEND = "shaders/forward/blend.comp"
+BLEND_BACK = "shaders/backward/blend_backward.comp"
+BACK = "shaders/backward/project_backward.comp"
+
+# case, guard, file, text that holds it, what stands there without it, test program, test (gtest filter)
+GUARDS = [
+    ("splat behind or on the near plane", "near_plane", PROJECT,
+     "p.z > camera.near_plane && p.z < 1e30", "p.z < 1e30",
+     "project_test", "Project.each_cull_reason_is_counted"),
+    ("Jacobian beyond 1.3 tan(fov/2)", "jacobian_clamp", COVARIANCE,
+     "clamp(p.xy / p.z, camera.ratio_min, camera.ratio_max)", "p.xy / p.z",
+     "project_test", "Project.wide_splats_outside_the_view_match_through_the_jacobian_clamp"),
+    ("Jacobian beyond 1.3 tan(fov/2)", "jacobian_clamp_gradient", GRADIENT,
+     "if (free_ratio > limits.x && free_ratio < limits.y)", "if (true)",
+     "project_backward_test", "ProjectBackward.splats_beyond_the_jacobian_clamp_match_double"),
+    ("needles and discs to 1e6", "determinant_as_product", COVARIANCE,
+     "dot(across, across) + low_pass * (n1 + n2) + low_pass * low_pass", "f.a * f.c - b * b",
+     "project_test", "Project.needles_and_discs_to_a_million_match_double"),
+    ("needles and discs to 1e6", "whitened_gradient", GRADIENT,
+     "(cross(r2, cross(r1, r2)) + args.low_pass * r1) * (f.l11 / f.c)", "f.l11 * r1 + f.l21 * r2",
+     "project_backward_test", "ProjectBackward.needles_and_discs_match_double"),
+    ("determinant tiny, huge or not positive", "determinant_limits", PROJECT,
+     "f.determinant > DETERMINANT_MIN && f.determinant < DETERMINANT_MAX", "true",
+     "project_test", "Project.each_cull_reason_is_counted"),
+    ("quaternion zero, tiny, huge, not normalised", "quaternion_limits", COVARIANCE,
+     "norm * norm > ROTATION_MIN_SQUARE && largest < 1e30", "true",
+     "project_test", "Project.each_cull_reason_is_counted"),
+    ("quaternion zero, tiny, huge, not normalised", "normalisation_gradient", GRADIENT,
+     "(d_unit - unit * dot(unit, d_unit)) / norm", "d_unit",
+     "project_backward_test", "ProjectBackward.quaternions_of_any_norm_match_double"),
+    ("log-scale of 50, opacity logit of 1e4", "scale_limit", PROJECT,
+     "exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT))", "exp(raw_scale)",
+     "project_test", "Project.parameters_beyond_their_limits_act_as_at_the_limit"),
+    ("log-scale of 50, opacity logit of 1e4", "scale_limit_gradient", GRADIENT,
+     "outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT)", "d_log_scale",
+     "project_backward_test", "ProjectBackward.parameters_beyond_their_limits_have_no_gradient"),
+    ("splat centre exactly on a pixel centre", "distance_at_the_centre", "shaders/kernels/builtin.glsl",
+     "sqrt(max(q, LEAST_DISTANCE * LEAST_DISTANCE))", "sqrt(q)",
+     "blend_test", "*sinc_psi_builtin:*mean_on_a_pixel_centre*"),
+    ("q within 1e-6 of the support's edge", "zero_beyond_the_edge", "shaders/kernels/builtin.glsl",
+     "w = inside ? max(w, 0.0) : 0.0;", "w = max(w, 0.0);",
+     "kernel_test", "KernelShader.CentreEdgeAndBeyond_areExact"),
+    ("q within 1e-6 of the support's edge", "edge_mask", "shaders/kernels/compact.glsl",
+     "min(q * KERNEL_INVERSE_SUPPORT, 1.0)", "q * KERNEL_INVERSE_SUPPORT",
+     "kernel_test", "KernelShader.CentreEdgeAndBeyond_areExact"),
+    ("opacity at 1, thousands of opaque layers", "alpha_limit", BLEND,
+     "min(light.w * kernel_value(x * x + y * y), ALPHA_MAX)", "light.w * kernel_value(x * x + y * y)",
+     "blend_test", "every_kernel/Blend.opaque_stack_stops_before_the_transmittance_limit/gaussian_psi"),
+    ("opacity at 1, thousands of opaque layers", "transmittance_stop", BLEND,
+     "next >= MIN_TRANSMITTANCE;", "before >= 0.0;",
+     "blend_test", "every_kernel/Blend.opaque_stack_stops_before_the_transmittance_limit/gaussian_psi"),
+    ("opacity at 1, thousands of opaque layers", "alpha_limit_gradient", BLEND_BACK,
+     "counts && raw < ALPHA_MAX ? before * ahead : 0.0", "counts ? before * ahead : 0.0",
+     "blend_backward_test",
+     "every_kernel/BlendBackward.opaque_layers_match_double_through_clamp_and_stop/gaussian_psi"),
+    ("10,000 thin layers in one pixel", "gradient_ends_where_the_pixel_ended", BLEND_BACK,
+     "raw >= ALPHA_CUTOFF && number <= px.last[k]", "raw >= ALPHA_CUTOFF",
+     "blend_backward_test", "BlendBackwardCases.pairs_behind_the_stop_get_zero"),
+    ("equal depths, shuffled order", "stable_sort", "shaders/sort/radix_scatter_columns.comp",
+     "for (uint i = begin; i < end; ++i) {", "for (uint i = end; i-- > begin;) {",
+     "frame_test", "Frame.equal_depths_keep_file_order"),
+    ("huge splats, a million splats in one tile", "long_lists", "shaders/forward/list_lengths.comp",
+     "if (pairs > args.list_capacity)", "if (false)",
+     "frame_passes_test", "ListLengths.*"),
+    ("huge splats, a million splats in one tile", "more_pairs_than_room", "shaders/forward/frame_groups.comp",
+     "if (total > args.pair_capacity)", "if (false)",
+     "frame_passes_test", "FrameGroups.more_pairs_than_room_raise_the_flag_and_are_cut"),
+    ("huge splats, a million splats in one tile", "emission_within_the_buffers", "shaders/forward/emit.comp",
+     "if (slot < args.pair_capacity)", "if (true)",
+     "frame_passes_test", "Emit.pairs_beyond_the_capacity_are_left_out"),
+    ("huge splats, a million splats in one tile", "pair_total_beyond_32_bits", "shaders/forward/emit.comp",
+     "atomicOr(status.overflow, OVERFLOW_TOTAL);", "",
+     "frame_passes_test", "Emit.a_total_beyond_32_bits_is_noted"),
+    ("huge splats, a million splats in one tile", "overflow_changes_nothing", BACK,
+     "|| status.overflow != 0u", "",
+     "adam_update_test", "AdamUpdate.an_overflowed_frame_changes_nothing"),
+    ("0 or 1 splats, none visible, all too faint", "empty_model", "trainer/densify/density_control.cpp",
+     "if (n == 0) return result;", "",
+     "densify_test", "Densify.an_empty_model_stays_empty"),
+    ("coordinates at 1e6 m", "recentring", "engine/scene/ply.cpp",
+     "> kRecentreBeyond)", "> 1e300)",
+     "ply_test", "Ply.map_coordinates_keep_millimetres"),
+    ("odd image sizes, more than 65,536 tiles", "wide_tile_keys", "engine/render/forward.cpp",
+     "bits_for(tile_count),", "16,",
+     "frame_test", "Frame.more_than_65536_tiles_are_told_apart"),
+    ("NaN or infinity in a PLY, points or pose", "finite_splats", "engine/scene/ply.cpp",
+     "if (!all_finite(values, columns)) return;", "",
+     "ply_test", "Ply.splats_with_nan_or_infinity_are_dropped_and_counted"),
+    ("NaN or infinity in a PLY, points or pose", "finite_opacity", PROJECT,
+     "|| isnan(logit)", "",
+     "project_test", "Project.values_that_are_not_finite_are_culled_with_their_reason"),
+    ("NaN or infinity in a PLY, points or pose", "finite_colour", PROJECT,
+     "if (!all(lessThan(colour, vec3(1e30)))) return 0u;", "",
+     "project_test", "Project.values_that_are_not_finite_are_culled_with_their_reason"),
+    ("NaN or infinite gradient", "finite_gradient", BACK,
+     "if (!finite(g)) {", "if (false) {",
+     "adam_update_test", "AdamUpdate.a_gradient_that_is_not_finite_is_counted_and_skipped"),
+    ("NaN or infinite gradient", "too_many_bad_gradients", "trainer/trainer.cpp",
+     "if (status.bad_gradients * kBadGradientShare <= splats) return;", "if (splats > 0) return;",
+     "trainer_test", "Training.more_bad_gradients_than_one_in_a_thousand_stop_the_run"),
+    ("neighbours at distance 0, 1 point, no points", "least_distance", "trainer/initial_model.cpp",
+     "result[i] = std::max(kMinDistance2, sum", "result[i] = std::max(0.0, sum",
+     "initial_model_test", "InitialModel.duplicate_points_have_a_finite_scale"),
+    ("Adam with v = 0 after a reset", "adam_epsilon", "shaders/optim/adam.glsl",
+     "+ ADAM_EPSILON);", "+ 0.0);",
+     "adam_update_test", "AdamUpdate.zero_moments_and_zero_gradient_move_nothing"),
+    ("degenerate camera", "focal_length", "engine/data/lens.cpp",
+     "for (int i = 0; i < (row->one_focal ? 1 : 2); ++i)", "for (int i = 0; i < 0; ++i)",
+     "lens_test", "Lens.bad_parameters_are_errors"),
+    ("degenerate camera", "orthonormal_rotation", "engine/data/pose.cpp",
+     "<= kTolerance))", "<= 1e300))",
+     "transforms_test", "Transforms.bad_files_are_errors_that_name_the_frame"),
+]
+
+
+def read(path, root=ROOT):
+    with open(os.path.join(root, path), encoding="utf-8") as file:
+        return file.read()
+
+
+def test_sources():
+    """-> {program: text}"""
+    found = {}
+    for folder, _, names in os.walk(os.path.join(ROOT, "tests")):
+        for name in names:
+            if name.endswith("_test.cpp"):
+                found[name[:-4]] = read(os.path.join(folder, name))
+    return found
+
+
+def case_table():
+    lines = ["| case | guard | where | test that turns red without it |", "|---|---|---|---|"]
+    before = None
+    for case, name, path, _, _, program, test in GUARDS:
+        shown = "" if case == before else case
+        before = case
+        lines.append(f"| {shown} | `{name}` | `{path}` | `{program}`: `{test}` |")
+    return "\n".join(lines)
+
+
+def error_table(check):
+    kernels, rows = [], {}
+    for row in check["checks"]:
+        group = re.fullmatch(r"hard cases, (\S+) psi", row["group"])
+        if not group or row["allowed"] == 0:
+            continue
+        if group[1] not in kernels:
+            kernels.append(group[1])
+        match = re.match(r"(.*) (image|gradient)", row["name"])
+        band = "*" if row["outside"] else ""
+        rows.setdefault((match[1], match[2]), {})[group[1]] = f"{row['error']:.0e}{band}"
+    lines = ["| case | of | " + " | ".join(k.replace("_", " ") for k in kernels) + " |",
+             "|---|---|" + "---|" * len(kernels)]
+    for (name, of), errors in rows.items():
+        lines.append(f"| {name} | {of} | " + " | ".join(errors.get(k, "") for k in kernels) + " |")
+    return "\n".join(lines)
+
+
+def between(text, name, new=None):
+    """The text between the markers of a table, or the whole with it replaced."""
+    begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->"
+    first, last = text.index(begin) + len(begin), text.index(end)
+    return text[first:last].strip() if new is None else text[:first] + new + "\n" + text[last:]
+
+
+def check():
+    problems = []
+    tests = test_sources()
+    for _, name, path, held, without, program, test in GUARDS:
+        if read(path).count(held) != 1:
+            problems.append(f"guard {name}: {path} holds '{held}' {read(path).count(held)} times")
+        if held == without:
+            problems.append(f"guard {name}: nothing is disabled")
+        words = [w for w in re.split(r"[*/.:]+", test) if len(w) > 3]
+        text = tests.get(program, "")
+        if not text or not any(w in text for w in words):
+            problems.append(f"guard {name}: no test {test} in {program}")
+        full = re.fullmatch(r"(?:\w+/)?(\w+)\.(\w+)(?:/\w+)?", test)
+        if full and not re.search(rf"TEST\w*\({full[1]},\s*{full[2]}\)", text):
+            problems.append(f"guard {name}: {program} has no TEST({full[1]}, {full[2]})")
+    docs = read(DOCS)
+    if between(docs, "cases") != case_table():
+        problems.append(f"{DOCS}: the table of cases is not that of tools/guards.py; run its docs command")
+    for name in re.findall(r'add\(\s*"(\w+)"', read("engine/check/hard_cases.cpp")):
+        if f"| {name}" not in between(docs, "errors"):
+            problems.append(f"{DOCS}: no errors of the case {name}; see tools/guards.py docs")
+    print("\n".join(problems) or f"guards: {len(GUARDS)}, all in place")
+    return 1 if problems else 0
+
+
+def write_docs(check_file):
+    docs = between(read(DOCS), "cases", new=case_table())
+    if check_file:
+        with open(check_file, encoding="utf-8") as file:
+            docs = between(docs, "errors", new=error_table(json.load(file)))
+    with open(os.path.join(ROOT, DOCS), "w", encoding="utf-8") as file:
+        file.write(docs)
+    return 0
+
+
+def shell(command, **more):
+    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, **more)
+
+
+def is_red(result, test):
+    """A crash counts; no test run at all does not."""
+    if "[==========] Running 0 tests" in result.stdout:
+        sys.exit(f"no test matches {test}")
+    return result.returncode != 0
+
+
+def run(names):
+    copy = os.path.join(ROOT, COPY, "source")
+    os.makedirs(copy, exist_ok=True)
+    files = shell(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT).stdout
+    for name in files.splitlines():
+        new, old = os.path.join(ROOT, name), os.path.join(copy, name)
+        if os.path.isfile(new) and not (os.path.exists(old) and filecmp.cmp(new, old, shallow=False)):
+            os.makedirs(os.path.dirname(old), exist_ok=True)
+            shutil.copyfile(new, old)
+    build = os.path.join(ROOT, COPY, "build")
+    made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release"])
+    if made.returncode:
+        sys.exit(made.stdout)
+    chosen = [g for g in GUARDS if not names or g[1] in names]
+    failed = 0
+    for _, name, path, held, without, program, test in chosen:
+        target = os.path.join(copy, path)
+        original = read(path, copy)
+        with open(target, "w", encoding="utf-8") as file:
+            file.write(original.replace(held, without))
+        try:
+            built = shell(["ninja", "-C", build, program])
+            if built.returncode:
+                verdict = "FAIL: does not build\n" + built.stdout[-2000:]
+            else:
+                result = shell([os.path.join(build, "tests", program), f"--gtest_filter={test}"], timeout=600)
+                verdict = "red, as it must" if is_red(result, test) else "FAIL: still green"
+        finally:
+            with open(target, "w", encoding="utf-8") as file:
+                file.write(original)
+        failed += verdict.startswith("FAIL")
+        print(f"{name}: {program} {test}: {verdict}", flush=True)
+    print(f"{len(chosen)} guards, {failed} unwatched")
+    return 1 if failed else 0
+
+
+def main():
+    if len(sys.argv) > 1 and sys.argv[1] == "check":
+        return check()
+    if len(sys.argv) > 1 and sys.argv[1] == "docs":
+        return write_docs(sys.argv[2] if len(sys.argv) > 2 else None)
+    if len(sys.argv) > 1 and sys.argv[1] == "run":
+        return run(sys.argv[2:])
+    sys.exit(__doc__)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# Trains ITERATIONS (default 10,000) on the shipped scene without density control, samples the process's memory
+# every second, and fails unless the last fifth of the run holds at most 2 % more than the fifth before it.
+#   tools/soak.sh [ITERATIONS]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+iterations=${1:-10000}
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+build/darb train assets/scene -o "$out" -r 4 --iterations "$iterations" --densify-until-iter 0 \
+    --test-iterations "$iterations" --save-iterations "$iterations" -q &
+run=$!
+while kill -0 $run 2>/dev/null; do
+    awk '/VmRSS/ { print $2 }' "/proc/$run/status" 2>/dev/null || true
+    sleep 1
+done >"$out/rss"
+wait $run
+python3 - "$out/rss" "$iterations" <<'TEXT'
+import statistics
+import sys
+
+samples = [int(line) for line in open(sys.argv[1], encoding="ascii")]
+n = len(samples)
+if n < 20:
+    sys.exit(f"{n} samples are too few to judge: ask for more iterations")
+before, last = samples[n * 3 // 5 : n * 4 // 5], samples[n * 4 // 5 : n - 2]
+a, b = statistics.median(before), statistics.median(last)
+print(f"{sys.argv[2]} iterations, {n} s: {a / 1024:.1f} MiB, then {b / 1024:.1f} MiB, most {max(samples) / 1024:.1f} MiB")
+sys.exit(0 if b <= 1.02 * a else "memory grows")
+TEXT
