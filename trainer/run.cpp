@@ -43,6 +43,7 @@ class Run {
     void on_result(const IterationResult& result);
     void evaluate(int iteration);
     void save_model(int iteration);
+    void show_step();
     void save_checkpoint(const std::filesystem::path& path);
     double seconds() const {
         return seconds_ +
@@ -63,6 +64,7 @@ class Run {
     RunLog log_;
     Progress progress_;
     RunSummary summary_;
+    IterationResult latest_;
     double seconds_ = 0;
     bool running_ = false;
     Clock::time_point started_;
@@ -80,6 +82,7 @@ void Run::resume() {
 }
 
 void Run::on_result(const IterationResult& result) {
+    latest_ = result;
     log_.iteration(result, seconds());
     progress_.update(result, device_);
 }
@@ -122,6 +125,12 @@ void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(true);
 }
 
+// The stopwatch counts what the view draws: it shares the device.
+void Run::show_step() {
+    run_.on_step({trainer_.splats(), trainer_.iteration(), options_.iterations, latest_,
+                  summary_.evaluations});
+}
+
 RunSummary Run::execute(const std::atomic<bool>* stop) {
     const std::filesystem::path latest = run_.output / "checkpoint.darb";
     trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
@@ -141,6 +150,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
             save_checkpoint(run_.output / fmt::format("chkpnt{}.darb", i));
         if (last || (run_.checkpoint_interval > 0 && i % run_.checkpoint_interval == 0))
             save_checkpoint(latest);
+        if (run_.on_step) show_step();
     }
     trainer_.drain();
     stopwatch(false);
