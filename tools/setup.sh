@@ -32,12 +32,16 @@ build    zlib1g-dev           checksums and compression
 build    libzstd-dev          SPZ files
 build    libzip-dev           SOG files
 build    libwebp-dev          SOG files
+build    libglfw3-dev         window of the viewer
+build    libimgui-dev         panels of the viewer
 run      mesa-vulkan-drivers  lavapipe, the CPU device, and the GPU drivers of Mesa
 tests    libgtest-dev         tests
 tests    vulkan-validationlayers  synchronization validation
 tests    clang                second compiler, sanitizer build
 tests    libclang-rt-dev      ASan and UBSan run time
 tests    clang-format-14      layout check; one version, so one answer
+tests    xvfb                 a display for the tests of the window
+tests    xdotool              mouse and keys in them
 tests    python3              style script (standard library only)
 colmap   colmap               cameras from photos; optional
 '

@@ -43,6 +43,7 @@ class Run {
     void on_result(const IterationResult& result);
     void evaluate(int iteration);
     void save_model(int iteration);
+    void show_step();
     void save_checkpoint(const std::filesystem::path& path);
     void train(const std::atomic<bool>* stop);
     void report_troubles();
@@ -65,6 +66,7 @@ class Run {
     RunLog log_;
     Progress progress_;
     RunSummary summary_;
+    IterationResult latest_;
     double seconds_ = 0;
     bool running_ = false;
     Clock::time_point started_;
@@ -82,6 +84,7 @@ void Run::resume() {
 }
 
 void Run::on_result(const IterationResult& result) {
+    latest_ = result;
     log_.iteration(result, trainer_.counters(), seconds());
     progress_.update(result, device_);
 }
@@ -122,6 +125,12 @@ void Run::save_checkpoint(const std::filesystem::path& path) {
     write_checkpoint(
         path, {trainer_.state(), settings_text(options_), dataset_fingerprint(dataset_), seconds_});
     stopwatch(true);
+}
+
+// The stopwatch counts what the view draws: it shares the device.
+void Run::show_step() {
+    run_.on_step({trainer_.splats(), trainer_.iteration(), options_.iterations, latest_,
+                  summary_.evaluations});
 }
 
 RunSummary Run::execute(const std::atomic<bool>* stop) {
@@ -168,6 +177,7 @@ void Run::train(const std::atomic<bool>* stop) {
             save_checkpoint(run_.output / fmt::format("chkpnt{}.darb", i));
         if (last || (run_.checkpoint_interval > 0 && i % run_.checkpoint_interval == 0))
             save_checkpoint(latest);
+        if (run_.on_step) show_step();
     }
     trainer_.drain();
     stopwatch(false);

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,16 @@
 
 namespace darb {
 
+struct Evaluation;
+
+/// What a run shows to a live view between two iterations; valid during the call.
+struct LiveStep {
+    const GpuSplats& splats;  // Trainer::splats
+    int iteration = 0, last_iteration = 0;
+    const IterationResult& result;  // of the latest iteration whose result is known
+    const std::vector<Evaluation>& evaluations;
+};
+
 struct RunOptions {
     std::filesystem::path output;
     std::vector<int> test_iterations, save_iterations, checkpoint_iterations;
@@ -25,6 +36,7 @@ struct RunOptions {
         1'000;  // of checkpoint.darb, the latest; 0: only at the end and Ctrl-C
     std::filesystem::path resume_from;  // empty: start afresh
     bool quiet = false;
+    std::function<void(const LiveStep&)> on_step;  // may be empty
 };
 
 struct ViewMetrics {

@@ -61,6 +61,9 @@ class Trainer {
     /// Iterations finished or under way.
     int iteration() const { return iteration_; }
     std::uint32_t splat_count() const { return splats_.count(); }
+    /// On the device, for work on the same queue between steps; the object stays, its buffers are
+    /// replaced by density control.
+    const GpuSplats& splats() const { return splats_; }
     int sh_degree() const;  // in use at the current iteration
     SplatModel model();     // drains
 

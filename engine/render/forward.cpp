@@ -211,6 +211,7 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
 
 void Forward::record_blend(Commands& commands, const gpu::CameraData& data,
                            const glm::vec3& background) {
+    if (before_blend) before_blend(commands);
     commands.pass("blend");
     for (std::uint32_t segment = 0; segment < list_segments_; ++segment) {
         const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x, background.r,

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <vector>
@@ -66,6 +67,10 @@ class Forward {
     void record(Commands& commands, const GpuSplats& splats, const Buffer& cameras,
                 std::uint32_t camera_index, const gpu::CameraData& data, int sh_degree,
                 const glm::vec3& background);
+
+    /// Recorded between the tile ranges and the blend, where set: what a view changes of the
+    /// projected splats (splat_light), without a copy of the blend.
+    std::function<void(Commands&)> before_blend;
 
     /// Outputs of the last recorded frame.
     const Buffer& image() const { return image_; }    // float [3][H][W], not clamped

@@ -10,6 +10,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/live_view.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
@@ -40,6 +41,7 @@ void recall_arguments(TrainFlags& flags) {
     recalled.run.output = flags.run.output;
     if (!flags.device.empty()) recalled.device = flags.device;
     recalled.run.quiet = flags.run.quiet;
+    recalled.view = flags.view;
     flags = recalled;
 }
 
@@ -68,6 +70,7 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
 
     DeviceOptions device_options;
     device_options.select = flags.device;
+    const LiveSystem live(flags.view, device_options);
     Device device(device_options);
     const Dataset dataset = load_training_data(flags);
     if (!recalled)  // only now: a command that fails above leaves that of an earlier run
@@ -75,7 +78,11 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
     print_plan(device, dataset, flags);
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
-    print_summary(run_training(device, dataset, flags.train, flags.run, &g_stop), flags);
+    const std::unique_ptr<LiveView> view = live.open(device, dataset, g_stop);
+    if (view) flags.run.on_step = [&](const LiveStep& step) { view->show(step); };
+    const RunSummary summary = run_training(device, dataset, flags.train, flags.run, &g_stop);
+    print_summary(summary, flags);
+    if (view) view->finish(summary.model);
     return 0;
 }
 

@@ -111,6 +111,7 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
         ->capture_default_str();
     command.add_option("--seed", f.train.seed)->capture_default_str();
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`");
+    command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training");
     command.add_flag("-q,--quiet", f.run.quiet, "no progress");
     command.add_flag("--deterministic", f.deterministic,
                      "accepted: every run on one device already repeats bit by bit");
@@ -119,7 +120,6 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     add_missing(command, "--accuracy", "the choice of accuracy");
     add_missing(command, "--exposure-lr-init", "per-photo exposure");
     add_missing(command, "--depths,-d", "depth supervision");
-    add_missing(command, "--view", "the live view");
 }
 
 }  // namespace darb

@@ -15,6 +15,7 @@ struct TrainFlags {
     std::string dataset;
     std::string device;
     bool resume = false;
+    bool view = false;  // follow in a window
     bool sequential = false;
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;

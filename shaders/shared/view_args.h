@@ -1,0 +1,43 @@
+// Argument structs of the passes that only the viewer runs (shaders/view), read by C++ and GLSL.
+#ifndef DARB_VIEW_ARGS_H
+#define DARB_VIEW_ARGS_H
+
+#include "types.h"
+
+#define VIEW_GROUP 64
+
+// What display.comp makes of a frame.
+#define VIEW_COLOUR 0  // the picture
+#define VIEW_ERROR 1   // mean absolute difference to the photo, as heat
+#define VIEW_DEPTH 2   // mean depth of what was blended, as heat; nothing blended: background
+#define VIEW_COUNT 3   // pairs of the tile's list that the pixel walked through, as heat
+
+#ifdef __cplusplus
+namespace darb::gpu {
+#endif
+
+struct DisplayArgs {
+    uint width;   // px of the frame
+    uint height;  // px
+    uint tiles_x;
+    float heat_max;                  // error or count that gets the hottest colour
+    float split;                     // px; left of it the photo is shown, in VIEW_COLOUR
+    float photo_x, photo_y;          // px of the frame at the photo's top left corner
+    float photo_scale;               // px of the frame per photo px
+    uint photo_width, photo_height;  // px
+    float background_r, background_g, background_b;
+};
+
+// depth_light: replaces each visible splat's colour by (depth between near and far, 1, 0).
+struct DepthLightArgs {
+    uint splat_count;  // N
+    float near_depth;  // world units
+    float far_depth;
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(DisplayArgs) == 52);
+static_assert(sizeof(DepthLightArgs) == 12);
+}  // namespace darb::gpu
+#endif
+#endif

@@ -1,0 +1,121 @@
+#include "viewer/camera_path.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+
+namespace darb {
+namespace {
+
+CameraPath curved() {
+    CameraPath path;
+    Navigation n;
+    for (int i = 0; i < 5; ++i) {
+        n.look(0.6, i % 2 == 0 ? 0.2 : -0.3);
+        n.fly({0.3 * i, -0.1, 1.0});
+        n.fov_y = 0.8 + 0.05 * i;
+        path.add(n, 1.0 + 0.5 * i);
+    }
+    return path;
+}
+
+double turned(const KeyFrame& a, const KeyFrame& b) {
+    return std::abs(glm::dot(a.orientation, b.orientation));
+}
+
+TEST(CameraPath, Sample_at_a_key_is_the_key) {
+    const CameraPath path = curved();
+    for (const KeyFrame& key : path.keys) {
+        const KeyFrame got = path.sample(key.seconds);
+        EXPECT_NEAR(glm::distance(got.eye, key.eye), 0, 1e-12);
+        EXPECT_NEAR(turned(got, key), 1, 1e-12);
+        EXPECT_NEAR(got.fov_y, key.fov_y, 1e-12);
+    }
+}
+
+TEST(CameraPath, Sample_outside_stays_at_the_ends) {
+    const CameraPath path = curved();
+    EXPECT_EQ(path.sample(-1).eye, path.keys.front().eye);
+    EXPECT_EQ(path.sample(99).eye, path.keys.back().eye);
+}
+
+// Velocity just before and just after a key: a kink would differ by the size of the velocity.
+TEST(CameraPath, Sample_has_no_kink_at_the_keys) {
+    const CameraPath path = curved();
+    constexpr double h = 1e-5;
+    for (size_t k = 1; k + 1 < path.keys.size(); ++k) {
+        const double t = path.keys[k].seconds;
+        const glm::dvec3 before = (path.sample(t).eye - path.sample(t - h).eye) / h;
+        const glm::dvec3 after = (path.sample(t + h).eye - path.sample(t).eye) / h;
+        EXPECT_NEAR(glm::distance(before, after), 0, 1e-3 * (1 + glm::length(before))) << k;
+        const glm::dquat a = path.sample(t - h).orientation, b = path.sample(t).orientation,
+                         c = path.sample(t + h).orientation;
+        const double first = 2 * std::acos(std::min(1.0, std::abs(glm::dot(a, b)))) / h;
+        const double second = 2 * std::acos(std::min(1.0, std::abs(glm::dot(b, c)))) / h;
+        EXPECT_NEAR(first, second, 0.02 * (1 + first)) << k;
+    }
+}
+
+TEST(CameraPath, Sample_takes_the_short_way_for_either_sign_of_a_quaternion) {
+    CameraPath path = curved();
+    const KeyFrame middle = path.sample(1.3);
+    path.keys[1].orientation = -path.keys[1].orientation;
+    path.keys[2].orientation = -path.keys[2].orientation;
+    EXPECT_NEAR(turned(path.sample(1.3), middle), 1, 1e-12);
+}
+
+TEST(CameraPath, Straight_even_keys_give_even_speed) {
+    CameraPath path;
+    Navigation n;
+    for (int i = 0; i < 4; ++i, n.eye.x += 1) path.add(n, 2);
+    for (double t = 0; t <= 6; t += 0.25) EXPECT_NEAR(path.sample(t).eye.x, t / 2, 1e-12);
+}
+
+class CameraPathFile : public ::testing::Test {
+  protected:
+    std::filesystem::path file_ = std::filesystem::temp_directory_path() /
+                                  ("camera_path_" + std::to_string(::getpid()) + ".json");
+    void TearDown() override { std::filesystem::remove(file_); }
+};
+
+TEST_F(CameraPathFile, Round_trip_is_exact) {
+    const CameraPath path = curved();
+    write_camera_path(file_, path);
+    const CameraPath got = read_camera_path(file_);
+    ASSERT_EQ(got.keys.size(), path.keys.size());
+    for (size_t k = 0; k < path.keys.size(); ++k) {
+        EXPECT_EQ(got.keys[k].eye, path.keys[k].eye);
+        EXPECT_EQ(got.keys[k].seconds, path.keys[k].seconds);
+        EXPECT_NEAR(got.keys[k].fov_y, path.keys[k].fov_y, 1e-12);
+        EXPECT_NEAR(turned(got.keys[k], path.keys[k]), 1, 1e-12);
+    }
+}
+
+TEST_F(CameraPathFile, Broken_files_are_errors_that_name_the_file) {
+    const std::string key =
+        R"({"seconds":0,"eye":[0,0,0],"orientation":[1,0,0,0],"fov_y_degrees":50})";
+    for (const std::string& text :
+         {std::string("{"), std::string("[]"), std::string(R"({"key_frames":[]})"),
+          R"({"key_frames":[)" + key + "," + key + "]}",  // no time passes
+          std::string(R"({"key_frames":[{"seconds":0,"eye":[0,0],"orientation":[1,0,0,0],)"
+                      R"("fov_y_degrees":50}]})"),
+          std::string(R"({"key_frames":[{"seconds":0,"eye":[0,0,0],"orientation":[0,0,0,0],)"
+                      R"("fov_y_degrees":50}]})"),
+          std::string(R"({"key_frames":[{"seconds":0,"eye":[0,0,0],"orientation":[1,0,0,0],)"
+                      R"("fov_y_degrees":180}]})")}) {
+        write_file_atomic(file_, text);
+        try {
+            read_camera_path(file_);
+            FAIL() << "taken: " << text;
+        } catch (const Error& e) {
+            EXPECT_NE(std::string(e.what()).find(file_.string()), std::string::npos) << e.what();
+        }
+    }
+}
+
+}  // namespace
+}  // namespace darb

@@ -1,0 +1,46 @@
+// darb train --view: a window that follows a training run. The run calls it between two iterations,
+// on its own thread, so device and queue are never shared between threads.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <memory>
+
+#include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
+#include "trainer/run.h"
+
+namespace darb {
+
+class LiveView {
+  public:
+    struct State;
+    explicit LiveView(std::unique_ptr<State> state);
+    ~LiveView();
+
+    /// Handles the window's events and, now and then, shows the splats; blocks while paused. Does
+    /// nothing once the window is closed.
+    void show(const LiveStep& step);
+    /// The run is over: shows its scene until the window is closed.
+    void finish(const std::filesystem::path& model);
+
+  private:
+    std::unique_ptr<State> state_;
+};
+
+/// The window system, before the device is made; nothing where on is false. Throws Error where
+/// there is no display, or no viewer in this build.
+class LiveSystem {
+  public:
+    LiveSystem(bool on, DeviceOptions& options);
+    ~LiveSystem();
+    /// Null where it is off. stop: set by Ctrl-C, ends a pause.
+    std::unique_ptr<LiveView> open(Device& device, const Dataset& dataset,
+                                   const std::atomic<bool>& stop) const;
+
+  private:
+    struct System;
+    std::unique_ptr<System> system_;
+};
+
+}  // namespace darb

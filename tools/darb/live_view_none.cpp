@@ -1,0 +1,26 @@
+// In place of live_view.cpp where the viewer was not built.
+#include "engine/core/error.h"
+#include "tools/darb/live_view.h"
+
+namespace darb {
+
+struct LiveView::State {};
+struct LiveSystem::System {};
+
+LiveView::LiveView(std::unique_ptr<State> state) : state_(std::move(state)) {}
+LiveView::~LiveView() = default;
+void LiveView::show(const LiveStep&) {}
+void LiveView::finish(const std::filesystem::path&) {}
+
+LiveSystem::LiveSystem(bool on, DeviceOptions&) {
+    if (on)
+        throw Error("--view", "this darb was built without the viewer",
+                    "Install libglfw3-dev and libimgui-dev (tools/setup.sh) and build again.");
+}
+LiveSystem::~LiveSystem() = default;
+std::unique_ptr<LiveView> LiveSystem::open(Device&, const Dataset&,
+                                           const std::atomic<bool>&) const {
+    return nullptr;
+}
+
+}  // namespace darb

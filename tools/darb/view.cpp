@@ -1,0 +1,80 @@
+// darb view SCENE: the interactive viewer; with --screenshot or --export it needs no window system.
+
+#include <fmt/format.h>
+
+#include <limits>
+#include <memory>
+
+#include "engine/core/error.h"
+#include "engine/data/image_io.h"
+#include "tools/darb/commands.h"
+#include "tools/darb/scene_file.h"
+#include "tools/darb/view_flags.h"
+#include "viewer/window.h"
+
+namespace darb {
+
+namespace {
+
+int without_window(const ViewFlags& flags, const ViewerOptions& options, const PixelSize& size) {
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    Device device(device_options);
+    Viewer viewer(device, options);
+    if (!flags.scene.empty()) viewer.open(flags.scene);
+    viewer.finish_loading();
+    apply_flags(viewer, flags, size);
+    const auto draw = [&] {
+        viewer.frame({}, size.width, size.height, true);
+        if (!viewer.session().error.empty()) throw Error("darb view", viewer.session().error);
+    };
+    for (int i = 0; i < 3; ++i) draw();  // panels find their size in the first, times in the second
+    if (!flags.screenshot.empty()) {
+        viewer.compose();
+        viewer.canvas().submit_and_wait();
+        write_png(flags.screenshot, viewer.canvas().read_back());
+        fmt::print("{}\n", flags.screenshot.string());
+    }
+    if (!flags.frames.empty()) {
+        viewer.export_path_now();
+        fmt::print("{}\n", viewer.session().note);
+    }
+    return 0;
+}
+
+int view(const ViewFlags& flags) {
+    const PixelSize size = parse_size(flags.size);
+    ViewerOptions options;
+    options.up = flags.up;
+    if (!flags.up.empty()) up_from_name(flags.up);
+    options.views = find_views(flags);
+    options.resolve = find_scene;
+    if (!flags.screenshot.empty() || !flags.frames.empty())
+        return without_window(flags, options, size);
+    const WindowSystem windows;
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    windows.require(device_options);
+    Device device(device_options);
+    ViewerWindow window(device, options, size.width, size.height);
+    apply_flags(window.viewer(), flags, size);
+    if (!flags.scene.empty()) {
+        window.viewer().open(flags.scene);
+        window.set_title(flags.scene.filename().string() + " - darb");
+    }
+    while (window.pump(std::numeric_limits<double>::infinity())) {
+    }
+    return 0;
+}
+
+}  // namespace
+
+void add_view(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<ViewFlags>();
+    CLI::App* command =
+        app.add_subcommand("view", "Look at a scene in a window, edit it, fly through it");
+    add_view_flags(*command, *flags);
+    command->callback([flags, &action] { action = [flags] { return view(*flags); }; });
+}
+
+}  // namespace darb

@@ -1,0 +1,95 @@
+#include "tools/darb/view_flags.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "engine/core/error.h"
+#include "engine/data/camera_list.h"
+
+namespace darb {
+
+namespace fs = std::filesystem;
+
+PixelSize parse_size(const std::string& text) {
+    PixelSize size;
+    const char* end = text.data() + text.size();
+    const auto [x, error] = std::from_chars(text.data(), end, size.width);
+    const bool has_x = error == std::errc() && x != end && *x == 'x';
+    const auto last = has_x ? std::from_chars(x + 1, end, size.height) : std::from_chars_result{};
+    const bool whole = has_x && last.ec == std::errc() && last.ptr == end;
+    if (!whole || size.width < 16 || size.height < 16 || size.width > 16384 || size.height > 16384)
+        throw Error("--size", "'" + text + "' is no size", "Write WIDTHxHEIGHT, 16 to 16384 px.");
+    return size;
+}
+
+std::vector<View> find_views(const ViewFlags& flags) {
+    DatasetOptions options;
+    options.require_photos = false;
+    if (!flags.cameras.empty()) return load_cameras(flags.cameras, options);
+    if (flags.scene.empty()) return {};
+    for (fs::path folder = fs::absolute(flags.scene); folder.has_relative_path();
+         folder = folder.parent_path()) {
+        if (fs::is_regular_file(folder / "cameras.json"))
+            return load_cameras(folder / "cameras.json");
+        if (folder.filename() != "point_cloud" &&
+            folder.parent_path().filename() != "point_cloud" && !fs::is_regular_file(folder))
+            break;
+    }
+    return {};
+}
+
+void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) {
+    Session& s = viewer.session();
+    const auto choice = [](const std::string& name, std::initializer_list<const char*> names) {
+        return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
+    };
+    s.display.mode = choice(flags.show, {"picture", "error", "depth", "work"});
+    s.display.style =
+        static_cast<SplatStyle>(choice(flags.style, {"splats", "points", "ellipsoids"}));
+    if (flags.white_background) s.display.background = glm::vec3(1.0f);
+    s.panels = !flags.no_panels;
+    s.path.export_width = size.width;
+    s.path.export_height = size.height;
+    s.path.fps = flags.fps;
+    if (!flags.frames.empty()) s.path.folder = flags.frames;
+    if (!flags.path.empty()) {
+        s.path.file = flags.path;
+        s.path.path = read_camera_path(flags.path);
+    }
+    if (flags.camera >= 0) viewer.choose_camera(flags.camera);
+    if (flags.show == "error" && s.photos.current < 0)
+        throw Error("--show error", "needs a photo", "Add --cameras DATASET --camera N.");
+    s.photos.compare = flags.compare;
+}
+
+void add_view_flags(CLI::App& c, ViewFlags& flags) {
+    c.add_option("scene", flags.scene, "a splat file or point cloud, or a folder of darb train");
+    c.add_option("--cameras", flags.cameras,
+                 "a data set, to look through its cameras and compare with its photos");
+    c.add_option("--camera", flags.camera, "start at this camera of the data set, from 0")
+        ->check(CLI::NonNegativeNumber);
+    c.add_option("--up", flags.up, "x, -x, y, -y, z or -z (default: from the cameras, else -y)");
+    c.add_option("--size", flags.size, "WIDTHxHEIGHT of window, screenshot and frames, px")
+        ->capture_default_str();
+    c.add_option("--screenshot", flags.screenshot,
+                 "write the window's content to this PNG, without a window");
+    c.add_option("--path", flags.path, "a camera path that the viewer saved");
+    c.add_option("--export", flags.frames,
+                 "write the path's frames (and a video, with ffmpeg) to this folder, no window")
+        ->needs(c.get_option("--path"));
+    c.add_option("--fps", flags.fps, "frames a second of --export")
+        ->check(CLI::Range(1, 240))
+        ->capture_default_str();
+    c.add_option("--show", flags.show, "what is drawn")
+        ->check(CLI::IsMember({"picture", "error", "depth", "work"}))
+        ->capture_default_str();
+    c.add_option("--splats-as", flags.style, "how splats are drawn")
+        ->check(CLI::IsMember({"splats", "points", "ellipsoids"}))
+        ->capture_default_str();
+    c.add_flag("--compare", flags.compare, "photo beside the picture, at a camera of the data set");
+    c.add_flag("--no-panels", flags.no_panels, "start with the panels hidden (key H)");
+    c.add_flag("-w,--white-background", flags.white_background, "white, not black");
+    c.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
+}
+
+}  // namespace darb

@@ -1,0 +1,32 @@
+// What darb view takes on the command line, and how a viewer starts from it.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "viewer/viewer.h"
+
+namespace darb {
+
+struct ViewFlags {
+    std::filesystem::path scene, cameras, screenshot, path, frames;
+    std::string device, up, size = "1280x720", show = "picture", style = "splats";
+    int camera = -1, fps = 30;
+    bool white_background = false, compare = false, no_panels = false;
+};
+
+struct PixelSize {
+    int width = 0, height = 0;
+};
+
+void add_view_flags(CLI::App& command, ViewFlags& flags);
+/// WIDTHxHEIGHT. Throws Error.
+PixelSize parse_size(const std::string& text);
+/// The data set of --cameras; else the cameras.json that darb train left beside the scene.
+std::vector<View> find_views(const ViewFlags& flags);
+/// Display, panels, path and camera. Throws Error.
+void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size);
+
+}  // namespace darb

@@ -1,0 +1,121 @@
+#include "viewer/camera_path.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+
+namespace darb {
+
+namespace {
+
+// Position, field of view and quaternion as one vector of eight numbers.
+using Row = std::array<double, 8>;
+
+Row row_of(const KeyFrame& key, const glm::dquat& near_to) {
+    const glm::dquat q =
+        glm::dot(key.orientation, near_to) < 0 ? -key.orientation : key.orientation;
+    return {key.eye.x, key.eye.y, key.eye.z, key.fov_y, q.w, q.x, q.y, q.z};
+}
+
+KeyFrame key_of(const Row& row, double seconds) {
+    KeyFrame key;
+    key.seconds = seconds;
+    key.eye = {row[0], row[1], row[2]};
+    key.fov_y = row[3];
+    key.orientation = glm::normalize(glm::dquat(row[4], row[5], row[6], row[7]));
+    return key;
+}
+
+double slope(double before, double t0, double after, double t1) {
+    return t1 > t0 ? (after - before) / (t1 - t0) : 0;
+}
+
+}  // namespace
+
+void CameraPath::add(const Navigation& view, double seconds) {
+    KeyFrame key;
+    key.seconds = keys.empty() ? 0 : duration() + seconds;
+    key.eye = view.eye;
+    key.orientation = glm::quat_cast(view.axes);
+    key.fov_y = view.fov_y;
+    keys.push_back(key);
+}
+
+KeyFrame CameraPath::sample(double seconds) const {
+    DARB_CHECK(!keys.empty());
+    if (seconds <= keys.front().seconds) return keys.front();
+    if (seconds >= keys.back().seconds) return keys.back();
+    const auto next = std::upper_bound(keys.begin(), keys.end(), seconds,
+                                       [](double t, const KeyFrame& k) { return t < k.seconds; });
+    const size_t b = static_cast<size_t>(next - keys.begin()), a = b - 1;
+    const size_t before = a > 0 ? a - 1 : a, after = std::min(b + 1, keys.size() - 1);
+    const glm::dquat reference = keys[a].orientation;
+    const Row r0 = row_of(keys[before], reference), r1 = row_of(keys[a], reference);
+    const glm::dquat end(row_of(keys[b], reference)[4], row_of(keys[b], reference)[5],
+                         row_of(keys[b], reference)[6], row_of(keys[b], reference)[7]);
+    const Row r2 = row_of(keys[b], reference), r3 = row_of(keys[after], end);
+    const double span = keys[b].seconds - keys[a].seconds, t = (seconds - keys[a].seconds) / span;
+    const double h0 = (1 + 2 * t) * (1 - t) * (1 - t), h1 = t * (1 - t) * (1 - t);
+    const double h2 = t * t * (3 - 2 * t), h3 = t * t * (t - 1);
+    Row out{};
+    for (size_t i = 0; i < out.size(); ++i) {
+        const double m1 = slope(r0[i], keys[before].seconds, r2[i], keys[b].seconds);
+        const double m2 = slope(r1[i], keys[a].seconds, r3[i], keys[after].seconds);
+        out[i] = h0 * r1[i] + h1 * span * m1 + h2 * r2[i] + h3 * span * m2;
+    }
+    return key_of(out, seconds);
+}
+
+void apply(const KeyFrame& key, Navigation& view) {
+    view.eye = key.eye;
+    view.axes = glm::mat3_cast(key.orientation);
+    view.fov_y = key.fov_y;
+}
+
+void write_camera_path(const std::filesystem::path& file, const CameraPath& path) {
+    nlohmann::json list = nlohmann::json::array();
+    for (const KeyFrame& k : path.keys)
+        list.push_back(
+            {{"seconds", k.seconds},
+             {"eye", {k.eye.x, k.eye.y, k.eye.z}},
+             {"orientation", {k.orientation.w, k.orientation.x, k.orientation.y, k.orientation.z}},
+             {"fov_y_degrees", glm::degrees(k.fov_y)}});
+    write_file_atomic(file, nlohmann::json{{"key_frames", list}}.dump(1));
+}
+
+CameraPath read_camera_path(const std::filesystem::path& file) {
+    CameraPath path;
+    const std::string hint = "A path is written by the viewer's panel \"Camera path\".";
+    try {
+        const auto json = nlohmann::json::parse(read_text_file(file));
+        for (const auto& k : json.at("key_frames")) {
+            const auto eye = k.at("eye").get<std::array<double, 3>>();
+            const auto q = k.at("orientation").get<std::array<double, 4>>();
+            KeyFrame key;
+            key.seconds = k.at("seconds").get<double>();
+            key.eye = {eye[0], eye[1], eye[2]};
+            key.orientation = glm::dquat(q[0], q[1], q[2], q[3]);
+            key.fov_y = glm::radians(k.at("fov_y_degrees").get<double>());
+            const std::string where = fmt::format("{}, key {}", file.string(), path.keys.size());
+            if (!path.keys.empty() && key.seconds <= path.keys.back().seconds)
+                throw Error(where, "its time is not after that of the key before", hint);
+            if (!(glm::length(key.orientation) > 1e-6))
+                throw Error(where, "its orientation is no quaternion", hint);
+            if (!(key.fov_y > 0 && key.fov_y < glm::pi<double>()))
+                throw Error(where, "its field of view is not between 0 and 180 degrees", hint);
+            key.orientation = glm::normalize(key.orientation);
+            path.keys.push_back(key);
+        }
+    } catch (const nlohmann::json::exception& e) {
+        throw Error(file.string(), fmt::format("key {}: {}", path.keys.size(), e.what()), hint);
+    }
+    if (path.keys.empty()) throw Error(file.string(), "has no key frames", hint);
+    return path;
+}
+
+}  // namespace darb

@@ -1,0 +1,39 @@
+// CameraPath: key frames that a camera flies through smoothly. Position and field of view are cubic
+// Hermite curves through the keys, tangents by finite differences over time (Catmull-Rom where the
+// times are even); orientation is the same curve on quaternions of one hemisphere, normalised.
+#pragma once
+
+#include <filesystem>
+#include <glm/gtc/quaternion.hpp>
+#include <vector>
+
+#include "viewer/navigation.h"
+
+namespace darb {
+
+struct KeyFrame {
+    double seconds = 0;  // from the start; ascending along a path
+    glm::dvec3 eye{0.0};
+    glm::dquat orientation{1, 0, 0, 0};  // camera to world
+    double fov_y = 0;                    // rad
+};
+
+struct CameraPath {
+    std::vector<KeyFrame> keys;
+
+    double duration() const { return keys.empty() ? 0 : keys.back().seconds; }
+    /// The current view, `seconds` after the last key (the first is at 0).
+    void add(const Navigation& view, double seconds = 2);
+    /// Before the first and after the last key: that key. The path must not be empty.
+    KeyFrame sample(double seconds) const;
+};
+
+/// Puts the camera there; up and pivot distance stay.
+void apply(const KeyFrame& key, Navigation& view);
+
+/// JSON: {"key_frames": [{"seconds", "eye": [3], "orientation": [w, x, y, z], "fov_y_degrees"}]}.
+/// read throws Error naming file and key.
+void write_camera_path(const std::filesystem::path& file, const CameraPath& path);
+CameraPath read_camera_path(const std::filesystem::path& file);
+
+}  // namespace darb

@@ -1,0 +1,30 @@
+// DisplaySettings: how a scene is shown, as the panels edit it.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "engine/kernels/kernel_family.h"
+#include "shaders/shared/limits.h"
+#include "shaders/shared/view_args.h"
+
+namespace darb {
+
+/// splats: as they are; points: dots at the means; ellipsoids: hard ellipses of two standard
+/// deviations, nearly opaque.
+enum class SplatStyle { splats, points, ellipsoids };
+
+struct DisplaySettings {
+    int mode = VIEW_COLOUR;  // shaders/shared/view_args.h
+    SplatStyle style = SplatStyle::splats;
+    int kernel = KERNEL_GAUSSIAN;
+    Footprint footprint = Footprint::psi;
+    int sh_degree = 3;  // highest in use
+    glm::vec3 background{0.0f};
+    float near_plane = static_cast<float>(NEAR_DEFAULT);  // world units
+    float error_max = 0.25f;   // mean absolute difference that is shown hottest
+    float count_max = 500.0f;  // pairs that are shown hottest
+
+    bool operator==(const DisplaySettings&) const = default;
+};
+
+}  // namespace darb

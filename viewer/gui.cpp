@@ -1,0 +1,123 @@
+#include "viewer/gui.h"
+
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_vulkan.h>
+#include <imgui.h>
+
+namespace darb {
+
+namespace {
+
+constexpr float kFontPx = 13;  // ProggyClean, Dear ImGui's own, is sharp at multiples of it
+
+void check_gui(VkResult result) {
+    check_vulkan(result, "panels");
+}
+
+}  // namespace
+
+Gui::Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* window)
+    : device_(device.handle()), windowed_(window != nullptr) {
+    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 16};
+    VkDescriptorPoolCreateInfo pool{};
+    pool.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+    pool.flags = VK_DESCRIPTOR_POOL_CREATE_FREE_DESCRIPTOR_SET_BIT;
+    pool.maxSets = 16;
+    pool.poolSizeCount = 1;
+    pool.pPoolSizes = &size;
+    check_vulkan(vkCreateDescriptorPool(device_, &pool, nullptr, &pool_), "panels");
+
+    ImGui::CreateContext();
+    ImGuiIO& io = ImGui::GetIO();
+    io.IniFilename = nullptr;  // leaves no file in the current folder
+    ImGui::StyleColorsDark();
+    ImGui::GetStyle().WindowRounding = 4;
+    ImGui::GetStyle().ScaleAllSizes(scale);
+    ImFontConfig font;
+    font.SizePixels = kFontPx * scale;
+    io.Fonts->AddFontDefault(&font);
+    if (windowed_) ImGui_ImplGlfw_InitForVulkan(window, true);
+
+    ImGui_ImplVulkan_InitInfo info{};
+    info.Instance = device.instance();
+    info.PhysicalDevice = device.physical();
+    info.Device = device_;
+    info.QueueFamily = device.queue_family();
+    info.Queue = device.queue();
+    info.PipelineCache = device.pipeline_cache();
+    info.DescriptorPool = pool_;
+    info.MinImageCount = info.ImageCount = 2;
+    info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
+    info.CheckVkResultFn = check_gui;
+    ImGui_ImplVulkan_Init(&info, render_pass);
+    upload_fonts(device);
+}
+
+// From 1.90 on the backend uploads them itself.
+void Gui::upload_fonts([[maybe_unused]] Device& device) {
+#if IMGUI_VERSION_NUM < 19000
+    VkCommandPool pool = VK_NULL_HANDLE;
+    VkCommandPoolCreateInfo pool_info{};
+    pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+    pool_info.queueFamilyIndex = device.queue_family();
+    check_vulkan(vkCreateCommandPool(device_, &pool_info, nullptr, &pool), "panels");
+    VkCommandBuffer commands = VK_NULL_HANDLE;
+    VkCommandBufferAllocateInfo allocate{};
+    allocate.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+    allocate.commandPool = pool;
+    allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    allocate.commandBufferCount = 1;
+    check_vulkan(vkAllocateCommandBuffers(device_, &allocate, &commands), "panels");
+    VkCommandBufferBeginInfo begin{};
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    check_vulkan(vkBeginCommandBuffer(commands, &begin), "panels");
+    ImGui_ImplVulkan_CreateFontsTexture(commands);
+    check_vulkan(vkEndCommandBuffer(commands), "panels");
+    VkSubmitInfo submit{};
+    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands;
+    check_vulkan(vkQueueSubmit(device.queue(), 1, &submit, VK_NULL_HANDLE), "panels");
+    check_vulkan(vkQueueWaitIdle(device.queue()), "panels");
+    ImGui_ImplVulkan_DestroyFontUploadObjects();
+    vkDestroyCommandPool(device_, pool, nullptr);
+#endif
+}
+
+Gui::~Gui() {
+    vkDeviceWaitIdle(device_);
+    ImGui_ImplVulkan_Shutdown();
+    if (windowed_) ImGui_ImplGlfw_Shutdown();
+    ImGui::DestroyContext();
+    vkDestroyDescriptorPool(device_, pool_, nullptr);
+}
+
+void Gui::begin(int width, int height) {
+    ImGui_ImplVulkan_NewFrame();
+    if (windowed_) {
+        ImGui_ImplGlfw_NewFrame();
+    } else {
+        ImGuiIO& io = ImGui::GetIO();
+        io.DisplaySize = ImVec2(static_cast<float>(width), static_cast<float>(height));
+        io.DeltaTime = 1.0f / 60;
+    }
+    ImGui::NewFrame();
+}
+
+void Gui::end() {
+    ImGui::Render();
+}
+
+void Gui::draw(VkCommandBuffer commands) {
+    ImGui_ImplVulkan_RenderDrawData(ImGui::GetDrawData(), commands);
+}
+
+bool Gui::wants_mouse() const {
+    return ImGui::GetIO().WantCaptureMouse;
+}
+
+bool Gui::wants_keys() const {
+    return ImGui::GetIO().WantTextInput;
+}
+
+}  // namespace darb

@@ -1,0 +1,37 @@
+// Gui: Dear ImGui on a device, with or without a window.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include "engine/gpu/device.h"
+
+struct GLFWwindow;
+
+namespace darb {
+
+class Gui {
+  public:
+    /// scale: 1 on ordinary screens, 2 on high-DPI ones. window: null where there is none.
+    Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* window);
+    ~Gui();
+    Gui(const Gui&) = delete;
+    Gui& operator=(const Gui&) = delete;
+
+    /// Starts a frame; with a window its input and size are taken from it, else these.
+    void begin(int width, int height);
+    /// Ends it: what the panels said is ready for draw().
+    void end();
+    void draw(VkCommandBuffer commands);
+
+    /// Whether the panels, not the scene, get the pointer or the keys.
+    bool wants_mouse() const;
+    bool wants_keys() const;
+
+  private:
+    void upload_fonts(Device& device);
+    VkDevice device_;
+    VkDescriptorPool pool_ = VK_NULL_HANDLE;
+    bool windowed_;
+};
+
+}  // namespace darb

@@ -1,0 +1,40 @@
+// Input: what mouse and keys did since the last frame, free of any window system.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace darb {
+
+enum class Key {
+    frame_all,    // F
+    level,        // L
+    hide_panels,  // H
+    full_screen,  // F11
+    picture,      // P
+    next_camera,  // ]
+    last_camera,  // [
+    add_key,      // K
+    play,         // space
+    remove,       // Delete
+    undo,         // Ctrl Z
+    redo,         // Ctrl Y
+    save,         // Ctrl S
+    quit,         // Ctrl Q
+    escape,       // Esc: leaves full screen, stops playing, cancels loading
+};
+
+struct Input {
+    double x = 0, y = 0;    // px, pointer
+    double dx = 0, dy = 0;  // px that it moved with a button down, since the last frame
+    double wheel = 0;       // steps, up positive
+    // Down now or during that motion.
+    bool left = false, middle = false, right = false, shift = false, control = false;
+    bool double_click = false;
+    // Held: W S A D E Q.
+    bool ahead = false, back = false, to_left = false, to_right = false, rise = false, sink = false;
+    std::vector<Key> pressed;
+    std::vector<std::filesystem::path> dropped;
+};
+
+}  // namespace darb

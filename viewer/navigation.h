@@ -1,0 +1,58 @@
+// Navigation: where a viewer's camera is and how mouse and keys move it. Pure mathematics, no
+// window. The frame is that of Camera: x right, y down, z forward.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <string>
+
+#include "engine/scene/camera.h"
+
+namespace darb {
+
+struct Navigation {
+    glm::dvec3 eye{0, 0, -3};  // world
+    glm::dmat3 axes{1.0};      // columns: the camera's right, down and forward in the world
+    glm::dvec3 up{0, -1, 0};   // unit, world; what an orbit turns around
+    double distance = 3;       // world, from the eye to the pivot in front of it
+    double fov_y = glm::radians(50.0);  // rad, full height
+
+    glm::dvec3 right() const { return axes[0]; }
+    glm::dvec3 down() const { return axes[1]; }
+    glm::dvec3 forward() const { return axes[2]; }
+    glm::dvec3 pivot() const { return eye + distance * forward(); }
+
+    /// Around the pivot: to_right turns around `up` so that the scene follows the hand, to_down
+    /// tilts and stops one degree before the poles. Radians.
+    void orbit(double to_right, double to_down);
+    /// Turns the head, the eye stays. Radians.
+    void look(double to_right, double to_down);
+    /// Shifts the eye so that what is at the pivot's depth follows the pointer. Pixels of a window
+    /// of this height.
+    void pan(double dx_px, double dy_px, int height_px);
+    /// The pivot stays, its distance is multiplied by factor > 0.
+    void zoom(double factor);
+    /// World units along right, up (of the camera) and forward: W goes where one looks.
+    void fly(const glm::dvec3& right_up_forward);
+    /// The sphere fills the smaller side of a window; direction and horizon stay.
+    void frame(const glm::dvec3& centre, double radius, double aspect);
+    /// A new pivot in the direction of `point`, without turning: only its distance changes.
+    void set_pivot_depth(const glm::dvec3& point);
+    /// New world up, horizon levelled to it.
+    void set_up(const glm::dvec3& new_up);
+    /// Takes roll away: right becomes perpendicular to up.
+    void level();
+    /// Pose and field of view of a photo's camera.
+    void take(const Camera& camera);
+    /// The pinhole for a window, principal point in its middle.
+    Camera camera(int width_px, int height_px) const;
+
+  private:
+    void turn(double to_right, double to_down);
+};
+
+/// Unit vector of x, -x, y, -y, z, -z. Throws Error for other names.
+glm::dvec3 up_from_name(const std::string& name);
+/// Name of the axis nearest to a direction.
+std::string up_name(const glm::dvec3& up);
+
+}  // namespace darb

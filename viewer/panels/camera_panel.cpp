@@ -1,0 +1,74 @@
+// Camera: up axis, field of view, cameras of the data set, comparison with the photo.
+#include <imgui.h>
+
+#include <algorithm>
+
+#include "viewer/panels/panels.h"
+
+namespace darb {
+
+namespace {
+
+void up_axis(Session& s) {
+    Navigation& n = s.navigation;
+    ImGui::Text("up: %s (kept with --up %s)", up_name(n.up).c_str(), up_name(n.up).c_str());
+    if (ImGui::Button("Flip")) n.set_up(-n.up);
+    for (int axis = 0; axis < 3; ++axis) {
+        ImGui::SameLine();
+        constexpr const char* kNames[] = {"X up", "Y up", "Z up"};
+        glm::dvec3 up(0.0);
+        up[axis] = 1;
+        if (ImGui::Button(kNames[axis])) n.set_up(up);
+    }
+    ImGui::SameLine();
+    if (ImGui::Button("Level")) n.level();
+}
+
+void data_set(Session& s) {
+    Photos& p = s.photos;
+    if (p.views.empty()) return;
+    const char* now = p.current < 0 ? "free" : p.views[static_cast<size_t>(p.current)].name.c_str();
+    if (ImGui::BeginCombo("data set", now)) {
+        for (int i = 0; i < static_cast<int>(p.views.size()); ++i) {
+            const View& view = p.views[static_cast<size_t>(i)];
+            ImGui::PushID(i);
+            if (ImGui::Selectable(view.name.c_str(), i == p.current)) {
+                p.current = i;
+                p.failed = false;
+                s.navigation.take(view.camera);
+            }
+            ImGui::PopID();
+        }
+        ImGui::EndCombo();
+    }
+    if (p.current < 0) {
+        ImGui::TextDisabled("[ and ] step through its cameras");
+        return;
+    }
+    if (ImGui::Checkbox("photo beside the picture", &p.compare)) p.failed = false;
+    if (p.compare) ImGui::SliderFloat("photo up to", &p.split, 0, 1, "%.2f");
+}
+
+}  // namespace
+
+void camera_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) return;
+    if (ImGui::Button("Frame all (F)")) s.requests.frame_all = true;
+    ImGui::SameLine();
+    if (ImGui::Button("Picture (P)")) s.requests.take_picture = true;
+    if (s.photos.current < 0) {
+        float degrees = static_cast<float>(glm::degrees(s.navigation.fov_y));
+        if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f deg"))
+            s.navigation.fov_y = glm::radians(static_cast<double>(degrees));
+        float speed = static_cast<float>(s.fly_speed);
+        if (ImGui::DragFloat("fly speed", &speed, 0.01f * std::max(speed, 0.01f), 1e-4f, 1e4f,
+                             "%.3g units/s"))
+            s.fly_speed = speed;
+        up_axis(s);
+    }
+    ImGui::SliderFloat("near", &s.display.near_plane, 0.001f, 10, "%.3f",
+                       ImGuiSliderFlags_Logarithmic);
+    data_set(s);
+}
+
+}  // namespace darb

@@ -1,0 +1,130 @@
+// Selection by box or sphere, delete, crop, undo, save.
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "viewer/panels/panels.h"
+#include "viewer/view_camera.h"
+
+namespace darb {
+
+namespace {
+
+constexpr ImU32 kOutline = IM_COL32(255, 200, 60, 255);
+constexpr int kCircleSteps = 64;
+
+bool edit_vector(const char* label, glm::dvec3& v, float speed, int components) {
+    std::array<float, 3> f{float(v.x), float(v.y), float(v.z)};
+    const bool changed = ImGui::DragScalarN(label, ImGuiDataType_Float, f.data(), components, speed,
+                                            nullptr, nullptr, "%.3f");
+    if (changed)
+        for (int i = 0; i < components; ++i) v[i] = f[static_cast<size_t>(i)];
+    return changed;
+}
+
+void line(const Camera& camera, const glm::dvec3& a, const glm::dvec3& b) {
+    const glm::dvec3 p = camera.rotation * a + camera.translation;
+    const glm::dvec3 q = camera.rotation * b + camera.translation;
+    constexpr double kNear = 1e-3;
+    if (p.z < kNear || q.z < kNear) return;
+    const auto at = [&](const glm::dvec3& v) {
+        return ImVec2(static_cast<float>(camera.fx * v.x / v.z + camera.cx),
+                      static_cast<float>(camera.fy * v.y / v.z + camera.cy));
+    };
+    ImGui::GetBackgroundDrawList()->AddLine(at(p), at(q), kOutline, 1.5f);
+}
+
+void draw_box(const Camera& camera, const Region& r) {
+    for (int corner = 0; corner < 8; ++corner)
+        for (int axis = 0; axis < 3; ++axis) {
+            if ((corner >> axis & 1) != 0) continue;
+            const auto at = [&](int c) {
+                return r.centre + r.half_size * glm::dvec3((c & 1) != 0 ? 1 : -1,
+                                                           (c & 2) != 0 ? 1 : -1,
+                                                           (c & 4) != 0 ? 1 : -1);
+            };
+            line(camera, at(corner), at(corner | 1 << axis));
+        }
+}
+
+void draw_sphere(const Camera& camera, const Region& r) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (int i = 0; i < kCircleSteps; ++i) {
+            const auto at = [&](int step) {
+                const double a = 2 * glm::pi<double>() * step / kCircleSteps;
+                glm::dvec3 p(0.0);
+                p[(axis + 1) % 3] = std::cos(a);
+                p[(axis + 2) % 3] = std::sin(a);
+                return r.centre + r.half_size.x * p;
+            };
+            line(camera, at(i), at(i + 1));
+        }
+}
+
+void buttons(Session& s) {
+    const SplatModel& model = s.scene->model;
+    bool changed = false;
+    if (ImGui::Button("Delete inside")) changed = s.edit.remove(model, s.region, true) > 0;
+    ImGui::SameLine();
+    if (ImGui::Button("Crop to it")) changed = s.edit.remove(model, s.region, false) > 0;
+    ImGui::BeginDisabled(!s.edit.can_undo());
+    if (ImGui::Button("Undo")) {
+        s.edit.undo();
+        changed = true;
+    }
+    ImGui::EndDisabled();
+    ImGui::SameLine();
+    ImGui::BeginDisabled(!s.edit.can_redo());
+    if (ImGui::Button("Redo")) {
+        s.edit.redo();
+        changed = true;
+    }
+    ImGui::EndDisabled();
+    ImGui::SameLine();
+    ImGui::Text("%zu deleted", s.edit.removed_count());
+    if (changed) s.requests.opacity_changed = true;
+}
+
+}  // namespace
+
+void draw_region(const Session& s, int width, int height) {
+    const Photos& p = s.photos;
+    const Camera camera =
+        p.current < 0 ? s.navigation.camera(width, height)
+                      : fitted(p.views[static_cast<size_t>(p.current)].camera, width, height);
+    if (s.region.shape == Region::Shape::box)
+        draw_box(camera, s.region);
+    else
+        draw_sphere(camera, s.region);
+}
+
+void edit_panel(Session& s) {
+    if (!s.scene || !ImGui::CollapsingHeader("Edit")) return;
+    ImGui::Checkbox("show the selection", &s.show_region);
+    int shape = s.region.shape == Region::Shape::sphere ? 1 : 0;
+    if (ImGui::Combo("shape", &shape, "box\0sphere\0"))
+        s.region.shape = shape == 1 ? Region::Shape::sphere : Region::Shape::box;
+    const float speed = static_cast<float>(s.scene->bounds.radius / 200);
+    bool moved = edit_vector("centre", s.region.centre, speed, 3);
+    moved |= edit_vector(shape == 1 ? "radius" : "half size", s.region.half_size, speed,
+                         shape == 1 ? 1 : 3);
+    s.region.half_size = glm::max(s.region.half_size, glm::dvec3(1e-6));
+    if (ImGui::Button("Centre on the pivot")) {
+        s.region.centre = s.navigation.pivot();
+        moved = true;
+    }
+    if (moved) s.show_region = true;
+    if (ImGui::Button("Count")) {
+        const size_t inside = count_inside(s.scene->model, s.region, s.edit);
+        s.note = std::to_string(inside) + " splats are inside";
+    }
+    ImGui::SameLine();
+    buttons(s);
+    path_field("file", s.save_file);
+    ImGui::SameLine();
+    if (ImGui::Button("Save")) s.requests.save = true;
+}
+
+}  // namespace darb

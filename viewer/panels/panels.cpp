@@ -1,0 +1,107 @@
+// The side panel as a whole, and what is drawn over the picture: progress, errors, help.
+#include "viewer/panels/panels.h"
+
+#include <imgui.h>
+
+#include <cstring>
+
+namespace darb {
+
+namespace {
+
+constexpr float kWidth = 330;  // px at scale 1
+
+void progress_window(Session& s, float width, float height) {
+    if (s.load_share < 0 && s.export_share < 0) return;
+    ImGui::SetNextWindowPos(ImVec2(width / 2, height - 20), 0, ImVec2(0.5f, 1));
+    ImGui::Begin("progress", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
+    const bool loads = s.load_share >= 0;
+    ImGui::TextUnformatted(loads ? s.load_stage.c_str() : "exporting frames");
+    ImGui::ProgressBar(static_cast<float>(loads ? s.load_share : s.export_share),
+                       ImVec2(kWidth * s.gui_scale, 0));
+    ImGui::SameLine();
+    if (ImGui::Button("Cancel")) (loads ? s.requests.cancel_load : s.requests.cancel_export) = true;
+    ImGui::End();
+}
+
+void error_window(Session& s, float width, float height) {
+    if (s.error.empty()) return;
+    ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
+    ImGui::PushStyleColor(ImGuiCol_TitleBgActive, ImVec4(0.6f, 0.1f, 0.1f, 1));
+    ImGui::PushStyleColor(ImGuiCol_TitleBg, ImVec4(0.6f, 0.1f, 0.1f, 1));
+    ImGui::Begin("That did not work", nullptr,
+                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
+    ImGui::PopStyleColor(2);
+    ImGui::PushTextWrapPos(500 * s.gui_scale);
+    ImGui::TextUnformatted(s.error.c_str());
+    if (s.scene) ImGui::TextDisabled("The scene before is still there.");
+    ImGui::PopTextWrapPos();
+    if (ImGui::Button("Close")) s.error.clear();
+    ImGui::End();
+}
+
+void help(const Session& s) {
+    if (!ImGui::CollapsingHeader("Keys and mouse")) return;
+    ImGui::TextUnformatted(
+        "left drag          orbit\n"
+        "right drag         look around\n"
+        "middle, Shift+left pan\n"
+        "wheel              zoom (flying: speed)\n"
+        "double click       orbit around this\n"
+        "W A S D Q E        fly\n"
+        "F  L               frame all, level\n"
+        "[  ]               camera of the data set\n"
+        "K  space           add key frame, play\n"
+        "Delete             delete the selection\n"
+        "Ctrl+Z Y S Q       undo, redo, save, quit\n"
+        "P  H  F11          picture, panels, full screen");
+    ImGui::TextDisabled("Drop a file to open it. %s", s.device_name.c_str());
+}
+
+void empty_hint(const Session& s, float width, float height) {
+    if (s.scene || s.training.live || s.load_share >= 0) return;
+    const char* text = "Drop a splat file here";
+    const ImVec2 size = ImGui::CalcTextSize(text);
+    ImGui::GetBackgroundDrawList()->AddText(ImVec2((width - size.x) / 2, (height - size.y) / 2),
+                                            IM_COL32(200, 200, 200, 255), text);
+}
+
+}  // namespace
+
+void path_field(const char* label, std::filesystem::path& path) {
+    char text[1024];
+    const std::string now = path.string();
+    std::strncpy(text, now.c_str(), sizeof text - 1);
+    text[sizeof text - 1] = '\0';
+    if (ImGui::InputText(label, text, sizeof text)) path = text;
+}
+
+void draw_panels(Session& s, int width_px, int height_px) {
+    const float width = static_cast<float>(width_px), height = static_cast<float>(height_px);
+    if (s.show_region) draw_region(s, width_px, height_px);
+    empty_hint(s, width, height);
+    ImGui::SetNextWindowPos(ImVec2(8, 8), ImGuiCond_FirstUseEver);
+    ImGui::SetNextWindowSizeConstraints(ImVec2(kWidth * s.gui_scale, 0),
+                                        ImVec2(kWidth * s.gui_scale, height - 16));
+    ImGui::Begin("darb", nullptr, ImGuiWindowFlags_AlwaysAutoResize);
+    ImGui::PushItemWidth(150 * s.gui_scale);
+    scene_panel(s);
+    training_panel(s);
+    display_panel(s);
+    camera_panel(s);
+    performance_panel(s);
+    edit_panel(s);
+    path_panel(s);
+    help(s);
+    if (!s.note.empty()) {
+        ImGui::Separator();
+        ImGui::TextWrapped("%s", s.note.c_str());
+    }
+    ImGui::PopItemWidth();
+    ImGui::End();
+    progress_window(s, width, height);
+    error_window(s, width, height);
+}
+
+}  // namespace darb

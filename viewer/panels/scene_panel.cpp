@@ -1,0 +1,78 @@
+// What is open, and how it is displayed.
+#include <imgui.h>
+
+#include <string>
+
+#include "viewer/panels/panels.h"
+
+namespace darb {
+
+namespace {
+
+void kernel_choice(Session& s) {
+    DisplaySettings& d = s.display;
+    const std::string now(kernel_name(d.kernel));
+    if (ImGui::BeginCombo("kernel", now.c_str())) {
+        for (int k = 0; k < KERNEL_COUNT; ++k) {
+            const std::string name(kernel_name(k));
+            if (ImGui::Selectable(name.c_str(), k == d.kernel)) d.kernel = k;
+        }
+        ImGui::EndCombo();
+    }
+    int footprint = d.footprint == Footprint::exact ? 1 : 0;
+    if (ImGui::Combo("footprint", &footprint, "psi\0exact\0"))
+        d.footprint = footprint == 1 ? Footprint::exact : Footprint::psi;
+    if (!s.scene) return;
+    const SplatModel& m = s.scene->model;
+    if (m.kernel == d.kernel && m.footprint == d.footprint) return;
+    ImGui::TextWrapped("The scene was trained with %s, %s.",
+                       std::string(kernel_name(m.kernel)).c_str(),
+                       std::string(footprint_name(m.footprint)).c_str());
+    if (ImGui::Button("Back to the scene's own")) {
+        d.kernel = m.kernel;
+        d.footprint = m.footprint;
+    }
+}
+
+}  // namespace
+
+void scene_panel(Session& s) {
+    if (!s.scene || !ImGui::CollapsingHeader("Scene", ImGuiTreeNodeFlags_DefaultOpen)) return;
+    const Scene& scene = *s.scene;
+    ImGui::TextWrapped("%s", scene.file.filename().string().c_str());
+    ImGui::Text("%zu splats, SH degree %d", scene.model.size() - s.edit.removed_count(),
+                scene.model.sh_degree);
+    ImGui::Text("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);
+    if (s.shown_sh_degree < scene.model.sh_degree)
+        ImGui::TextWrapped("This device's buffers hold colour up to degree %d.", s.shown_sh_degree);
+    for (const std::string& note : scene.notes) ImGui::TextWrapped("%s", note.c_str());
+}
+
+void display_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Display", ImGuiTreeNodeFlags_DefaultOpen)) return;
+    DisplaySettings& d = s.display;
+    constexpr const char* kModes[] = {"picture", "error to photo", "depth", "work per pixel"};
+    if (ImGui::BeginCombo("show", kModes[d.mode])) {
+        for (int m = 0; m < 4; ++m) {
+            if (m == VIEW_ERROR && s.photos.current < 0) continue;
+            if (ImGui::Selectable(kModes[m], m == d.mode)) d.mode = m;
+        }
+        ImGui::EndCombo();
+    }
+    if (d.mode == VIEW_ERROR)
+        ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f",
+                           ImGuiSliderFlags_Logarithmic);
+    if (d.mode == VIEW_COUNT)
+        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f pairs",
+                           ImGuiSliderFlags_Logarithmic);
+    if (s.scene) {
+        int style = static_cast<int>(d.style);
+        if (ImGui::Combo("splats as", &style, "splats\0points\0ellipsoids\0"))
+            d.style = static_cast<SplatStyle>(style);
+    }
+    kernel_choice(s);
+    ImGui::SliderInt("SH degree", &d.sh_degree, 0, 3);
+    ImGui::ColorEdit3("background", &d.background.x);
+}
+
+}  // namespace darb

@@ -1,0 +1,121 @@
+#include "viewer/scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+
+#include "engine/core/error.h"
+#include "engine/data/point_cloud_ply.h"
+#include "engine/data/point_splats.h"
+#include "engine/scene/splat_file.h"
+
+namespace darb {
+
+namespace {
+
+struct Cancelled {};
+
+constexpr std::size_t kReadBlock = 8 << 20;  // bytes between two reports
+constexpr double kReadShare = 0.4;           // of the time, by experience; the rest is decoding
+
+std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
+                                      const LoadProgress& progress) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(file, error);
+    std::ifstream in(file, std::ios::binary);
+    if (error || !in)
+        throw Error(file.string(), "cannot be read", "Name a splat file, for example a .ply.");
+    std::vector<std::byte> bytes(size);
+    for (std::uintmax_t at = 0; at < size; at += kReadBlock) {
+        const std::uintmax_t count = std::min<std::uintmax_t>(kReadBlock, size - at);
+        in.read(reinterpret_cast<char*>(bytes.data() + at), static_cast<std::streamsize>(count));
+        if (!in) throw Error(file.string(), "cannot be read to its end");
+        if (progress)
+            progress(kReadShare * static_cast<double>(at + count) / static_cast<double>(size),
+                     "reading");
+    }
+    return bytes;
+}
+
+}  // namespace
+
+Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress) {
+    const auto start = std::chrono::steady_clock::now();
+    Scene scene;
+    scene.file = file;
+    SplatFile facts;
+    if (is_sog_folder(file)) {
+        if (progress) progress(kReadShare, "decoding");
+        scene.model = load_splats(file, &facts);
+    } else {
+        const std::vector<std::byte> bytes = read_in_blocks(file, progress);
+        if (progress) progress(kReadShare, "decoding");
+        scene.is_points = is_point_cloud(bytes);
+        scene.model =
+            scene.is_points
+                ? points_as_splats(parse_point_cloud_ply(bytes, file.string(), facts.dropped))
+                : parse_splats(bytes, file.string(), &facts);
+    }
+    scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
+    scene.notes = facts.notes;
+    if (facts.dropped > 0)
+        scene.notes.push_back(
+            fmt::format("{} splats with NaN or infinity were dropped.", facts.dropped));
+    if (scene.model.antialias)
+        scene.notes.emplace_back("Trained with anti-aliasing, which is not rendered.");
+    if (scene.is_points) scene.notes.emplace_back("Points are shown as opaque balls.");
+    if (progress) progress(0.95, "measuring");
+    scene.bounds = scene_bounds(scene.model);
+    scene.load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return scene;
+}
+
+LoadJob::LoadJob(std::filesystem::path file, std::function<void()> wake)
+    : file_(std::move(file)), wake_(std::move(wake)), thread_([this] { run(); }) {}
+
+LoadJob::~LoadJob() {
+    cancel();
+    wait();
+}
+
+void LoadJob::run() {
+    try {
+        scene_ = load_scene_file(file_, [this](double share, const char* stage) {
+            if (cancelled_) throw Cancelled();
+            share_ = share;
+            {
+                const std::lock_guard lock(mutex_);
+                stage_ = stage;
+            }
+            if (wake_) wake_();
+        });
+    } catch (const Cancelled&) {
+    } catch (const std::bad_alloc&) {
+        error_ = std::make_exception_ptr(
+            Error(file_.string(), "does not fit into memory", "Prune the scene first."));
+    } catch (...) {
+        error_ = std::current_exception();
+    }
+    done_ = true;
+    if (wake_) wake_();
+}
+
+std::string LoadJob::stage() const {
+    const std::lock_guard lock(mutex_);
+    return stage_;
+}
+
+void LoadJob::wait() {
+    if (thread_.joinable()) thread_.join();
+}
+
+std::optional<Scene> LoadJob::take() {
+    wait();
+    if (cancelled_) return {};
+    if (error_) std::rethrow_exception(error_);
+    return std::move(scene_);
+}
+
+}  // namespace darb

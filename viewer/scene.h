@@ -1,0 +1,65 @@
+// Scene: a splat file in memory, and the job that loads one in the background.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "engine/scene/splat_model.h"
+#include "viewer/bounds.h"
+
+namespace darb {
+
+struct Scene {
+    std::filesystem::path file;
+    SplatModel model;
+    Bounds bounds;
+    std::string format;      // as format_name says it
+    bool is_points = false;  // a point cloud: no splat parameters in the file
+    double load_s = 0;
+    std::vector<std::string> notes;  // what was dropped or cannot be shown, a sentence each
+};
+
+/// A file that load_splats reads, or a PLY point cloud, which becomes small opaque splats.
+/// `progress` is called with 0..1 and what is being done; it throws to cancel. Throws Error naming
+/// the file.
+using LoadProgress = std::function<void(double share, const char* stage)>;
+Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress = {});
+
+/// One file on a thread of its own. Cancelling takes effect at the next report of progress.
+class LoadJob {
+  public:
+    /// wake: called from the thread whenever there is something new to show.
+    LoadJob(std::filesystem::path file, std::function<void()> wake);
+    ~LoadJob();  // cancels and waits
+    LoadJob(const LoadJob&) = delete;
+    LoadJob& operator=(const LoadJob&) = delete;
+
+    const std::filesystem::path& file() const { return file_; }
+    double share() const { return share_; }
+    std::string stage() const;
+    void cancel() { cancelled_ = true; }
+    bool done() const { return done_; }
+    void wait();
+    /// After done(): the scene, or nothing where it was cancelled. Throws the Error of loading.
+    std::optional<Scene> take();
+
+  private:
+    void run();
+    std::filesystem::path file_;
+    std::function<void()> wake_;
+    std::atomic<double> share_{0};
+    std::atomic<bool> cancelled_{false}, done_{false};
+    mutable std::mutex mutex_;  // of stage_
+    std::string stage_;
+    std::optional<Scene> scene_;
+    std::exception_ptr error_;
+    std::thread thread_;
+};
+
+}  // namespace darb

@@ -1,0 +1,101 @@
+// Session: everything that the panels show and edit. Panels change it, the viewer acts on it.
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
+#include "viewer/camera_path.h"
+#include "viewer/display.h"
+#include "viewer/edit.h"
+#include "viewer/input.h"
+#include "viewer/navigation.h"
+#include "viewer/scene.h"
+
+namespace darb {
+
+/// Cameras of a data set, and the photo of the one that is looked through.
+struct Photos {
+    std::vector<View> views;
+    int current = -1;      // -1: free camera
+    bool compare = false;  // photo left of the split
+    float split = 0.5f;    // share of the window's width
+    Buffer buffer;         // uint [height][width]
+    int width = 0, height = 0;
+    int loaded = -1;      // the view that buffer holds
+    bool failed = false;  // this view's photo could not be read
+};
+
+struct PathState {
+    CameraPath path;
+    std::filesystem::path file = "camera_path.json";
+    std::filesystem::path folder = "frames";
+    float seconds_per_key = 2;
+    double at_s = 0;
+    bool playing = false;
+    int fps = 30;
+    int export_width = 1280, export_height = 720;
+};
+
+/// What a training run reports, iteration by iteration.
+struct TrainingCurves {
+    bool live = false, finished = false;
+    int iteration = 0, last_iteration = 0;
+    std::vector<float> loss, psnr_db, splats;  // smoothed; thinned out as they get long
+    std::vector<float> held_out_psnr_db;       // one value an evaluation
+    bool paused = false;
+    int steps_to_go = 0;  // while paused
+};
+
+struct FrameTimes {
+    std::vector<PassTime> passes;  // of the last picture
+    double picture_ms = 0;         // wall clock, of the last picture
+    double frame_ms = 0;           // the whole frame: picture, panels, presentation
+    double scale = 1;              // share of the resolution it had
+    std::uint32_t visible = 0, pairs = 0;
+    double full_ms = 0;            // of the last picture at full resolution
+    std::deque<double> moving_ms;  // whole frames in motion, latest last
+};
+
+/// What panels and keys ask for; the viewer does it after the panels of a frame and clears it.
+struct Requests {
+    bool frame_all = false, take_picture = false, save = false, quit = false;
+    bool full_screen = false, cancel_load = false, load_path = false, save_path = false;
+    bool export_path = false, cancel_export = false, opacity_changed = false;
+};
+
+struct Session {
+    std::unique_ptr<Scene> scene;  // null: none yet, or a training run is shown
+    Edit edit;
+    Region region;
+    bool show_region = false;
+    std::filesystem::path save_file;
+    Navigation navigation;
+    double fly_speed = 1;  // world units a second
+    DisplaySettings display;
+    Photos photos;
+    PathState path;
+    TrainingCurves training;
+    FrameTimes times;
+    Requests requests;
+    std::string error;  // shown until dismissed
+    std::string note;   // shown in the status line
+    std::string device_name;
+    double load_share = -1;  // below 0: nothing is being loaded
+    std::string load_stage;
+    double export_share = -1;
+    int shown_sh_degree = 0;
+    bool panels = true;
+    float gui_scale = 1;
+};
+
+/// The panels of one frame. Needs an ImGui frame.
+void draw_panels(Session& session, int width, int height);
+
+}  // namespace darb

@@ -1,0 +1,91 @@
+// SplatPicture: a scene on the device and 8-bit pictures of it, in any display mode. It wraps the
+// engine's Forward, which it builds anew when kernel, footprint or what a mode needs changes.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/render/forward.h"
+#include "viewer/bounds.h"
+#include "viewer/display.h"
+
+namespace darb {
+
+/// A photo over a part of the frame, for comparison. Position and scale in px of the full frame.
+struct PhotoOverlay {
+    const Buffer* photo = nullptr;  // uint [height][width], R in the low byte
+    int width = 0, height = 0;      // px
+    double x = 0, y = 0, scale = 1;
+    double split = 0;  // share of the frame's width, left of which the photo is shown
+};
+
+class SplatPicture {
+  public:
+    explicit SplatPicture(Device& device);
+
+    /// Uploads a scene; the model must stay where it is as long as it is shown. Where a device's
+    /// buffers cannot hold all view-dependent colour, higher degrees are left out: see
+    /// shown_sh_degree. Throws Error and keeps the scene before.
+    void set_scene(const SplatModel& model, const Bounds& bounds);
+    /// Shows splats that someone else owns and changes (a training run); display styles that
+    /// need the model on the host fall back to splats.
+    void set_live(const GpuSplats& splats, const Bounds& bounds);
+    void clear();
+    bool empty() const { return splats() == nullptr; }
+    int shown_sh_degree() const { return splats() ? splats()->sh_degree() : 0; }
+    const Bounds& bounds() const { return bounds_; }
+    std::uint32_t splat_count() const { return splats() ? splats()->count() : 0; }
+
+    /// Deleted splats (1) vanish, the others are as in the model.
+    void set_removed(const std::vector<std::uint8_t>& removed);
+
+    /// Renders and waits. camera: at the size of the frame that is wanted.
+    void render(const Camera& camera, const DisplaySettings& display, const PhotoOverlay& photo);
+
+    /// Of the last render: B8G8R8A8 [height][width], its size, counters, times of the passes.
+    const Buffer& pixels() const { return pixels_; }
+    int width() const { return width_; }
+    int height() const { return height_; }
+    const gpu::FrameStatus& status() const { return status_; }
+    /// Whether it had to build pipelines, which some drivers compile while they run.
+    bool compiled() const { return compiled_; }
+    const std::vector<PassTime>& pass_times() const { return pass_times_; }
+
+  private:
+    const GpuSplats* splats() const { return live_ ? live_ : own_ ? &*own_ : nullptr; }
+    const GpuSplats& styled(SplatStyle style);
+    Forward& forward_for(const GpuSplats& splats, const DisplaySettings& display);
+    void record_display(Commands& commands, const Forward& forward, const gpu::CameraData& data,
+                        const DisplaySettings& display, const PhotoOverlay& photo);
+    void upload_opacity(GpuSplats& splats, const std::vector<float>& opacity);
+
+    struct Key {  // what a Forward is built for
+        int kernel = -1, sh_stored = 0;
+        Footprint footprint = Footprint::psi;
+        float alpha_cutoff = 0;
+        bool store = false;
+        bool operator==(const Key&) const = default;
+    };
+
+    Device* device_;
+    Commands commands_;
+    Pipeline depth_light_;
+    std::map<int, Pipeline> display_pipelines_;  // by mode * 2 + whether there is a photo
+    const SplatModel* model_ = nullptr;
+    const GpuSplats* live_ = nullptr;
+    std::optional<GpuSplats> own_, styled_;
+    SplatStyle styled_as_ = SplatStyle::splats;
+    std::vector<std::uint8_t> removed_;
+    Bounds bounds_;
+    std::optional<Forward> forward_;
+    Key key_;
+    Buffer pixels_, no_photo_;
+    int width_ = 0, height_ = 0;
+    bool compiled_ = false;
+    gpu::FrameStatus status_{};
+    std::vector<PassTime> pass_times_;
+};
+
+}  // namespace darb

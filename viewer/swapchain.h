@@ -1,0 +1,51 @@
+// Swapchain: gives a canvas to a window's surface.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <vector>
+
+#include "engine/gpu/device.h"
+#include "viewer/canvas.h"
+
+namespace darb {
+
+class Swapchain {
+  public:
+    /// Takes the surface. Throws Error where the device cannot present to it.
+    Swapchain(Device& device, VkSurfaceKHR surface);
+    ~Swapchain();
+    Swapchain(const Swapchain&) = delete;
+    Swapchain& operator=(const Swapchain&) = delete;
+
+    /// Copies the composed canvas into the next image and presents it. compose records the canvas
+    /// and is called once there is an image. False where the window changed its size meanwhile:
+    /// the next call makes a new chain.
+    template <class Compose>
+    bool present(Canvas& canvas, const Compose& compose) {
+        std::uint32_t index = 0;
+        if (!acquire(canvas.width(), canvas.height(), index)) return false;
+        finish(canvas, compose(), index);
+        return true;
+    }
+
+  private:
+    bool acquire(int width, int height, std::uint32_t& index);
+    void finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t index);
+    void choose_format();
+    void create(int width, int height);
+    void release_images();
+
+    Device* device_;
+    VkSurfaceKHR surface_;
+    VkSurfaceFormatKHR format_{};
+    VkPresentModeKHR mode_ = VK_PRESENT_MODE_FIFO_KHR;
+    VkSwapchainKHR chain_ = VK_NULL_HANDLE;
+    std::vector<VkImage> images_;
+    std::vector<VkSemaphore> drawn_;  // one an image
+    VkSemaphore acquired_ = VK_NULL_HANDLE;
+    VkExtent2D extent_{};
+    bool stale_ = true;
+};
+
+}  // namespace darb

@@ -1,0 +1,59 @@
+#include "viewer/view_camera.h"
+
+#include <algorithm>
+
+namespace darb {
+
+namespace {
+constexpr double kPickRadius = 8;     // px
+constexpr float kPickLogit = -0.85f;  // an opacity of 0.3
+}  // namespace
+
+double fit_scale(const Camera& camera, int width, int height) {
+    return std::min(double(width) / camera.width, double(height) / camera.height);
+}
+
+Camera fitted(const Camera& camera, int width, int height) {
+    const double s = fit_scale(camera, width, height);
+    Camera c = camera;
+    c.fx *= s;
+    c.fy *= s;
+    c.cx = c.cx * s + 0.5 * (width - s * camera.width);
+    c.cy = c.cy * s + 0.5 * (height - s * camera.height);
+    c.width = width;
+    c.height = height;
+    return c;
+}
+
+Camera resized(const Camera& camera, int width, int height) {
+    const double sx = double(width) / camera.width, sy = double(height) / camera.height;
+    Camera c = camera;
+    c.fx *= sx;
+    c.cx *= sx;
+    c.fy *= sy;
+    c.cy *= sy;
+    c.width = width;
+    c.height = height;
+    return c;
+}
+
+std::optional<glm::dvec3> pick(const SplatModel& m, const std::vector<std::uint8_t>& removed,
+                               const Camera& camera, double x, double y) {
+    std::optional<glm::dvec3> best;
+    double best_depth = 0;
+    for (size_t i = 0; i < m.size(); ++i) {
+        if ((!removed.empty() && removed[i] != 0) || m.opacity[i] < kPickLogit) continue;
+        const glm::dvec3 world =
+            m.origin + glm::dvec3(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
+        const glm::dvec3 p = camera.rotation * world + camera.translation;
+        if (p.z <= 0 || (best && p.z >= best_depth)) continue;
+        const double dx = camera.fx * p.x / p.z + camera.cx - x;
+        const double dy = camera.fy * p.y / p.z + camera.cy - y;
+        if (dx * dx + dy * dy > kPickRadius * kPickRadius) continue;
+        best = world;
+        best_depth = p.z;
+    }
+    return best;
+}
+
+}  // namespace darb

@@ -1,0 +1,26 @@
+// Cameras for a window: a photo's camera fitted into it, a camera at another resolution, and which
+// splat is under the pointer.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/scene/camera.h"
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+/// px of the window per px of the photo, such that the whole photo is seen.
+double fit_scale(const Camera& camera, int width, int height);
+/// The photo's camera with its frame centred in the window; what lies beyond it is shown too.
+Camera fitted(const Camera& camera, int width, int height);
+/// The same view at another size.
+Camera resized(const Camera& camera, int width, int height);
+
+/// The nearest of the splats whose mean projects within 8 px of the pointer and that are neither
+/// deleted nor nearly transparent; its mean in the world.
+std::optional<glm::dvec3> pick(const SplatModel& model, const std::vector<std::uint8_t>& removed,
+                               const Camera& camera, double x, double y);
+
+}  // namespace darb

@@ -1,0 +1,109 @@
+// Viewer: a scene, its camera and its panels, drawn into a canvas; with a window or without one.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/canvas.h"
+#include "viewer/gui.h"
+#include "viewer/path_export.h"
+#include "viewer/resolution.h"
+#include "viewer/session.h"
+#include "viewer/splat_picture.h"
+
+namespace darb {
+
+struct ViewerOptions {
+    std::vector<View> views;  // cameras of a data set, may be none
+    std::string up;           // x, -x, ...; "" = from the cameras, else -y
+    float gui_scale = 1;
+    /// The file that a path means (an output folder names its last scene). Throws Error.
+    std::function<std::filesystem::path(const std::filesystem::path&)> resolve;
+    /// Called from other threads when there is something to show.
+    std::function<void()> wake;
+};
+
+class Viewer {
+  public:
+    /// window: null without one.
+    Viewer(Device& device, ViewerOptions options, GLFWwindow* window = nullptr);
+    ~Viewer();
+
+    /// Loads in the background; the scene before stays until the new one is there, and also when
+    /// that fails: session().error then says why. An earlier load is cancelled.
+    void open(const std::filesystem::path& path);
+    bool loading() const { return job_ != nullptr; }
+    /// Waits for the load. Throws its Error.
+    void finish_loading();
+    /// Follows splats that someone else changes; see TrainingCurves for the rest.
+    /// The splats must stay where they are until end_live.
+    void show_live(const GpuSplats& splats, const Bounds& bounds);
+    void end_live();
+
+    /// Looks through camera n of the data set. Throws Error where there is no such camera.
+    void choose_camera(int n);
+
+    /// One frame: input, panels, the picture where something changed, all of it into the canvas.
+    /// full: draws anew at full resolution in any case. Returns seconds until the next frame is
+    /// wanted: 0 at once, infinity when nothing happens by itself.
+    double frame(const Input& input, int width, int height, bool full);
+    /// The canvas was shown: the whole frame's time is known.
+    void presented();
+
+    /// Records the canvas's commands; run by the caller (Canvas::submit_and_wait).
+    VkCommandBuffer compose();
+    Canvas& canvas() { return canvas_; }
+    Session& session() { return session_; }
+    const SplatPicture& picture() const { return picture_; }
+    Gui& gui() { return gui_; }
+    /// Exports the session's path; blocks. For use without a window.
+    void export_path_now();
+
+  private:
+    using Clock = std::chrono::steady_clock;
+    struct PictureKey {  // what a picture depends on
+        Camera camera;
+        DisplaySettings display;
+        int photo = -1;
+        float split = 0;
+        int version = 0;
+        bool operator==(const PictureKey& other) const;
+    };
+
+    void poll_load();
+    void adopt(Scene scene);
+    void handle_keys(const Input& input);
+    void move(const Input& input, double seconds, int width, int height);
+    void leave_photo();
+    void act_on_requests(int width, int height);
+    void load_current_photo();
+    void play_path(double seconds);
+    Camera frame_camera(int width, int height) const;
+    PhotoOverlay overlay(const Camera& camera, int width, int height) const;
+    void draw_picture(const PictureKey& key, double scale);
+    void step_export();
+    void report(const std::exception& error);
+
+    Device* device_;
+    ViewerOptions options_;
+    Session session_;
+    Canvas canvas_;
+    Gui gui_;
+    SplatPicture picture_;
+    ResolutionControl resolution_;
+    std::unique_ptr<LoadJob> job_;
+    std::vector<std::unique_ptr<LoadJob>> cancelled_;
+    std::optional<PathExport> export_;
+    PictureKey drawn_, last_;
+    double drawn_scale_ = 0;
+    int version_ = 0;  // of the scene and its edits
+    bool drew_moving_ = false;
+    bool continuous_ = false;  // the last frame wanted this one at once
+    Clock::time_point frame_start_, changed_at_, last_frame_;
+};
+
+}  // namespace darb

@@ -1,0 +1,317 @@
+#define GLFW_INCLUDE_VULKAN
+#include "viewer/window.h"
+
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "engine/core/error.h"
+#include "viewer/swapchain.h"
+
+namespace darb {
+
+namespace {
+
+constexpr double kDoubleClick_s = 0.35;
+constexpr int kSettlingFrames = 2;  // the panels need a frame to react to what changed in one
+
+std::string last_error() {
+    const char* text = nullptr;
+    glfwGetError(&text);
+    return text != nullptr ? text : "unknown";
+}
+
+std::optional<Key> key_for(int key, bool control) {
+    if (control) switch (key) {
+            case GLFW_KEY_Z:
+                return Key::undo;
+            case GLFW_KEY_Y:
+                return Key::redo;
+            case GLFW_KEY_S:
+                return Key::save;
+            case GLFW_KEY_Q:
+                return Key::quit;
+            default:
+                return {};
+        }
+    switch (key) {
+        case GLFW_KEY_F:
+            return Key::frame_all;
+        case GLFW_KEY_L:
+            return Key::level;
+        case GLFW_KEY_H:
+            return Key::hide_panels;
+        case GLFW_KEY_F11:
+            return Key::full_screen;
+        case GLFW_KEY_P:
+            return Key::picture;
+        case GLFW_KEY_RIGHT_BRACKET:
+            return Key::next_camera;
+        case GLFW_KEY_LEFT_BRACKET:
+            return Key::last_camera;
+        case GLFW_KEY_K:
+            return Key::add_key;
+        case GLFW_KEY_SPACE:
+            return Key::play;
+        case GLFW_KEY_DELETE:
+            return Key::remove;
+        case GLFW_KEY_ESCAPE:
+            return Key::escape;
+        default:
+            return {};
+    }
+}
+
+struct GlfwWindow {
+    GlfwWindow(int width, int height) {
+        glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+        handle = glfwCreateWindow(width, height, "darb", nullptr, nullptr);
+        if (handle == nullptr) throw Error("window", last_error());
+    }
+    ~GlfwWindow() { glfwDestroyWindow(handle); }
+    GlfwWindow(const GlfwWindow&) = delete;
+    GlfwWindow& operator=(const GlfwWindow&) = delete;
+    GLFWwindow* handle;
+};
+
+VkSurfaceKHR make_surface(Device& device, GLFWwindow* window) {
+    VkSurfaceKHR surface = VK_NULL_HANDLE;
+    check_vulkan(glfwCreateWindowSurface(device.instance(), window, nullptr, &surface), "window");
+    return surface;
+}
+
+float content_scale(GLFWwindow* window) {
+    float x = 1, y = 1;
+    glfwGetWindowContentScale(window, &x, &y);
+    return std::clamp(std::max(x, y), 1.0f, 4.0f);
+}
+
+}  // namespace
+
+WindowSystem::WindowSystem() {
+    if (glfwInit() != GLFW_TRUE)
+        throw Error("window system", last_error(),
+                    "Start it inside a desktop session, or use darb view --screenshot or darb "
+                    "render.");
+    if (glfwVulkanSupported() == GLFW_TRUE) return;
+    glfwTerminate();
+    throw Error("window system", "no Vulkan driver can show windows here",
+                "Use darb view --screenshot or darb render.");
+}
+
+WindowSystem::~WindowSystem() {
+    glfwTerminate();
+}
+
+void WindowSystem::require(DeviceOptions& options) const {
+    std::uint32_t count = 0;
+    const char** names = glfwGetRequiredInstanceExtensions(&count);
+    options.instance_extensions.assign(names, names + count);
+    options.device_extensions = {VK_KHR_SWAPCHAIN_EXTENSION_NAME};
+}
+
+// The callbacks collect input here; ImGui's, installed later, call these first.
+struct ViewerWindow::State {
+    State(Device& device, const ViewerOptions& options, int width, int height)
+        : window(width, height), swapchain(device, make_surface(device, window.handle)) {
+        glfwSetWindowUserPointer(window.handle, this);
+        install_callbacks();
+        ViewerOptions mine = options;
+        mine.gui_scale = content_scale(window.handle);
+        mine.wake = [this] {
+            woken = true;
+            glfwPostEmptyEvent();
+        };
+        viewer.emplace(device, mine, window.handle);
+        glfwGetWindowPos(window.handle, &windowed[0], &windowed[1]);
+        glfwGetWindowSize(window.handle, &windowed[2], &windowed[3]);
+    }
+    void install_callbacks();
+    void collect();
+    void drag(double x, double y);
+    void note_buttons();
+    bool* held_key(int key);  // its flag in input, or null
+    void draw();
+    void toggle_full_screen();
+    static State& of(GLFWwindow* w) { return *static_cast<State*>(glfwGetWindowUserPointer(w)); }
+
+    GlfwWindow window;
+    Swapchain swapchain;
+    std::optional<Viewer> viewer;
+    Input input;
+    bool dirty = true;
+    int settling = 0;
+    std::atomic<bool> woken{false};
+    double next_frame_at = 0;  // s of GLFW's clock
+    double last_click = -1;
+    double last_x = 0, last_y = 0;
+    int windowed[4] = {0, 0, 1280, 720};  // place and size outside of full screen
+};
+
+void ViewerWindow::State::install_callbacks() {
+    GLFWwindow* w = window.handle;
+    glfwSetKeyCallback(w, [](GLFWwindow* from, int key, int, int action, int mods) {
+        State& s = of(from);
+        s.dirty = true;
+        if (action != GLFW_PRESS) return;
+        if (bool* held = s.held_key(key)) *held = true;  // also when it is let go before the frame
+        if (const auto k = key_for(key, (mods & GLFW_MOD_CONTROL) != 0))
+            s.input.pressed.push_back(*k);
+    });
+    glfwSetMouseButtonCallback(w, [](GLFWwindow* from, int button, int action, int) {
+        State& s = of(from);
+        s.dirty = true;
+        if (button != GLFW_MOUSE_BUTTON_LEFT || action != GLFW_PRESS) return;
+        const double now = glfwGetTime();
+        s.input.double_click = now - s.last_click < kDoubleClick_s;
+        s.last_click = s.input.double_click ? -1 : now;
+    });
+    glfwSetCursorPosCallback(w, [](GLFWwindow* from, double x, double y) { of(from).drag(x, y); });
+    glfwSetScrollCallback(w, [](GLFWwindow* from, double, double y) {
+        of(from).input.wheel += y;
+        of(from).dirty = true;
+    });
+    glfwSetDropCallback(w, [](GLFWwindow* from, int count, const char** paths) {
+        for (int i = 0; i < count; ++i) of(from).input.dropped.emplace_back(paths[i]);
+        of(from).dirty = true;
+    });
+    glfwSetCharCallback(w, [](GLFWwindow* from, unsigned) { of(from).dirty = true; });
+    glfwSetWindowRefreshCallback(w, [](GLFWwindow* from) { of(from).dirty = true; });
+    glfwSetFramebufferSizeCallback(w, [](GLFWwindow* from, int, int) { of(from).dirty = true; });
+}
+
+bool* ViewerWindow::State::held_key(int key) {
+    switch (key) {
+        case GLFW_KEY_W:
+            return &input.ahead;
+        case GLFW_KEY_S:
+            return &input.back;
+        case GLFW_KEY_A:
+            return &input.to_left;
+        case GLFW_KEY_D:
+            return &input.to_right;
+        case GLFW_KEY_E:
+            return &input.rise;
+        case GLFW_KEY_Q:
+            return &input.sink;
+        default:
+            return nullptr;
+    }
+}
+
+void ViewerWindow::State::note_buttons() {
+    const auto button = [&](int b) { return glfwGetMouseButton(window.handle, b) == GLFW_PRESS; };
+    input.left |= button(GLFW_MOUSE_BUTTON_LEFT);
+    input.middle |= button(GLFW_MOUSE_BUTTON_MIDDLE);
+    input.right |= button(GLFW_MOUSE_BUTTON_RIGHT);
+}
+
+// Motion with a button down adds up event by event: a quick drag may begin and end between frames.
+void ViewerWindow::State::drag(double x, double y) {
+    dirty = true;
+    int window_width = 1, window_height = 1, width = 1, height = 1;
+    glfwGetWindowSize(window.handle, &window_width, &window_height);
+    glfwGetFramebufferSize(window.handle, &width, &height);
+    const auto down = [&](int b) { return glfwGetMouseButton(window.handle, b) == GLFW_PRESS; };
+    if (down(GLFW_MOUSE_BUTTON_LEFT) || down(GLFW_MOUSE_BUTTON_MIDDLE) ||
+        down(GLFW_MOUSE_BUTTON_RIGHT)) {
+        note_buttons();
+        input.dx += (x - last_x) * width / std::max(window_width, 1);
+        input.dy += (y - last_y) * height / std::max(window_height, 1);
+    }
+    last_x = x;
+    last_y = y;
+}
+
+// What is a state rather than an event: pointer, buttons, held keys.
+void ViewerWindow::State::collect() {
+    GLFWwindow* w = window.handle;
+    int window_width = 1, window_height = 1, width = 1, height = 1;
+    glfwGetWindowSize(w, &window_width, &window_height);
+    glfwGetFramebufferSize(w, &width, &height);
+    double x = 0, y = 0;
+    glfwGetCursorPos(w, &x, &y);
+    input.x = x * width / std::max(window_width, 1);
+    input.y = y * height / std::max(window_height, 1);
+    const auto key = [&](int k) { return glfwGetKey(w, k) == GLFW_PRESS; };
+    input.shift = key(GLFW_KEY_LEFT_SHIFT) || key(GLFW_KEY_RIGHT_SHIFT);
+    input.control = key(GLFW_KEY_LEFT_CONTROL) || key(GLFW_KEY_RIGHT_CONTROL);
+    for (const int k : {GLFW_KEY_W, GLFW_KEY_S, GLFW_KEY_A, GLFW_KEY_D, GLFW_KEY_E, GLFW_KEY_Q})
+        *held_key(k) |= key(k);
+    note_buttons();
+}
+
+void ViewerWindow::State::toggle_full_screen() {
+    GLFWwindow* w = window.handle;
+    if (glfwGetWindowMonitor(w) != nullptr) {
+        glfwSetWindowMonitor(w, nullptr, windowed[0], windowed[1], windowed[2], windowed[3], 0);
+        return;
+    }
+    glfwGetWindowPos(w, &windowed[0], &windowed[1]);
+    glfwGetWindowSize(w, &windowed[2], &windowed[3]);
+    GLFWmonitor* monitor = glfwGetPrimaryMonitor();
+    const GLFWvidmode* mode = monitor != nullptr ? glfwGetVideoMode(monitor) : nullptr;
+    if (mode != nullptr)
+        glfwSetWindowMonitor(w, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+}
+
+void ViewerWindow::State::draw() {
+    int width = 0, height = 0;
+    glfwGetFramebufferSize(window.handle, &width, &height);
+    if (width == 0 || height == 0) {  // minimised
+        next_frame_at = std::numeric_limits<double>::infinity();
+        dirty = false;
+        settling = 0;
+        return;
+    }
+    collect();
+    settling = dirty ? kSettlingFrames : settling - 1;
+    dirty = false;
+    const double wanted_in = viewer->frame(input, width, height, false);
+    next_frame_at = glfwGetTime() + wanted_in;
+    input = Input();
+    if (!swapchain.present(viewer->canvas(), [&] { return viewer->compose(); })) dirty = true;
+    viewer->presented();
+    Requests& requests = viewer->session().requests;
+    if (std::exchange(requests.full_screen, false)) toggle_full_screen();
+    if (requests.quit) glfwSetWindowShouldClose(window.handle, GLFW_TRUE);
+}
+
+ViewerWindow::ViewerWindow(Device& device, ViewerOptions options, int width, int height)
+    : state_(std::make_unique<State>(device, options, width, height)) {}
+
+ViewerWindow::~ViewerWindow() = default;
+
+Viewer& ViewerWindow::viewer() {
+    return *state_->viewer;
+}
+
+void ViewerWindow::set_title(const std::string& title) {
+    glfwSetWindowTitle(state_->window.handle, title.c_str());
+}
+
+void ViewerWindow::redraw() {
+    state_->dirty = true;
+}
+
+bool ViewerWindow::pump(double patience_s) {
+    State& s = *state_;
+    const auto due = [&] { return s.dirty || s.settling > 0 || glfwGetTime() >= s.next_frame_at; };
+    const double sleep = due() ? 0 : std::min(patience_s, s.next_frame_at - glfwGetTime());
+    if (sleep <= 0)
+        glfwPollEvents();
+    else if (std::isfinite(sleep))
+        glfwWaitEventsTimeout(sleep);
+    else
+        glfwWaitEvents();
+    if (glfwWindowShouldClose(s.window.handle)) return false;
+    const bool woken = s.woken.exchange(false);
+    if (woken || due()) s.draw();
+    return true;
+}
+
+}  // namespace darb

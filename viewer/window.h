@@ -1,0 +1,46 @@
+// ViewerWindow: a GLFW window around a Viewer. Frames are drawn when there is something new: input,
+// a finished load, a picture to refine; in between the process sleeps.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/gpu/device.h"
+#include "viewer/viewer.h"
+
+namespace darb {
+
+/// The window system, started before the device so that the device can be made for it.
+class WindowSystem {
+  public:
+    WindowSystem();  // throws Error where there is no display
+    ~WindowSystem();
+    WindowSystem(const WindowSystem&) = delete;
+    WindowSystem& operator=(const WindowSystem&) = delete;
+    /// What Device needs to present to windows.
+    void require(DeviceOptions& options) const;
+};
+
+class ViewerWindow {
+  public:
+    /// options.wake is set here. width and height in screen coordinates.
+    ViewerWindow(Device& device, ViewerOptions options, int width, int height);
+    ~ViewerWindow();
+    ViewerWindow(const ViewerWindow&) = delete;
+    ViewerWindow& operator=(const ViewerWindow&) = delete;
+
+    Viewer& viewer();
+    void set_title(const std::string& title);
+    /// The next pump draws a frame.
+    void redraw();
+    /// Handles what happened and draws a frame where one is wanted; sleeps up to patience_s (may be
+    /// infinity) until there is something to do. False once the window is closed.
+    bool pump(double patience_s);
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace darb
