@@ -7,40 +7,12 @@
 
 #include "engine/core/files.h"
 #include "trainer/report/html.h"
+#include "trainer/report/page.h"
 #include "trainer/report/svg_plot.h"
 
 namespace darb {
 
 namespace {
-
-constexpr const char* kStyle = R"css(
-:root{--ink:#1c1f24;--soft:#667080;--line:#dfe3e8;--page:#fff;--card:#f6f7f9;--s0:#2563b0;--s1:#d0571b}
-@media screen and (prefers-color-scheme:dark){:root{--ink:#e6e8eb;--soft:#98a2b0;--line:#333a44;
---page:#14171b;--card:#1d2127;--s0:#6ea8f0;--s1:#f0935a}}
-*{box-sizing:border-box}
-body{margin:0 auto;max-width:1080px;padding:2rem 1.25rem 4rem;background:var(--page);color:var(--ink);
-font:15px/1.5 system-ui,sans-serif}
-h1{font-size:1.5rem;margin:0;overflow-wrap:anywhere}h2{font-size:1.05rem;margin:2.2rem 0 .7rem}
-p{margin:.3rem 0}.soft{color:var(--soft)}
-.cards{display:flex;flex-wrap:wrap;gap:.7rem;margin-top:1.2rem}
-.cards div{background:var(--card);border-radius:8px;padding:.6rem .9rem;min-width:7.5rem;flex:1}
-.cards b{display:block;font-size:1.3rem;font-variant-numeric:tabular-nums}
-.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:1rem}
-svg{width:100%;height:auto;background:var(--card);border-radius:8px;break-inside:avoid}
-svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .name{font-weight:600;font-size:13px}
-svg .tick,svg .label{fill:var(--soft);font-size:11px}
-.grid{stroke:var(--line)}.axis{stroke:var(--soft);fill:none}.line{fill:none;stroke-width:1.8;stroke-linejoin:round}
-.line.s0{stroke:var(--s0)}.line.s1{stroke:var(--s1)}circle.s0{fill:var(--s0)}circle.s1{fill:var(--s1)}
-.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
-th,td{text-align:right;padding:.22rem .9rem .22rem 0;border-bottom:1px solid var(--line);white-space:nowrap}
-th{color:var(--soft);font-weight:500}th:first-child,td:first-child,td.text{text-align:left}
-td.text{white-space:normal;overflow-wrap:anywhere}
-td.bar{width:14rem;padding-right:0}td.bar i{display:block;height:.7em;border-radius:3px;background:var(--s0);
--webkit-print-color-adjust:exact;print-color-adjust:exact}
-figure{margin:0 0 1.2rem;break-inside:avoid}figure img{width:100%;display:block;border-radius:6px;image-rendering:auto}
-figcaption{display:flex;justify-content:space-between;color:var(--soft);margin-bottom:.25rem;gap:1rem}
-.parts{display:grid;grid-template-columns:repeat(3,1fr);color:var(--soft);font-size:.85rem}
-)css";
 
 struct TimeUnit {
     const char* label;
@@ -101,26 +73,22 @@ std::string plots(const ReportData& data) {
     return html.empty() ? "" : "<h2>Curves</h2><div class='plots'>" + html + "</div>\n";
 }
 
-std::string card(const std::string& value, const std::string& name) {
-    return fmt::format("<div><b>{}</b><span class='soft'>{}</span></div>", html_escape(value),
-                       html_escape(name));
-}
-
 std::string cards(const ReportData& data) {
     std::string html;
     if (!data.evaluations.empty()) {
         const ReportEvaluation& last = data.evaluations.back();
-        html += card(format_number(last.psnr_db, 2) + " dB", "PSNR, held out");
-        html += card(format_number(last.ssim, 4), "SSIM, held out");
+        html += html_card(format_number(last.psnr_db, 2) + " dB", "PSNR, held out");
+        html += html_card(format_number(last.ssim, 4), "SSIM, held out");
     }
     if (!data.samples.empty()) {
         const ReportSample& last = data.samples.back();
-        html += card(format_number(last.splats), "splats");
-        html += card(format_number(last.iteration), "iterations");
-        html += card(format_number(last.seconds, last.seconds < 100 ? 1 : 0) + " s", "training");
+        html += html_card(format_number(last.splats), "splats");
+        html += html_card(format_number(last.iteration), "iterations");
+        html +=
+            html_card(format_number(last.seconds, last.seconds < 100 ? 1 : 0) + " s", "training");
         if (last.iteration > 0)
-            html +=
-                card(format_number(1e3 * last.seconds / last.iteration, 1) + " ms", "an iteration");
+            html += html_card(format_number(1e3 * last.seconds / last.iteration, 1) + " ms",
+                              "an iteration");
     }
     return html.empty() ? "" : "<div class='cards'>" + html + "</div>\n";
 }
@@ -200,16 +168,9 @@ std::string notes(const ReportData& data) {
 }  // namespace
 
 std::string report_html(const ReportData& data) {
-    std::string html = "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>\n";
-    html += "<meta name='viewport' content='width=device-width,initial-scale=1'>\n";
-    html += "<meta name='color-scheme' content='light dark'>\n";
-    html += fmt::format("<title>{}</title>\n<style>{}</style></head><body>\n",
-                        html_escape(data.title), kStyle);
-    html += fmt::format("<h1>{}</h1>\n<p class='soft'>{}</p>\n", html_escape(data.title),
-                        html_escape(data.device));
-    html += cards(data) + plots(data) + pictures(data) + evaluation_table(data) + pass_table(data) +
-            settings(data) + notes(data);
-    return html + "</body></html>\n";
+    return html_page(data.title, data.device,
+                     cards(data) + plots(data) + pictures(data) + evaluation_table(data) +
+                         pass_table(data) + settings(data) + notes(data));
 }
 
 void write_report(const std::filesystem::path& path, const ReportData& data) {
