@@ -80,7 +80,7 @@ void Run::resume() {
 }
 
 void Run::on_result(const IterationResult& result) {
-    log_.iteration(result, seconds());
+    log_.iteration(result, seconds(), trainer_.pass_totals());
     progress_.update(result, device_);
 }
 

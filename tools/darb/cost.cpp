@@ -9,19 +9,12 @@
 #include "engine/core/files.h"
 #include "tools/cost/report.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/cost_flags.h"
 #include "tools/darb/scene_file.h"
 
 namespace darb {
 
 namespace {
-
-struct CostFlags {
-    std::string scene, dataset, device;
-    std::filesystem::path json, html;
-    bool quick = false, full = false, quiet = false, white_background = false;
-    DatasetOptions data;
-    std::string size = "640x480";
-};
 
 // What a run takes its time for: quick about a tenth of the default, full about ten times.
 struct Extent {
@@ -57,6 +50,9 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
 int cost(const CostFlags& flags) {
     if (flags.quick && flags.full)
         throw Error("--quick --full", "contradict each other", "Use one of them.");
+    if (!flags.train.empty()) return train_cost(flags);
+    if (flags.scene.empty())
+        throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
     const Extent extent = extent_of(flags);
     const SplatModel model = load_scene(flags.scene);
     if (model.size() == 0)
@@ -76,13 +72,10 @@ int cost(const CostFlags& flags) {
     fmt::print("{}: {} splats, {}; {} views of {}\n\n{}", flags.scene, model.size(), result.device,
                views.cameras.size(), flags.dataset.empty() ? "an orbit" : flags.dataset,
                cost_table(result));
-    if (!flags.json.empty()) {
-        nlohmann::json json = cost_json(result);
-        json["scene"] = flags.scene;
-        json["dataset"] = flags.dataset;
-        write_file_atomic(
-            flags.json, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-    }
+    nlohmann::json json = cost_json(result);
+    json["scene"] = flags.scene;
+    json["dataset"] = flags.dataset;
+    write_json(flags.json, json);
     if (!flags.html.empty()) write_file_atomic(flags.html, cost_html(result, flags.scene));
     return 0;
 }
@@ -93,8 +86,13 @@ void add_cost(CLI::App& app, Action& action) {
     auto flags = std::make_shared<CostFlags>();
     CLI::App* command =
         app.add_subcommand("cost", "Measure what each accuracy setting costs in time");
-    command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train")
-        ->required();
+    command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train");
+    command->add_option("--train", flags->train,
+                        "price the settings in training on this data set instead");
+    command->add_option("--seeds", flags->seeds, "runs a setting with --train (default 3)")
+        ->check(CLI::Range(1, 100));
+    command->add_option("--iterations", flags->iterations, "of a run with --train (default 1,500)")
+        ->check(CLI::Range(20, 1'000'000));
     command->add_option("dataset", flags->dataset,
                         "photos with cameras; without: eight views around the splats");
     command->add_option("--json", flags->json, "write every number to this file");

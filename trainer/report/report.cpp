@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/core/files.h"
+#include "engine/data/image_io.h"
 #include "trainer/report/html.h"
 #include "trainer/report/page.h"
 #include "trainer/report/svg_plot.h"
@@ -56,6 +57,19 @@ std::string plots_against(const ReportData& data, const std::string& x_label, X&
     return svg_plot(quality) + svg_plot(loss);
 }
 
+// Milliseconds of each pass, on top of one another, over training time.
+std::string pass_stack(const ReportData& data, const TimeUnit& unit) {
+    StackPlot stack{"Time an iteration, by pass", unit.label, "ms an iteration", {}, {}, {}};
+    for (const ReportPass& pass : data.passes) stack.names.push_back(pass.name);
+    stack.layers.resize(data.passes.size());
+    for (const ReportSample& s : data.samples) {
+        if (s.pass_ms.size() != data.passes.size() || s.pass_ms.empty()) continue;
+        stack.x.push_back(s.seconds / unit.seconds);
+        for (size_t p = 0; p < s.pass_ms.size(); ++p) stack.layers[p].push_back(s.pass_ms[p]);
+    }
+    return svg_stack(stack);
+}
+
 std::string plots(const ReportData& data) {
     const TimeUnit unit = time_unit(longest_seconds(data));
     const auto iteration = [](const auto& row) { return row.iteration; };
@@ -69,7 +83,7 @@ std::string plots(const ReportData& data) {
     Plot ssim{"SSIM, held-out photos", "iterations", "SSIM", {}};
     ssim.series = {series_of(
         "SSIM", data.evaluations, iteration, [](const auto& e) { return e.ssim; }, true)};
-    html += svg_plot(splats) + svg_plot(ssim);
+    html += svg_plot(splats) + svg_plot(ssim) + pass_stack(data, unit);
     return html.empty() ? "" : "<h2>Curves</h2><div class='plots'>" + html + "</div>\n";
 }
 
@@ -115,7 +129,7 @@ std::string pass_table(const ReportData& data) {
         rooflines |= pass.roofline.has_value();
     }
     if (!(total > 0)) return {};
-    const char* head = rooflines ? "<th>of the memory roofline</th>" : "";
+    const char* head = rooflines ? "<th>of the roofline</th>" : "";
     std::string html = fmt::format(
         "<h2>Time an iteration</h2><div class='wide'><table><tr><th>pass</th><th>ms</th>"
         "<th>share</th>{}<th></th></tr>\n",
@@ -124,11 +138,12 @@ std::string pass_table(const ReportData& data) {
         const std::string share =
             pass.roofline ? format_number(100 * *pass.roofline, 1) + " %" : "";
         html += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{} %</td>{}<td class='bar'><i "
+            "<tr><td>{}</td><td>{}</td><td>{} %</td>{}<td class='bar'><i class='s{}' "
             "style='width:{:.1f}%'></i></td></tr>\n",
             html_escape(pass.name), format_number(pass.ms, 3),
             format_number(100 * pass.ms / total, 1),
-            rooflines ? "<td>" + share + "</td>" : std::string(), 100 * pass.ms / largest);
+            rooflines ? "<td>" + share + "</td>" : std::string(), &pass - data.passes.data(),
+            100 * pass.ms / largest);
     }
     return html +
            fmt::format("<tr><td>together</td><td>{}</td><td></td>{}<td></td></tr>",
@@ -139,14 +154,20 @@ std::string pass_table(const ReportData& data) {
 std::string pictures(const ReportData& data) {
     std::string html;
     for (const ReportPicture& picture : data.pictures) {
+        const ImageInfo info = read_image_info(picture.file);
+        const std::string name = html_escape(picture.name);
         html += fmt::format(
-            "<figure><figcaption><span>{}</span><span>{} dB, SSIM {}</span></figcaption>"
-            "<img alt='photo, render and error of {}' src='data:image/png;base64,{}'>"
-            "<div class='parts'><span>photo</span><span>render</span><span>{}</span></div>"
-            "</figure>\n",
-            html_escape(picture.name), format_number(picture.psnr_db, 2),
-            format_number(picture.ssim, 4), html_escape(picture.name),
-            base64(read_file(picture.file)), html_escape(data.error_caption));
+            "<figure style='--r:{}/{};--x:50%;--p:url(data:image/png;base64,{})'>"
+            "<figcaption><span>{}</span><span>{} dB, SSIM {}</span></figcaption>"
+            "<div class='pair'><div class='pane photo' role='img' aria-label='photo of {}'>"
+            "<div class='pane render' role='img' aria-label='render of {}'></div></div>"
+            "<div class='pane error' role='img' aria-label='error of {}'></div></div>"
+            "<div class='parts'><label>render left, photo right <input type='range' min='0' "
+            "max='100' value='50' oninput='this.closest(\"figure\").style.setProperty(\"--x\","
+            "this.value+\"%\")'/></label><span>{}</span></div></figure>\n",
+            info.width / 3, info.height, base64(read_file(picture.file)), name,
+            format_number(picture.psnr_db, 2), format_number(picture.ssim, 4), name, name, name,
+            html_escape(data.error_caption));
     }
     return html.empty() ? "" : "<h2>Held-out pictures</h2>\n" + html;
 }
