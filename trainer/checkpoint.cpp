@@ -171,7 +171,7 @@ std::string settings_text(const TrainOptions& o) {
                 {"seed", o.seed},
                 {"kernel", kernel_name(o.kernel)},
                 {"footprint", footprint_name(o.footprint)},
-                {"evaluation", o.evaluation == EVALUATION_BUILTIN ? "builtin" : "polynomial"},
+                {"accuracy", accuracy_text(o.accuracy)},
                 {"sh_degree", o.sh_degree},
                 {"sh_interval", o.sh_interval},
                 {"white_background", o.white_background},

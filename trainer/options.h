@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/render/accuracy.h"
 
 namespace darb {
 
@@ -16,7 +17,7 @@ struct TrainOptions {
 
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
-    int evaluation = EVALUATION_POLYNOMIAL;
+    Accuracy accuracy;  // footprint and SH degree aside: they are the two here
     int sh_degree = 3;  // one more every sh_interval iterations
     int sh_interval = 1'000;
     bool white_background = false;  // what pictures are compared over; black otherwise

@@ -85,7 +85,7 @@ void Run::resume() {
 
 void Run::on_result(const IterationResult& result) {
     latest_ = result;
-    log_.iteration(result, trainer_.counters(), seconds());
+    log_.iteration(result, trainer_.counters(), seconds(), trainer_.pass_totals());
     progress_.update(result, device_);
 }
 

@@ -96,10 +96,17 @@ void RunLog::write(const Json& event) {
     events_.push_back(event);
 }
 
-void RunLog::start(const Device& device, const Dataset& dataset, const TrainOptions& options,
+void RunLog::start(Device& device, const Dataset& dataset, const TrainOptions& options,
                    std::uint32_t splats) {
+    rates_ = measure_rates(device);
     int held_out = 0;
-    for (const View& v : dataset.views) held_out += v.is_test ? 1 : 0;
+    double pixels = 0;
+    for (const View& v : dataset.views) {
+        held_out += v.is_test ? 1 : 0;
+        if (!v.is_test) pixels += double(v.camera.width) * v.camera.height;
+    }
+    counts_.pixels = pixels / std::max<double>(1.0, double(dataset.views.size()) - held_out);
+    counts_.sh_degree = options.sh_degree;
     start_ = {{"event", "start"},
               {"version", DARB_VERSION},
               {"device", device.info().name},
@@ -110,6 +117,8 @@ void RunLog::start(const Device& device, const Dataset& dataset, const TrainOpti
               {"train_views", dataset.views.size() - held_out},
               {"held_out_views", held_out},
               {"splats", splats},
+              {"copy_bytes_per_s", rates_.bytes_per_s},
+              {"fma_per_s", rates_.fma_per_s},
               {"settings", Json::parse(settings_text(options))}};
     write(start_);
 }
@@ -118,11 +127,22 @@ void RunLog::failure(int iteration, const std::string& what) {
     write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
 }
 
-void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, double seconds) {
+void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, double seconds,
+                       const std::vector<PassTotal>& totals) {
+    counts_.splats += r.splats;
+    counts_.visible += r.visible;
+    counts_.pairs += r.pairs;
+    ++counted_;
     loss_sum_ += r.loss;
     psnr_sum_ += r.psnr_db;
     ++summed_;
     if (r.iteration % kLogInterval != 0) return;
+    Json passes = Json::object();
+    for (size_t p = 0; p < totals.size(); ++p) {
+        const double before = p < written_.size() ? written_[p].ms : 0;
+        passes[totals[p].name] = (totals[p].ms - before) / summed_;
+    }
+    written_ = totals;
     write({{"event", "iteration"},
            {"iteration", r.iteration},
            {"seconds", seconds},
@@ -134,7 +154,8 @@ void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, 
            {"bad_gradients", counters.bad_gradients},
            {"overflows", counters.overflows},
            {"redone_iterations", counters.redone_iterations},
-           {"culled_splat_frames", culled_json(counters)}});
+           {"culled_splat_frames", culled_json(counters)},
+           {"passes_ms", passes}});
     loss_sum_ = psnr_sum_ = 0;
     summed_ = 0;
 }
@@ -147,19 +168,33 @@ ReportData RunLog::report_data(const RunSummary& summary, const Json& metrics) c
     ReportData data;
     data.title = start_.value("dataset", "");
     data.device = start_.value("device", "") + ", " + start_.value("driver", "");
+    for (const Json& p : metrics["passes_ms"]) {
+        ReportPass pass{p.value("name", ""), p.value("ms", 0.0), std::nullopt};
+        if (p.contains("roofline")) pass.roofline = p.value("roofline", 0.0);
+        data.passes.push_back(std::move(pass));
+    }
     for (const Json& e : events_) {
         const std::string kind = e.value("event", "");
-        if (kind == "iteration")
-            data.samples.push_back({e.value("iteration", 0), e.value("seconds", 0.0),
-                                    e.value("loss", 0.0), e.value("psnr_db", 0.0),
-                                    e.value("splats", 0u)});
+        if (kind == "iteration") {
+            ReportSample sample{e.value("iteration", 0), e.value("seconds", 0.0),
+                                e.value("loss", 0.0), e.value("psnr_db", 0.0),
+                                e.value("splats", 0u)};
+            const Json passes = e.value("passes_ms", Json::object());
+            if (!passes.empty())
+                for (const ReportPass& pass : data.passes)
+                    sample.pass_ms.push_back(passes.value(pass.name, 0.0));
+            data.samples.push_back(std::move(sample));
+        }
         if (kind == "evaluation" && !e["views"].empty())
             data.evaluations.push_back({e.value("iteration", 0), e.value("seconds", 0.0),
                                         e.value("psnr_db", 0.0), e.value("ssim", 0.0),
                                         e.value("splats", 0u)});
     }
-    for (const Json& p : metrics["passes_ms"])
-        data.passes.push_back({p.value("name", ""), p.value("ms", 0.0), std::nullopt});
+    if (rates_.bytes_per_s > 0)
+        data.notes.push_back(fmt::format(
+            "Roofline: bytes and multiply-adds of a pass, estimated from counts, at the rates "
+            "measured at the start: {:.1f} GB/s of copies, {:.1f} billion multiply-adds a second.",
+            1e-9 * rates_.bytes_per_s, 1e-9 * rates_.fma_per_s));
     for (const auto& [name, value] : start_["settings"].items())
         data.settings.emplace_back(name,
                                    value.is_string() ? value.get<std::string>() : value.dump());
@@ -172,10 +207,17 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
                                      const Device& device) {
     const TrainCounters& c = trainer.counters();
     Json passes = Json::array();
-    for (const PassTotal& p : trainer.pass_totals())
-        passes.push_back(
-            {{"name", p.name},
-             {"ms", p.ms / std::max<double>(1.0, double(trainer.timed_iterations()))}});
+    FrameCounts mean = counts_;
+    mean.splats /= std::max(counted_, 1.0);
+    mean.visible /= std::max(counted_, 1.0);
+    mean.pairs /= std::max(counted_, 1.0);
+    for (const PassTotal& p : trainer.pass_totals()) {
+        const double ms = p.ms / std::max<double>(1.0, double(trainer.timed_iterations()));
+        Json pass{{"name", p.name}, {"ms", ms}};
+        if (const auto work = pass_work(p.name, mean))
+            pass["roofline"] = roofline_share(*work, rates_, ms);
+        passes.push_back(std::move(pass));
+    }
     Json evaluations = Json::array();
     for (const Json& e : events_)
         if (e.value("event", "") == "evaluation") evaluations.push_back(e);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/render/roofline.h"
 #include "trainer/report/report.h"
 #include "trainer/run.h"
 
@@ -26,10 +27,12 @@ class RunLog {
     /// Forgets events after an iteration: a resumed run writes them again.
     void cut_after(int iteration);
 
-    void start(const Device& device, const Dataset& dataset, const TrainOptions& options,
+    void start(Device& device, const Dataset& dataset, const TrainOptions& options,
                std::uint32_t splats);
-    /// Keeps one line in kLogInterval. counters: of the run so far.
-    void iteration(const IterationResult& result, const TrainCounters& counters, double seconds);
+    /// Keeps one line in kLogInterval. counters: of the run so far; totals: of the passes, as Trainer
+    /// sums them.
+    void iteration(const IterationResult& result, const TrainCounters& counters, double seconds,
+                   const std::vector<PassTotal>& totals);
     /// What ended the run before its time.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);
@@ -48,6 +51,10 @@ class RunLog {
     std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
     double loss_sum_ = 0, psnr_sum_ = 0;
     int summed_ = 0;
+    FrameCounts counts_;  // sums over counted_ iterations
+    double counted_ = 0;
+    std::vector<PassTotal> written_;  // totals at the last line
+    DeviceRates rates_;
     nlohmann::json start_;
 };
 

@@ -19,7 +19,7 @@ ForwardOptions forward_options(const TrainOptions& options) {
     ForwardOptions f;
     f.kernel = options.kernel;
     f.footprint = options.footprint;
-    f.evaluation = options.evaluation;
+    set_options(options.accuracy, f);
     f.sh_stored = options.sh_degree;
     f.store_for_backward = true;
     return f;

@@ -9,10 +9,13 @@ ForwardOptions forward_options(const SplatModel& model, const WalkSettings& sett
     options.kernel = model.kernel;
     options.footprint = model.footprint;
     options.evaluation = settings.evaluation;
+    options.polynomial_degree = settings.polynomial_degree;
+    options.storage = settings.storage;
+    options.depth_order = settings.depth_order;
     options.alpha_cutoff = settings.alpha_cutoff;
     options.transmittance_stop = settings.transmittance_stop;
     options.sh_stored = model.sh_degree;
-    options.store_for_backward = true;
+    options.store_for_backward = settings.depth_order != DEPTH_ORDER_PIXEL;
     return options;
 }
 

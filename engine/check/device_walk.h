@@ -20,6 +20,9 @@ struct DeviceWalk {
 
 struct WalkSettings {
     int evaluation = EVALUATION_POLYNOMIAL;
+    int polynomial_degree = 5;
+    int storage = STORAGE_FLOAT32;
+    int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};

@@ -239,6 +239,12 @@ void add_variable(const Module& module, std::uint32_t id, ShaderInterface& out) 
     }
     if (const auto name = module.names.find(id); name != module.names.end())
         binding.name = name->second;
+    for (ShaderInterface::Binding& twin : out.bindings) {  // two views of one buffer
+        if (twin.set != binding.set || twin.binding != binding.binding) continue;
+        twin.reads |= binding.reads;
+        twin.writes |= binding.writes;
+        return;
+    }
     out.bindings.push_back(std::move(binding));
 }
 

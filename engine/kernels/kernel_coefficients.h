@@ -74,7 +74,8 @@ void evaluate_gaussian(const KernelCoefficients& k, Real q, Real& w, Real& slope
     Real p, dp;
     evaluate_polynomial(k, y - n, p, dp);
     w = std::ldexp(p, static_cast<int>(n));
-    slope = Real(-0.5) * w;
+    slope = k.degree < 5 ? Real(-0.72134752044448170368) * std::ldexp(dp, static_cast<int>(n))
+                         : Real(-0.5) * w;
 }
 
 template <class Real>

@@ -19,6 +19,7 @@ struct Sample {
     T weight = 0;  // w(q)
     T alpha = 0;
     bool clamped = false;  // alpha is ALPHA_MAX
+    size_t entry = 0;      // in the tile's list
 };
 
 /// False where the splat is skipped.
@@ -70,17 +71,44 @@ T walk_pixel(std::span<const ProjectedSplat<T>> list, int x, int y, const Kernel
              const RenderSettings& settings, const Blend& blend) {
     const T cutoff = T(settings.alpha_cutoff), stop = T(settings.transmittance_stop);
     T transmittance = 1;
+    const auto goes_on = [&](const Sample<T>& sample) {
+        const T next = transmittance * (1 - sample.alpha);
+        if (next < stop) {
+            return false;
+        }
+        blend(sample.entry, sample, transmittance);
+        transmittance = next;
+        return true;
+    };
+    const bool resort = settings.depth_order == DEPTH_ORDER_PIXEL;
+    std::vector<std::pair<T, Sample<T>>> by_depth;  // held back where they are resorted
     Sample<T> sample;
     for (size_t k = 0; k < list.size(); ++k) {
         if (!sample_splat(list[k], T(x) + T(0.5), T(y) + T(0.5), kernel, cutoff, sample)) {
             continue;
         }
-        const T next = transmittance * (1 - sample.alpha);
-        if (next < stop) {
+        sample.entry = k;
+        if (resort) {
+            const T depth = list[k].depth - glm::dot(list[k].depth_slope, {sample.u, sample.v});
+            const auto place =
+                std::upper_bound(by_depth.begin(), by_depth.end(), depth,
+                                 [](T d, const auto& held) { return d < held.first; });
+            by_depth.insert(place, {depth, sample});
+            if (settings.depth_window > 0 && by_depth.size() > settings.depth_window) {
+                const Sample<T> nearest = by_depth.front().second;
+                by_depth.erase(by_depth.begin());
+                if (!goes_on(nearest)) {
+                    return transmittance;
+                }
+            }
+        } else if (!goes_on(sample)) {
             break;
         }
-        blend(k, sample, transmittance);
-        transmittance = next;
+    }
+    for (const auto& one : by_depth) {
+        if (!goes_on(one.second)) {
+            break;
+        }
     }
     return transmittance;
 }

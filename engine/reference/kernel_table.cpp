@@ -58,11 +58,14 @@ std::vector<double> fit(const Function& f) {
 
 }  // namespace
 
-KernelTable::KernelTable(int kernel, Footprint footprint)
-    : exact_(footprint == Footprint::exact),
+KernelTable::KernelTable(int kernel, Footprint footprint, int polynomial_degree)
+    : polynomial_(polynomial_degree == 0
+                      ? nullptr
+                      : &kernel_coefficients(kernel, footprint, polynomial_degree)),
+      exact_(footprint == Footprint::exact),
       support_(kernel_support(kernel)),
       covariance_scale_(darb::covariance_scale(kernel, footprint)) {
-    if (!std::isfinite(support_)) {
+    if (!std::isfinite(support_) || polynomial_ != nullptr) {
         return;
     }
     const auto q_of = [this](double x) {
@@ -86,6 +89,11 @@ double KernelTable::evaluate(const std::vector<double>& table, double x) const {
 }
 
 double KernelTable::value(double q) const {
+    if (polynomial_ != nullptr) {
+        double w, slope;
+        darb::evaluate(*polynomial_, q, w, slope);
+        return w;
+    }
     if (value_table_.empty()) {
         return std::exp(-0.5 * q);
     }
@@ -94,6 +102,11 @@ double KernelTable::value(double q) const {
 }
 
 double KernelTable::slope(double q) const {
+    if (polynomial_ != nullptr) {
+        double w, slope;
+        darb::evaluate(*polynomial_, q, w, slope);
+        return slope;
+    }
     if (slope_table_.empty()) {
         return -0.5 * std::exp(-0.5 * q);
     }
@@ -109,8 +122,9 @@ double KernelTable::reach(double opacity, double cutoff) const {
     if (!(opacity >= cutoff)) {
         return 0.0;
     }
-    if (value_table_.empty()) {
-        return -2 * std::log(cutoff / opacity);
+    if (!std::isfinite(support_)) {
+        // A short polynomial is up to a percent off; blending tests every sample again.
+        return -2 * std::log(cutoff / opacity) + (polynomial_ != nullptr ? 0.05 : 0.0);
     }
     double low = 0, high = support_;
     while (high - low > 1e-14 * support_) {
@@ -120,17 +134,21 @@ double KernelTable::reach(double opacity, double cutoff) const {
     return high;
 }
 
-const KernelTable& kernel_table(int kernel, Footprint footprint) {
+const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_degree) {
     DARB_CHECK(kernel >= 0 && kernel < KERNEL_COUNT, "kernel = {}", kernel);
+    DARB_CHECK(polynomial_degree >= 0 && polynomial_degree <= kFullDegree, "degree = {}",
+               polynomial_degree);
     struct Slot {
         std::once_flag once;
         std::unique_ptr<const KernelTable> table;
     };
     // A cache of constants, so no state: each entry is built once and never changes.
-    static std::array<Slot, KERNEL_COUNT * 2> slots;
-    Slot& slot = slots[kernel * 2 + (footprint == Footprint::exact ? 1 : 0)];
-    std::call_once(slot.once,
-                   [&] { slot.table = std::make_unique<const KernelTable>(kernel, footprint); });
+    static std::array<Slot, KERNEL_COUNT * 2 * (kFullDegree + 1)> slots;
+    const int row = kernel * 2 + (footprint == Footprint::exact ? 1 : 0);
+    Slot& slot = slots[row * (kFullDegree + 1) + polynomial_degree];
+    std::call_once(slot.once, [&] {
+        slot.table = std::make_unique<const KernelTable>(kernel, footprint, polynomial_degree);
+    });
     return *slot.table;
 }
 

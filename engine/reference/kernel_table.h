@@ -6,13 +6,16 @@
 
 #include <vector>
 
+#include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/kernel_family.h"
 
 namespace darb::reference {
 
 class KernelTable {
   public:
-    KernelTable(int kernel, Footprint footprint);
+    /// polynomial_degree: 0, or the degree of the shaders' polynomial that takes the profile's
+    /// place.
+    KernelTable(int kernel, Footprint footprint, int polynomial_degree = 0);
 
     /// As kernel_value and kernel_slope, to 1e-12 absolute; q >= 0.
     double value(double q) const;
@@ -24,14 +27,15 @@ class KernelTable {
   private:
     double evaluate(const std::vector<double>& table, double x) const;
 
-    bool exact_;      // tabled in s, else in q / R^2
-    double support_;  // R^2
+    const KernelCoefficients* polynomial_ = nullptr;  // takes the place of the tables
+    bool exact_;                                      // tabled in s, else in q / R^2
+    double support_;                                  // R^2
     double covariance_scale_;
     std::vector<double> value_table_;  // [kPieces][kTerms] monomials in [-1, 1]; empty: gaussian
     std::vector<double> slope_table_;  // of the slope; of slope * s, finite at the edge, if exact_
 };
 
 /// The table of a kernel and footprint, built on first use and kept; safe from several threads.
-const KernelTable& kernel_table(int kernel, Footprint footprint);
+const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_degree = 0);
 
 }  // namespace darb::reference

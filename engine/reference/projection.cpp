@@ -142,7 +142,29 @@ Vec3<T> colour_backward(const Splats<T>& splats, size_t index, int degree, const
     return (d_direction - view.direction * glm::dot(view.direction, d_direction)) / view.distance;
 }
 
+/// What device storage in half precision makes of a projected splat; see lib/covariance.glsl.
+template <class T>
+void round_storage(ProjectedSplat<T>& p) {
+    constexpr double kLeast = 6.103515625e-05;  // the smallest half with all its bits
+    const auto rounded = [](T x) { return static_cast<T>(round_to_half(static_cast<double>(x))); };
+    p.l11 = std::max(rounded(p.l11), T(kLeast));
+    p.l21 = rounded(p.l21);
+    p.l22 = std::max(rounded(p.l22), T(kLeast));
+    p.cov_yy = 1 / (p.l22 * p.l22);
+    p.cov_xy = -p.l21 * p.cov_yy / p.l11;
+    p.cov_xx = (p.l21 * p.l21 + p.l22 * p.l22) * p.cov_yy / (p.l11 * p.l11);
+    for (int c = 0; c < 3; ++c) {
+        p.colour[c] = rounded(p.colour[c]);
+    }
+}
+
 }  // namespace
+
+double round_to_half(double x) {
+    int exponent = 0;
+    const double mantissa = std::frexp(x, &exponent);
+    return std::ldexp(std::nearbyint(std::ldexp(mantissa, 11)), exponent - 11);
+}
 
 std::string_view cull_name(Cull cull) {
     constexpr std::string_view kNames[kCullCount] = {
@@ -180,6 +202,10 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
         covariance_terms(mean, rotation, &splats.log_scale[index * 3], camera, settings.low_pass,
                          kernel.covariance_scale());
     p.opacity = sigmoid_of_clamped(splats.opacity[index]) * antialias_factor(splats, terms);
+    const bool half = settings.storage == STORAGE_FLOAT16;
+    if (half) {
+        p.opacity = static_cast<T>(round_to_half(static_cast<double>(p.opacity)));
+    }
     if (!(p.opacity >= T(settings.alpha_cutoff))) {
         p.cull = Cull::opacity;
         return p;
@@ -197,11 +223,18 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     p.l11 = std::sqrt(p.cov_yy / terms.det);
     p.l21 = -p.cov_xy / (std::sqrt(p.cov_yy) * std::sqrt(terms.det));
     p.l22 = 1 / std::sqrt(p.cov_yy);
+    const Vec3<T> r3 =
+        terms.root * (Vec3<T>(0, 0, 1) * view_rotation<T>(camera) * rotation.matrix) * terms.scale;
+    const T c1 = glm::dot(r3, terms.r1), c2 = glm::dot(r3, terms.r2);
+    p.depth_slope = {p.l11 * c1 + p.l21 * c2, p.l22 * c2};
     p.reach = T(kernel.reach(static_cast<double>(p.opacity), settings.alpha_cutoff));
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     p.colour = colour_of(splats, index, active_degree(splats, settings), view.direction);
     if (!std::isfinite(p.colour.x + p.colour.y + p.colour.z)) {
         p.cull = Cull::colour;
+    }
+    if (half) {
+        round_storage(p);
     }
     return p;
 }

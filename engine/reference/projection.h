@@ -28,7 +28,13 @@ struct ProjectedSplat {
     T opacity = 0;      // (0, 1), with the antialiasing factor where the model asks for it
     T reach = 0;        // q from which alpha is below the cut-off
     Vec3<T> colour{0};  // >= 0
+    /// The splat's depth at a pixel is depth - depth_slope . (u, v) in the mean, (u, v) the offset
+    /// whitened by the factor.
+    Vec2<T> depth_slope{0};
 };
+
+/// The nearest half-precision number, ties to even, of a value that a half has with all its bits.
+double round_to_half(double x);
 
 /// dL/d(each rendered quantity of a splat); zero for culled splats.
 template <class T>

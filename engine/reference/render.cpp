@@ -47,13 +47,14 @@ template <class T>
 BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
                             const RenderSettings& settings) {
     check_shapes(splats, camera);
-    const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
+    const KernelTable& kernel =
+        kernel_table(splats.kernel, splats.footprint, settings.polynomial_degree);
     BasicRenderResult<T> result;
     result.projected.resize(splats.size());
     for_each_splat(splats.size(), settings.threads, [&](size_t i) {
         result.projected[i] = project(splats, i, camera, settings, kernel);
     });
-    result.tiles = make_tile_lists(camera.width, camera.height, result.projected);
+    result.tiles = make_tile_lists(camera.width, camera.height, result.projected, settings);
     for (const ProjectedSplat<T>& splat : result.projected) {
         ++result.culled[static_cast<size_t>(splat.cull)];
     }
@@ -77,7 +78,8 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     DARB_CHECK(
         d_alpha.data.empty() || (d_alpha.width == camera.width && d_alpha.height == camera.height),
         "{}x{}", d_alpha.width, d_alpha.height);
-    const KernelTable& kernel = kernel_table(splats.kernel, splats.footprint);
+    const KernelTable& kernel =
+        kernel_table(splats.kernel, splats.footprint, settings.polynomial_degree);
     const TileLists& tiles = result.tiles;
     // Every pair has a slot of its own and the sums run in list order, so that the result does not
     // depend on the threads.

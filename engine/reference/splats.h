@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/scene/splat_model.h"
+#include "shaders/shared/accuracy_list.h"
 #include "shaders/shared/limits.h"
 
 namespace darb::reference {
@@ -56,8 +57,14 @@ struct RenderSettings {
     double alpha_cutoff = ALPHA_CUTOFF_DEFAULT;
     double transmittance_stop = TRANSMITTANCE_STOP;
     double background[3] = {0, 0, 0};
-    int sh_degree = 3;  // active degree; the model's own where that is lower
-    int threads = 0;    // 0: one per core. The result does not depend on it.
+    // The accuracy settings, as the device has them; the defaults are the truth.
+    int polynomial_degree = 0;      // of the kernel, see KernelTable; 0: the profile itself
+    int storage = STORAGE_FLOAT32;  // STORAGE_FLOAT16 rounds what the device stores as halves, and
+                                    // takes the rounding as the identity on the way back
+    int depth_order = DEPTH_ORDER_CENTRE;
+    size_t depth_window = 0;  // of DEPTH_ORDER_PIXEL; 0: a full sort at every pixel
+    int sh_degree = 3;        // active degree; the model's own where that is lower
+    int threads = 0;          // 0: one per core. The result does not depend on it.
 };
 
 }  // namespace darb::reference

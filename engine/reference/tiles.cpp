@@ -1,6 +1,7 @@
 #include "engine/reference/tiles.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -17,6 +18,13 @@ T q_at(const ProjectedSplat<T>& s, T dx, T dy) {
     const T u = s.l11 * dx + s.l21 * dy;
     const T v = s.l22 * dy;
     return u * u + v * v;
+}
+
+/// The device's key of a depth, see shaders/lib/depth.glsl.
+std::uint32_t depth_key_16(float depth, float near_z) {
+    const std::uint32_t above =
+        std::bit_cast<std::uint32_t>(depth) - std::bit_cast<std::uint32_t>(near_z);
+    return std::min(above >> DEPTH_KEY_SHIFT, (1U << DEPTH_KEY_BITS) - 1);
 }
 
 struct TileRange {
@@ -57,16 +65,22 @@ void for_each_tile(const ProjectedSplat<T>& s, int width, int height, int tiles_
 }  // namespace
 
 template <class T>
-std::vector<std::uint32_t> depth_order(const std::vector<ProjectedSplat<T>>& splats) {
+std::vector<std::uint32_t> depth_order(const std::vector<ProjectedSplat<T>>& splats,
+                                       const RenderSettings& settings) {
+    const auto key = [&](std::uint32_t i) {
+        return settings.depth_order == DEPTH_ORDER_CENTRE16
+                   ? T(depth_key_16(static_cast<float>(splats[i].depth),
+                                    static_cast<float>(settings.near_z)))
+                   : splats[i].depth;
+    };
     std::vector<std::uint32_t> order;
     for (size_t i = 0; i < splats.size(); ++i) {
         if (splats[i].cull == Cull::none) {
             order.push_back(static_cast<std::uint32_t>(i));
         }
     }
-    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-        return splats[a].depth < splats[b].depth;
-    });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
     return order;
 }
 
@@ -93,7 +107,8 @@ T smallest_q(const ProjectedSplat<T>& s, int x0, int y0, int x1, int y1) {
 }
 
 template <class T>
-TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>& splats) {
+TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>& splats,
+                          const RenderSettings& settings) {
     TileLists lists;
     lists.tiles_x = (width + kTileSize - 1) / kTileSize;
     lists.tiles_y = (height + kTileSize - 1) / kTileSize;
@@ -102,7 +117,7 @@ TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>&
     };
     std::vector<Pair> pairs;
     lists.begin.assign(lists.tile_count() + 1, 0);
-    for (const std::uint32_t i : depth_order(splats)) {
+    for (const std::uint32_t i : depth_order(splats, settings)) {
         const size_t before = pairs.size();
         for_each_tile(splats[i], width, height, lists.tiles_x, lists.tiles_y, [&](size_t tile) {
             pairs.push_back({static_cast<std::uint32_t>(tile), i});
@@ -123,10 +138,12 @@ TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>&
     return lists;
 }
 
-#define DARB_INSTANTIATE(T)                                                                 \
-    template std::vector<std::uint32_t> depth_order(const std::vector<ProjectedSplat<T>>&); \
-    template T smallest_q(const ProjectedSplat<T>&, int, int, int, int);                    \
-    template TileLists make_tile_lists(int, int, std::vector<ProjectedSplat<T>>&);
+#define DARB_INSTANTIATE(T)                                                                \
+    template std::vector<std::uint32_t> depth_order(const std::vector<ProjectedSplat<T>>&, \
+                                                    const RenderSettings&);                \
+    template T smallest_q(const ProjectedSplat<T>&, int, int, int, int);                   \
+    template TileLists make_tile_lists(int, int, std::vector<ProjectedSplat<T>>&,          \
+                                       const RenderSettings&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 

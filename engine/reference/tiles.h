@@ -19,9 +19,11 @@ struct TileLists {
     size_t pair_count() const { return splats.size(); }
 };
 
-/// Indices of the splats that are not culled, by camera z; equal depths keep index order.
+/// Indices of the splats that are not culled, by camera z, or by its 16-bit key; equal depths keep
+/// index order.
 template <class T>
-std::vector<std::uint32_t> depth_order(const std::vector<ProjectedSplat<T>>& splats);
+std::vector<std::uint32_t> depth_order(const std::vector<ProjectedSplat<T>>& splats,
+                                       const RenderSettings& settings = {});
 
 /// The smallest q of the pixel centres in [x0, x1) x [y0, y1), as a real-valued lower bound (the
 /// minimum over the box that the centres span); 0 when the mean lies in it.
@@ -31,6 +33,7 @@ T smallest_q(const ProjectedSplat<T>& splat, int x0, int y0, int x1, int y1);
 /// A splat is listed in every tile with a pixel centre box that its ellipse q < reach touches.
 /// Splats that touch none are marked Cull::outside.
 template <class T>
-TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>& splats);
+TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>& splats,
+                          const RenderSettings& settings = {});
 
 }  // namespace darb::reference

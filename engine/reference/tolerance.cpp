@@ -41,6 +41,15 @@ constexpr Tolerance kTable[] = {
     {"difference_float32", 5e-3, 5e-3, 0, 1 - 1e-5, 3e-3,
      "for compare_scaled: central differences of float32 images, h = 2^-6: truncation h^2 f''' / 6 "
      "= 4e-5 f''', large for a short quaternion, and rounding 1e-6 / 2h = 3e-5"},
+    {"image_half", 5e-4, 2e-3, 0.01, 1 - 1e-5, 2e-3,
+     "halves rounded the same way on both sides; where float32 lands on the other side of a tie, a "
+     "value moves by 2^-11 of itself"},
+    {"gradient_scaled_half", 2e-3, 1e-2, 0.01, 1 - 1e-4, 1e-2,
+     "for compare_scaled; as image_half, and the device takes the sums of q's factor by moments of "
+     "the rounded factor, which is 2^-11 of them"},
+    {"image_resorted", 2e-5, 2e-5, 0.01, 1 - 1e-4, 1e-2,
+     "as image_float32; the slope of the depth is stored as two halves, so that two splats cross "
+     "up to a pixel off"},
     {"loss_float32", 1e-6, 1e-5, 0, 1 - 1e-8, 1e-5,
      "SSIM's variances cancel: 11x11 sums of squares"},
     {"loss_gradient_float32", 1e-9, 1e-3, 0.001, 1 - 1e-7, 1e-4,

@@ -26,8 +26,12 @@ int bits_for(std::uint32_t count) {
 }  // namespace
 
 SpecConstants kernel_constants(const ForwardOptions& options) {
-    return kernel_constants(options.kernel, options.footprint, options.evaluation,
-                            options.polynomial_degree, options.alpha_cutoff);
+    SpecConstants constants =
+        kernel_constants(options.kernel, options.footprint, options.evaluation,
+                         options.polynomial_degree, options.alpha_cutoff);
+    constants["STORAGE"] = options.storage;
+    constants["DEPTH_ORDER"] = options.depth_order;
+    return constants;
 }
 
 gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, float near_plane) {
@@ -67,12 +71,16 @@ std::uint32_t blend_subgroup(const Device& device) {
 
 Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
+    DARB_CHECK(!options.store_for_backward || options.depth_order != DEPTH_ORDER_PIXEL,
+               "a resorted pixel cannot be walked back");
     const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
-    compact_ = Pipeline(device, "compact", per_item);
+    SpecConstants of_splat = kernel_constants(options);
+    of_splat["THREADS"] = SPLAT_GROUP;
+    compact_ = Pipeline(device, "compact", of_splat);
     gather_counts_ = Pipeline(device, "gather_counts", per_item);
     groups_visible_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 0}}, false);
     groups_pairs_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 1}}, false);
-    emit_ = Pipeline(device, "emit", per_item);
+    emit_ = Pipeline(device, "emit", of_splat);
     tile_ranges_ = Pipeline(device, "tile_ranges", per_item);
     list_lengths_ = Pipeline(device, "list_lengths", per_item);
     make_blend(1);
@@ -144,7 +152,7 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
     if (splats > splat_capacity_ || splat_capacity_ == 0) {
         const std::uint64_t n = splat_capacity_ = std::max(splats, kMinCapacity);
         splat_shape_ = Buffer(d, "splat shape", n * 16);
-        splat_light_ = Buffer(d, "splat light", n * 16);
+        splat_light_ = Buffer(d, "splat light", n * (options_.storage == STORAGE_FLOAT16 ? 8 : 16));
         splat_bound_ = Buffer(d, "splat bound", n * 16);
         cover_ = Buffer(d, "tile cover", n * 16);
         for (auto [buffer, name] : {std::pair{&pair_count_, "pair count"},
@@ -204,7 +212,7 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
                            splat_light_, splat_bound_, cover_, pair_count_, visible_, status_},
                           g.x, g.y);
     }
-    record_depth_order(commands, n);
+    record_depth_order(commands, n, data.near_plane);
     record_pairs(commands, data, n);
     record_blend(commands, data, background);
 }
@@ -223,8 +231,8 @@ void Forward::record_blend(Commands& commands, const gpu::CameraData& data,
     }
 }
 
-void Forward::record_depth_order(Commands& commands, std::uint32_t n) {
-    const gpu::SplatArgs args{n};
+void Forward::record_depth_order(Commands& commands, std::uint32_t n, float near_plane) {
+    const gpu::CompactArgs args{n, near_plane};
     const gpu::PairArgs pair_args{pair_capacity_, 0, 0, 0};
     const Groups g = groups_for(n);
     commands.pass("compact");
@@ -236,7 +244,8 @@ void Forward::record_depth_order(Commands& commands, std::uint32_t n) {
                       {visible_, visible_offset_, splat_bound_, depth_key_, depth_order_}, g.x,
                       g.y);
     commands.pass("depth sort");
-    depth_sort_->record(commands, depth_key_, depth_order_, visible_in_use_, 0, 32);
+    const int key_bits = options_.depth_order == DEPTH_ORDER_CENTRE16 ? DEPTH_KEY_BITS : 32;
+    depth_sort_->record(commands, depth_key_, depth_order_, visible_in_use_, 0, key_bits);
 }
 
 void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t n) {

@@ -16,6 +16,7 @@
 #include "engine/render/radix_sort.h"
 #include "engine/render/scan.h"
 #include "engine/scene/camera.h"
+#include "shaders/shared/accuracy_list.h"
 #include "shaders/shared/limits.h"
 #include "shaders/shared/render_args.h"
 
@@ -29,11 +30,13 @@ struct ForwardOptions {
     int polynomial_degree = 5;
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
-    int sh_stored = 0;  // degree of the buffers
+    int storage = STORAGE_FLOAT32;         // of projected splats
+    int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
+    int sh_stored = 0;                     // degree of the buffers
     bool store_for_backward = false;
 };
 
-/// The kernel's constants for these options, which every pass that evaluates the kernel needs.
+/// The constants of these options that several passes share: kernel, storage and depth order.
 SpecConstants kernel_constants(const ForwardOptions& options);
 
 /// A camera as the shaders read it. origin: SplatModel::origin, taken out of the pose in double.
@@ -94,7 +97,7 @@ class Forward {
 
   private:
     Pipeline& project_pipeline(int sh_degree);
-    void record_depth_order(Commands& commands, std::uint32_t splat_count);
+    void record_depth_order(Commands& commands, std::uint32_t splat_count, float near_plane);
     void record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t splat_count);
     void record_blend(Commands& commands, const gpu::CameraData& data, const glm::vec3& background);
     void make_blend(std::uint32_t segments);

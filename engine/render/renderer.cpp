@@ -1,17 +1,37 @@
 #include "engine/render/renderer.h"
 
+#include <algorithm>
+
+#include "engine/render/groups.h"
+
 namespace darb {
 
 namespace {
 
-ForwardOptions options_for(const SplatModel& model, ForwardOptions options) {
+FrameAccuracy accuracy_for(const SplatModel& model, const Accuracy& accuracy,
+                           ForwardOptions options) {
+    FrameAccuracy frame = frame_accuracy(accuracy, model);
+    set_options(accuracy, options);
     options.kernel = model.kernel;
-    options.footprint = model.footprint;
+    options.footprint = frame.footprint;
     options.sh_stored = model.sh_degree;
-    return options;
+    frame.options = options;
+    return frame;
 }
 
 }  // namespace
+
+Camera halved(const Camera& camera) {
+    Camera small = camera;
+    small.width = (camera.width + 1) / 2;
+    small.height = (camera.height + 1) / 2;
+    const double x = double(small.width) / camera.width, y = double(small.height) / camera.height;
+    small.fx *= x;
+    small.cx *= x;
+    small.fy *= y;
+    small.cy *= y;
+    return small;
+}
 
 ImageF planes_to_image(const std::vector<float>& planes, int width, int height) {
     ImageF image(width, height, 3);
@@ -21,30 +41,50 @@ ImageF planes_to_image(const std::vector<float>& planes, int width, int height) 
     return image;
 }
 
-Renderer::Renderer(Device& device, const SplatModel& model, ForwardOptions options)
+Renderer::Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy,
+                   ForwardOptions options)
     : device_(&device),
+      accuracy_(accuracy_for(model, accuracy, options)),
       splats_(device, model, false),
-      forward_(device, options_for(model, options)),
-      commands_(device) {}
+      forward_(device, accuracy_.options),
+      commands_(device) {
+    if (accuracy_.halved) upsample_ = Pipeline(device, "upsample", {{"THREADS", SPLAT_GROUP}});
+}
+
+const Buffer& Renderer::record_upsample(const Camera& rendered, const Camera& shown) {
+    const std::uint64_t pixels = std::uint64_t(shown.width) * shown.height;
+    if (!upsampled_ || upsampled_.bytes() < pixels * 12)
+        upsampled_ = Buffer(*device_, "upsampled image", pixels * 12);
+    const gpu::UpsampleArgs args{
+        static_cast<std::uint32_t>(rendered.width), static_cast<std::uint32_t>(rendered.height),
+        static_cast<std::uint32_t>(shown.width), static_cast<std::uint32_t>(shown.height)};
+    const Groups g = groups_for(pixels);
+    commands_.pass("upsample");
+    commands_.dispatch(upsample_, args, {forward_.image(), upsampled_}, g.x, g.y);
+    return upsampled_;
+}
 
 ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int sh_degree,
                         float near_plane) {
-    const gpu::CameraData data = camera_data(camera, splats_.origin(), near_plane);
+    const Camera rendered = accuracy_.halved ? halved(camera) : camera;
+    const gpu::CameraData data = camera_data(rendered, splats_.origin(), near_plane);
     const Buffer cameras = upload_cameras(*device_, {data});
     const int degree =
-        sh_degree < 0 ? splats_.sh_degree() : std::min(sh_degree, splats_.sh_degree());
+        sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
     const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
-    forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
+    forward_.reserve(splats_.count(), pairs, rendered.width, rendered.height);
+    const Buffer* image = nullptr;
     for (;;) {
         commands_.begin();
         forward_.record(commands_, splats_, cameras, 0, data, degree, background);
+        image = accuracy_.halved ? &record_upsample(rendered, camera) : &forward_.image();
         commands_.submit_and_wait();
         status_ = forward_.read_status();
         if (!forward_.make_room(status_)) break;
     }
     pass_times_ = commands_.pass_times();
     const size_t floats = size_t(camera.width) * camera.height * 3;
-    return planes_to_image(forward_.image().download<float>(floats), camera.width, camera.height);
+    return planes_to_image(image->download<float>(floats), camera.width, camera.height);
 }
 
 }  // namespace darb

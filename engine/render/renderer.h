@@ -1,18 +1,20 @@
-// Renderer: one model on one device, pictures of it for any camera.
+// Renderer: one model on one device, pictures of it for any camera, at a chosen accuracy.
 #pragma once
 
 #include "engine/core/image.h"
+#include "engine/render/accuracy.h"
 #include "engine/render/forward.h"
 
 namespace darb {
 
 class Renderer {
   public:
-    /// Uploads the model. options.kernel, footprint and sh_stored are taken from it.
-    Renderer(Device& device, const SplatModel& model, ForwardOptions options = {});
+    /// Uploads the model. options holds what neither the model nor the accuracy decides.
+    Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {},
+             ForwardOptions options = {});
 
-    /// RGB, not clamped. sh_degree -1: all of the model's. Grows its buffers and repeats the frame
-    /// when it has more splat-tile pairs than before.
+    /// RGB, not clamped. sh_degree -1: all that the accuracy allows. Grows its buffers and repeats
+    /// the frame when it has more splat-tile pairs than before.
     ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
                   int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
 
@@ -21,13 +23,21 @@ class Renderer {
     const std::vector<PassTime>& pass_times() const { return pass_times_; }
 
   private:
+    const Buffer& record_upsample(const Camera& rendered, const Camera& shown);
+
     Device* device_;
+    FrameAccuracy accuracy_;
     GpuSplats splats_;
     Forward forward_;
+    Pipeline upsample_;  // where the resolution is halved
+    Buffer upsampled_;   // float [3][H][W]
     Commands commands_;
     gpu::FrameStatus status_{};
     std::vector<PassTime> pass_times_;
 };
+
+/// The same view with half the pixels each way, rounded up.
+Camera halved(const Camera& camera);
 
 /// float [3][H][W] planes to an interleaved image.
 ImageF planes_to_image(const std::vector<float>& planes, int width, int height);

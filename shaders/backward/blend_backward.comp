@@ -27,9 +27,6 @@ layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer PairOrder { uint pair_order[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer SplatShape { vec4 splat_shape[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer SplatLight { vec4 splat_light[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer LastPair { uint last_pair[]; };
@@ -37,6 +34,10 @@ layout(set = 0, binding = 9, scalar) buffer Partials { float partials[]; };     
 layout(set = 0, binding = 10, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
 layout(set = 0, binding = 11, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
 
+#define SHAPE_BINDING 3
+#define LIGHT_BINDING 4
+#define BOUND_BINDING 5
+#include "lib/projected.glsl"
 #include "lib/block.glsl"
 #include "lib/reduce.glsl"
 
@@ -114,9 +115,8 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
             const uint splat = hit_pair[at];
             number = hit_index[at] + 1u;
             slot = pair_order[number - 1u];
-            shape = splat_shape[splat];
-            light = splat_light[splat];
-            l22 = splat_bound[splat].x;
+            shape = load_shape(splat, l22);
+            light = load_light(splat);
         }
         uint lane = size;
         do {  // not a for: some drivers run the body once more behind a mask

@@ -27,14 +27,16 @@ layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer PairOrder { uint pair_order[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer SplatShape { vec4 splat_shape[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer SplatLight { vec4 splat_light[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
 layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W]
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) buffer LastPair { uint last_pair[]; };
 
+#define SHAPE_BINDING 3
+#define LIGHT_BINDING 4
+#define BOUND_BINDING 5
+#include "lib/projected.glsl"
 #include "lib/block.glsl"
+#include "lib/window.glsl"
 
 struct Pixels {
     float transmittance[PIXELS];  // negative once the pixel has ended
@@ -42,19 +44,35 @@ struct Pixels {
     uint last[PIXELS];  // 1 + the last pair looked at while it was alive; 0: none
 };
 
+vec3 load_depth(uint splat) {  // z and its slope
+    const vec4 bound = splat_bound[splat];
+    return vec3(bound.z, unpackHalf2x16(floatBitsToUint(bound.w)));
+}
+
+void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, uint number) {
+    const float before = px.transmittance[k];
+    const float wanted = alpha * before;
+    const float next = before - wanted;
+    const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
+    px.colour[k] += (goes_on ? wanted : 0.0) * colour;
+    px.transmittance[k] = goes_on ? next : -abs(before);
+    if (STORE_FOR_BACKWARD == 1) px.last[k] = goes_on ? number : px.last[k];
+}
+
 // One splat on all pixels of the thread. d: mean - centre of the thread's first pixel.
-void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number) {
+void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number, vec3 depth) {
     for (uint k = 0u; k < PIXELS; ++k) {
         const vec2 to_mean = d - vec2(slot_offset(k));
         const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
-        const float alpha = min(light.w * kernel_value(x * x + y * y), ALPHA_MAX);
-        const float before = px.transmittance[k];
-        const float wanted = (alpha >= ALPHA_CUTOFF ? alpha : 0.0) * before;
-        const float next = before - wanted;
-        const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
-        px.colour[k] += (goes_on ? wanted : 0.0) * light.rgb;
-        px.transmittance[k] = goes_on ? next : -abs(before);
-        if (STORE_FOR_BACKWARD == 1) px.last[k] = goes_on ? number : px.last[k];
+        const float raw = min(light.w * kernel_value(x * x + y * y), ALPHA_MAX);
+        const float alpha = raw >= ALPHA_CUTOFF ? raw : 0.0;
+        if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) {
+            const float z = alpha > 0.0 ? depth.x - depth.y * x - depth.z * y : NO_DEPTH;
+            const vec4 nearest = exchange_nearest(k, z, vec4(light.rgb, alpha));
+            blend_sample(px, k, nearest.a, nearest.rgb, number);
+        } else {
+            blend_sample(px, k, alpha, light.rgb, number);
+        }
     }
 }
 
@@ -64,21 +82,24 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
     for (uint batch = 0u; batch < count; batch += SUBGROUP_SIZE) {
         const uint mine = batch + gl_SubgroupInvocationID;
         vec4 shape = vec4(0.0), light = vec4(0.0);
+        vec3 depth = vec3(0.0);
         float l22 = 0.0;
         uint number = 0u;
         if (mine < count) {
             const uint splat = hit_pair[hits_base() + mine];
             number = hit_index[hits_base() + mine] + 1u;
-            shape = splat_shape[splat];
-            light = splat_light[splat];
-            l22 = splat_bound[splat].x;
+            shape = load_shape(splat, l22);
+            light = load_light(splat);
+            if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) depth = load_depth(splat);
         }
         const uint end = min(SUBGROUP_SIZE, count - batch);
         uint lane = 0u;
         do {  // not a for: some drivers run the body once more behind a mask
             const vec4 s = subgroupBroadcast(shape, lane);
+            vec3 z = vec3(0.0);
+            if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) z = subgroupBroadcast(depth, lane);
             blend_splat(px, s.xy - centre, s, subgroupBroadcast(light, lane),
-                        subgroupBroadcast(l22, lane), subgroupBroadcast(number, lane));
+                        subgroupBroadcast(l22, lane), subgroupBroadcast(number, lane), z);
         } while (++lane < end);
         alive = px.transmittance[0];
         for (uint k = 1u; k < PIXELS; ++k) alive = max(alive, px.transmittance[k]);
@@ -133,11 +154,19 @@ void main() {
         px.transmittance[k] = at.x < args.width && at.y < args.height ? 1.0 : -1.0;
         px.colour[k] = vec3(0.0);
         px.last[k] = 0u;
+        if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) clear_window(k);
     }
     if (SEGMENT > 0u && args.segment > 0u) load(px, first);
     for (uint chunk = range.x; chunk < range.y; chunk += CHUNK) {
         const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bit);
         if (!blend_hits(px, centre, count)) break;
+    }
+    if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) {
+        for (uint k = 0u; k < PIXELS; ++k)
+            for (uint i = 0u; i < WINDOW; ++i) {
+                const vec4 light = window_light[i * PIXELS + k];
+                blend_sample(px, k, light.a, light.rgb, 0u);
+            }
     }
     store(px, first);
 }

@@ -10,9 +10,10 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
 
+#include "lib/depth.glsl"
 #include "lib/linear_id.glsl"
 
-layout(push_constant, scalar) uniform Push { SplatArgs args; };
+layout(push_constant, scalar) uniform Push { CompactArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Visible { uint visible[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer VisibleOffset { uint visible_offset[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
@@ -23,6 +24,6 @@ void main() {
     const uint i = linear_id();
     if (i >= args.splat_count || visible[i] == 0u) return;
     const uint slot = visible_offset[i];
-    depth_key[slot] = floatBitsToUint(splat_bound[i].z);  // positive floats sort as their bits
+    depth_key[slot] = sort_key(splat_bound[i].z, args.near_plane);
     depth_order[slot] = i;
 }

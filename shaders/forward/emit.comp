@@ -21,8 +21,9 @@ layout(set = 0, binding = 3, scalar) readonly buffer Cover { uvec4 cover[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer PairTile { uint pair_tile[]; };
 layout(set = 0, binding = 5, scalar) writeonly buffer PairSplat { uint pair_splat[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer PairBegin { uint pair_begin[]; };  // by splat
-layout(set = 0, binding = 7, scalar) readonly buffer SplatShape { vec4 splat_shape[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
+#define SHAPE_BINDING 7
+#define BOUND_BINDING 8
+#include "lib/projected.glsl"
 
 struct Ellipse {
     vec4 shape;  // mean, l11, l21
@@ -61,7 +62,9 @@ void main() {
     if (rank >= status.visible) return;
     const uint splat = depth_order[rank];
     const TileCover c = unpack_cover(cover[splat]);
-    const Ellipse e = Ellipse(splat_shape[splat], splat_bound[splat].xy);
+    Ellipse e;
+    e.shape = load_shape(splat, e.bound.x);
+    e.bound.y = splat_bound[splat].y;
     uint slot = pair_offset[rank];
     pair_begin[splat] = slot;
     // Offsets only grow, unless their sum left 32 bits.

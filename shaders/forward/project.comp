@@ -18,6 +18,7 @@ layout(constant_id = 2) const int SH_STORED = 0;   // degree of the buffer's lay
 #include "lib/sh.glsl"
 #include "lib/covariance.glsl"
 #include "lib/tile.glsl"
+#include "lib/depth.glsl"
 
 layout(push_constant, scalar) uniform Push { ProjectArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
@@ -28,8 +29,10 @@ layout(set = 0, binding = 4, scalar) readonly buffer Opacity { float opacity_log
 layout(set = 0, binding = 5, scalar) readonly buffer ShDc { vec3 sh_dc[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer ShRest { float sh_rest[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer SplatShape { vec4 splat_shape[]; };  // mean, l11, l21
+layout(set = 0, binding = 7, scalar) writeonly buffer SplatShapeHalf { uvec4 splat_shape_half[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer SplatLight { vec4 splat_light[]; };  // rgb, opacity
-layout(set = 0, binding = 9, scalar) writeonly buffer SplatBound { vec4 splat_bound[]; };  // l22, reach, depth, 0
+layout(set = 0, binding = 8, scalar) writeonly buffer SplatLightHalf { uvec2 splat_light_half[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer SplatBound { vec4 splat_bound[]; };  // l22, reach, depth, slope
 layout(set = 0, binding = 10, scalar) writeonly buffer Cover { uvec4 cover[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer PairCount { uint pair_count[]; };
 layout(set = 0, binding = 12, scalar) writeonly buffer Visible { uint visible[]; };
@@ -48,6 +51,26 @@ vec3 splat_colour(uint i, vec3 direction) {
         }
     }
     return mix(colour, vec3(0.0), lessThan(colour, vec3(0.0)));  // keeps NaN, which max may drop
+}
+
+// Given the image position, a splat's depth has the mean z - slope . (x, y), (x, y) the whitened offset of blend.comp:
+// slope = L c, c the covariance of depth and image position; r3: the row of M for the depth. As two halves.
+float depth_slope(Factor f, vec3 r1, vec3 r2, vec3 r3) {
+    const vec2 c = vec2(dot(r3, r1), dot(r3, r2));
+    const float x = f.l11 * c.x + f.l21 * c.y, y = f.l22 * c.y;
+    return uintBitsToFloat(packHalf2x16(vec2(round_half(x), round_half(y))));
+}
+
+void store_splat(uint i, vec2 mean, Factor f, vec3 colour, float opacity) {
+    if (STORAGE == STORAGE_FLOAT32) {
+        splat_shape[i] = vec4(mean, f.l11, f.l21);
+        splat_light[i] = vec4(colour, opacity);
+    } else {
+        splat_shape_half[i] = uvec4(floatBitsToUint(mean), packHalf2x16(vec2(f.l11, f.l21)),
+                                    packHalf2x16(vec2(f.l22, 0.0)));
+        splat_light_half[i] = uvec2(packHalf2x16(vec2(round_half(colour.r), round_half(colour.g))),
+                                    packHalf2x16(vec2(round_half(colour.b), opacity)));
+    }
 }
 
 // The number of tiles; the cover is empty when the ellipse misses the image.
@@ -91,8 +114,9 @@ uint project(uint i, out int reason) {
 
     reason = CULL_OPACITY;
     const float logit = opacity_logit[i];
-    const float opacity =
+    float opacity =
         1.0 / (1.0 + exp(-clamp(logit, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT)));
+    if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);
     const float reach = kernel_reach(opacity);
     if (!(reach > 0.0) || isnan(logit)) return 0u;
 
@@ -121,9 +145,10 @@ uint project(uint i, out int reason) {
     const vec3 colour = splat_colour(i, normalize(p_world - camera.centre));
     if (!all(lessThan(colour, vec3(1e30)))) return 0u;
 
-    splat_shape[i] = vec4(mean, f.l11, f.l21);
-    splat_light[i] = vec4(colour, opacity);
-    splat_bound[i] = vec4(f.l22, reach, p.z, 0.0);
+    float slope = 0.0;
+    if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) slope = depth_slope(f, r1, r2, (camera.row2 * axes) * s);
+    store_splat(i, mean, f, colour, opacity);
+    splat_bound[i] = vec4(f.l22, reach, p.z, slope);
     cover[i] = pack_cover(c);
     return count;
 }

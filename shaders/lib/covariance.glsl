@@ -35,11 +35,23 @@ vec3 to_world(CameraData camera, vec3 v) {
     return camera.row0 * v.x + camera.row1 * v.y + camera.row2 * v.z;
 }
 
+#include "lib/half.glsl"
+
 struct Factor {
     float l11, l21, l22;
     float a, c;           // the diagonal of S'
     float determinant;
 };
+
+// The factor as it is stored in half precision, and the diagonal of the covariance that belongs to it. Splats wider
+// than 16,000 px end there.
+void round_factor(inout Factor f) {
+    f.l11 = max(round_half(f.l11), HALF_LEAST);
+    f.l21 = round_half(f.l21);
+    f.l22 = max(round_half(f.l22), HALF_LEAST);
+    f.c = 1.0 / (f.l22 * f.l22);
+    f.a = (f.l21 * f.l21 + f.l22 * f.l22) * f.c / (f.l11 * f.l11);
+}
 
 // r1, r2: rows of M. The determinant in product form has no cancellation.
 Factor cholesky_factor(vec3 r1, vec3 r2, float low_pass) {
@@ -52,5 +64,6 @@ Factor cholesky_factor(vec3 r1, vec3 r2, float low_pass) {
     f.l11 = sqrt(f.c / f.determinant);
     f.l22 = inversesqrt(f.c);
     f.l21 = -b * f.l22 * inversesqrt(f.determinant);
+    if (STORAGE == STORAGE_FLOAT16) round_factor(f);
     return f;
 }

@@ -79,7 +79,12 @@ struct ProjectArgs {
     float low_pass;  // px^2, added to the diagonal of the projected covariance
 };
 
-struct SplatArgs {     // compact, gather_counts
+struct CompactArgs {
+    uint splat_count;  // N
+    float near_plane;  // world units along z: where the 16-bit depth keys begin
+};
+
+struct SplatArgs {     // gather_counts
     uint splat_count;  // N
 };
 
@@ -97,6 +102,11 @@ struct BlendArgs {
     float background_r, background_g, background_b;
     uint segment;   // of every list that this dispatch works off, where SEGMENT > 0
     uint segments;  // in all
+};
+
+struct UpsampleArgs {
+    uint small_width, small_height;  // px, of the image that was rendered
+    uint width, height;              // px, of the result
 };
 
 #ifdef __cplusplus

@@ -36,7 +36,11 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"train" + out, "no data set"},
                     {train + "--sh_degree 4", "--sh-degree"},
                     {train + "--kernel no_such", "no such kernel"},
-                    {train + "--footprint no_such", "psi or exact"},
+                    {train + "--footprint no_such", "psi, exact"},
+                    {train + "--accuracy high", "fast, balanced or exact"},
+                    {train + "--alpha-cutoff 1/2", "1/255, 1/1024, 1/64"},
+                    {train + "--depth-order pixel", "no backward pass"},
+                    {train + "--render-scale 1/2", "-r 2"},
                     {train + "--strategy no_such", "no such strategy"},
                     {"eval", "scene"},
                     {"eval a.ply b --split no_such", "--split"},
@@ -68,7 +72,7 @@ TEST(Command, features_that_are_not_there_say_so) {
     std::vector<BadCommand> commands;
     for (const char* option :
          {"--strategy mcmc", "--strategy=budget", "--antialiasing", "--effects all",
-          "--accuracy high", "--exposure_lr_init 0.01", "-d depths", "--depths depths", "--view"})
+          "--exposure_lr_init 0.01", "-d depths", "--depths depths", "--view"})
         commands.push_back({train + option, "not part of this version"});
     expect_refused(commands);
 }

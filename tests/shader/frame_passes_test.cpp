@@ -41,7 +41,7 @@ TEST(Compact, visible_splats_keep_their_order) {
         const GuardedBuffer flags(device, "visible", visible), offsets(device, "offset", offset),
             bounds(device, "bound", bound), key(device, "key", keys.size() * 4),
             splat(device, "order", order.size() * 4);
-        run("compact", gpu::SplatArgs{n}, {flags, offsets, bounds, key, splat}, n);
+        run("compact", gpu::CompactArgs{n, 0.2f}, {flags, offsets, bounds, key, splat}, n);
         EXPECT_EQ(key.read<std::uint32_t>(), keys) << n;
         EXPECT_EQ(splat.read<std::uint32_t>(), order) << n;
         EXPECT_TRUE(key.intact() && splat.intact()) << n;

@@ -10,6 +10,7 @@
 #include "engine/core/files.h"
 #include "engine/data/dataset.h"
 #include "engine/render/renderer.h"
+#include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/scene_file.h"
 #include "trainer/evaluation.h"
@@ -23,6 +24,7 @@ struct EvalFlags {
     std::string split = "test", device;
     bool white_background = false;
     DatasetOptions data;
+    AccuracyFlags accuracy;
 };
 
 std::vector<View> views_of(const Dataset& dataset, const EvalFlags& flags) {
@@ -58,6 +60,7 @@ void print_table(const Evaluation& evaluation) {
 }
 
 int eval(EvalFlags flags) {
+    const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
     const SplatModel model = load_scene_to_render(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
@@ -65,7 +68,7 @@ int eval(EvalFlags flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    Renderer renderer(device, model);
+    Renderer renderer(device, model, accuracy);
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     Evaluation evaluation;
     for (const View& view : views)
@@ -105,6 +108,7 @@ void add_eval(CLI::App& app, Action& action) {
                         "as in training: 1, 2, 4, 8 or a width in px");
     command->add_flag("-w,--white-background", flags->white_background,
                       "white behind alpha, not black");
+    add_accuracy_flags(*command, flags->accuracy);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     command->callback([flags, &action] { action = [flags] { return eval(*flags); }; });
 }

@@ -12,6 +12,7 @@
 #include "engine/data/camera_list.h"
 #include "engine/data/image_io.h"
 #include "engine/render/renderer.h"
+#include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/scene_file.h"
 #include "trainer/evaluation.h"
@@ -24,9 +25,9 @@ struct RenderFlags {
     std::filesystem::path scene, cameras, output;
     std::string device;
     bool white_background = false;
-    int sh_degree = -1;
     float near_plane = static_cast<float>(NEAR_DEFAULT);
     DatasetOptions data;
+    AccuracyFlags accuracy;
 };
 
 // The view's name without its extension and folders; "_2", "_3" where it was there before.
@@ -66,6 +67,7 @@ double median(std::vector<double> values) {
 }
 
 int render(const RenderFlags& flags) {
+    const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const SplatModel model = load_scene_to_render(flags.scene);
     std::vector<View> views = load_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
@@ -74,14 +76,13 @@ int render(const RenderFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    Renderer renderer(device, model);
+    Renderer renderer(device, model, accuracy);
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     std::set<std::string> used;
     std::vector<double> frame_ms;
     for (const View& view : views) {
         const auto start = std::chrono::steady_clock::now();
-        const ImageF image =
-            renderer.render(view.camera, background, flags.sh_degree, flags.near_plane);
+        const ImageF image = renderer.render(view.camera, background, -1, flags.near_plane);
         const std::chrono::duration<double, std::milli> ms =
             std::chrono::steady_clock::now() - start;
         frame_ms.push_back(ms.count());
@@ -108,13 +109,10 @@ void add_render(CLI::App& app, Action& action) {
     command->add_option("-r,--resolution", flags->data.resolution,
                         "1, 2, 4, 8: divide the cameras' size; above 8: width in px");
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
-    command
-        ->add_option("--sh-degree", flags->sh_degree,
-                     "highest degree of view-dependent colour (default: all the scene has)")
-        ->check(CLI::Range(0, 3));
     command->add_option("--near", flags->near_plane, "nearest distance drawn, world units")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
+    add_accuracy_flags(*command, flags->accuracy);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     command->callback([flags, &action] { action = [flags] { return render(*flags); }; });
 }

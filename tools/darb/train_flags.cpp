@@ -100,13 +100,7 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
             "gaussian, raised_cosine, half_cosine_squared, sinc, inverse_quadratic, cosine, "
             "squared_raised_cosine, inverse_multiquadric, parabolic")
         ->capture_default_str();
-    command
-        .add_option("--footprint", f.footprint,
-                    "psi: the paper's; exact: the kernel's true projection")
-        ->capture_default_str();
-    command.add_option("--evaluation", f.evaluation, "polynomial, or builtin sin, cos and exp")
-        ->capture_default_str()
-        ->check(CLI::IsMember({"polynomial", "builtin"}));
+    add_accuracy_flags(command, f.accuracy, true);
     command.add_option("--strategy", f.strategy, "how the splats grow: adc, as 3DGS")
         ->capture_default_str();
     command.add_option("--seed", f.train.seed)->capture_default_str();
@@ -117,7 +111,6 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
                      "accepted: every run on one device already repeats bit by bit");
     add_missing(command, "--antialiasing", "anti-aliasing");
     add_missing(command, "--effects", "the effect plan");
-    add_missing(command, "--accuracy", "the choice of accuracy");
     add_missing(command, "--exposure-lr-init", "per-photo exposure");
     add_missing(command, "--depths,-d", "depth supervision");
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "engine/data/dataset.h"
+#include "tools/darb/accuracy_flags.h"
 #include "trainer/options.h"
 #include "trainer/run.h"
 
@@ -19,7 +20,8 @@ struct TrainFlags {
     bool sequential = false;
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
-    std::string kernel = "gaussian", footprint = "psi", evaluation = "polynomial", strategy = "adc";
+    std::string kernel = "gaussian", strategy = "adc";
+    AccuracyFlags accuracy;
     DatasetOptions data;
     TrainOptions train;
     RunOptions run;

@@ -23,13 +23,11 @@ void finish_train_flags(TrainFlags& f) {
     if (!kernel)
         throw Error("--kernel " + f.kernel, "no such kernel",
                     "See `darb train --help` for the nine names.");
-    const auto footprint = footprint_from_name(f.footprint);
-    if (!footprint)
-        throw Error("--footprint " + f.footprint, "no such footprint", "Use psi or exact.");
     check_strategy(f.strategy);
     f.train.kernel = *kernel;
-    f.train.footprint = *footprint;
-    f.train.evaluation = f.evaluation == "builtin" ? EVALUATION_BUILTIN : EVALUATION_POLYNOMIAL;
+    f.train.accuracy = chosen_accuracy(f.accuracy, true);
+    f.train.footprint =
+        f.train.accuracy.value(kFootprint) == FOOTPRINT_EXACT ? Footprint::exact : Footprint::psi;
     f.train.sh_rest_lr = f.train.sh_dc_lr / 20.0f;
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())

@@ -6,41 +6,14 @@
 #include <cmath>
 
 #include "engine/core/files.h"
+#include "engine/data/image_io.h"
 #include "trainer/report/html.h"
+#include "trainer/report/page.h"
 #include "trainer/report/svg_plot.h"
 
 namespace darb {
 
 namespace {
-
-constexpr const char* kStyle = R"css(
-:root{--ink:#1c1f24;--soft:#667080;--line:#dfe3e8;--page:#fff;--card:#f6f7f9;--s0:#2563b0;--s1:#d0571b}
-@media screen and (prefers-color-scheme:dark){:root{--ink:#e6e8eb;--soft:#98a2b0;--line:#333a44;
---page:#14171b;--card:#1d2127;--s0:#6ea8f0;--s1:#f0935a}}
-*{box-sizing:border-box}
-body{margin:0 auto;max-width:1080px;padding:2rem 1.25rem 4rem;background:var(--page);color:var(--ink);
-font:15px/1.5 system-ui,sans-serif}
-h1{font-size:1.5rem;margin:0;overflow-wrap:anywhere}h2{font-size:1.05rem;margin:2.2rem 0 .7rem}
-p{margin:.3rem 0}.soft{color:var(--soft)}
-.cards{display:flex;flex-wrap:wrap;gap:.7rem;margin-top:1.2rem}
-.cards div{background:var(--card);border-radius:8px;padding:.6rem .9rem;min-width:7.5rem;flex:1}
-.cards b{display:block;font-size:1.3rem;font-variant-numeric:tabular-nums}
-.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:1rem}
-svg{width:100%;height:auto;background:var(--card);border-radius:8px;break-inside:avoid}
-svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .name{font-weight:600;font-size:13px}
-svg .tick,svg .label{fill:var(--soft);font-size:11px}
-.grid{stroke:var(--line)}.axis{stroke:var(--soft);fill:none}.line{fill:none;stroke-width:1.8;stroke-linejoin:round}
-.line.s0{stroke:var(--s0)}.line.s1{stroke:var(--s1)}circle.s0{fill:var(--s0)}circle.s1{fill:var(--s1)}
-.wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
-th,td{text-align:right;padding:.22rem .9rem .22rem 0;border-bottom:1px solid var(--line);white-space:nowrap}
-th{color:var(--soft);font-weight:500}th:first-child,td:first-child,td.text{text-align:left}
-td.text{white-space:normal;overflow-wrap:anywhere}
-td.bar{width:14rem;padding-right:0}td.bar i{display:block;height:.7em;border-radius:3px;background:var(--s0);
--webkit-print-color-adjust:exact;print-color-adjust:exact}
-figure{margin:0 0 1.2rem;break-inside:avoid}figure img{width:100%;display:block;border-radius:6px;image-rendering:auto}
-figcaption{display:flex;justify-content:space-between;color:var(--soft);margin-bottom:.25rem;gap:1rem}
-.parts{display:grid;grid-template-columns:repeat(3,1fr);color:var(--soft);font-size:.85rem}
-)css";
 
 struct TimeUnit {
     const char* label;
@@ -84,6 +57,19 @@ std::string plots_against(const ReportData& data, const std::string& x_label, X&
     return svg_plot(quality) + svg_plot(loss);
 }
 
+// Milliseconds of each pass, on top of one another, over training time.
+std::string pass_stack(const ReportData& data, const TimeUnit& unit) {
+    StackPlot stack{"Time an iteration, by pass", unit.label, "ms an iteration", {}, {}, {}};
+    for (const ReportPass& pass : data.passes) stack.names.push_back(pass.name);
+    stack.layers.resize(data.passes.size());
+    for (const ReportSample& s : data.samples) {
+        if (s.pass_ms.size() != data.passes.size() || s.pass_ms.empty()) continue;
+        stack.x.push_back(s.seconds / unit.seconds);
+        for (size_t p = 0; p < s.pass_ms.size(); ++p) stack.layers[p].push_back(s.pass_ms[p]);
+    }
+    return svg_stack(stack);
+}
+
 std::string plots(const ReportData& data) {
     const TimeUnit unit = time_unit(longest_seconds(data));
     const auto iteration = [](const auto& row) { return row.iteration; };
@@ -97,30 +83,26 @@ std::string plots(const ReportData& data) {
     Plot ssim{"SSIM, held-out photos", "iterations", "SSIM", {}};
     ssim.series = {series_of(
         "SSIM", data.evaluations, iteration, [](const auto& e) { return e.ssim; }, true)};
-    html += svg_plot(splats) + svg_plot(ssim);
+    html += svg_plot(splats) + svg_plot(ssim) + pass_stack(data, unit);
     return html.empty() ? "" : "<h2>Curves</h2><div class='plots'>" + html + "</div>\n";
-}
-
-std::string card(const std::string& value, const std::string& name) {
-    return fmt::format("<div><b>{}</b><span class='soft'>{}</span></div>", html_escape(value),
-                       html_escape(name));
 }
 
 std::string cards(const ReportData& data) {
     std::string html;
     if (!data.evaluations.empty()) {
         const ReportEvaluation& last = data.evaluations.back();
-        html += card(format_number(last.psnr_db, 2) + " dB", "PSNR, held out");
-        html += card(format_number(last.ssim, 4), "SSIM, held out");
+        html += html_card(format_number(last.psnr_db, 2) + " dB", "PSNR, held out");
+        html += html_card(format_number(last.ssim, 4), "SSIM, held out");
     }
     if (!data.samples.empty()) {
         const ReportSample& last = data.samples.back();
-        html += card(format_number(last.splats), "splats");
-        html += card(format_number(last.iteration), "iterations");
-        html += card(format_number(last.seconds, last.seconds < 100 ? 1 : 0) + " s", "training");
+        html += html_card(format_number(last.splats), "splats");
+        html += html_card(format_number(last.iteration), "iterations");
+        html +=
+            html_card(format_number(last.seconds, last.seconds < 100 ? 1 : 0) + " s", "training");
         if (last.iteration > 0)
-            html +=
-                card(format_number(1e3 * last.seconds / last.iteration, 1) + " ms", "an iteration");
+            html += html_card(format_number(1e3 * last.seconds / last.iteration, 1) + " ms",
+                              "an iteration");
     }
     return html.empty() ? "" : "<div class='cards'>" + html + "</div>\n";
 }
@@ -147,7 +129,7 @@ std::string pass_table(const ReportData& data) {
         rooflines |= pass.roofline.has_value();
     }
     if (!(total > 0)) return {};
-    const char* head = rooflines ? "<th>of the memory roofline</th>" : "";
+    const char* head = rooflines ? "<th>of the roofline</th>" : "";
     std::string html = fmt::format(
         "<h2>Time an iteration</h2><div class='wide'><table><tr><th>pass</th><th>ms</th>"
         "<th>share</th>{}<th></th></tr>\n",
@@ -156,11 +138,12 @@ std::string pass_table(const ReportData& data) {
         const std::string share =
             pass.roofline ? format_number(100 * *pass.roofline, 1) + " %" : "";
         html += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{} %</td>{}<td class='bar'><i "
+            "<tr><td>{}</td><td>{}</td><td>{} %</td>{}<td class='bar'><i class='s{}' "
             "style='width:{:.1f}%'></i></td></tr>\n",
             html_escape(pass.name), format_number(pass.ms, 3),
             format_number(100 * pass.ms / total, 1),
-            rooflines ? "<td>" + share + "</td>" : std::string(), 100 * pass.ms / largest);
+            rooflines ? "<td>" + share + "</td>" : std::string(), &pass - data.passes.data(),
+            100 * pass.ms / largest);
     }
     return html +
            fmt::format("<tr><td>together</td><td>{}</td><td></td>{}<td></td></tr>",
@@ -171,14 +154,20 @@ std::string pass_table(const ReportData& data) {
 std::string pictures(const ReportData& data) {
     std::string html;
     for (const ReportPicture& picture : data.pictures) {
+        const ImageInfo info = read_image_info(picture.file);
+        const std::string name = html_escape(picture.name);
         html += fmt::format(
-            "<figure><figcaption><span>{}</span><span>{} dB, SSIM {}</span></figcaption>"
-            "<img alt='photo, render and error of {}' src='data:image/png;base64,{}'>"
-            "<div class='parts'><span>photo</span><span>render</span><span>{}</span></div>"
-            "</figure>\n",
-            html_escape(picture.name), format_number(picture.psnr_db, 2),
-            format_number(picture.ssim, 4), html_escape(picture.name),
-            base64(read_file(picture.file)), html_escape(data.error_caption));
+            "<figure style='--r:{}/{};--x:50%;--p:url(data:image/png;base64,{})'>"
+            "<figcaption><span>{}</span><span>{} dB, SSIM {}</span></figcaption>"
+            "<div class='pair'><div class='pane photo' role='img' aria-label='photo of {}'>"
+            "<div class='pane render' role='img' aria-label='render of {}'></div></div>"
+            "<div class='pane error' role='img' aria-label='error of {}'></div></div>"
+            "<div class='parts'><label>render left, photo right <input type='range' min='0' "
+            "max='100' value='50' oninput='this.closest(\"figure\").style.setProperty(\"--x\","
+            "this.value+\"%\")'/></label><span>{}</span></div></figure>\n",
+            info.width / 3, info.height, base64(read_file(picture.file)), name,
+            format_number(picture.psnr_db, 2), format_number(picture.ssim, 4), name, name, name,
+            html_escape(data.error_caption));
     }
     return html.empty() ? "" : "<h2>Held-out pictures</h2>\n" + html;
 }
@@ -200,16 +189,9 @@ std::string notes(const ReportData& data) {
 }  // namespace
 
 std::string report_html(const ReportData& data) {
-    std::string html = "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>\n";
-    html += "<meta name='viewport' content='width=device-width,initial-scale=1'>\n";
-    html += "<meta name='color-scheme' content='light dark'>\n";
-    html += fmt::format("<title>{}</title>\n<style>{}</style></head><body>\n",
-                        html_escape(data.title), kStyle);
-    html += fmt::format("<h1>{}</h1>\n<p class='soft'>{}</p>\n", html_escape(data.title),
-                        html_escape(data.device));
-    html += cards(data) + plots(data) + pictures(data) + evaluation_table(data) + pass_table(data) +
-            settings(data) + notes(data);
-    return html + "</body></html>\n";
+    return html_page(data.title, data.device,
+                     cards(data) + plots(data) + pictures(data) + evaluation_table(data) +
+                         pass_table(data) + settings(data) + notes(data));
 }
 
 void write_report(const std::filesystem::path& path, const ReportData& data) {

@@ -17,6 +17,7 @@ struct ReportSample {  // a point of the training curves, averaged or not
     double loss = 0;
     double psnr_db = 0;  // of the training batch
     std::uint32_t splats = 0;
+    std::vector<double> pass_ms = {};  // per iteration, by ReportData::passes; may be empty
 };
 
 struct ReportEvaluation {  // means over the held-out views
@@ -30,7 +31,7 @@ struct ReportEvaluation {  // means over the held-out views
 struct ReportPass {
     std::string name;
     double ms = 0;                   // per iteration
-    std::optional<double> roofline;  // share of the device's memory bandwidth, 0 to 1
+    std::optional<double> roofline;  // share of what the device can do, 0 to 1
 };
 
 struct ReportPicture {
@@ -47,7 +48,7 @@ struct ReportData {
     std::vector<ReportPass> passes;             // in the order they run
     std::vector<std::pair<std::string, std::string>> settings;
     std::vector<ReportPicture> pictures;
-    std::string error_caption = "error x 4";  // of the pictures' third part
+    std::string error_caption = "error x 4";  // of the third part of the pictures
     std::vector<std::string> notes;           // a sentence each
 };
 

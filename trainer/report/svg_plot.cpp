@@ -4,89 +4,31 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "trainer/report/html.h"
+#include "trainer/report/svg_axes.h"
 
 namespace darb {
 
 namespace {
 
-// Of the view box, in user units; CSS scales the whole.
-constexpr double kWidth = 480, kHeight = 260;
-constexpr double kLeft = 58, kRight = 20, kTop = 30, kBottom = 44;
 constexpr std::size_t kMaxPoints = 600;  // a curve; more cannot be told apart at this size
 
-struct Axis {
-    double low = std::numeric_limits<double>::infinity();
-    double high = -std::numeric_limits<double>::infinity();
-    double from = 0, to = 1;  // where low and high lie in the picture
-    bool log = false;
-
-    bool takes(double v) const { return std::isfinite(v) && (!log || v > 0); }
-    double scaled(double v) const { return log ? std::log10(v) : v; }
-    void include(double v) {
-        low = std::min(low, scaled(v));
-        high = std::max(high, scaled(v));
-    }
-    bool empty() const { return low > high; }
-    void widen() {
-        if (high - low < 1e-9 * std::max(1.0, std::abs(low))) {
-            const double half = std::max(0.5, 0.05 * std::abs(low));
-            low -= half;
-            high += half;
-        }
-    }
-    double place(double v) const { return from + (scaled(v) - low) / (high - low) * (to - from); }
-};
-
-std::vector<double> ticks_of(const Axis& axis) {
-    if (!axis.log) return round_ticks(axis.low, axis.high);
-    std::vector<double> ticks;
-    for (int e = static_cast<int>(std::floor(axis.low)); e <= axis.high; ++e)
-        for (const double m : {1.0, 2.0, 5.0}) {
-            const double log = std::log10(m) + e;
-            if (log >= axis.low && log <= axis.high) ticks.push_back(m * std::pow(10, e));
-        }
-    if (ticks.size() >= 2) return ticks;
-    return round_ticks(std::pow(10, axis.low), std::pow(10, axis.high));
-}
-
-std::string tick_text(double v) {
-    if (std::abs(v) >= 1e6) return fmt::format("{:g}M", v / 1e6);
-    if (std::abs(v) >= 1e4) return fmt::format("{:g}k", v / 1e3);
-    return fmt::format("{:.6g}", std::abs(v) < 1e-12 ? 0.0 : v);
-}
-
-std::string draw_axes(const Plot& plot, const Axis& x, const Axis& y) {
-    std::string svg;
-    for (const double v : ticks_of(y)) {
-        svg +=
-            fmt::format("<path class='grid' d='M{:.1f} {:.1f}H{:.1f}'/>", x.from, y.place(v), x.to);
-        svg += fmt::format("<text class='tick' text-anchor='end' x='{:.1f}' y='{:.1f}'>{}</text>",
-                           x.from - 6, y.place(v) + 4, tick_text(v));
-    }
-    for (const double v : ticks_of(x)) {
-        svg +=
-            fmt::format("<path class='grid' d='M{:.1f} {:.1f}V{:.1f}'/>", x.place(v), y.from, y.to);
-        svg +=
-            fmt::format("<text class='tick' text-anchor='middle' x='{:.1f}' y='{:.1f}'>{}</text>",
-                        x.place(v), y.from + 16, tick_text(v));
-    }
-    svg += fmt::format("<path class='axis' d='M{:.1f} {:.1f}V{:.1f}H{:.1f}'/>", x.from, y.to,
-                       y.from, x.to);
-    svg += fmt::format("<text class='label' text-anchor='middle' x='{:.1f}' y='{:.1f}'>{}</text>",
-                       (x.from + x.to) / 2, kHeight - 8, html_escape(plot.x_label));
-    svg += fmt::format(
-        "<text class='label' text-anchor='middle' transform='translate(13 {:.1f}) rotate(-90)'>"
-        "{}</text>",
-        (y.from + y.to) / 2, html_escape(plot.y_label));
-    return svg;
+std::string draw_dot(const PlotSeries& series, std::size_t index, std::size_t point, const Axis& x,
+                     const Axis& y) {
+    const auto& [px, py] = series.points[point];
+    const std::string title = point < series.titles.size()
+                                  ? series.titles[point]
+                                  : fmt::format("{}: {:.6g}, {:.6g}", series.name, px, py);
+    return fmt::format(
+        "<circle class='s{}' cx='{:.1f}' cy='{:.1f}' r='3.5'><title>{}</title></circle>", index,
+        x.place(px), y.place(py), html_escape(title));
 }
 
 std::string draw_series(const PlotSeries& series, std::size_t index, const Axis& x, const Axis& y) {
     std::string path, dots;
-    const std::size_t stride = (series.points.size() + kMaxPoints - 1) / kMaxPoints;
+    const std::size_t stride =
+        series.line ? (series.points.size() + kMaxPoints - 1) / kMaxPoints : 1;
     bool pen_down = false;
     for (std::size_t i = 0; i < series.points.size(); ++i) {
         const auto& [px, py] = series.points[i];
@@ -96,29 +38,13 @@ std::string draw_series(const PlotSeries& series, std::size_t index, const Axis&
             pen_down = false;
             continue;
         }
+        if (series.stairs && pen_down) path += fmt::format("H{:.1f}", x.place(px));
         path += fmt::format("{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', x.place(px), y.place(py));
         pen_down = true;
-        if (series.dots)
-            dots += fmt::format(
-                "<circle class='s{}' cx='{:.1f}' cy='{:.1f}' r='3.5'><title>{}: {:.6g}, {:.6g}"
-                "</title></circle>",
-                index, x.place(px), y.place(py), html_escape(series.name), px, py);
+        if (series.dots) dots += draw_dot(series, index, i, x, y);
     }
-    return path.empty() ? "" : fmt::format("<path class='line s{}' d='{}'/>{}", index, path, dots);
-}
-
-std::string draw_legend(const Plot& plot) {
-    if (plot.series.size() < 2) return {};
-    std::string svg;
-    double right = kWidth - kRight;
-    for (std::size_t i = plot.series.size(); i-- > 0;) {
-        svg += fmt::format("<text class='tick' text-anchor='end' x='{:.1f}' y='18'>{}</text>",
-                           right, html_escape(plot.series[i].name));
-        right -= 6.2 * static_cast<double>(plot.series[i].name.size()) + 8;
-        svg += fmt::format("<path class='line s{}' d='M{:.1f} 14h-14'/>", i, right);
-        right -= 26;
-    }
-    return svg;
+    if (!series.line || path.empty()) return dots;
+    return fmt::format("<path class='line s{}' d='{}'/>{}", index, path, dots);
 }
 
 }  // namespace
@@ -139,6 +65,7 @@ std::vector<double> round_ticks(double low, double high) {
 
 std::string svg_plot(const Plot& plot) {
     Axis x, y;
+    x.log = plot.log_x;
     y.log = plot.log_y;
     for (const PlotSeries& series : plot.series)
         for (const auto& [px, py] : series.points)
@@ -147,25 +74,72 @@ std::string svg_plot(const Plot& plot) {
                 y.include(py);
             }
     if (x.empty()) return {};
-    x.include(0);
+    const bool from_zero = plot.x_from_zero && !plot.log_x;
+    if (from_zero) x.include(0);
     if (plot.from_zero && !plot.log_y) y.include(0);
     x.widen();
     y.widen();
     const double margin = 0.04 * (y.high - y.low);
     if (!(plot.from_zero && y.low == 0)) y.low -= margin;
     y.high += margin;
-    x.from = kLeft;
-    x.to = kWidth - kRight;
-    y.from = kHeight - kBottom;
-    y.to = kTop;
-    std::string svg = fmt::format(
-        "<svg viewBox='0 0 {} {}' role='img' aria-label='{}'>"
-        "<text class='name' x='{}' y='18'>{}</text>",
-        kWidth, kHeight, html_escape(plot.title), kLeft, html_escape(plot.title));
-    svg += draw_axes(plot, x, y);
-    for (std::size_t i = 0; i < plot.series.size(); ++i)
+    if (!from_zero) {
+        const double beside = 0.04 * (x.high - x.low);
+        x.low -= beside;
+        x.high += beside;
+    }
+    x.from = kPlotLeft;
+    x.to = kPlotWidth - kPlotRight;
+    y.from = kPlotHeight - kPlotBottom;
+    y.to = kPlotTop;
+    std::string svg = open_plot(plot.title) + draw_axes(plot.x_label, plot.y_label, x, y);
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < plot.series.size(); ++i) {
         svg += draw_series(plot.series[i], i, x, y);
-    return svg + draw_legend(plot) + "</svg>\n";
+        names.push_back(plot.series[i].name);
+    }
+    return svg + draw_legend(names) + "</svg>\n";
+}
+
+std::string svg_stack(const StackPlot& plot) {
+    Axis x, y;
+    std::vector<double> top(plot.x.size(), 0.0);
+    for (const std::vector<double>& layer : plot.layers)
+        for (std::size_t i = 0; i < top.size(); ++i) top[i] += layer[i];
+    for (std::size_t i = 0; i < top.size(); ++i) {
+        x.include(plot.x[i]);
+        y.include(top[i]);
+    }
+    if (x.empty() || plot.layers.empty()) return {};
+    x.include(0);
+    y.include(0);
+    x.widen();
+    y.widen();
+    x.from = kPlotLeft;
+    x.to = kPlotWidth - kPlotRight;
+    y.from = kPlotHeight - kPlotBottom;
+    y.to = kPlotTop + 12;  // room for a second line of names
+    std::string svg = open_plot(plot.title) + draw_axes(plot.x_label, plot.y_label, x, y);
+    std::vector<double> base(plot.x.size(), 0.0);
+    const std::size_t stride = (plot.x.size() + kMaxPoints - 1) / kMaxPoints;
+    for (std::size_t l = 0; l < plot.layers.size(); ++l) {
+        std::string there, back;
+        double sum = 0;
+        for (std::size_t i = 0; i < plot.x.size(); i += stride) {
+            const double above = base[i] + plot.layers[l][i];
+            there += fmt::format("{}{:.1f} {:.1f}", there.empty() ? 'M' : 'L', x.place(plot.x[i]),
+                                 y.place(above));
+            back.insert(0, fmt::format("L{:.1f} {:.1f}", x.place(plot.x[i]), y.place(base[i])));
+        }
+        for (std::size_t i = 0; i < plot.x.size(); ++i) {
+            base[i] += plot.layers[l][i];
+            sum += plot.layers[l][i];
+        }
+        svg += fmt::format(
+            "<path class='area s{}' d='{}{}z'><title>{}: {:.3g} in the mean</title>"
+            "</path>",
+            l, there, back, html_escape(plot.names[l]), sum / static_cast<double>(plot.x.size()));
+    }
+    return svg + "</svg>\n";
 }
 
 }  // namespace darb

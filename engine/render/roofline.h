@@ -1,0 +1,37 @@
+// How near each pass is to what the device can do: two rates measured at start, and the bytes and
+// operations of each pass, estimated from counts. The one place where these estimates stand.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+struct DeviceRates {
+    double bytes_per_s = 0;  // of a copy between buffers, read and written bytes together
+    double fma_per_s = 0;    // float32 multiply-adds in registers
+};
+
+/// Best of a few runs; about a tenth of a second. 0 where the device has no timestamps.
+DeviceRates measure_rates(Device& device);
+
+/// Means of the frames or iterations that a time belongs to.
+struct FrameCounts {
+    double splats = 0, visible = 0, pairs = 0, pixels = 0;
+    int sh_degree = 0;  // of the buffers
+};
+
+struct PassWork {
+    double bytes = 0;  // that must be moved at least once
+    double fma = 0;
+};
+
+/// By the name that Forward, Loss and Backward give a pass; nothing for others.
+std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& counts);
+
+/// The time that the slower of the two rates needs for the work, over the time taken.
+double roofline_share(const PassWork& work, const DeviceRates& rates, double ms);
+
+}  // namespace darb

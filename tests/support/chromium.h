@@ -1,0 +1,64 @@
+// Opens a page in headless Chromium, where it is installed, and tells what it looks like from
+// inside.
+#pragma once
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "engine/core/files.h"
+
+namespace darb::test {
+
+inline std::string chromium() {
+    for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
+        if (std::system(fmt::format("command -v {} > /dev/null 2>&1", name).c_str()) == 0)
+            return name;
+    return {};
+}
+
+struct OpenedPage {
+    int plots = 0, drawn = 0;  // SVG elements; those with a visible curve, dot or area
+    int pictures = 0;          // elements with a background picture of some size
+    std::string console;       // what was written to it; empty: nothing
+};
+
+/// The page gets a script of the test's at its end, which writes what it finds into the title.
+inline OpenedPage open_page(const std::string& html, const std::filesystem::path& folder) {
+    constexpr const char* kProbe =
+        "<script>const all=[...document.querySelectorAll('svg')];"
+        "const seen=e=>{const b=e.getBoundingClientRect();return b.width>0||b.height>0};"
+        "document.title='PLOTS '+all.length+' '+all.filter(s=>seen(s)&&[...s.querySelectorAll("
+        "'path.line,path.area,circle')].some(seen)).length+' '+[...document.querySelectorAll("
+        "'.pane')].filter(e=>seen(e)&&getComputedStyle(e).backgroundImage.startsWith('url'))"
+        ".length+' END'</script>";
+    const auto page = folder / fmt::format("page_{}.html", ::getpid());
+    const auto dom = folder / fmt::format("dom_{}.html", ::getpid());
+    const auto log = folder / fmt::format("log_{}.txt", ::getpid());
+    const auto profile = folder / fmt::format("profile_{}", ::getpid());
+    std::string probed = html;
+    probed.insert(probed.rfind("</body>"), kProbe);
+    write_file_atomic(page, probed);
+    OpenedPage opened;
+    if (std::system(fmt::format("{} --headless --no-sandbox --disable-gpu --user-data-dir='{}' "
+                                "--enable-logging=stderr --dump-dom 'file://{}' > '{}' 2> '{}'",
+                                chromium(), profile.string(), page.string(), dom.string(),
+                                log.string())
+                        .c_str()) != 0)
+        opened.console = "chromium failed: " + read_text_file(log);
+    const std::string text = read_text_file(dom), said = read_text_file(log);
+    const size_t at = text.find("PLOTS ");
+    if (at != std::string::npos)
+        std::sscanf(text.c_str() + at, "PLOTS %d %d %d END", &opened.plots, &opened.drawn,
+                    &opened.pictures);
+    if (const size_t line = said.find("CONSOLE"); line != std::string::npos)
+        opened.console += said.substr(line, 400);
+    for (const auto& file : {page, dom, log}) std::filesystem::remove(file);
+    std::filesystem::remove_all(profile);
+    return opened;
+}
+
+}  // namespace darb::test

@@ -1,0 +1,69 @@
+// What accuracy costs in time: every accuracy setting alone, and combinations of them, measured on
+// one model, one set of views and one device.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/gpu/device.h"
+#include "engine/render/accuracy.h"
+#include "tools/cost/picture_error.h"
+#include "tools/cost/views.h"
+
+namespace darb {
+
+struct CostPlan {
+    int least_repeats = 3, most_repeats = 25;
+    double seconds = 25;  // of each of the two rounds (alone, combinations), after warm-up
+    size_t combinations = 16;
+};
+
+/// Median and quartiles over the repeats.
+struct Spread {
+    double median = 0, low = 0, high = 0;
+};
+Spread spread_of(std::vector<double> samples);
+
+struct CostRow {
+    Accuracy accuracy;
+    std::string name;  // accuracy_text
+    int setting = -1;  // the one that differs from balanced; -1: none or several
+    Spread ms;         // of a frame, mean over the views: the sum of its passes
+    std::vector<std::pair<std::string, Spread>> passes;
+    PictureError error;                               // against the truth in the file's depth order
+    PictureError error_by_pixel;                      // against the truth sorted at every pixel
+    std::optional<double> photo_psnr_db, photo_ssim;  // means over the views
+    bool same_as_balanced = false;                    // bit by bit
+    bool on_front = false, on_photo_front = false;
+};
+
+struct CostResult {
+    std::vector<CostRow> rows;  // balanced first, then each choice alone, presets, combinations
+    std::vector<std::string> view_names;
+    std::uint64_t pixels = 0;  // of all views
+    size_t splats = 0;
+    std::string device, driver, kernel, footprint;
+    int repeats = 0;           // of the round with fewer
+    double drift = 1;          // of balanced: round of combinations over round of single settings
+    size_t group = 0;          // rows measured side by side
+    double truth_seconds = 0;  // to render the truth, both orders
+};
+
+/// progress: a line for the user, now and then.
+CostResult measure_cost(Device& device, const SplatModel& model, const CostViews& views,
+                        const glm::vec3& background, const CostPlan& plan,
+                        const std::function<void(const std::string&)>& progress);
+
+/// The combinations that the single measurements predict to be on the front: times multiply,
+/// squared errors add. At most `most`, spread evenly along it; none that rows already hold.
+std::vector<Accuracy> promising_combinations(const std::vector<CostRow>& rows, size_t most);
+
+/// Marks the rows that no other one beats in time and error.
+void mark_fronts(std::vector<CostRow>& rows);
+
+/// "fastest within 0.1 dB: ...", a sentence each.
+std::vector<std::string> cost_answers(const CostResult& result);
+
+}  // namespace darb

@@ -1,0 +1,16 @@
+// The results of `darb cost` as a table, as JSON and as a page.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tools/cost/cost.h"
+
+namespace darb {
+
+std::string cost_table(const CostResult& result);
+nlohmann::json cost_json(const CostResult& result);
+/// title: the scene. A whole page without outside resources.
+std::string cost_html(const CostResult& result, const std::string& title);
+
+}  // namespace darb

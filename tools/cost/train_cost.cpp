@@ -1,0 +1,199 @@
+#include "tools/cost/train_cost.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "engine/check/device_walk.h"
+#include "engine/core/error.h"
+#include "engine/reference/loss.h"
+#include "engine/reference/render.h"
+#include "trainer/evaluation.h"
+#include "trainer/initial_model.h"
+#include "trainer/trainer.h"
+
+namespace darb {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kBelow[] = {3, 1, 0.3};  // dB below the end of balanced
+
+struct TrainedRun {
+    double ms = 0;
+    std::vector<std::pair<double, double>> curve;  // (seconds, PSNR)
+    SplatModel model;
+};
+
+std::vector<TrainCostRow> training_rows() {
+    std::vector<TrainCostRow> rows(1);
+    for (int s = 0; s < kAccuracyCount; ++s) {
+        if (s == kShDegree) continue;  // has its own schedule in training
+        for (size_t c = 1; c < accuracy_settings()[s].choices.size(); ++c) {
+            TrainCostRow row;
+            row.accuracy.choice[s] = static_cast<int>(c);
+            if (!row.accuracy.of(s).in_training) continue;
+            if (s == kFootprint && row.accuracy.value(s) == FOOTPRINT_PSI) continue;  // the default
+            rows.push_back(row);
+        }
+    }
+    for (const int preset : {int(kFast), int(kExact)}) {
+        TrainCostRow row;
+        row.accuracy = preset_accuracy(preset, true);
+        rows.push_back(row);
+    }
+    for (TrainCostRow& row : rows) row.name = accuracy_text(row.accuracy);
+    return rows;
+}
+
+TrainOptions with(TrainOptions options, const Accuracy& accuracy, int seed) {
+    options.accuracy = accuracy;
+    options.footprint =
+        accuracy.value(kFootprint) == FOOTPRINT_EXACT ? Footprint::exact : options.footprint;
+    options.seed += static_cast<std::uint64_t>(seed);
+    return options;
+}
+
+TrainedRun train_once(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
+                      const TrainOptions& options, int evaluations) {
+    Trainer trainer(device, dataset, photos, initial_model(dataset, options), options);
+    TrainedRun run;
+    double seconds = 0;
+    for (int e = 1; e <= evaluations; ++e) {
+        const int until = options.iterations * e / evaluations;
+        const auto start = Clock::now();
+        while (trainer.iteration() < until) trainer.step();
+        trainer.drain();
+        seconds += std::chrono::duration<double>(Clock::now() - start).count();
+        run.curve.emplace_back(seconds, evaluate_held_out(trainer, dataset, photos).psnr_db);
+    }
+    run.ms = 1e3 * seconds / options.iterations;
+    run.model = trainer.model();
+    return run;
+}
+
+/// The time at which the curve first crosses a PSNR, linear between evaluations; < 0: never.
+double seconds_to(const std::vector<std::pair<double, double>>& curve, double psnr_db) {
+    for (size_t i = 0; i < curve.size(); ++i) {
+        if (curve[i].second < psnr_db) continue;
+        if (i == 0) return curve[0].first;
+        const double t = (psnr_db - curve[i - 1].second) / (curve[i].second - curve[i - 1].second);
+        return curve[i - 1].first + t * (curve[i].first - curve[i - 1].first);
+    }
+    return -1;
+}
+
+/// Relative distance of the device's gradients from the double ones at the most accurate settings,
+/// for the loss of one photo.
+double gradient_error(Device& device, SplatModel model, const View& view, const ImageU8& photo,
+                      const Accuracy& accuracy, const TrainOptions& options) {
+    const FrameAccuracy frame = frame_accuracy(accuracy, model);
+    model.footprint = frame.footprint;
+    const Accuracy exact = preset_accuracy(kExact);
+    reference::RenderSettings settings;
+    settings.alpha_cutoff = exact.value(kAlphaCutoff);
+    settings.transmittance_stop = exact.value(kTransmittanceStop);
+    const glm::vec3 background(options.white_background ? 1.0f : 0.0f);
+    for (int c = 0; c < 3; ++c) settings.background[c] = background[c];
+    Camera relative = view.camera;
+    relative.translation += relative.rotation * model.origin;
+    const auto splats = reference::make_splats<double>(model);
+    const auto truth = reference::render(splats, relative, settings);
+    const ImageF target = composite(photo, background);
+    Image<double> wanted(target.width, target.height, 3);
+    std::copy(target.data.begin(), target.data.end(), wanted.data.begin());
+    const auto loss = reference::loss(truth.images.colour, wanted, {options.lambda_dssim});
+    const auto g = reference::backward(splats, relative, settings, truth, loss.d_image);
+
+    check::WalkSettings walk;
+    walk.evaluation = frame.options.evaluation;
+    walk.polynomial_degree = frame.options.polynomial_degree;
+    walk.storage = frame.options.storage;
+    walk.depth_order = frame.options.depth_order;
+    walk.alpha_cutoff = frame.options.alpha_cutoff;
+    walk.transmittance_stop = frame.options.transmittance_stop;
+    walk.background = background;
+    const auto got = check::walk_on_device(device, model, view.camera, loss.d_image, walk);
+    const std::vector<double>* expected[kAttributeCount] = {&g.splats.position, &g.splats.log_scale,
+                                                            &g.splats.rotation, &g.splats.opacity,
+                                                            &g.splats.sh_dc,    &g.splats.sh_rest};
+    double off = 0;
+    int attributes = 0;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        double difference = 0, size = 0;
+        for (size_t i = 0; i < expected[a]->size(); ++i) {
+            const double e = (*expected[a])[i] - got.d[a][i];
+            difference += e * e;
+            size += (*expected[a])[i] * (*expected[a])[i];
+        }
+        if (!(size > 0)) continue;
+        off += std::sqrt(difference / size);
+        ++attributes;
+    }
+    return off / std::max(attributes, 1);
+}
+
+const View& first_view(const Dataset& dataset, bool test) {
+    for (const View& view : dataset.views)
+        if (view.is_test == test) return view;
+    throw Error(dataset.root.string(),
+                test ? "holds out no photo to measure on" : "has no photo to train on",
+                "Use a data set of two photos or more.");
+}
+
+}  // namespace
+
+TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
+                                   const TrainOptions& options, const TrainCostPlan& plan,
+                                   const std::function<void(const std::string&)>& progress) {
+    TrainCostResult result;
+    const View& shown = first_view(dataset, false);
+    first_view(dataset, true);
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    result.rows = training_rows();
+    std::vector<std::vector<TrainedRun>> runs(result.rows.size());
+    for (int seed = 0; seed < plan.seeds; ++seed)
+        for (size_t r = 0; r < result.rows.size(); ++r) {
+            progress(fmt::format("seed {} of {}, {} of {}: {}", seed + 1, plan.seeds, r + 1,
+                                 result.rows.size(), result.rows[r].name));
+            runs[r].push_back(train_once(device, dataset, photos,
+                                         with(options, result.rows[r].accuracy, seed),
+                                         plan.evaluations));
+        }
+    std::vector<double> ends;
+    for (const TrainedRun& run : runs[0]) ends.push_back(run.curve.back().second);
+    for (const double below : kBelow) result.targets.push_back(spread_of(ends).median - below);
+
+    const ImageU8& photo = photos[static_cast<size_t>(&shown - dataset.views.data())];
+    for (size_t r = 0; r < result.rows.size(); ++r) {
+        TrainCostRow& row = result.rows[r];
+        std::vector<double> ms, psnr;
+        for (const TrainedRun& run : runs[r]) {
+            ms.push_back(run.ms);
+            psnr.push_back(run.curve.back().second);
+        }
+        row.ms = spread_of(ms);
+        row.psnr_db = spread_of(psnr);
+        for (const double target : result.targets) {
+            std::vector<double> seconds;
+            for (const TrainedRun& run : runs[r])
+                if (const double s = seconds_to(run.curve, target); s >= 0) seconds.push_back(s);
+            row.reached.push_back(static_cast<int>(seconds.size()));
+            row.seconds_to.push_back(spread_of(std::move(seconds)));
+        }
+        row.curve = runs[r][0].curve;
+        row.gradient_error =
+            gradient_error(device, runs[0][0].model, shown, photo, row.accuracy, options);
+    }
+    result.seeds = plan.seeds;
+    result.iterations = options.iterations;
+    result.device = device.info().name;
+    result.driver = device.info().driver;
+    result.dataset = dataset.root.string();
+    return result;
+}
+
+}  // namespace darb

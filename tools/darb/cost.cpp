@@ -1,0 +1,115 @@
+// darb cost SCENE.ply [DATASET]: what each accuracy setting costs in time and buys in accuracy.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <memory>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "tools/cost/report.h"
+#include "tools/darb/commands.h"
+#include "tools/darb/cost_flags.h"
+#include "tools/darb/scene_file.h"
+
+namespace darb {
+
+namespace {
+
+// What a run takes its time for: quick about a tenth of the default, full about ten times.
+struct Extent {
+    CostPlan plan;
+    size_t views = 8;
+};
+
+Extent extent_of(const CostFlags& flags) {
+    Extent extent;
+    if (flags.quick) extent = {{2, 5, 3, 4}, 2};
+    if (flags.full) extent = {{10, 100, 240, 64}, 32};
+    return extent;
+}
+
+void orbit_size(const std::string& text, int& width, int& height) {
+    char rest = 0;
+    if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 16 ||
+        height < 16 || width > 16'384 || height > 16'384)
+        throw Error("--size " + text, "is no size in pixels", "Write it as 640x480, 16 or more.");
+}
+
+CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most) {
+    if (flags.dataset.empty()) {
+        int width = 0, height = 0;
+        orbit_size(flags.size, width, height);
+        return orbit_views(model, static_cast<int>(std::min<size_t>(most, 8)), width, height);
+    }
+    DatasetOptions options = flags.data;
+    options.hold_out = true;
+    return dataset_views(load_dataset(flags.dataset, options), most);
+}
+
+int cost(const CostFlags& flags) {
+    if (flags.quick && flags.full)
+        throw Error("--quick --full", "contradict each other", "Use one of them.");
+    if (!flags.train.empty()) return train_cost(flags);
+    if (flags.scene.empty())
+        throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
+    const Extent extent = extent_of(flags);
+    const SplatModel model = load_scene(flags.scene);
+    if (model.size() == 0)
+        throw Error(flags.scene, "holds no splats", "There is nothing to measure.");
+    const CostViews views = views_of(flags, model, extent.views);
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    Device device(device_options);
+    if (device.info().timestamp_period_ns <= 0)
+        throw Error(device.info().name, "has no timestamps",
+                    "Choose another device (darb devices).");
+    const CostResult result =
+        measure_cost(device, model, views, glm::vec3(flags.white_background ? 1.0f : 0.0f),
+                     extent.plan, [&](const std::string& line) {
+                         if (!flags.quiet) fmt::print(stderr, "{}\n", line);
+                     });
+    fmt::print("{}: {} splats, {}; {} views of {}\n\n{}", flags.scene, model.size(), result.device,
+               views.cameras.size(), flags.dataset.empty() ? "an orbit" : flags.dataset,
+               cost_table(result));
+    nlohmann::json json = cost_json(result);
+    json["scene"] = flags.scene;
+    json["dataset"] = flags.dataset;
+    write_json(flags.json, json);
+    if (!flags.html.empty()) write_file_atomic(flags.html, cost_html(result, flags.scene));
+    return 0;
+}
+
+}  // namespace
+
+void add_cost(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<CostFlags>();
+    CLI::App* command =
+        app.add_subcommand("cost", "Measure what each accuracy setting costs in time");
+    command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train");
+    command->add_option("--train", flags->train,
+                        "price the settings in training on this data set instead");
+    command->add_option("--seeds", flags->seeds, "runs a setting with --train (default 3)")
+        ->check(CLI::Range(1, 100));
+    command->add_option("--iterations", flags->iterations, "of a run with --train (default 1,500)")
+        ->check(CLI::Range(20, 1'000'000));
+    command->add_option("dataset", flags->dataset,
+                        "photos with cameras; without: eight views around the splats");
+    command->add_option("--json", flags->json, "write every number to this file");
+    command->add_option("--html", flags->html, "write a page with plots to this file");
+    command->add_flag("--quick", flags->quick, "seconds: fewer views, repeats and combinations");
+    command->add_flag("--full", flags->full, "minutes: more of all three");
+    command->add_option("--size", flags->size, "of the views around the splats, px")
+        ->capture_default_str();
+    command
+        ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
+        ->capture_default_str();
+    command->add_option("-r,--resolution", flags->data.resolution,
+                        "as in training: 1, 2, 4, 8 or a width in px");
+    command->add_flag("-w,--white-background", flags->white_background, "white, not black");
+    command->add_flag("-q,--quiet", flags->quiet, "no progress");
+    command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    command->callback([flags, &action] { action = [flags] { return cost(*flags); }; });
+}
+
+}  // namespace darb

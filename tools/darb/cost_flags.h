@@ -1,0 +1,27 @@
+// The command line of `darb cost`.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+struct CostFlags {
+    std::string scene, dataset, device, train;
+    int seeds = 0, iterations = 0;
+    std::filesystem::path json, html;
+    bool quick = false, full = false, quiet = false, white_background = false;
+    DatasetOptions data;
+    std::string size = "640x480";
+};
+
+/// To a file; nothing where the path is empty.
+void write_json(const std::filesystem::path& path, const nlohmann::json& json);
+
+/// darb cost --train DATASET
+int train_cost(const CostFlags& flags);
+
+}  // namespace darb

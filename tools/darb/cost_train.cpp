@@ -1,0 +1,46 @@
+// darb cost --train DATASET: what each accuracy setting costs and changes in training.
+
+#include <fmt/format.h>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "tools/cost/train_cost.h"
+#include "tools/darb/cost_flags.h"
+
+namespace darb {
+
+void write_json(const std::filesystem::path& path, const nlohmann::json& json) {
+    if (path.empty()) return;
+    write_file_atomic(path,
+                      json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+int train_cost(const CostFlags& flags) {
+    if (!flags.scene.empty())
+        throw Error("darb cost " + flags.scene + " --train " + flags.train,
+                    "--train takes no scene: it trains its own", "Leave the scene out.");
+    TrainOptions options;
+    options.iterations = flags.quick ? 300 : flags.full ? 7'000 : 1'500;
+    if (flags.iterations > 0) options.iterations = flags.iterations;
+    options.white_background = flags.white_background;
+    TrainCostPlan plan;
+    plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
+    if (flags.seeds > 0) plan.seeds = flags.seeds;
+    DatasetOptions data = flags.data;
+    data.hold_out = true;
+    const Dataset dataset = load_dataset(flags.train, data);
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    Device device(device_options);
+    const TrainCostResult result =
+        measure_train_cost(device, dataset, options, plan, [&](const std::string& line) {
+            if (!flags.quiet) fmt::print(stderr, "{}\n", line);
+        });
+    fmt::print("{}: {} iterations, {} seeds, {}\n\n{}", flags.train, result.iterations,
+               result.seeds, result.device, train_cost_table(result));
+    write_json(flags.json, train_cost_json(result));
+    if (!flags.html.empty()) write_file_atomic(flags.html, train_cost_html(result));
+    return 0;
+}
+
+}  // namespace darb
