@@ -38,6 +38,7 @@ tests    vulkan-validationlayers  synchronization validation
 tests    clang                second compiler, sanitizer build
 tests    libclang-rt-dev      ASan and UBSan run time
 tests    clang-format-14      layout check; one version, so one answer
+tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
 tests    python3              style script (standard library only)
 colmap   colmap               cameras from photos; optional
 '

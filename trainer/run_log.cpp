@@ -90,7 +90,7 @@ void RunLog::write(const Json& event) {
 }
 
 void RunLog::start(const Device& device, const Dataset& dataset, const TrainOptions& options,
-                   std::uint32_t splats) {
+                   std::uint32_t splats, const std::string& effects_json) {
     int held_out = 0;
     for (const View& v : dataset.views) held_out += v.is_test ? 1 : 0;
     start_ = {{"event", "start"},
@@ -104,6 +104,7 @@ void RunLog::start(const Device& device, const Dataset& dataset, const TrainOpti
               {"held_out_views", held_out},
               {"splats", splats},
               {"settings", Json::parse(settings_text(options))}};
+    if (!effects_json.empty()) start_["effects"] = Json::parse(effects_json);
     write(start_);
 }
 
@@ -167,6 +168,12 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
     Json evaluations = Json::array();
     for (const Json& e : events_)
         if (e.value("event", "") == "evaluation") evaluations.push_back(e);
+    Json probes = Json::array();
+    for (const Trainer::Probe& p : trainer.probes())
+        probes.push_back({{"iteration", p.iteration},
+                          {"degree", p.degree},
+                          {"gain_db", p.gain_db},
+                          {"admitted", p.admitted}});
     const Json metrics{
         {"start", start_},
         {"iteration", summary.iteration},
@@ -182,6 +189,9 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"cloned_or_split", c.cloned_or_split},
         {"pruned", c.pruned},
         {"culled_splat_frames", culled},
+        {"effects", start_.value("effects", Json::array())},
+        {"sh_probes", probes},
+        {"sh_degree", trainer.sh_degree()},
         {"evaluations", evaluations}};
     write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
     const auto report = folder_ / "report.html";

@@ -27,7 +27,7 @@ class RunLog {
     void cut_after(int iteration);
 
     void start(const Device& device, const Dataset& dataset, const TrainOptions& options,
-               std::uint32_t splats);
+               std::uint32_t splats, const std::string& effects_json);
     void iteration(const IterationResult& result,
                    double seconds);  // keeps one line in kLogInterval
     void evaluation(const Evaluation& evaluation);

@@ -18,7 +18,9 @@
 #include "engine/render/forward.h"
 #include "engine/render/loss.h"
 #include "trainer/densify/density_control.h"
+#include "trainer/exposure.h"
 #include "trainer/options.h"
+#include "trainer/smoothing.h"
 
 namespace darb {
 
@@ -60,7 +62,18 @@ class Trainer {
     int iteration() const { return iteration_; }
     std::uint32_t splat_count() const { return splats_.count(); }
     int sh_degree() const;  // in use at the current iteration
-    SplatModel model();     // drains
+    SplatModel model();  // as a file holds it: the smoothing filter worked in; drains
+
+    /// The exposure of each training photo by the view's name; empty where it is off. Drains.
+    std::map<std::string, ColourMap> exposures();
+
+    /// What a probe for view-dependent colour found.
+    struct Probe {
+        int iteration = 0, degree = 0;  // degree: the one on trial
+        double gain_db = 0;             // on the photos set aside
+        bool admitted = false;
+    };
+    const std::vector<Probe>& probes() const { return probes_; }
 
     /// A picture of the current splats, RGB not clamped. Drains.
     ImageF render(const Camera& camera);
@@ -77,6 +90,9 @@ class Trainer {
     /// The state beside the model that a checkpoint holds. moments: [attribute][2 N stride].
     struct State {
         int iteration = 0;
+        int next_probe = 0;
+        std::vector<float> smoothing;  // [N], or empty where the effect is off
+        std::vector<float> exposure;   // Exposure::state(), or empty
         SplatModel model;
         std::vector<std::vector<float>> moments;
         std::vector<float> gradient_sum;  // [N][2]
@@ -94,7 +110,15 @@ class Trainer {
         Commands commands;  // last: they are waited for before anything that they use goes
     };
     int view_for(int iteration);
+    int degree_at(int iteration) const;
     void launch(int iteration);
+    void record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
+                const Buffer& loss);
+    void settle_effects(int iteration);
+    void probe_degree();
+    double probe_arm(const State& start, int degree, const std::vector<int>& aside);
+    double photo_psnr(int view);
+    void set_degree(State& state, int degree);
     gpu::FrameStatus finish(Flight& flight);  // where it overflowed nothing was changed
     void settle(Flight& flight);              // finish, and do again what overflowed
     void density_control(int iteration);
@@ -106,15 +130,21 @@ class Trainer {
     TrainOptions options_;
     glm::vec3 background_;
     double extent_;
-    std::vector<int> train_views_;
+    std::vector<std::string> names_;  // of all views
+    std::vector<int> train_views_;    // ascending
     std::vector<int> order_;  // of train_views_ in this epoch
     int order_epoch_ = -1;
+    int next_probe_;
+    std::vector<Probe> probes_;
+    std::vector<int> probe_views_;  // not empty while a probe runs: the views it trains on
 
     GpuSplats splats_;
     Forward forward_;
     Backward backward_;
     Loss loss_;
     DensityControl density_;
+    std::optional<SmoothingFilter> smoothing_;  // options.antialias
+    std::optional<Exposure> exposure_;          // options.exposure
     std::vector<gpu::CameraData> camera_data_;
     Buffer cameras_;
     std::vector<Buffer> photos_;  // [view]: uint [H][W], R in the low byte; empty for test views

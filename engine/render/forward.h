@@ -11,6 +11,7 @@
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
+#include "engine/render/effects.h"
 #include "engine/render/gpu_splats.h"
 #include "engine/render/radix_sort.h"
 #include "engine/render/scan.h"
@@ -29,6 +30,7 @@ struct ForwardOptions {
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
     int sh_stored = 0;  // degree of the buffers
+    ProjectionEffects effects;
     bool store_for_backward = false;
 };
 
@@ -67,12 +69,19 @@ class Forward {
                 std::uint32_t camera_index, const gpu::CameraData& data, int sh_degree,
                 const glm::vec3& background);
 
+    /// After record() of the same frame: image() then holds sum w z, sum w and 0, w the weight of
+    /// each splat in a pixel and z its depth along the optical axis, world units.
+    void record_depth(Commands& commands, std::uint32_t splats, const gpu::CameraData& data);
+
     /// Outputs of the last recorded frame.
     const Buffer& image() const { return image_; }    // float [3][H][W], not clamped
     const Buffer& status() const { return status_; }  // gpu::FrameStatus
     gpu::FrameStatus read_status() const;
     /// The overflow flag and all counters to zero. The queue must be idle.
     void clear_status();
+
+    /// After the splats' colour buffers changed their degree.
+    void set_sh_stored(int degree);
 
     // For the backward pass.
     const ForwardOptions& options() const { return options_; }
@@ -99,6 +108,7 @@ class Forward {
     std::map<int, Pipeline> project_;  // by SH degree in use
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
         list_lengths_, blend_;
+    std::optional<Pipeline> depth_light_;  // made when a depth image is first asked for
     std::optional<Scan> scan_;
     std::optional<RadixSort> depth_sort_, tile_sort_;
     std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0, tile_capacity_ = 0;

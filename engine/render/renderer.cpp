@@ -1,5 +1,7 @@
 #include "engine/render/renderer.h"
 
+#include "engine/core/check.h"
+
 namespace darb {
 
 namespace {
@@ -8,6 +10,7 @@ ForwardOptions options_for(const SplatModel& model, ForwardOptions options) {
     options.kernel = model.kernel;
     options.footprint = model.footprint;
     options.sh_stored = model.sh_degree;
+    options.effects.antialias = model.antialias;
     return options;
 }
 
@@ -30,6 +33,8 @@ Renderer::Renderer(Device& device, const SplatModel& model, ForwardOptions optio
 ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int sh_degree,
                         float near_plane) {
     const gpu::CameraData data = camera_data(camera, splats_.origin(), near_plane);
+    DARB_CHECK(!camera.lens.active || forward_.options().effects.lens, "a lens, not compiled in");
+    camera_ = data;
     const Buffer cameras = upload_cameras(*device_, {data});
     const int degree =
         sh_degree < 0 ? splats_.sh_degree() : std::min(sh_degree, splats_.sh_degree());
@@ -45,6 +50,24 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
     pass_times_ = commands_.pass_times();
     const size_t floats = size_t(camera.width) * camera.height * 3;
     return planes_to_image(forward_.image().download<float>(floats), camera.width, camera.height);
+}
+
+ImageF Renderer::render_depth() {
+    DARB_CHECK(camera_.width > 0, "no picture was rendered before");
+    const int width = static_cast<int>(camera_.width), height = static_cast<int>(camera_.height);
+    commands_.begin();
+    forward_.record_depth(commands_, splats_.count(), camera_);
+    commands_.submit_and_wait();
+    pass_times_ = commands_.pass_times();
+    const size_t pixels = size_t(width) * height;
+    const auto planes = forward_.image().download<float>(2 * pixels);
+    ImageF result(width, height, 2);
+    for (size_t p = 0; p < pixels; ++p) {
+        const float weight = planes[pixels + p];
+        result.data[2 * p] = weight >= 1.0f / 255 ? planes[p] / weight : 0.0f;
+        result.data[2 * p + 1] = weight;
+    }
+    return result;
 }
 
 }  // namespace darb

@@ -8,13 +8,19 @@ namespace darb {
 
 class Renderer {
   public:
-    /// Uploads the model. options.kernel, footprint and sh_stored are taken from it.
+    /// Uploads the model. options.kernel, footprint, sh_stored and effects.antialias are taken from
+    /// it. Cameras with a lens need options.effects.lens.
     Renderer(Device& device, const SplatModel& model, ForwardOptions options = {});
 
     /// RGB, not clamped. sh_degree -1: all of the model's. Grows its buffers and repeats the frame
     /// when it has more splat-tile pairs than before.
     ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
                   int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
+
+    /// Of the camera of the last render, which must have been one. [H][W][2]: the expected depth
+    /// sum w z / sum w along the optical axis, world units, and sum w, the opacity of the pixel;
+    /// depth 0 where nothing is seen (opacity below 1/255).
+    ImageF render_depth();
 
     /// Of the last render.
     gpu::FrameStatus status() const { return status_; }
@@ -26,6 +32,7 @@ class Renderer {
     Forward forward_;
     Commands commands_;
     gpu::FrameStatus status_{};
+    gpu::CameraData camera_{};  // of the last render
     std::vector<PassTime> pass_times_;
 };
 

@@ -14,6 +14,7 @@ using Action = std::function<int()>;
 void add_train(CLI::App& app, Action& action, const std::vector<std::string>& arguments);
 void add_eval(CLI::App& app, Action& action);
 void add_render(CLI::App& app, Action& action);
+void add_plan(CLI::App& app, Action& action);
 void add_info(CLI::App& app, Action& action);
 void add_convert(CLI::App& app, Action& action);
 void add_devices(CLI::App& app, Action& action);

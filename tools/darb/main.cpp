@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
     darb::add_train(app, action, arguments);
     darb::add_eval(app, action);
     darb::add_render(app, action);
+    darb::add_plan(app, action);
     darb::add_info(app, action);
     darb::add_convert(app, action);
     darb::add_devices(app, action);

@@ -10,9 +10,11 @@
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
+#include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
 #include "trainer/evaluation.h"
 
@@ -26,6 +28,8 @@ struct RenderFlags {
     bool white_background = false;
     int sh_degree = -1;
     float near_plane = static_cast<float>(NEAR_DEFAULT);
+    std::string effects = "auto", depth;
+    double depth_unit = 0.001;
     DatasetOptions data;
 };
 
@@ -58,6 +62,15 @@ void scale_camera(Camera& camera, int resolution) {
     camera.height = height;
 }
 
+void write_depth(const std::filesystem::path& frame, const ImageF& depth, bool npy, double unit) {
+    std::filesystem::path file = frame;
+    file.replace_filename(frame.stem().string() + (npy ? "_depth.npy" : "_depth.png"));
+    if (npy)
+        write_npy(file, depth);
+    else
+        write_depth_png(file, depth, unit);
+}
+
 double median(std::vector<double> values) {
     if (values.empty()) return 0;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -66,7 +79,8 @@ double median(std::vector<double> values) {
 }
 
 int render(const RenderFlags& flags) {
-    const SplatModel model = load_scene_to_render(flags.scene);
+    const EffectChoice choice = parse_effects(flags.effects);
+    SplatModel model = load_scene(flags.scene);
     std::vector<View> views = load_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
     if (is_list)
@@ -74,7 +88,12 @@ int render(const RenderFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    Renderer renderer(device, model);
+    const EffectPlan plan =
+        plan_rendering(model, views, {.depth = !flags.depth.empty()}, choice);
+    apply_plan(plan, model);
+    ForwardOptions options;
+    options.effects = plan.projection();
+    Renderer renderer(device, model, options);
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     std::set<std::string> used;
     std::vector<double> frame_ms;
@@ -85,8 +104,12 @@ int render(const RenderFlags& flags) {
         const std::chrono::duration<double, std::milli> ms =
             std::chrono::steady_clock::now() - start;
         frame_ms.push_back(ms.count());
-        write_png(flags.output / frame_name(view.name, used), to_8bit(image));
+        const auto file = flags.output / frame_name(view.name, used);
+        write_png(file, to_8bit(image));
+        if (plan.on(EFFECT_DEPTH))
+            write_depth(file, renderer.render_depth(), flags.depth == "npy", flags.depth_unit);
     }
+    fmt::print("effects: {}\n", plan_line(plan));
     fmt::print("{} frames in {}, median {:.2f} ms a frame on {}\n", views.size(),
                flags.output.string(), median(frame_ms), device.info().name);
     return 0;
@@ -113,6 +136,16 @@ void add_render(CLI::App& app, Action& action) {
                      "highest degree of view-dependent colour (default: all the scene has)")
         ->check(CLI::Range(0, 3));
     command->add_option("--near", flags->near_plane, "nearest distance drawn, world units")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    add_effects_flag(*command, flags->effects);
+    add_lens_flag(*command, flags->data);
+    command
+        ->add_option("--depth", flags->depth,
+                     "depth images beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) "
+                     "or npy (float32, world units)")
+        ->check(CLI::IsMember({"png", "npy"}));
+    command->add_option("--depth-unit", flags->depth_unit, "world units of one step of a depth PNG")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");

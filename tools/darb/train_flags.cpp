@@ -1,6 +1,7 @@
 #include "tools/darb/train_flags.h"
 
 #include "engine/core/error.h"
+#include "tools/darb/effect_flags.h"
 
 namespace darb {
 
@@ -114,10 +115,15 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     command.add_flag("-q,--quiet", f.run.quiet, "no progress");
     command.add_flag("--deterministic", f.deterministic,
                      "accepted: every run on one device already repeats bit by bit");
-    add_missing(command, "--antialiasing", "anti-aliasing");
-    add_missing(command, "--effects", "the effect plan");
+    add_effects_flag(command, f.effects);
+    add_lens_flag(command, f.data);
+    command.add_flag("--antialiasing", f.antialiasing, "as --effects +antialias");
+    for (auto [name, rate] : {std::pair{"--exposure-lr-init", &f.train.exposure_lr_init},
+                              {"--exposure-lr-final", &f.train.exposure_lr_final}})
+        command.add_option(name, *rate, "of the exposure of each photo, where that is trained")
+            ->capture_default_str()
+            ->check(CLI::PositiveNumber);
     add_missing(command, "--accuracy", "the choice of accuracy");
-    add_missing(command, "--exposure-lr-init", "per-photo exposure");
     add_missing(command, "--depths,-d", "depth supervision");
     add_missing(command, "--view", "the live view");
 }

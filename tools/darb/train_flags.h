@@ -14,6 +14,8 @@ namespace darb {
 struct TrainFlags {
     std::string dataset;
     std::string device;
+    std::string effects = "auto";
+    bool antialiasing = false;  // as 3DGS spells +antialias
     bool resume = false;
     bool sequential = false;
     bool deterministic = false;  // every run is; the flag only lets scripts say so
