@@ -50,7 +50,8 @@ void Exposure::record_backward(Commands& commands, const Buffer& image, const Bu
     const std::uint32_t groups = groups_of(pixels);
     commands.dispatch(backward_, gpu::ExposureArgs{pixels, photo, groups},
                       {maps_, image, d_image, partials_}, groups);
-    const double correction1 = 1.0 - std::pow(0.9, visits), correction2 = 1.0 - std::pow(0.999, visits);
+    const double correction1 = 1.0 - std::pow(0.9, visits),
+                 correction2 = 1.0 - std::pow(0.999, visits);
     const gpu::ExposureUpdateArgs args{photo, photos_, groups,
                                        static_cast<float>(rate / correction1),
                                        static_cast<float>(1.0 / std::sqrt(correction2))};

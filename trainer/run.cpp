@@ -150,10 +150,10 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
         const int i = trainer_.iteration();
         for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
             const Trainer::Probe& p = trainer_.probes()[told_probes_];
-            progress_.note(fmt::format("iteration {}: colour of degree {} {} ({:+.3f} dB on photos "
-                                       "set aside)",
-                                       p.iteration, p.degree, p.admitted ? "admitted" : "refused",
-                                       p.gain_db));
+            progress_.note(
+                fmt::format("iteration {}: colour of degree {} {} ({:+.3f} dB on photos "
+                            "set aside)",
+                            p.iteration, p.degree, p.admitted ? "admitted" : "refused", p.gain_db));
         }
         const bool last = i == options_.iterations;
         if (last || contains(run_.test_iterations, i)) evaluate(i);

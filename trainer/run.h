@@ -25,9 +25,9 @@ struct RunOptions {
         1'000;  // of checkpoint.darb, the latest; 0: only at the end and Ctrl-C
     std::filesystem::path resume_from;  // empty: start afresh
     bool quiet = false;
-    std::string effects;           // the plan in a line, for the log
-    std::string effects_json;      // the same as JSON, for metrics.json; may be empty
-    std::vector<ImageU8> photos;   // already loaded, in the order of the views; else empty
+    std::string effects;          // the plan in a line, for the log
+    std::string effects_json;     // the same as JSON, for metrics.json; may be empty
+    std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
 };
 
 struct ViewMetrics {

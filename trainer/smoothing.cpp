@@ -16,8 +16,7 @@ SmoothingFilter::SmoothingFilter(Device& device, const ProjectionEffects& effect
     filter_ = Pipeline(device, "smoothing_filter", constants);
 }
 
-void SmoothingFilter::update(GpuSplats& splats, const Buffer& cameras,
-                             std::uint32_t camera_count) {
+void SmoothingFilter::update(GpuSplats& splats, const Buffer& cameras, std::uint32_t camera_count) {
     const std::uint64_t bytes = std::uint64_t{std::max(splats.count(), 1u)} * sizeof(float);
     if (splats.smoothing().bytes() != bytes)
         splats.smoothing() = Buffer(*device_, "smoothing", bytes);
@@ -36,16 +35,15 @@ SplatModel bake_smoothing(const SplatModel& model, const std::vector<float>& fil
     for (std::size_t i = 0; i < model.size(); ++i) {
         double kept = 1;
         for (std::size_t c = 0; c < 3; ++c) {
-            const double s = std::exp(std::clamp<double>(model.log_scale[3 * i + c],
-                                                         -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT));
+            const double s = std::exp(
+                std::clamp<double>(model.log_scale[3 * i + c], -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT));
             const double wide = std::hypot(s, double{filter[i]});
             kept *= s / wide;
             baked.log_scale[3 * i + c] = static_cast<float>(std::log(wide));
         }
         const double opacity = kept / (1 + std::exp(-double{model.opacity[i]}));
-        baked.opacity[i] =
-            static_cast<float>(std::clamp(std::log(opacity / (1 - opacity)), -OPACITY_LOGIT_LIMIT,
-                                          OPACITY_LOGIT_LIMIT));
+        baked.opacity[i] = static_cast<float>(std::clamp(
+            std::log(opacity / (1 - opacity)), -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT));
     }
     return baked;
 }

@@ -62,7 +62,7 @@ class Trainer {
     int iteration() const { return iteration_; }
     std::uint32_t splat_count() const { return splats_.count(); }
     int sh_degree() const;  // in use at the current iteration
-    SplatModel model();  // as a file holds it: the smoothing filter worked in; drains
+    SplatModel model();     // as a file holds it: the smoothing filter worked in; drains
 
     /// The exposure of each training photo by the view's name; empty where it is off. Drains.
     std::map<std::string, ColourMap> exposures();
@@ -132,7 +132,7 @@ class Trainer {
     double extent_;
     std::vector<std::string> names_;  // of all views
     std::vector<int> train_views_;    // ascending
-    std::vector<int> order_;  // of train_views_ in this epoch
+    std::vector<int> order_;          // of train_views_ in this epoch
     int order_epoch_ = -1;
     int next_probe_;
     std::vector<Probe> probes_;

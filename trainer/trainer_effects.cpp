@@ -11,9 +11,9 @@ namespace darb {
 
 namespace {
 
-constexpr int kFilterInterval = 100;    // iterations, as Mip-Splatting
-constexpr double kProbeGain_db = 0.05;  // that a degree must bring
-constexpr int kProbeIterations = 120;   // of each arm
+constexpr int kFilterInterval = 100;     // iterations, as Mip-Splatting
+constexpr double kProbeGain_db = 0.05;   // that a degree must bring
+constexpr int kProbeIterations = 120;    // of each arm
 constexpr std::size_t kFewestViews = 8;  // fewer photos leave none to set aside: the schedule holds
 constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 

@@ -4,7 +4,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cstring>
 #include <string>
 #include <vector>
 
@@ -23,9 +22,8 @@ void put_chunk(std::string& to, const char* type, const std::string& data) {
     put_u32(to, static_cast<std::uint32_t>(data.size()));
     const std::string body = type + data;
     to += body;
-    put_u32(to, static_cast<std::uint32_t>(
-                    crc32(0, reinterpret_cast<const Bytef*>(body.data()),
-                          static_cast<uInt>(body.size()))));
+    put_u32(to, static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(body.data()),
+                                                 static_cast<uInt>(body.size()))));
 }
 
 float first_channel(const ImageF& image, std::size_t pixel) {
@@ -49,9 +47,9 @@ void write_depth_png(const std::filesystem::path& path, const ImageF& depth, dou
     }
     uLongf bytes = compressBound(static_cast<uLong>(rows.size()));
     std::string packed(bytes, '\0');
-    const int result = compress(reinterpret_cast<Bytef*>(packed.data()), &bytes,
-                                reinterpret_cast<const Bytef*>(rows.data()),
-                                static_cast<uLong>(rows.size()));
+    const int result =
+        compress(reinterpret_cast<Bytef*>(packed.data()), &bytes,
+                 reinterpret_cast<const Bytef*>(rows.data()), static_cast<uLong>(rows.size()));
     DARB_CHECK(result == Z_OK, "zlib {}", result);
     packed.resize(bytes);
 
@@ -64,27 +62,6 @@ void write_depth_png(const std::filesystem::path& path, const ImageF& depth, dou
               std::string("DepthUnit") + '\0' + fmt::format("{} world units a step", unit));
     put_chunk(file, "IDAT", packed);
     put_chunk(file, "IEND", "");
-    write_file_atomic(path, file);
-}
-
-void write_npy(const std::filesystem::path& path, const ImageF& image) {
-    std::string header =
-        fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", image.height,
-                    image.width);
-    constexpr std::size_t kPreamble = 10, kAlign = 64;
-    header.append(kAlign - (kPreamble + header.size() + 1) % kAlign, ' ');
-    header += '\n';
-    std::string file = "\x93NUMPY";
-    file += std::string("\x01\x00", 2);
-    file += static_cast<char>(header.size() & 0xff);
-    file += static_cast<char>(header.size() >> 8);
-    file += header;
-    for (std::size_t p = 0; p < std::size_t(image.width) * image.height; ++p) {
-        const float value = first_channel(image, p);
-        char bytes[sizeof value];
-        std::memcpy(bytes, &value, sizeof value);
-        file.append(bytes, sizeof value);
-    }
     write_file_atomic(path, file);
 }
 

@@ -190,8 +190,8 @@ glm::dvec2 Lens::project(glm::dvec2 ray) const {
 }
 
 LensTerms Lens::terms(glm::dvec2 size) const {
-    constexpr int kBorderSamples = 64;       // a side
-    constexpr double kMaxTangent = 10.0;     // 84 degrees
+    constexpr int kBorderSamples = 64;    // a side
+    constexpr double kMaxTangent = 10.0;  // 84 degrees
     LensTerms terms;
     terms.active = true;
     if (front_ == Front::equidistant) terms.front_tan = terms.front_scale = 1;

@@ -75,8 +75,8 @@ Vec2<T> radial_second(const Vec2<T>& v, const Radial<T>& g, const Mat2<T>& c) {
     for (int k = 0; k < 2; ++k)
         for (int i = 0; i < 2; ++i)
             for (int j = 0; j < 2; ++j) {
-                const T first = (i == j ? v[k] : T(0)) + (i == k ? v[j] : T(0)) +
-                                (j == k ? v[i] : T(0));
+                const T first =
+                    (i == j ? v[k] : T(0)) + (i == k ? v[j] : T(0)) + (j == k ? v[i] : T(0));
                 d[k] += c[j][i] * (2 * g.first * first + 4 * g.second * v[i] * v[j] * v[k]);
             }
     return d;
@@ -148,17 +148,17 @@ RayBounds ray_bounds(const Camera& camera) {
     const glm::dvec2 size(camera.width, camera.height), focal(camera.fx, camera.fy);
     const glm::dvec2 principal(camera.cx, camera.cy);
     if (camera.lens.active) {
-        const glm::dvec2 margin = kJacobianMargin * 0.5 * (camera.lens.ray_max - camera.lens.ray_min);
+        const glm::dvec2 margin =
+            kJacobianMargin * 0.5 * (camera.lens.ray_max - camera.lens.ray_min);
         return {camera.lens.ray_min - margin, camera.lens.ray_max + margin};
     }
     const glm::dvec2 margin = kJacobianMargin * 0.5 * size / focal;
     return {-principal / focal - margin, (size - principal) / focal + margin};
 }
 
-#define DARB_INSTANTIATE(T)                                                      \
-    template LensPoint<T> lens_point(const LensTerms&, const Vec2<T>&);          \
-    template Vec2<T> lens_jacobian_backward(const LensTerms&, const Vec2<T>&, \
-                                            const Mat2<T>&);
+#define DARB_INSTANTIATE(T)                                             \
+    template LensPoint<T> lens_point(const LensTerms&, const Vec2<T>&); \
+    template Vec2<T> lens_jacobian_backward(const LensTerms&, const Vec2<T>&, const Mat2<T>&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 

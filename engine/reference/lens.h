@@ -9,7 +9,7 @@ namespace darb::reference {
 
 template <class T>
 struct LensPoint {
-    Vec2<T> value{0};    // distorted ray
+    Vec2<T> value{0};     // distorted ray
     Mat2<T> jacobian{1};  // [column][row]: d value_row / d ray_column
     bool seen = true;     // false beyond the fold
 };

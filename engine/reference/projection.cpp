@@ -175,8 +175,8 @@ Vec3<T> mean_backward(const Vec3<T>& mean, const CovarianceTerms<T>& terms, cons
         d_uv[c] -= (fx * at.jacobian[c][0] * d_j1.z + fy * at.jacobian[c][1] * d_j2.z) / z;
     if (!terms.ratio.x_inside) d_uv.x = 0;
     if (!terms.ratio.y_inside) d_uv.y = 0;
-    d_uv += glm::transpose(lens_point(camera.lens, free).jacobian) *
-            Vec2<T>(fx * d_px.x, fy * d_px.y);
+    d_uv +=
+        glm::transpose(lens_point(camera.lens, free).jacobian) * Vec2<T>(fx * d_px.x, fy * d_px.y);
     const T scaled = glm::dot(terms.j1, d_j1) + glm::dot(terms.j2, d_j2);  // J goes with 1 / z
     return {d_uv.x / z, d_uv.y / z, -(glm::dot(d_uv, free) + scaled) / z};
 }
@@ -290,8 +290,8 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
         out.position[index * 3 + c] = d_position[c];
         // d ln(scale)/d ln(s) = share, and the filter's factor of the opacity falls with s / scale.
         const T share = terms.smooth.share[c];
-        const T d_log = d_scale[c] * terms.scale[c] * share +
-                        gradient.d_opacity * splat.opacity * (1 - share);
+        const T d_log =
+            d_scale[c] * terms.scale[c] * share + gradient.d_opacity * splat.opacity * (1 - share);
         out.log_scale[index * 3 + c] = free ? d_log : T(0);
     }
     for (int c = 0; c < 4; ++c) {

@@ -37,9 +37,9 @@ RatioTerms<T> ratio_terms(const Vec3<T>& mean_camera, const Camera& camera);
 /// What the 3D smoothing filter makes of the standard deviations. factor: what the opacity keeps.
 template <class T>
 struct SmoothedScale {
-    Vec3<T> scale{0};   // sqrt(s^2 + f^2), world units
-    Vec3<T> share{1};   // s^2 / (s^2 + f^2) = d ln(scale) / d ln(s)
-    T factor = 1;       // product of s / scale
+    Vec3<T> scale{0};  // sqrt(s^2 + f^2), world units
+    Vec3<T> share{1};  // s^2 / (s^2 + f^2) = d ln(scale) / d ln(s)
+    T factor = 1;      // product of s / scale
 };
 template <class T>
 SmoothedScale<T> smoothed_scale(const T* log_scale, T filter);

@@ -45,9 +45,17 @@ Splats<T> make_splats(const SplatModel& model) {
     const auto copy = [](const std::vector<float>& from) {
         return std::vector<T>(from.begin(), from.end());
     };
-    return {model.sh_degree,      model.kernel,          model.footprint,      model.antialias,
-            copy(model.position), copy(model.log_scale), copy(model.rotation), copy(model.opacity),
-            copy(model.sh_dc),    copy(model.sh_rest),   {}};
+    return {model.sh_degree,
+            model.kernel,
+            model.footprint,
+            model.antialias,
+            copy(model.position),
+            copy(model.log_scale),
+            copy(model.rotation),
+            copy(model.opacity),
+            copy(model.sh_dc),
+            copy(model.sh_rest),
+            {}};
 }
 
 /// The Jacobian is taken at x/z clamped to the image plus this share of W / (2 fx) on each side.

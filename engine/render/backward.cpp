@@ -113,15 +113,28 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                         step.opacity_weight / n,
                                         step.scale_weight / (3.0f * n)};
     const Groups g = groups_for(splats.count());
-    commands.dispatch(
-        project_pipeline(sh_degree), args,
-        {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
-         splats.parameters(kRotation), splats.parameters(kOpacity), splats.parameters(kShDc),
-         splats.parameters(kShRest), splats.moments(kPosition), splats.moments(kLogScale),
-         splats.moments(kRotation), splats.moments(kOpacity), splats.moments(kShDc),
-         splats.moments(kShRest), forward.pair_count(), forward.pair_begin(), partials_,
-         partial_rest_, gradient_sum_, forward.status(), splats.smoothing()},
-        g.x, g.y);
+    commands.dispatch(project_pipeline(sh_degree), args,
+                      {cameras,
+                       splats.parameters(kPosition),
+                       splats.parameters(kLogScale),
+                       splats.parameters(kRotation),
+                       splats.parameters(kOpacity),
+                       splats.parameters(kShDc),
+                       splats.parameters(kShRest),
+                       splats.moments(kPosition),
+                       splats.moments(kLogScale),
+                       splats.moments(kRotation),
+                       splats.moments(kOpacity),
+                       splats.moments(kShDc),
+                       splats.moments(kShRest),
+                       forward.pair_count(),
+                       forward.pair_begin(),
+                       partials_,
+                       partial_rest_,
+                       gradient_sum_,
+                       forward.status(),
+                       splats.smoothing()},
+                      g.x, g.y);
 }
 
 }  // namespace darb

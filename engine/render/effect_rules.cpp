@@ -11,13 +11,13 @@ namespace darb {
 
 namespace {
 
-constexpr double kColourStep = 1.0 / 512;    // half of an 8-bit step
-constexpr double kCentreStep_px = 0.01;      // a shift by it changes no 8-bit picture
-constexpr double kFootprintRatio = 2.0;      // largest pixel footprint of a point over its smallest
-constexpr double kFootprintShare = 0.1;      // of the points
+constexpr double kColourStep = 1.0 / 512;  // half of an 8-bit step
+constexpr double kCentreStep_px = 0.01;    // a shift by it changes no 8-bit picture
+constexpr double kFootprintRatio = 2.0;    // largest pixel footprint of a point over its smallest
+constexpr double kFootprintShare = 0.1;    // of the points
 constexpr double kGainSpread = 0.02;
-constexpr std::size_t kGainViews = 3;        // that see a point, at least
-constexpr std::size_t kGainPoints = 20;      // of a photo, at least
+constexpr std::size_t kGainViews = 3;              // that see a point, at least
+constexpr std::size_t kGainPoints = 20;            // of a photo, at least
 constexpr double kDarkest = 10, kBrightest = 245;  // of 255: sensors are linear in between
 
 /// The largest change of a colour that band l of a splat can make over all directions:
@@ -55,9 +55,10 @@ EffectRow colour_rule(const SplatModel& model) {
     row.on = row.degree > 0;
     row.reason = row.on ? fmt::format("degree {}: a colour changes by up to {:.3f} with the view",
                                       row.degree, row.measured)
-                        : fmt::format("no colour changes by more than {:.4f} with the view, "
-                                      "limit 1/512",
-                                      dropped);
+                        : fmt::format(
+                              "no colour changes by more than {:.4f} with the view, "
+                              "limit 1/512",
+                              dropped);
     if (!row.on) row.measured = dropped;
     return row;
 }
@@ -66,13 +67,13 @@ EffectRow centre_rule(const std::vector<View>& views) {
     EffectRow row;
     for (const View& view : views) {
         const Camera& c = view.camera;
-        row.measured = std::max({row.measured, std::abs(c.cx - 0.5 * c.width),
-                                 std::abs(c.cy - 0.5 * c.height)});
+        row.measured = std::max(
+            {row.measured, std::abs(c.cx - 0.5 * c.width), std::abs(c.cy - 0.5 * c.height)});
     }
     row.on = row.measured > kCentreStep_px;
-    row.reason = views.empty() ? "no cameras are named"
-                               : fmt::format("the principal point is off by {:.2f} px at most",
-                                             row.measured);
+    row.reason = views.empty()
+                     ? "no cameras are named"
+                     : fmt::format("the principal point is off by {:.2f} px at most", row.measured);
     return row;
 }
 
@@ -85,11 +86,12 @@ EffectRow lens_rule(const std::vector<View>& views) {
     }
     row.on = lenses > 0;
     row.measured = static_cast<double>(lenses);
-    row.reason = row.on ? fmt::format("{} of {} cameras keep their original lens", lenses,
-                                      views.size())
-                        : fmt::format("{} of {} photos are distorted and are straightened once, at "
-                                      "load",
-                                      distorted, views.size());
+    row.reason =
+        row.on ? fmt::format("{} of {} cameras keep their original lens", lenses, views.size())
+               : fmt::format(
+                     "{} of {} photos are distorted and are straightened once, at "
+                     "load",
+                     distorted, views.size());
     return row;
 }
 
@@ -128,9 +130,10 @@ EffectRow antialias_rule(const Dataset& dataset) {
     row.on = row.measured >= kFootprintShare;
     row.reason = points.size() == 0
                      ? "there are no points to measure footprints on"
-                     : fmt::format("{:.1f} % of the points are seen at pixel footprints that "
-                                   "differ by more than 2x, limit 10 %",
-                                   100 * row.measured);
+                     : fmt::format(
+                           "{:.1f} % of the points are seen at pixel footprints that "
+                           "differ by more than 2x, limit 10 %",
+                           100 * row.measured);
     return row;
 }
 
@@ -238,9 +241,9 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
                           const RenderOutputs& outputs, const EffectChoice& choice) {
     EffectPlan plan;
     plan.row(EFFECT_VIEW_COLOUR) = colour_rule(model);
-    plan.row(EFFECT_ANTIALIAS) = {model.antialias, false, 0, model.antialias ? 1.0 : 0.0,
-                                  fmt::format("the file says SplatRenderMode {}",
-                                              model.antialias ? "mip" : "default")};
+    plan.row(EFFECT_ANTIALIAS) = {
+        model.antialias, false, 0, model.antialias ? 1.0 : 0.0,
+        fmt::format("the file says SplatRenderMode {}", model.antialias ? "mip" : "default")};
     plan.row(EFFECT_EXPOSURE).reason = "of photos in training alone";
     plan.row(EFFECT_OFF_CENTRE) = centre_rule(views);
     plan.row(EFFECT_LENS) = lens_rule(views);

@@ -215,13 +215,13 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
     if (n > 0) {
         const gpu::ProjectArgs args{n, camera_index, static_cast<float>(LOW_PASS_DEFAULT)};
         const Groups g = groups_for(n);
-        commands.dispatch(project_pipeline(sh_degree), args,
-                          {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
-                           splats.parameters(kRotation), splats.parameters(kOpacity),
-                           splats.parameters(kShDc), splats.parameters(kShRest), splat_shape_,
-                           splat_light_, splat_bound_, cover_, pair_count_, visible_, status_,
-                           splats.smoothing()},
-                          g.x, g.y);
+        commands.dispatch(
+            project_pipeline(sh_degree), args,
+            {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
+             splats.parameters(kRotation), splats.parameters(kOpacity), splats.parameters(kShDc),
+             splats.parameters(kShRest), splat_shape_, splat_light_, splat_bound_, cover_,
+             pair_count_, visible_, status_, splats.smoothing()},
+            g.x, g.y);
     }
     record_depth_order(commands, n);
     record_pairs(commands, data, n);

@@ -19,8 +19,8 @@ struct LensTerms {
     std::array<double, 4> k{};
     std::array<double, 3> d{};
     glm::dvec2 tangential{0.0}, prism{0.0};
-    double fold = 0;                             // largest |w| that the lens maps one to one
-    glm::dvec2 ray_min{0.0}, ray_max{0.0};       // of the frame
+    double fold = 0;                        // largest |w| that the lens maps one to one
+    glm::dvec2 ray_min{0.0}, ray_max{0.0};  // of the frame
 };
 
 struct Camera {

@@ -66,8 +66,8 @@ TEST(Command, features_that_are_not_there_say_so) {
     const std::string train =
         fmt::format("train {} -o {} ", kScene, (scratch() / "unused").string());
     std::vector<BadCommand> commands;
-    for (const char* option :
-         {"--strategy mcmc", "--strategy=budget", "--accuracy high", "-d depths", "--depths depths", "--view"})
+    for (const char* option : {"--strategy mcmc", "--strategy=budget", "--accuracy high",
+                               "-d depths", "--depths depths", "--view"})
         commands.push_back({train + option, "not part of this version"});
     expect_refused(commands);
 }

@@ -71,14 +71,16 @@ Left left_in(const std::string& shader, const Constants& c) {
                                  ? 0
                                  : 1;
         left.atan += line.find(" Atan ") != std::string::npos ? 1 : 0;
-        left.length_or_cross += line.find(" Length ") != std::string::npos ||
-                                        line.find(" Cross ") != std::string::npos
-                                    ? 1
-                                    : 0;
+        left.length_or_cross +=
+            line.find(" Length ") != std::string::npos || line.find(" Cross ") != std::string::npos
+                ? 1
+                : 0;
         if (w[0] == "OpDecorate" && w.size() == 4 && w[2] == "Binding")
             left.bindings.insert(std::stoi(w[3]));
-        if (w[0] == "OpName" && w.size() == 3 && w[2] == "\"CameraData\"") camera_struct += w[1] + " ";
-        if (op("OpLoad") && camera_struct.find(w[3] + " ") != std::string::npos) cameras.insert(w[0]);
+        if (w[0] == "OpName" && w.size() == 3 && w[2] == "\"CameraData\"")
+            camera_struct += w[1] + " ";
+        if (op("OpLoad") && camera_struct.find(w[3] + " ") != std::string::npos)
+            cameras.insert(w[0]);
         if (op("OpCompositeExtract") && w.size() > 5 && cameras.count(w[4]) > 0)
             left.camera_members.insert(std::stoi(w[5]));
     }

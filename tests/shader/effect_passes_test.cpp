@@ -81,7 +81,8 @@ TEST(ExposurePass, map_gradient_and_step_match_double_on_any_size) {
             const double m1 = 0.9 * start[36 + 24 + 2 * k] + 0.1 * d_map[k];
             const double m2 = 0.999 * start[36 + 24 + 2 * k + 1] + 0.001 * d_map[k] * d_map[k];
             moments.insert(moments.end(), {m1, m2});
-            got_moments.insert(got_moments.end(), {run.state[36 + 24 + 2 * k], run.state[36 + 24 + 2 * k + 1]});
+            got_moments.insert(got_moments.end(),
+                               {run.state[36 + 24 + 2 * k], run.state[36 + 24 + 2 * k + 1]});
             const double change = -0.01 * (m1 / (1 - std::pow(0.9, 3))) /
                                   (std::sqrt(m2 / (1 - std::pow(0.999, 3))) + 1e-15);
             for (size_t v = 0; v < kPhotos; ++v) {

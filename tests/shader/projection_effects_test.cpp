@@ -77,8 +77,8 @@ size_t expect_walks_match(const TestScene& s, ProjectionEffects effects) {
                 have.push_back(stored[a][c] / unit);
             }
         }
-        EXPECT_TRUE(compare_scaled(attribute_name(a), want, have,
-                                   tolerance("project_gradient_float32")));
+        EXPECT_TRUE(
+            compare_scaled(attribute_name(a), want, have, tolerance("project_gradient_float32")));
     }
     return seen.size();
 }
@@ -154,7 +154,8 @@ TEST(ProjectionEffects, a_centred_camera_needs_no_principal_point_bit_by_bit) {
     EXPECT_EQ(on.bound, off.bound);
     EXPECT_EQ(on.light, off.light);
     const Partials partials = Partials::random(s.model.size(), 5);
-    const PassState a = run_backward_pass(s.model, s.camera, 1, false, start_state(s.model), partials);
+    const PassState a =
+        run_backward_pass(s.model, s.camera, 1, false, start_state(s.model), partials);
     const PassState b = run_backward_pass(s.model, s.camera, 1, false, start_state(s.model),
                                           partials, {}, {.off_centre = false});
     EXPECT_EQ(a.moments, b.moments);

@@ -29,8 +29,11 @@ inline std::vector<std::pair<std::string, LensTerms>> test_lenses() {
     prism.k = {-0.03, 0.01, -0.002, 0.0005};
     prism.tangential = glm::dvec2(0.004, 0.006);
     prism.prism = glm::dvec2(0.01, -0.02);
-    return {{"OPENCV", opencv}, {"FULL_OPENCV", full}, {"OPENCV_FISHEYE", fisheye},
-            {"FOV", fov},       {"THIN_PRISM_FISHEYE", prism}};
+    return {{"OPENCV", opencv},
+            {"FULL_OPENCV", full},
+            {"OPENCV_FISHEYE", fisheye},
+            {"FOV", fov},
+            {"THIN_PRISM_FISHEYE", prism}};
 }
 
 }  // namespace darb::test

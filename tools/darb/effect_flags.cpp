@@ -1,6 +1,6 @@
 #include "tools/darb/effect_flags.h"
 
-#include <memory>
+#include <utility>
 
 namespace darb {
 
@@ -19,6 +19,15 @@ void add_lens_flag(CLI::App& command, DatasetOptions& data) {
             "undistort: straight pictures; original: distorted as the photos are")
         ->check(CLI::IsMember({"undistort", "original"}))
         ->default_str("undistort");
+}
+
+void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options) {
+    command.add_flag("--antialiasing", antialiasing, "as --effects +antialias");
+    for (auto [name, rate] : {std::pair{"--exposure-lr-init", &options.exposure_lr_init},
+                              {"--exposure-lr-final", &options.exposure_lr_final}})
+        command.add_option(name, *rate, "of the exposure of each photo, where that is trained")
+            ->capture_default_str()
+            ->check(CLI::PositiveNumber);
 }
 
 nlohmann::json plan_json(const EffectPlan& plan) {

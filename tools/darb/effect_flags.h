@@ -16,6 +16,9 @@ void add_effects_flag(CLI::App& command, std::string& text);
 /// Adds --lens.
 void add_lens_flag(CLI::App& command, DatasetOptions& data);
 
+/// Adds --antialiasing and the rates of exposure.
+void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options);
+
 /// A row an effect: name, on, overridden, measured, reason.
 nlohmann::json plan_json(const EffectPlan& plan);
 

@@ -93,10 +93,8 @@ json compare_choices(const Subject& s, const PlanFlags& flags) {
     json list = json::array();
     for (const char* name : {"none", "auto", "all"}) {
         const Measured m = measure(s, flags, plan_of(s, flags, parse_effects(name)));
-        list.push_back({{"effects", name},
-                        {"ms", m.ms},
-                        {"spread_ms", m.spread_ms},
-                        {"peak_bytes", m.bytes}});
+        list.push_back(
+            {{"effects", name}, {"ms", m.ms}, {"spread_ms", m.spread_ms}, {"peak_bytes", m.bytes}});
         if (!flags.as_json)
             fmt::print("{:<5} {:>9.2f} ms (spread {:.2f})  {:>9.2f} MB at the peak\n", name, m.ms,
                        m.spread_ms, static_cast<double>(m.bytes) / 1e6);

@@ -56,8 +56,8 @@ std::vector<View> framing_views(const SplatModel& model) {
         c.cy = 0.5 * kHeight;
         const glm::dvec3 right(std::cos(angle), 0, -std::sin(angle)), down(0, 1, 0);
         c.rotation = glm::transpose(glm::dmat3(right, down, glm::cross(right, down)));
-        c.translation = glm::dvec3(0, 0, 3 * std::sqrt(radius2)) -
-                        c.rotation * (centre + model.origin);
+        c.translation =
+            glm::dvec3(0, 0, 3 * std::sqrt(radius2)) - c.rotation * (centre + model.origin);
         views.push_back(view);
     }
     return views;

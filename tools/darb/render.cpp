@@ -10,10 +10,10 @@
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
-#include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/depth_file.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
 #include "trainer/evaluation.h"
@@ -62,15 +62,6 @@ void scale_camera(Camera& camera, int resolution) {
     camera.height = height;
 }
 
-void write_depth(const std::filesystem::path& frame, const ImageF& depth, bool npy, double unit) {
-    std::filesystem::path file = frame;
-    file.replace_filename(frame.stem().string() + (npy ? "_depth.npy" : "_depth.png"));
-    if (npy)
-        write_npy(file, depth);
-    else
-        write_depth_png(file, depth, unit);
-}
-
 double median(std::vector<double> values) {
     if (values.empty()) return 0;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -88,8 +79,7 @@ int render(const RenderFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    const EffectPlan plan =
-        plan_rendering(model, views, {.depth = !flags.depth.empty()}, choice);
+    const EffectPlan plan = plan_rendering(model, views, {.depth = !flags.depth.empty()}, choice);
     apply_plan(plan, model);
     ForwardOptions options;
     options.effects = plan.projection();

@@ -72,8 +72,8 @@ void plan_effects(const Dataset& dataset, const EffectChoice& choice, TrainFlags
     const EffectPlan plan = plan_training(dataset, flags.run.photos, flags.train.sh_degree, choice);
     apply_plan(plan, flags.train);
     flags.run.effects = plan_line(plan);
-    flags.run.effects_json = plan_json(plan).dump(-1, ' ', false,
-                                                  nlohmann::json::error_handler_t::replace);
+    flags.run.effects_json =
+        plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 int train(TrainFlags flags, std::vector<std::string> arguments) {

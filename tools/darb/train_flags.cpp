@@ -117,12 +117,7 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
                      "accepted: every run on one device already repeats bit by bit");
     add_effects_flag(command, f.effects);
     add_lens_flag(command, f.data);
-    command.add_flag("--antialiasing", f.antialiasing, "as --effects +antialias");
-    for (auto [name, rate] : {std::pair{"--exposure-lr-init", &f.train.exposure_lr_init},
-                              {"--exposure-lr-final", &f.train.exposure_lr_final}})
-        command.add_option(name, *rate, "of the exposure of each photo, where that is trained")
-            ->capture_default_str()
-            ->check(CLI::PositiveNumber);
+    add_training_effect_flags(command, f.antialiasing, f.train);
     add_missing(command, "--accuracy", "the choice of accuracy");
     add_missing(command, "--depths,-d", "depth supervision");
     add_missing(command, "--view", "the live view");

@@ -131,8 +131,7 @@ TEST(EffectPlanOfDataset, footprints_that_differ_call_for_antialiasing) {
 TEST(EffectPlanOfDataset, gains_that_differ_call_for_exposure_where_tracks_say_so) {
     Capture c;
     for (size_t v = 0; v < c.photos.size(); ++v)
-        for (std::uint8_t& value : c.photos[v].data)
-            value = static_cast<std::uint8_t>(120 + 3 * v);
+        for (std::uint8_t& value : c.photos[v].data) value = static_cast<std::uint8_t>(120 + 3 * v);
     EXPECT_EQ(c.on(), On{EFFECT_EXPOSURE});
     EXPECT_GT(plan_training(c.dataset, c.photos, 0).row(EFFECT_EXPOSURE).measured, 0.05);
     c.forget_tracks();
