@@ -32,7 +32,8 @@ class Run {
           dataset_(dataset),
           options_(options),
           run_(run),
-          photos_(run.photos.empty() ? load_photos(dataset.views) : run.photos),
+          loaded_(run.photos.empty() ? load_photos(dataset.views) : std::vector<ImageU8>{}),
+          photos_(run.photos.empty() ? loaded_ : run.photos),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
           log_(run.output, !run.resume_from.empty()),
           progress_(1, options.iterations, run.quiet) {}
@@ -59,7 +60,8 @@ class Run {
     const Dataset& dataset_;
     const TrainOptions& options_;
     const RunOptions& run_;
-    std::vector<ImageU8> photos_;
+    const std::vector<ImageU8> loaded_;  // empty where RunOptions brought the photos
+    const std::vector<ImageU8>& photos_;
     Trainer trainer_;
     RunLog log_;
     Progress progress_;

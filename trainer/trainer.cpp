@@ -88,7 +88,12 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
                     "Every view is held out; train without --eval or add photos.");
     cameras_ = upload_cameras(device, camera_data_);
     d_image_ = Buffer(device, "d_image", pixels * 12);
-    if (options_.antialias) smoothing_.emplace(device, forward_.options().effects);
+    if (options_.antialias) {
+        smoothing_.emplace(device, forward_.options().effects);
+        std::vector<gpu::CameraData> train_data;
+        for (const int view : train_views_) train_data.push_back(camera_data_[view]);
+        train_cameras_ = upload_cameras(device, train_data);
+    }
     if (options_.exposure)
         exposure_.emplace(device, static_cast<std::uint32_t>(train_views_.size()), pixels);
     settle_effects(0);
@@ -180,8 +185,7 @@ void Trainer::record(Commands& commands, int view, int iteration, int degree, co
     const gpu::CameraData& data = camera_data_[view];
     const auto index = static_cast<std::uint32_t>(view);
     const std::uint32_t pixels = data.width * data.height;
-    const auto photo = static_cast<std::uint32_t>(
-        std::lower_bound(train_views_.begin(), train_views_.end(), view) - train_views_.begin());
+    const std::uint32_t photo = photo_of(view);
     const glm::vec3 behind = background_for(iteration);
     forward_.record(commands, splats_, cameras_, index, data, degree, behind);
     if (exposure_) exposure_->record(commands, forward_.image(), photo, pixels);
@@ -196,8 +200,8 @@ void Trainer::record(Commands& commands, int view, int iteration, int degree, co
         exposure_->record_backward(commands, forward_.image(), d_image_, forward_.status(), photo,
                                    pixels, static_cast<float>(rate), visits);
     }
-    backward_.record(commands, forward_, splats_, d_image_, cameras_, index, data, degree,
-                     behind, step);
+    backward_.record(commands, forward_, splats_, d_image_, cameras_, index, data, degree, behind,
+                     step);
 }
 
 gpu::FrameStatus Trainer::finish(Flight& flight) {
@@ -273,6 +277,7 @@ void Trainer::density_control(int iteration) {
             density_.run(splats_, backward_.gradient_sum(), args, growth_limit());
         counters_.cloned_or_split += result.grown;
         counters_.pruned += result.pruned;
+        smoothing_stale_ |= result.grown > 0 || result.pruned > 0;
         backward_.reserve(splats_.count(), 0);
         Commands& commands = flights_[0].commands;
         commands.begin();
@@ -343,7 +348,7 @@ void Trainer::restore(const State& s) {
     backward_.set_sh_stored(s.model.sh_degree);
     if (s.next_probe > 0) next_probe_ = s.next_probe;
     if (smoothing_) {
-        smoothing_->update(splats_, cameras_, static_cast<std::uint32_t>(camera_data_.size()));
+        update_smoothing();
         if (!s.smoothing.empty()) splats_.smoothing().upload(s.smoothing);
     }
     if (exposure_ && !s.exposure.empty()) exposure_->restore(s.exposure);

@@ -114,7 +114,9 @@ class Trainer {
     void launch(int iteration);
     void record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
                 const Buffer& loss);
+    std::uint32_t photo_of(int view) const;  // its index among the training photos
     void settle_effects(int iteration);
+    void update_smoothing();
     void probe_degree();
     double probe_arm(const State& start, int degree, const std::vector<int>& aside);
     double photo_psnr(int view);
@@ -143,6 +145,8 @@ class Trainer {
     Backward backward_;
     Loss loss_;
     DensityControl density_;
+    bool smoothing_stale_ = true;               // splats came or went
+    Buffer train_cameras_;                      // options.antialias
     std::optional<SmoothingFilter> smoothing_;  // options.antialias
     std::optional<Exposure> exposure_;          // options.exposure
     std::vector<gpu::CameraData> camera_data_;

@@ -19,11 +19,20 @@ constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 
 }  // namespace
 
+std::uint32_t Trainer::photo_of(int view) const {
+    return static_cast<std::uint32_t>(
+        std::lower_bound(train_views_.begin(), train_views_.end(), view) - train_views_.begin());
+}
+
+void Trainer::update_smoothing() {
+    smoothing_->update(splats_, train_cameras_, static_cast<std::uint32_t>(train_views_.size()));
+    smoothing_stale_ = false;
+}
+
 void Trainer::settle_effects(int iteration) {
-    if (smoothing_ && (iteration % kFilterInterval == 0 ||
-                       splats_.smoothing().bytes() / sizeof(float) != splats_.count())) {
+    if (smoothing_ && (smoothing_stale_ || iteration % kFilterInterval == 0)) {
         drain();
-        smoothing_->update(splats_, cameras_, static_cast<std::uint32_t>(camera_data_.size()));
+        update_smoothing();
     }
     if (options_.probe_sh && iteration == next_probe_ && iteration < options_.iterations &&
         splats_.sh_degree() < options_.sh_degree)
@@ -74,8 +83,12 @@ double Trainer::photo_psnr(int view) {
         flight.commands.begin();
         forward_.record(flight.commands, splats_, cameras_, static_cast<std::uint32_t>(view), data,
                         sh_degree(), background_);
-        loss_.record(flight.commands, forward_.image(), photos_[view], d_image_, flight.loss, 0,
-                     width, height, background_, options_.lambda_dssim);
+        if (exposure_)
+            exposure_->record(flight.commands, forward_.image(), photo_of(view),
+                              data.width * data.height);
+        loss_.record(flight.commands, exposure_ ? exposure_->mapped() : forward_.image(),
+                     photos_[view], d_image_, flight.loss, 0, width, height, background_,
+                     options_.lambda_dssim);
         flight.commands.submit_and_wait();
     } while (forward_.make_room(forward_.read_status()));
     gpu::LossResult loss;

@@ -46,7 +46,7 @@ std::string optimised(const std::string& shader, const Constants& c) {
         if (binary.name == shader) write_file_atomic(in, std::as_bytes(binary.words));
     const std::string command = fmt::format(
         "spirv-opt --set-spec-const-default-value '1:{0} 2:{0} 200:{1} 201:{2} 202:{3} 203:{4}' "
-        "--freeze-spec-const --fold-spec-const-op-composite -O {5} -o - | spirv-dis "
+        "--freeze-spec-const --fold-spec-const-op-composite -O -O {5} -o - | spirv-dis "
         "--no-indent --raw-id -o {6} -",
         c.degree, c.off_centre, c.antialias, c.smoothing, c.lens, in.string(), text.string());
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
@@ -81,6 +81,7 @@ Left left_in(const std::string& shader, const Constants& c) {
             camera_struct += w[1] + " ";
         if (op("OpLoad") && camera_struct.find(w[3] + " ") != std::string::npos)
             cameras.insert(w[0]);
+        if (op("OpCopyLogical") && cameras.count(w[4]) > 0) cameras.insert(w[0]);
         if (op("OpCompositeExtract") && w.size() > 5 && cameras.count(w[4]) > 0)
             left.camera_members.insert(std::stoi(w[5]));
     }
