@@ -42,6 +42,7 @@ tests    libclang-rt-dev      ASan and UBSan run time
 tests    clang-format-14      layout check; one version, so one answer
 tests    xvfb                 a display for the tests of the window
 tests    xdotool              mouse and keys in them
+tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
 tests    python3              style script (standard library only)
 colmap   colmap               cameras from photos; optional
 '

@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kMagic[8] = {'D', 'A', 'R', 'B', 'C', 'K', 'P', 'T'};
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 // Magic, version, CRC-32 of everything behind itself, bytes of the JSON header.
 constexpr size_t kCrcAt = sizeof kMagic + 4, kSizeAt = kCrcAt + 4, kHeadBytes = kSizeAt + 8;
 constexpr std::uint64_t kMaxSplats = 1u << 30;
@@ -27,6 +27,8 @@ void for_each_array(State& state, Visit visit) {
     for (int a = 0; a < kAttributeCount; ++a) visit(attribute_values(state.model, a));
     for (int a = 0; a < kAttributeCount; ++a) visit(state.moments[a]);
     visit(state.gradient_sum);
+    visit(state.smoothing);
+    visit(state.exposure);
 }
 
 std::uint32_t checksum(std::span<const std::byte> bytes) {
@@ -43,6 +45,9 @@ Json header_of(const Checkpoint& c) {
     const SplatModel& m = c.state.model;
     const TrainCounters& n = c.state.counters;
     return Json{{"iteration", c.state.iteration},
+                {"next_probe", c.state.next_probe},
+                {"smoothing", c.state.smoothing.size()},
+                {"exposure", c.state.exposure.size()},
                 {"splats", m.size()},
                 {"sh_degree", m.sh_degree},
                 {"kernel", kernel_name(m.kernel)},
@@ -61,6 +66,7 @@ Json header_of(const Checkpoint& c) {
 void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     SplatModel& m = c.state.model;
     c.state.iteration = h.at("iteration").get<int>();
+    c.state.next_probe = h.at("next_probe").get<int>();
     m.sh_degree = h.at("sh_degree").get<int>();
     const auto kernel = kernel_from_name(h.at("kernel").get<std::string>());
     const auto footprint = footprint_from_name(h.at("footprint").get<std::string>());
@@ -137,22 +143,29 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     if (header_bytes > file.size() - kHeadBytes) throw fail("truncated in the header");
     const auto* text = reinterpret_cast<const char*>(file.data() + kHeadBytes);
     Checkpoint c;
-    std::uint64_t splats = 0;
+    std::uint64_t splats = 0, smoothing = 0, exposure = 0;
     try {
         const Json header = Json::parse(text, text + header_bytes);
         read_header(header, c, where);
         splats = header.at("splats").get<std::uint64_t>();
+        smoothing = header.at("smoothing").get<std::uint64_t>();
+        exposure = header.at("exposure").get<std::uint64_t>();
+        if ((smoothing != 0 && smoothing != splats) || exposure > kMaxSplats)
+            throw fail("the header's sizes make no sense");
     } catch (const Json::exception& e) {
         throw fail(std::string("the header cannot be read: ") + e.what());
     }
     const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
-    const std::uint64_t expected = splats * floats_per_splat(c.state.model) * sizeof(float);
+    const std::uint64_t floats = splats * floats_per_splat(c.state.model) + smoothing + exposure;
+    const std::uint64_t expected = floats * sizeof(float);
     if (payload.size() != expected)
         throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
                                payload.size(), splats, expected));
     if (checksum(file.subspan(kSizeAt)) != crc)
         throw fail("damaged: the checksum does not match the content");
     size_arrays(c, splats);
+    c.state.smoothing.resize(smoothing);
+    c.state.exposure.resize(exposure);
     size_t at = 0;
     for_each_array(c.state, [&](std::vector<float>& values) {
         if (!values.empty())
@@ -174,6 +187,13 @@ std::string settings_text(const TrainOptions& o) {
                 {"accuracy", accuracy_text(o.accuracy)},
                 {"sh_degree", o.sh_degree},
                 {"sh_interval", o.sh_interval},
+                {"effects",
+                 {{"probe_sh", o.probe_sh},
+                  {"antialias", o.antialias},
+                  {"exposure", o.exposure},
+                  {"off_centre", o.off_centre},
+                  {"lens", o.lens},
+                  {"exposure_lr", {o.exposure_lr_init, o.exposure_lr_final}}}},
                 {"white_background", o.white_background},
                 {"random_background", o.random_background},
                 {"lambda_dssim", o.lambda_dssim},

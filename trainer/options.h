@@ -20,6 +20,14 @@ struct TrainOptions {
     Accuracy accuracy;  // footprint and SH degree aside: they are the two here
     int sh_degree = 3;  // one more every sh_interval iterations
     int sh_interval = 1'000;
+    // false: a degree is added at each interval. true: only where a probe on training photos set
+    // aside gains kProbeGain_db; refused ones are tried again after as many iterations as before.
+    bool probe_sh = false;
+    bool antialias = false;  // opacity compensation and the 3D smoothing filter of Mip-Splatting
+    bool exposure = false;   // an affine map of colours per photo, trained beside the splats
+    float exposure_lr_init = 0.01f, exposure_lr_final = 0.001f;
+    bool off_centre = true;         // false: every principal point is the centre of its photo
+    bool lens = false;              // cameras have Camera::lens
     bool white_background = false;  // what pictures are compared over; black otherwise
     bool random_background = true;  // train over another colour each iteration: no surface can
                                     // stay half transparent to borrow the background's colour

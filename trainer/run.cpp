@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -31,7 +32,8 @@ class Run {
           dataset_(dataset),
           options_(options),
           run_(run),
-          photos_(load_photos(dataset.views)),
+          loaded_(run.photos.empty() ? load_photos(dataset.views) : std::vector<ImageU8>{}),
+          photos_(run.photos.empty() ? loaded_ : run.photos),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
           log_(run.output, !run.resume_from.empty()),
           progress_(1, options.iterations, run.quiet) {}
@@ -61,12 +63,14 @@ class Run {
     const Dataset& dataset_;
     const TrainOptions& options_;
     const RunOptions& run_;
-    std::vector<ImageU8> photos_;
+    const std::vector<ImageU8> loaded_;  // empty where RunOptions brought the photos
+    const std::vector<ImageU8>& photos_;
     Trainer trainer_;
     RunLog log_;
     Progress progress_;
     RunSummary summary_;
     IterationResult latest_;
+    size_t told_probes_ = 0;
     double seconds_ = 0;
     bool running_ = false;
     Clock::time_point started_;
@@ -81,6 +85,16 @@ void Run::resume() {
     progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
+}
+
+// As 3DGS writes it: name -> three rows of four.
+std::string exposure_text(const std::map<std::string, ColourMap>& maps) {
+    nlohmann::json all = nlohmann::json::object();
+    for (const auto& [name, map] : maps)
+        for (size_t r = 0; r < 3; ++r)
+            all[name].push_back(std::vector<float>(map.begin() + std::ptrdiff_t(4 * r),
+                                                   map.begin() + std::ptrdiff_t(4 * r + 4)));
+    return all.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 void Run::on_result(const IterationResult& result) {
@@ -117,6 +131,8 @@ void Run::save_model(int iteration) {
     summary_.model =
         run_.output / "point_cloud" / fmt::format("iteration_{}", iteration) / "point_cloud.ply";
     write_ply(summary_.model, trainer_.model());
+    if (const auto maps = trainer_.exposures(); !maps.empty())
+        write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
     stopwatch(true);
 }
 
@@ -139,7 +155,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
     if (!run_.resume_from.empty()) resume();
-    log_.start(device_, dataset_, options_, trainer_.splat_count());
+    log_.start(device_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
 
     try {
         train(stop);
@@ -170,6 +186,13 @@ void Run::train(const std::atomic<bool>* stop) {
         if (const std::uint32_t n = trainer_.stopped_by_memory(); n != 0 && stopped == 0)
             progress_.note(fmt::format("growth stops at {} splats: --max-memory", stopped = n));
         const int i = trainer_.iteration();
+        for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
+            const Trainer::Probe& p = trainer_.probes()[told_probes_];
+            progress_.note(
+                fmt::format("iteration {}: colour of degree {} {} ({:+.3f} dB on photos "
+                            "set aside)",
+                            p.iteration, p.degree, p.admitted ? "admitted" : "refused", p.gain_db));
+        }
         const bool last = i == options_.iterations;
         if (last || contains(run_.test_iterations, i)) evaluate(i);
         if (last || contains(run_.save_iterations, i)) save_model(i);

@@ -97,7 +97,7 @@ void RunLog::write(const Json& event) {
 }
 
 void RunLog::start(Device& device, const Dataset& dataset, const TrainOptions& options,
-                   std::uint32_t splats) {
+                   std::uint32_t splats, const std::string& effects_json) {
     rates_ = measure_rates(device);
     int held_out = 0;
     double pixels = 0;
@@ -120,6 +120,7 @@ void RunLog::start(Device& device, const Dataset& dataset, const TrainOptions& o
               {"copy_bytes_per_s", rates_.bytes_per_s},
               {"fma_per_s", rates_.fma_per_s},
               {"settings", Json::parse(settings_text(options))}};
+    if (!effects_json.empty()) start_["effects"] = Json::parse(effects_json);
     write(start_);
 }
 
@@ -221,6 +222,12 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
     Json evaluations = Json::array();
     for (const Json& e : events_)
         if (e.value("event", "") == "evaluation") evaluations.push_back(e);
+    Json probes = Json::array();
+    for (const Trainer::Probe& p : trainer.probes())
+        probes.push_back({{"iteration", p.iteration},
+                          {"degree", p.degree},
+                          {"gain_db", p.gain_db},
+                          {"admitted", p.admitted}});
     const Json metrics{
         {"start", start_},
         {"iteration", summary.iteration},
@@ -239,6 +246,9 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"cloned_or_split", c.cloned_or_split},
         {"pruned", c.pruned},
         {"culled_splat_frames", culled_json(c)},
+        {"effects", start_.value("effects", Json::array())},
+        {"sh_probes", probes},
+        {"sh_degree", trainer.sh_degree()},
         {"evaluations", evaluations}};
     write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
     const auto report = folder_ / "report.html";

@@ -28,7 +28,7 @@ class RunLog {
     void cut_after(int iteration);
 
     void start(Device& device, const Dataset& dataset, const TrainOptions& options,
-               std::uint32_t splats);
+               std::uint32_t splats, const std::string& effects_json);
     /// Keeps one line in kLogInterval. counters: of the run so far; totals: of the passes, as Trainer
     /// sums them.
     void iteration(const IterationResult& result, const TrainCounters& counters, double seconds,

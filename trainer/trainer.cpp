@@ -15,18 +15,32 @@ namespace darb {
 
 namespace {
 
+// While a probe runs, times the rate of the view-dependent part: what it trains is thrown away, so
+// that it may look far ahead.
+constexpr float kProbeRestRate = 8;
+
 ForwardOptions forward_options(const TrainOptions& options) {
     ForwardOptions f;
     f.kernel = options.kernel;
     f.footprint = options.footprint;
     set_options(options.accuracy, f);
-    f.sh_stored = options.sh_degree;
+    f.sh_stored = options.probe_sh ? 0 : options.sh_degree;
+    f.effects = {options.off_centre || options.lens, options.antialias, options.antialias,
+                 options.lens};
     f.store_for_backward = true;
     return f;
 }
 
 // More splats than this share with a gradient that is not finite: something is broken.
 constexpr std::uint64_t kBadGradientShare = 1'000;
+SplatModel start_model(SplatModel start, const TrainOptions& options) {
+    start.antialias = options.antialias;
+    if (options.probe_sh) {
+        start.sh_degree = 0;
+        start.sh_rest.clear();
+    }
+    return start;
+}
 
 int largest(const Dataset& dataset, int Camera::*side) {
     int most = 1;
@@ -47,7 +61,8 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       options_(options),
       background_(options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset.views)),
-      splats_(device, start, true),
+      next_probe_(std::max(options.sh_interval, 1)),
+      splats_(device, start_model(start, options), true),
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options), BackwardResult::update),
       loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height),
@@ -62,6 +77,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
         camera_data_.push_back(camera_data(view.camera, splats_.origin()));
+        names_.push_back(view.name);
         photos_.emplace_back();
         if (view.is_test) continue;
         train_views_.push_back(static_cast<int>(i));
@@ -76,15 +92,30 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
                     "Every view is held out; train without --eval or add photos.");
     cameras_ = upload_cameras(device, camera_data_);
     d_image_ = Buffer(device, "d_image", pixels * 12);
+    if (options_.antialias) {
+        smoothing_.emplace(device, forward_.options().effects);
+        std::vector<gpu::CameraData> train_data;
+        for (const int view : train_views_) train_data.push_back(camera_data_[view]);
+        train_cameras_ = upload_cameras(device, train_data);
+    }
+    if (options_.exposure)
+        exposure_.emplace(device, static_cast<std::uint32_t>(train_views_.size()), pixels);
+    settle_effects(0);
     forward_.reserve(splats_.count(), splats_.count() * 4, largest(dataset, &Camera::width),
                      largest(dataset, &Camera::height));
 }
 
+int Trainer::degree_at(int iteration) const {
+    if (options_.probe_sh) return splats_.sh_degree();
+    return std::min(options_.sh_degree, iteration / std::max(options_.sh_interval, 1));
+}
+
 int Trainer::sh_degree() const {
-    return std::min(options_.sh_degree, iteration_ / std::max(options_.sh_interval, 1));
+    return degree_at(iteration_);
 }
 
 int Trainer::view_for(int iteration) {
+    if (!probe_views_.empty()) return probe_views_[iteration % probe_views_.size()];
     const int count = static_cast<int>(train_views_.size());
     const int epoch = (iteration - 1) / count;
     if (epoch != order_epoch_) {
@@ -116,7 +147,7 @@ AdamStep Trainer::rates(int iteration) const {
     step.rotation = options_.rotation_lr * late;
     step.opacity = options_.opacity_lr * late;
     step.sh_dc = options_.sh_dc_lr * late;
-    step.sh_rest = options_.sh_rest_lr * late;
+    step.sh_rest = options_.sh_rest_lr * late * (probe_views_.empty() ? 1.0f : kProbeRestRate);
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight = options_.scale_weight / static_cast<float>(extent_);
@@ -127,6 +158,7 @@ void Trainer::step() {
     launch(++iteration_);
     settle(flights_[(iteration_ + 1) & 1]);
     density_control(iteration_);
+    settle_effects(iteration_);
 }
 
 void Trainer::drain() {
@@ -146,17 +178,34 @@ void Trainer::launch(int iteration) {
 
     flight.iteration = iteration;
     Commands& commands = flight.commands;
-    const int degree = std::min(options_.sh_degree, iteration / std::max(options_.sh_interval, 1));
     commands.begin();
-    const glm::vec3 behind = background_for(iteration);
-    forward_.record(commands, splats_, cameras_, static_cast<std::uint32_t>(view), data, degree,
-                    behind);
-    loss_.record(commands, forward_.image(), photos_[view], d_image_, flight.loss, 0, width, height,
-                 behind, options_.lambda_dssim);
-    backward_.record(commands, forward_, splats_, d_image_, cameras_,
-                     static_cast<std::uint32_t>(view), data, degree, behind, rates(iteration));
+    record(commands, view, iteration, degree_at(iteration), rates(iteration), flight.loss);
     commands.copy(forward_.status(), flight.status, sizeof(gpu::FrameStatus));
     commands.submit();
+}
+
+void Trainer::record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
+                     const Buffer& loss) {
+    const gpu::CameraData& data = camera_data_[view];
+    const auto index = static_cast<std::uint32_t>(view);
+    const std::uint32_t pixels = data.width * data.height;
+    const std::uint32_t photo = photo_of(view);
+    const glm::vec3 behind = background_for(iteration);
+    forward_.record(commands, splats_, cameras_, index, data, degree, behind);
+    if (exposure_) exposure_->record(commands, forward_.image(), photo, pixels);
+    loss_.record(commands, exposure_ ? exposure_->mapped() : forward_.image(), photos_[view],
+                 d_image_, loss, 0, static_cast<int>(data.width), static_cast<int>(data.height),
+                 behind, options_.lambda_dssim);
+    if (exposure_) {
+        const double t = std::clamp(double(iteration) / options_.iterations, 0.0, 1.0);
+        const double rate = options_.exposure_lr_init *
+                            std::pow(options_.exposure_lr_final / options_.exposure_lr_init, t);
+        const int visits = (iteration - 1) / static_cast<int>(train_views_.size()) + 1;
+        exposure_->record_backward(commands, forward_.image(), d_image_, forward_.status(), photo,
+                                   pixels, static_cast<float>(rate), visits);
+    }
+    backward_.record(commands, forward_, splats_, d_image_, cameras_, index, data, degree, behind,
+                     step);
 }
 
 gpu::FrameStatus Trainer::finish(Flight& flight) {
@@ -261,6 +310,7 @@ void Trainer::density_control(int iteration) {
             stopped_by_memory_ = within_memory;
         counters_.cloned_or_split += result.grown;
         counters_.pruned += result.pruned;
+        smoothing_stale_ |= result.grown > 0 || result.pruned > 0;
         backward_.reserve(splats_.count(), 0);
         Commands& commands = flights_[0].commands;
         commands.begin();
@@ -272,7 +322,18 @@ void Trainer::density_control(int iteration) {
 
 SplatModel Trainer::model() {
     drain();
-    return splats_.download();
+    const SplatModel model = splats_.download();
+    if (!smoothing_ || model.size() == 0) return model;
+    return bake_smoothing(model, splats_.smoothing().download<float>(model.size()));
+}
+
+std::map<std::string, ColourMap> Trainer::exposures() {
+    std::map<std::string, ColourMap> named;
+    if (!exposure_) return named;
+    drain();
+    const std::vector<ColourMap> maps = exposure_->maps();
+    for (size_t p = 0; p < maps.size(); ++p) named[names_[train_views_[p]]] = maps[p];
+    return named;
 }
 
 ImageF Trainer::render(const Camera& camera) {
@@ -295,8 +356,12 @@ ImageF Trainer::render(const Camera& camera) {
 
 Trainer::State Trainer::state() {
     State s;
-    s.model = model();
+    drain();
+    s.model = splats_.download();
     s.iteration = iteration_;
+    s.next_probe = next_probe_;
+    if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
+    if (exposure_) s.exposure = exposure_->state();
     for (int a = 0; a < kAttributeCount; ++a) {
         const size_t floats = size_t{splats_.count()} * splats_.stride(a) * 2;
         s.moments.push_back(floats ? splats_.moments(a).download<float>(floats)
@@ -312,6 +377,14 @@ Trainer::State Trainer::state() {
 void Trainer::restore(const State& s) {
     drain();
     splats_ = GpuSplats(*device_, s.model, true);
+    forward_.set_sh_stored(s.model.sh_degree);
+    backward_.set_sh_stored(s.model.sh_degree);
+    if (s.next_probe > 0) next_probe_ = s.next_probe;
+    if (smoothing_) {
+        update_smoothing();
+        if (!s.smoothing.empty()) splats_.smoothing().upload(s.smoothing);
+    }
+    if (exposure_ && !s.exposure.empty()) exposure_->restore(s.exposure);
     for (int a = 0; a < kAttributeCount; ++a)
         if (!s.moments[a].empty()) splats_.moments(a).upload(s.moments[a]);
     backward_.reserve(splats_.count(), 0);

@@ -19,7 +19,9 @@
 #include "engine/render/loss.h"
 #include "trainer/densify/density_control.h"
 #include "trainer/memory_plan.h"
+#include "trainer/exposure.h"
 #include "trainer/options.h"
+#include "trainer/smoothing.h"
 
 namespace darb {
 
@@ -65,7 +67,18 @@ class Trainer {
     /// replaced by density control.
     const GpuSplats& splats() const { return splats_; }
     int sh_degree() const;  // in use at the current iteration
-    SplatModel model();     // drains
+    SplatModel model();     // as a file holds it: the smoothing filter worked in; drains
+
+    /// The exposure of each training photo by the view's name; empty where it is off. Drains.
+    std::map<std::string, ColourMap> exposures();
+
+    /// What a probe for view-dependent colour found.
+    struct Probe {
+        int iteration = 0, degree = 0;  // degree: the one on trial
+        double gain_db = 0;             // on the photos set aside
+        bool admitted = false;
+    };
+    const std::vector<Probe>& probes() const { return probes_; }
 
     /// A picture of the current splats, RGB not clamped. Drains.
     ImageF render(const Camera& camera);
@@ -84,6 +97,9 @@ class Trainer {
     /// The state beside the model that a checkpoint holds. moments: [attribute][2 N stride].
     struct State {
         int iteration = 0;
+        int next_probe = 0;
+        std::vector<float> smoothing;  // [N], or empty where the effect is off
+        std::vector<float> exposure;   // Exposure::state(), or empty
         SplatModel model;
         std::vector<std::vector<float>> moments;
         std::vector<float> gradient_sum;  // [N][2]
@@ -101,7 +117,17 @@ class Trainer {
         Commands commands;  // last: they are waited for before anything that they use goes
     };
     int view_for(int iteration);
+    int degree_at(int iteration) const;
     void launch(int iteration);
+    void record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
+                const Buffer& loss);
+    std::uint32_t photo_of(int view) const;  // its index among the training photos
+    void settle_effects(int iteration);
+    void update_smoothing();
+    void probe_degree();
+    double probe_arm(const State& start, int degree, const std::vector<int>& aside);
+    double photo_psnr(int view);
+    void set_degree(State& state, int degree);
     gpu::FrameStatus finish(Flight& flight);  // where it overflowed nothing was changed
     void settle(Flight& flight);              // finish, and do again what overflowed
     void density_control(int iteration);
@@ -114,15 +140,23 @@ class Trainer {
     TrainOptions options_;
     glm::vec3 background_;
     double extent_;
-    std::vector<int> train_views_;
-    std::vector<int> order_;  // of train_views_ in this epoch
+    std::vector<std::string> names_;  // of all views
+    std::vector<int> train_views_;    // ascending
+    std::vector<int> order_;          // of train_views_ in this epoch
     int order_epoch_ = -1;
+    int next_probe_;
+    std::vector<Probe> probes_;
+    std::vector<int> probe_views_;  // not empty while a probe runs: the views it trains on
 
     GpuSplats splats_;
     Forward forward_;
     Backward backward_;
     Loss loss_;
     DensityControl density_;
+    bool smoothing_stale_ = true;               // splats came or went
+    Buffer train_cameras_;                      // options.antialias
+    std::optional<SmoothingFilter> smoothing_;  // options.antialias
+    std::optional<Exposure> exposure_;          // options.exposure
     std::vector<gpu::CameraData> camera_data_;
     Buffer cameras_;
     std::vector<Buffer> photos_;  // [view]: uint [H][W], R in the low byte; empty for test views

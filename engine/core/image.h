@@ -13,7 +13,7 @@ template <class T>
 struct Image {
     int width = 0;     // px
     int height = 0;    // px
-    int channels = 0;  // 1, 3 or 4
+    int channels = 0;  // 1 to 4
     std::vector<T> data;
 
     Image() = default;

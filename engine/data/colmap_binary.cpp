@@ -77,6 +77,7 @@ PointCloud parse_colmap_points(std::span<const std::byte> file, const std::strin
     ByteReader reader(file, where);
     const std::size_t count = reader.read_count(kPointBytes, "points");
     PointCloud points;
+    points.seen_begin.push_back(0);
     points.position.reserve(count * 3);
     points.colour.reserve(count * 3);
     dropped = 0;
@@ -89,11 +90,17 @@ PointCloud parse_colmap_points(std::span<const std::byte> file, const std::strin
         for (std::uint8_t& value : colour) value = reader.read<std::uint8_t>();
         reader.skip(8);  // error
         const std::size_t track = reader.read_count(kTrackBytes, "track elements");
-        reader.skip(track * kTrackBytes);
-        if (!std::isfinite(position[0] + position[1] + position[2])) {
+        const bool finite = std::isfinite(position[0] + position[1] + position[2]);
+        for (std::size_t t = 0; t < track; ++t) {
+            const auto image = reader.read<std::uint32_t>();
+            reader.skip(kTrackBytes - sizeof image);
+            if (finite) points.seen_by.push_back(image);
+        }
+        if (!finite) {
             ++dropped;
             continue;
         }
+        points.seen_begin.push_back(points.seen_by.size());
         points.position.insert(points.position.end(), position, position + 3);
         points.colour.insert(points.colour.end(), colour, colour + 3);
     }

@@ -63,6 +63,7 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     for (const ColmapImage& image : model.images) {
         View view;
         view.name = image.name;
+        view.source_id = image.id;
         view.photo = images / image.name;
         if (has_masks) view.mask = find_mask(masks, image.name);
         view.lens = model.cameras.at(image.camera_id);

@@ -109,6 +109,7 @@ std::vector<ColmapImage> parse_colmap_images_text(std::string_view file, const s
 PointCloud parse_colmap_points_text(std::string_view file, const std::string& where,
                                     std::size_t& dropped) {
     PointCloud points;
+    points.seen_begin.push_back(0);
     dropped = 0;
     for (Lines lines(file, where); lines.next_record();) {
         lines.number<std::uint64_t>("point id");
@@ -120,6 +121,12 @@ PointCloud parse_colmap_points_text(std::string_view file, const std::string& wh
             ++dropped;
             continue;
         }
+        if (!lines.rest().empty()) lines.word("the error");
+        while (!lines.rest().empty()) {
+            points.seen_by.push_back(lines.number<std::uint32_t>("image id of the track"));
+            lines.word("the point's index in the track");
+        }
+        points.seen_begin.push_back(points.seen_by.size());
         points.position.insert(points.position.end(), position, position + 3);
         points.colour.insert(points.colour.end(), colour, colour + 3);
     }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <sstream>
 
 #include "engine/core/error.h"
@@ -75,6 +76,31 @@ void hold_out(std::vector<View>& views) {
     for (std::size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].is_test = true;
 }
 
+// Image ids of the tracks to indices of the sorted views, each once a point.
+void index_tracks(Dataset& dataset) {
+    PointCloud& points = dataset.points;
+    if (points.seen_by.empty()) {
+        points.seen_begin.clear();
+        return;
+    }
+    std::map<std::uint32_t, std::uint32_t> index;
+    for (std::size_t i = 0; i < dataset.views.size(); ++i)
+        index[dataset.views[i].source_id] = static_cast<std::uint32_t>(i);
+    std::vector<std::uint32_t> seen, views;
+    std::vector<std::size_t> begin{0};
+    for (std::size_t p = 0; p + 1 < points.seen_begin.size(); ++p) {
+        views.clear();
+        for (std::size_t k = points.seen_begin[p]; k < points.seen_begin[p + 1]; ++k)
+            if (const auto at = index.find(points.seen_by[k]); at != index.end())
+                views.push_back(at->second);
+        std::sort(views.begin(), views.end());
+        seen.insert(seen.end(), views.begin(), std::unique(views.begin(), views.end()));
+        begin.push_back(seen.size());
+    }
+    points.seen_by = std::move(seen);
+    points.seen_begin = std::move(begin);
+}
+
 }  // namespace
 
 Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
@@ -82,6 +108,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
     Dataset dataset = load_source(path, options);
     std::stable_sort(dataset.views.begin(), dataset.views.end(),
                      [](const View& a, const View& b) { return a.name < b.name; });
+    index_tracks(dataset);
     if (options.hold_out) hold_out(dataset.views);
     fit_views(dataset, options);
     return dataset;

@@ -1,5 +1,6 @@
 // Dataset: photos with their cameras and the sparse points, from any of the supported sources.
-// Cameras are pinholes in the frame of engine/scene/camera.h, at the size the photos load with.
+// Cameras are pinholes in the frame of engine/scene/camera.h, at the size the photos load with;
+// with DatasetOptions::original_lens those of distorted photos have the lens before them.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +29,17 @@ struct View {
     LensModel lens;               // of the file on disk, turned by orientation; see load_photo
     bool is_test = false;         // held out
     int orientation = 1;          // EXIF number that load_photo applies, 1 = as stored
+    std::uint32_t source_id = 0;  // COLMAP's image id
 };
 
 struct PointCloud {
     std::vector<double> position;      // [P][3] world
     std::vector<std::uint8_t> colour;  // [P][3]
+    // Views that saw point p: seen_by[seen_begin[p]] up to seen_by[seen_begin[p + 1]], indices into
+    // Dataset::views without repeats (image ids while a COLMAP model is read). Both are empty where
+    // the source does not say.
+    std::vector<std::size_t> seen_begin;  // [P + 1]
+    std::vector<std::uint32_t> seen_by;
     std::size_t size() const { return colour.size() / 3; }
 };
 
@@ -53,6 +60,7 @@ struct DatasetOptions {
     bool hold_out = false;  // --eval: every 8th view by name from the first on is test; sources
                             // with a test file of their own use that in either case
     bool require_photos = true;  // false: cameras only (render)
+    bool original_lens = false;  // true: distorted photos stay so, and their cameras have the lens
 };
 
 /// DATASET is a COLMAP project folder (sparse/0, sparse, or the model files themselves), a folder

@@ -73,6 +73,22 @@ void set_intrinsics(View& view, const UndistortedFrame& frame, int resolution, T
     camera.fy = full.fy * sy;
     camera.cx = full.cx * sx;
     camera.cy = full.cy * sy;
+    camera.lens = full.lens;
+}
+
+/// The photo as it is, with its lens before the pinhole.
+UndistortedFrame original_frame(const LensModel& model) {
+    const Lens lens(model);
+    UndistortedFrame frame;
+    Camera& camera = frame.camera;
+    camera.width = model.width;
+    camera.height = model.height;
+    camera.fx = lens.focal.x;
+    camera.fy = lens.focal.y;
+    camera.cx = lens.principal.x;
+    camera.cy = lens.principal.y;
+    if (model.distorted()) camera.lens = lens.terms(glm::dvec2(model.width, model.height));
+    return frame;
 }
 
 void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& dataset) {
@@ -125,9 +141,11 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
         std::vector<double> key = view.lens.parameters;
         key.insert(key.end(), {double(view.lens.width), double(view.lens.height)});
         const auto [at, is_new] = frames.try_emplace({view.lens.model, std::move(key)});
-        if (is_new) at->second = undistorted_frame(view.lens, view.name);
+        if (is_new)
+            at->second = options.original_lens ? original_frame(view.lens)
+                                               : undistorted_frame(view.lens, view.name);
         dataset.has_alpha |= at->second.has_gaps;
-        if (view.lens.distorted()) ++tally.undistorted;
+        if (view.lens.distorted() && !options.original_lens) ++tally.undistorted;
         set_intrinsics(view, at->second, options.resolution, tally);
     }
     dataset.alpha_is_mask = dataset.has_alpha && !tally.own_alpha;

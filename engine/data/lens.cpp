@@ -189,6 +189,37 @@ glm::dvec2 Lens::project(glm::dvec2 ray) const {
     return focal * distort(ray).value + principal;
 }
 
+LensTerms Lens::terms(glm::dvec2 size) const {
+    constexpr int kBorderSamples = 64;    // a side
+    constexpr double kMaxTangent = 10.0;  // 84 degrees
+    LensTerms terms;
+    terms.active = true;
+    if (front_ == Front::equidistant) terms.front_tan = terms.front_scale = 1;
+    if (front_ == Front::fov) {
+        terms.front_tan = 2 * std::tan(0.5 * omega_);
+        terms.front_scale = omega_;
+    }
+    terms.k = k_;
+    terms.d = d_;
+    terms.tangential = {p1_, p2_};
+    terms.prism = {s1_, s2_};
+    terms.fold = fold_;
+    terms.ray_min = terms.ray_max = glm::dvec2(0.0);
+    const auto see = [&](double x, double y) {
+        const glm::dvec2 ray = unproject({x, y}).value_or(glm::dvec2(0.0));
+        terms.ray_min = glm::max(glm::min(terms.ray_min, ray), glm::dvec2(-kMaxTangent));
+        terms.ray_max = glm::min(glm::max(terms.ray_max, ray), glm::dvec2(kMaxTangent));
+    };
+    for (int i = 0; i <= kBorderSamples; ++i) {
+        const double x = size.x * i / kBorderSamples, y = size.y * i / kBorderSamples;
+        see(x, 0);
+        see(x, size.y);
+        see(0, y);
+        see(size.x, y);
+    }
+    return terms;
+}
+
 bool Lens::valid(glm::dvec2 ray) const {
     const double r = std::hypot(ray.x, ray.y);
     return (front_ == Front::equidistant ? std::atan(r) : r) <= fold_;

@@ -40,6 +40,9 @@ class Lens {
     /// the fold, or the ray is 90 degrees or more off the axis.
     std::optional<glm::dvec2> unproject(glm::dvec2 pixel) const;
     bool valid(glm::dvec2 ray) const;
+    /// The same lens for the projection passes. size: of the frame, px, whose rays bound those at
+    /// which the Jacobian is taken; corners that no ray below 84 degrees reaches are left out.
+    LensTerms terms(glm::dvec2 size) const;
 
     glm::dvec2 focal{1.0}, principal{0.0};  // px
 

@@ -21,7 +21,7 @@ ImageU8 load_photo(const View& view) {
                                 photo.width, photo.height, view.lens.width, view.lens.height),
                     "Leave the photos alone while they are in use.");
     if (!view.mask.empty()) apply_mask(photo, read_image(view.mask, view.orientation));
-    if (view.lens.distorted()) {
+    if (view.lens.distorted() && !view.camera.lens.active) {
         const Camera full = undistorted_frame(view.lens, view.photo.string()).camera;
         photo = undistort(photo, view.lens, full);
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/core/check.h"
+#include "engine/reference/lens.h"
 #include "engine/reference/projection_terms.h"
 #include "engine/reference/sh.h"
 
@@ -25,6 +26,17 @@ T sigmoid_of_clamped(T logit) {
 template <class T>
 T antialias_factor(const Splats<T>& splats, const CovarianceTerms<T>& terms) {
     return splats.antialias ? std::sqrt(terms.det_sharp / terms.det) : T(1);
+}
+
+template <class T>
+T filter_of(const Splats<T>& splats, size_t index) {
+    return splats.smoothing.empty() ? T(0) : splats.smoothing[index];
+}
+
+/// What both filters leave of the opacity.
+template <class T>
+T opacity_factor(const Splats<T>& splats, const CovarianceTerms<T>& terms) {
+    return antialias_factor(splats, terms) * terms.smooth.factor;
 }
 
 template <class T>
@@ -158,6 +170,33 @@ void round_storage(ProjectedSplat<T>& p) {
     }
 }
 
+/// dL/d(mean in the camera) through the Jacobian and the pixel.
+template <class T>
+Vec3<T> mean_backward(const Vec3<T>& mean, const CovarianceTerms<T>& terms, const Camera& camera,
+                      const Vec3<T>& d_j1, const Vec3<T>& d_j2, const Vec2<T>& d_px) {
+    const T fx = T(camera.fx), fy = T(camera.fy), z = mean.z;
+    if (!camera.lens.active) {
+        return jacobian_backward(mean, terms, camera, d_j1, d_j2) +
+               Vec3<T>(d_px.x * fx / z, d_px.y * fy / z,
+                       -(d_px.x * fx * mean.x + d_px.y * fy * mean.y) / (z * z));
+    }
+    // Rows of J: f_i (D_i0 (1, 0, -u) + D_i1 (0, 1, -v)) / z, D the lens's Jacobian at (u, v).
+    const Vec2<T> uv(terms.ratio.x, terms.ratio.y), free(mean.x / z, mean.y / z);
+    const LensPoint<T> at = lens_point(camera.lens, uv);
+    Mat2<T> d_lens;  // [column][row]
+    d_lens[0] = Vec2<T>(fx * (d_j1.x - uv.x * d_j1.z), fy * (d_j2.x - uv.x * d_j2.z)) / z;
+    d_lens[1] = Vec2<T>(fx * (d_j1.y - uv.y * d_j1.z), fy * (d_j2.y - uv.y * d_j2.z)) / z;
+    Vec2<T> d_uv = lens_jacobian_backward(camera.lens, uv, d_lens);
+    for (int c = 0; c < 2; ++c)
+        d_uv[c] -= (fx * at.jacobian[c][0] * d_j1.z + fy * at.jacobian[c][1] * d_j2.z) / z;
+    if (!terms.ratio.x_inside) d_uv.x = 0;
+    if (!terms.ratio.y_inside) d_uv.y = 0;
+    d_uv +=
+        glm::transpose(lens_point(camera.lens, free).jacobian) * Vec2<T>(fx * d_px.x, fy * d_px.y);
+    const T scaled = glm::dot(terms.j1, d_j1) + glm::dot(terms.j2, d_j2);  // J goes with 1 / z
+    return {d_uv.x / z, d_uv.y / z, -(glm::dot(d_uv, free) + scaled) / z};
+}
+
 }  // namespace
 
 double round_to_half(double x) {
@@ -199,9 +238,9 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
         return p;
     }
     const CovarianceTerms<T> terms =
-        covariance_terms(mean, rotation, &splats.log_scale[index * 3], camera, settings.low_pass,
-                         kernel.covariance_scale());
-    p.opacity = sigmoid_of_clamped(splats.opacity[index]) * antialias_factor(splats, terms);
+        covariance_terms(mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index),
+                         camera, settings.low_pass, kernel.covariance_scale());
+    p.opacity = sigmoid_of_clamped(splats.opacity[index]) * opacity_factor(splats, terms);
     const bool half = settings.storage == STORAGE_FLOAT16;
     if (half) {
         p.opacity = static_cast<T>(round_to_half(static_cast<double>(p.opacity)));
@@ -216,6 +255,15 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     }
     p.mean_px = {T(camera.fx) * mean.x / mean.z + T(camera.cx),
                  T(camera.fy) * mean.y / mean.z + T(camera.cy)};
+    if (camera.lens.active) {
+        const LensPoint<T> at = lens_point(camera.lens, Vec2<T>(mean) / mean.z);
+        if (!at.seen) {
+            p.cull = Cull::outside;
+            return p;
+        }
+        p.mean_px = {T(camera.fx) * at.value.x + T(camera.cx),
+                     T(camera.fy) * at.value.y + T(camera.cy)};
+    }
     p.depth = mean.z;
     p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
     p.cov_xy = glm::dot(terms.r1, terms.r2);
@@ -250,8 +298,8 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
     const RotationTerms<T> rotation = rotation_terms(&splats.rotation[index * 4]);
     const CovarianceTerms<T> terms =
-        covariance_terms(mean, rotation, &splats.log_scale[index * 3], camera, settings.low_pass,
-                         kernel.covariance_scale());
+        covariance_terms(mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index),
+                         camera, settings.low_pass, kernel.covariance_scale());
     const Mat3<T> view_matrix = view_rotation<T>(camera);
 
     // r1 = root (k1 R) diag(scale), r2 alike.
@@ -264,11 +312,7 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     const Vec3<T> d_j1 = view_matrix * (rotation.matrix * (e1 * terms.scale));
     const Vec3<T> d_j2 = view_matrix * (rotation.matrix * (e2 * terms.scale));
 
-    Vec3<T> d_mean = jacobian_backward(mean, terms, camera, d_j1, d_j2);
-    const Vec2<T> d_px = gradient.d_mean_px;
-    const T fx = T(camera.fx), fy = T(camera.fy);
-    d_mean += Vec3<T>(d_px.x * fx / mean.z, d_px.y * fy / mean.z,
-                      -(d_px.x * fx * mean.x + d_px.y * fy * mean.y) / (mean.z * mean.z));
+    const Vec3<T> d_mean = mean_backward(mean, terms, camera, d_j1, d_j2, gradient.d_mean_px);
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     const Vec3<T> d_position =
         d_mean * view_matrix +
@@ -277,7 +321,11 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     for (int c = 0; c < 3; ++c) {
         const bool free = inside(splats.log_scale[index * 3 + c], LOG_SCALE_LIMIT);
         out.position[index * 3 + c] = d_position[c];
-        out.log_scale[index * 3 + c] = free ? d_scale[c] * terms.scale[c] : T(0);
+        // d ln(scale)/d ln(s) = share, and the filter's factor of the opacity falls with s / scale.
+        const T share = terms.smooth.share[c];
+        const T d_log =
+            d_scale[c] * terms.scale[c] * share + gradient.d_opacity * splat.opacity * (1 - share);
+        out.log_scale[index * 3 + c] = free ? d_log : T(0);
     }
     for (int c = 0; c < 4; ++c) {
         out.rotation[index * 4 + c] = d_rotation[c];
@@ -285,7 +333,7 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     const T sigmoid = sigmoid_of_clamped(splats.opacity[index]);
     out.opacity[index] =
         inside(splats.opacity[index], OPACITY_LOGIT_LIMIT)
-            ? gradient.d_opacity * antialias_factor(splats, terms) * sigmoid * (1 - sigmoid)
+            ? gradient.d_opacity * opacity_factor(splats, terms) * sigmoid * (1 - sigmoid)
             : T(0);
 }
 

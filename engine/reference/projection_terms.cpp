@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/reference/lens.h"
+
 namespace darb::reference {
 
 template <class T>
@@ -35,12 +37,9 @@ Vec4<T> rotation_backward(const RotationTerms<T>& terms, const Mat3<T>& d) {
 
 template <class T>
 RatioTerms<T> ratio_terms(const Vec3<T>& mean_camera, const Camera& camera) {
-    const double margin_x = kJacobianMargin * camera.width / (2 * camera.fx);
-    const double margin_y = kJacobianMargin * camera.height / (2 * camera.fy);
-    const T min_x = T(-camera.cx / camera.fx - margin_x);
-    const T max_x = T((camera.width - camera.cx) / camera.fx + margin_x);
-    const T min_y = T(-camera.cy / camera.fy - margin_y);
-    const T max_y = T((camera.height - camera.cy) / camera.fy + margin_y);
+    const RayBounds bounds = ray_bounds(camera);
+    const T min_x = T(bounds.low.x), max_x = T(bounds.high.x);
+    const T min_y = T(bounds.low.y), max_y = T(bounds.high.y);
     const T x = mean_camera.x / mean_camera.z;
     const T y = mean_camera.y / mean_camera.z;
     return {std::clamp(x, min_x, max_x), std::clamp(y, min_y, max_y), x >= min_x && x <= max_x,
@@ -50,6 +49,19 @@ RatioTerms<T> ratio_terms(const Vec3<T>& mean_camera, const Camera& camera) {
 template <class T>
 T clamped_scale(T log_scale) {
     return std::exp(std::clamp(log_scale, T(-LOG_SCALE_LIMIT), T(LOG_SCALE_LIMIT)));
+}
+
+template <class T>
+SmoothedScale<T> smoothed_scale(const T* log_scale, T filter) {
+    SmoothedScale<T> s;
+    for (int c = 0; c < 3; ++c) {
+        const T sharp = clamped_scale(log_scale[c]);
+        s.scale[c] = filter > 0 ? std::sqrt(sharp * sharp + filter * filter) : sharp;
+        const T kept = filter > 0 ? sharp / s.scale[c] : T(1);
+        s.share[c] = kept * kept;
+        s.factor *= kept;
+    }
+    return s;
 }
 
 template <class T>
@@ -65,18 +77,24 @@ Vec3<T> mean_in_camera(const T* position, const Camera& camera) {
 
 template <class T>
 CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
-                                    const T* log_scale, const Camera& camera, double low_pass,
-                                    double covariance_scale) {
+                                    const T* log_scale, T filter, const Camera& camera,
+                                    double low_pass, double covariance_scale) {
     CovarianceTerms<T> c;
     c.ratio = ratio_terms(mean_camera, camera);
     const T fx = T(camera.fx), fy = T(camera.fy), z = mean_camera.z;
     c.j1 = {fx / z, 0, -fx * c.ratio.x / z};
     c.j2 = {0, fy / z, -fy * c.ratio.y / z};
+    if (camera.lens.active) {
+        const Vec3<T> along_x(1 / z, 0, -c.ratio.x / z), along_y(0, 1 / z, -c.ratio.y / z);
+        const Mat2<T> d = lens_point(camera.lens, Vec2<T>(c.ratio.x, c.ratio.y)).jacobian;
+        c.j1 = fx * (d[0][0] * along_x + d[1][0] * along_y);
+        c.j2 = fy * (d[0][1] * along_x + d[1][1] * along_y);
+    }
     const Mat3<T> view = view_rotation<T>(camera);
     c.k1 = c.j1 * view;
     c.k2 = c.j2 * view;
-    c.scale = {clamped_scale(log_scale[0]), clamped_scale(log_scale[1]),
-               clamped_scale(log_scale[2])};
+    c.smooth = smoothed_scale(log_scale, filter);
+    c.scale = c.smooth.scale;
     c.root = T(std::sqrt(covariance_scale));
     c.r1 = c.root * (c.k1 * rotation.matrix) * c.scale;
     c.r2 = c.root * (c.k2 * rotation.matrix) * c.scale;
@@ -93,10 +111,11 @@ CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTe
     template Vec4<T> rotation_backward(const RotationTerms<T>&, const Mat3<T>&);          \
     template RatioTerms<T> ratio_terms(const Vec3<T>&, const Camera&);                    \
     template T clamped_scale(T);                                                          \
+    template SmoothedScale<T> smoothed_scale(const T*, T);                                \
     template Mat3<T> view_rotation(const Camera&);                                        \
     template Vec3<T> mean_in_camera(const T*, const Camera&);                             \
     template CovarianceTerms<T> covariance_terms(const Vec3<T>&, const RotationTerms<T>&, \
-                                                 const T*, const Camera&, double, double);
+                                                 const T*, T, const Camera&, double, double);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 

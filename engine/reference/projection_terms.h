@@ -34,12 +34,23 @@ struct RatioTerms {
 template <class T>
 RatioTerms<T> ratio_terms(const Vec3<T>& mean_camera, const Camera& camera);
 
+/// What the 3D smoothing filter makes of the standard deviations. factor: what the opacity keeps.
+template <class T>
+struct SmoothedScale {
+    Vec3<T> scale{0};  // sqrt(s^2 + f^2), world units
+    Vec3<T> share{1};  // s^2 / (s^2 + f^2) = d ln(scale) / d ln(s)
+    T factor = 1;      // product of s / scale
+};
+template <class T>
+SmoothedScale<T> smoothed_scale(const T* log_scale, T filter);
+
 template <class T>
 struct CovarianceTerms {
     RatioTerms<T> ratio;
     Vec3<T> j1{0}, j2{0};  // rows of the Jacobian J, px per world unit
     Vec3<T> k1{0}, k2{0};  // rows of J W
-    Vec3<T> scale{0};      // standard deviations, world units
+    SmoothedScale<T> smooth;
+    Vec3<T> scale{0};      // standard deviations, filter included, world units
     T root = 1;            // sqrt of the footprint's covariance scale
     Vec3<T> r1{0}, r2{0};  // rows of M = root J W R diag(scale), px
     T det_sharp = 0;       // |r1 x r2|^2: determinant before the low-pass, px^4
@@ -56,7 +67,7 @@ Vec3<T> mean_in_camera(const T* position, const Camera& camera);
 
 template <class T>
 CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
-                                    const T* log_scale, const Camera& camera, double low_pass,
-                                    double covariance_scale);
+                                    const T* log_scale, T filter, const Camera& camera,
+                                    double low_pass, double covariance_scale);
 
 }  // namespace darb::reference

@@ -18,6 +18,8 @@ using Vec3 = glm::vec<3, T>;
 template <class T>
 using Vec4 = glm::vec<4, T>;
 template <class T>
+using Mat2 = glm::mat<2, 2, T>;
+template <class T>
 using Mat3 = glm::mat<3, 3, T>;
 
 /// SplatModel in the scalar T (double or float): see engine/scene/splat_model.h for units.
@@ -33,6 +35,7 @@ struct Splats {
     std::vector<T> opacity;    // [N] logit
     std::vector<T> sh_dc;      // [N][3]
     std::vector<T> sh_rest;    // [N][C-1][3]
+    std::vector<T> smoothing;  // [N] deviation of the 3D filter, world units; empty: none
 
     size_t size() const { return opacity.size(); }
     int rest_count() const { return ((sh_degree + 1) * (sh_degree + 1) - 1) * 3; }
@@ -43,9 +46,17 @@ Splats<T> make_splats(const SplatModel& model) {
     const auto copy = [](const std::vector<float>& from) {
         return std::vector<T>(from.begin(), from.end());
     };
-    return {model.sh_degree,      model.kernel,          model.footprint,      model.antialias,
-            copy(model.position), copy(model.log_scale), copy(model.rotation), copy(model.opacity),
-            copy(model.sh_dc),    copy(model.sh_rest)};
+    return {model.sh_degree,
+            model.kernel,
+            model.footprint,
+            model.antialias,
+            copy(model.position),
+            copy(model.log_scale),
+            copy(model.rotation),
+            copy(model.opacity),
+            copy(model.sh_dc),
+            copy(model.sh_rest),
+            {}};
 }
 
 /// The Jacobian is taken at x/z clamped to the image plus this share of W / (2 fx) on each side.

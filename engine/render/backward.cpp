@@ -37,6 +37,11 @@ void Backward::make_blend(bool segmented) {
     segmented_ = segmented;
 }
 
+void Backward::set_sh_stored(int degree) {
+    if (degree != options_.sh_stored) project_.clear();
+    options_.sh_stored = degree;
+}
+
 Pipeline& Backward::project_pipeline(int sh_degree) {
     const auto found = project_.find(sh_degree);
     if (found != project_.end()) return found->second;
@@ -44,6 +49,7 @@ Pipeline& Backward::project_pipeline(int sh_degree) {
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = options_.sh_stored;
+    add_constants(options_.effects, constants);
     constants["UPDATE"] = result_ == BackwardResult::update ? 1 : 0;
     return project_.emplace(sh_degree, Pipeline(*device_, "project_backward", constants))
         .first->second;
@@ -107,15 +113,28 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                         step.opacity_weight / n,
                                         step.scale_weight / (3.0f * n)};
     const Groups g = groups_for(splats.count());
-    commands.dispatch(
-        project_pipeline(sh_degree), args,
-        {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
-         splats.parameters(kRotation), splats.parameters(kOpacity), splats.parameters(kShDc),
-         splats.parameters(kShRest), splats.moments(kPosition), splats.moments(kLogScale),
-         splats.moments(kRotation), splats.moments(kOpacity), splats.moments(kShDc),
-         splats.moments(kShRest), forward.pair_count(), forward.pair_begin(), partials_,
-         partial_rest_, gradient_sum_, forward.status()},
-        g.x, g.y);
+    commands.dispatch(project_pipeline(sh_degree), args,
+                      {cameras,
+                       splats.parameters(kPosition),
+                       splats.parameters(kLogScale),
+                       splats.parameters(kRotation),
+                       splats.parameters(kOpacity),
+                       splats.parameters(kShDc),
+                       splats.parameters(kShRest),
+                       splats.moments(kPosition),
+                       splats.moments(kLogScale),
+                       splats.moments(kRotation),
+                       splats.moments(kOpacity),
+                       splats.moments(kShDc),
+                       splats.moments(kShRest),
+                       forward.pair_count(),
+                       forward.pair_begin(),
+                       partials_,
+                       partial_rest_,
+                       gradient_sum_,
+                       forward.status(),
+                       splats.smoothing()},
+                      g.x, g.y);
 }
 
 }  // namespace darb

@@ -36,6 +36,9 @@ class Backward {
                 const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
                 const AdamStep& step);
 
+    /// After the splats' colour buffers changed their degree.
+    void set_sh_stored(int degree);
+
     /// [N][2]: sum of |dL/dmean| in NDC units and the number of frames that saw the splat.
     Buffer& gradient_sum() { return gradient_sum_; }
     void clear_gradient_sum(Commands& commands) { commands.fill(gradient_sum_, 0); }

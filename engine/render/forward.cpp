@@ -44,11 +44,23 @@ gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, floa
     d.centre = glm::vec3(camera.centre() - origin);
     d.focal = glm::vec2(camera.fx, camera.fy);
     d.principal = glm::vec2(camera.cx, camera.cy);
-    const glm::dvec2 margin =
+    glm::dvec2 low(-camera.cx / camera.fx, -camera.cy / camera.fy);
+    glm::dvec2 high((camera.width - camera.cx) / camera.fx,
+                    (camera.height - camera.cy) / camera.fy);
+    glm::dvec2 margin =
         JACOBIAN_MARGIN * 0.5 * glm::dvec2(camera.width / camera.fx, camera.height / camera.fy);
-    const glm::dvec2 low(-camera.cx / camera.fx, -camera.cy / camera.fy);
-    const glm::dvec2 high((camera.width - camera.cx) / camera.fx,
-                          (camera.height - camera.cy) / camera.fy);
+    d.lens_fold = 1e18f;  // a lens without terms is the pinhole
+    if (const LensTerms& lens = camera.lens; lens.active) {
+        low = lens.ray_min;
+        high = lens.ray_max;
+        margin = JACOBIAN_MARGIN * 0.5 * (high - low);
+        d.lens_radial = glm::vec4(lens.k[0], lens.k[1], lens.k[2], lens.k[3]);
+        d.lens_rational = glm::vec3(lens.d[0], lens.d[1], lens.d[2]);
+        d.lens_tangential = glm::vec2(lens.tangential);
+        d.lens_prism = glm::vec2(lens.prism);
+        d.lens_front = glm::vec2(lens.front_tan, lens.front_scale);
+        d.lens_fold = static_cast<float>(lens.fold);
+    }
     d.ratio_min = glm::vec2(low - margin);
     d.ratio_max = glm::vec2(high + margin);
     d.width = static_cast<std::uint32_t>(camera.width);
@@ -129,6 +141,11 @@ bool Forward::make_room(const gpu::FrameStatus& status) {
     return true;
 }
 
+void Forward::set_sh_stored(int degree) {
+    if (degree != options_.sh_stored) project_.clear();
+    options_.sh_stored = degree;
+}
+
 Pipeline& Forward::project_pipeline(int sh_degree) {
     const auto found = project_.find(sh_degree);
     if (found != project_.end()) return found->second;
@@ -136,6 +153,7 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = options_.sh_stored;
+    add_constants(options_.effects, constants);
     return project_.emplace(sh_degree, Pipeline(*device_, "project", constants)).first->second;
 }
 
@@ -205,16 +223,29 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
     if (n > 0) {
         const gpu::ProjectArgs args{n, camera_index, static_cast<float>(LOW_PASS_DEFAULT)};
         const Groups g = groups_for(n);
-        commands.dispatch(project_pipeline(sh_degree), args,
-                          {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
-                           splats.parameters(kRotation), splats.parameters(kOpacity),
-                           splats.parameters(kShDc), splats.parameters(kShRest), splat_shape_,
-                           splat_light_, splat_bound_, cover_, pair_count_, visible_, status_},
-                          g.x, g.y);
+        commands.dispatch(
+            project_pipeline(sh_degree), args,
+            {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
+             splats.parameters(kRotation), splats.parameters(kOpacity), splats.parameters(kShDc),
+             splats.parameters(kShRest), splat_shape_, splat_light_, splat_bound_, cover_,
+             pair_count_, visible_, status_, splats.smoothing()},
+            g.x, g.y);
     }
     record_depth_order(commands, n, data.near_plane);
     record_pairs(commands, data, n);
     record_blend(commands, data, background);
+}
+
+void Forward::record_depth(Commands& commands, std::uint32_t splats, const gpu::CameraData& data) {
+    if (!depth_light_)
+        depth_light_.emplace(*device_, "depth_light", SpecConstants{{"THREADS", SPLAT_GROUP}});
+    commands.pass("depth");
+    if (splats > 0) {
+        const Groups g = groups_for(splats);
+        commands.dispatch(*depth_light_, gpu::SplatArgs{splats}, {splat_bound_, splat_light_}, g.x,
+                          g.y);
+    }
+    record_blend(commands, data, glm::vec3(0.0f));
 }
 
 void Forward::record_blend(Commands& commands, const gpu::CameraData& data,

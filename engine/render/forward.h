@@ -12,6 +12,7 @@
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
+#include "engine/render/effects.h"
 #include "engine/render/gpu_splats.h"
 #include "engine/render/radix_sort.h"
 #include "engine/render/scan.h"
@@ -33,6 +34,7 @@ struct ForwardOptions {
     int storage = STORAGE_FLOAT32;         // of projected splats
     int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
     int sh_stored = 0;                     // degree of the buffers
+    ProjectionEffects effects;
     bool store_for_backward = false;
 };
 
@@ -74,6 +76,9 @@ class Forward {
     /// Recorded between the tile ranges and the blend, where set: what a view changes of the
     /// projected splats (splat_light), without a copy of the blend.
     std::function<void(Commands&)> before_blend;
+    /// After record() of the same frame: image() then holds sum w z, sum w and 0, w the weight of
+    /// each splat in a pixel and z its depth along the optical axis, world units.
+    void record_depth(Commands& commands, std::uint32_t splats, const gpu::CameraData& data);
 
     /// Outputs of the last recorded frame.
     const Buffer& image() const { return image_; }    // float [3][H][W], not clamped
@@ -81,6 +86,9 @@ class Forward {
     gpu::FrameStatus read_status() const;
     /// The overflow flag and all counters to zero. The queue must be idle.
     void clear_status();
+
+    /// After the splats' colour buffers changed their degree.
+    void set_sh_stored(int degree);
 
     // For the backward pass.
     const ForwardOptions& options() const { return options_; }
@@ -107,6 +115,7 @@ class Forward {
     std::map<int, Pipeline> project_;  // by SH degree in use
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
         list_lengths_, blend_;
+    std::optional<Pipeline> depth_light_;  // made when a depth image is first asked for
     std::optional<Scan> scan_;
     std::optional<RadixSort> depth_sort_, tile_sort_;
     std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0, tile_capacity_ = 0;

@@ -44,6 +44,7 @@ GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments)
     header_.footprint = model.footprint;
     header_.antialias = model.antialias;
     header_.origin = model.origin;
+    smoothing_ = Buffer(device, "smoothing", 4);
     strides_ = {3, 3, 4, 1, 3, static_cast<std::uint32_t>(model.rest_count())};
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& values = attribute_values(model, a);

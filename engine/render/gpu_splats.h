@@ -35,6 +35,11 @@ class GpuSplats {
     Buffer& moments(int attribute) { return moments_[attribute]; }
     const Buffer& moments(int attribute) const { return moments_[attribute]; }
 
+    /// [N] deviation of the 3D smoothing filter, world units; one unused word where no effect needs
+    /// it.
+    Buffer& smoothing() { return smoothing_; }
+    const Buffer& smoothing() const { return smoothing_; }
+
     /// After an attribute's buffers were replaced by ones of another count (density control).
     void set_count(std::uint32_t count) { count_ = count; }
 
@@ -47,6 +52,7 @@ class GpuSplats {
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> parameters_;
     std::array<Buffer, kAttributeCount> moments_;  // [N][stride][2]: first, second
+    Buffer smoothing_;
 };
 
 /// The host array of an attribute.

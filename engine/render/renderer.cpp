@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/core/check.h"
 #include "engine/render/groups.h"
 
 namespace darb {
@@ -15,6 +16,7 @@ FrameAccuracy accuracy_for(const SplatModel& model, const Accuracy& accuracy,
     options.kernel = model.kernel;
     options.footprint = frame.footprint;
     options.sh_stored = model.sh_degree;
+    options.effects.antialias = model.antialias;
     frame.options = options;
     return frame;
 }
@@ -68,6 +70,8 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
                         float near_plane) {
     const Camera rendered = accuracy_.halved ? halved(camera) : camera;
     const gpu::CameraData data = camera_data(rendered, splats_.origin(), near_plane);
+    DARB_CHECK(!camera.lens.active || forward_.options().effects.lens, "a lens, not compiled in");
+    camera_ = data;
     const Buffer cameras = upload_cameras(*device_, {data});
     const int degree =
         sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
@@ -85,6 +89,24 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
     pass_times_ = commands_.pass_times();
     const size_t floats = size_t(camera.width) * camera.height * 3;
     return planes_to_image(image->download<float>(floats), camera.width, camera.height);
+}
+
+ImageF Renderer::render_depth() {
+    DARB_CHECK(camera_.width > 0, "no picture was rendered before");
+    const int width = static_cast<int>(camera_.width), height = static_cast<int>(camera_.height);
+    commands_.begin();
+    forward_.record_depth(commands_, splats_.count(), camera_);
+    commands_.submit_and_wait();
+    pass_times_ = commands_.pass_times();
+    const size_t pixels = size_t(width) * height;
+    const auto planes = forward_.image().download<float>(2 * pixels);
+    ImageF result(width, height, 2);
+    for (size_t p = 0; p < pixels; ++p) {
+        const float weight = planes[pixels + p];
+        result.data[2 * p] = weight >= 1.0f / 255 ? planes[p] / weight : 0.0f;
+        result.data[2 * p + 1] = weight;
+    }
+    return result;
 }
 
 }  // namespace darb

@@ -9,7 +9,8 @@ namespace darb {
 
 class Renderer {
   public:
-    /// Uploads the model. options holds what neither the model nor the accuracy decides.
+    /// Uploads the model. options holds what neither the model nor the accuracy decides. Cameras with
+    /// a lens need options.effects.lens.
     Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {},
              ForwardOptions options = {});
 
@@ -17,6 +18,11 @@ class Renderer {
     /// the frame when it has more splat-tile pairs than before.
     ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
                   int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
+
+    /// Of the camera of the last render, which must have been one. [H][W][2]: the expected depth
+    /// sum w z / sum w along the optical axis, world units, and sum w, the opacity of the pixel;
+    /// depth 0 where nothing is seen (opacity below 1/255).
+    ImageF render_depth();
 
     /// Of the last render.
     gpu::FrameStatus status() const { return status_; }
@@ -33,6 +39,7 @@ class Renderer {
     Buffer upsampled_;   // float [3][H][W]
     Commands commands_;
     gpu::FrameStatus status_{};
+    gpu::CameraData camera_{};  // of the last render
     std::vector<PassTime> pass_times_;
 };
 

@@ -1,10 +1,27 @@
-// Camera: a pinhole with pose, in double. Frame: x right, y down, z forward (COLMAP's).
+// Camera: a pinhole with pose, in double, and the lens before it where pictures are to be distorted
+// as the photo was. Frame: x right, y down, z forward (COLMAP's).
 // The centre of the top left pixel is at (0.5, 0.5).
 #pragma once
 
+#include <array>
 #include <glm/glm.hpp>
 
 namespace darb {
+
+/// Lens distortion of the plane z = 1. A ray u = (x/z, y/z) first becomes w = u a(|u|), with
+/// a(r) = atan(front_tan r) / (front_scale r) (fisheye and FOV; w = u where front_scale is 0); then
+///   w' = w (1 + k0 s + .. + k3 s^4) / (1 + d0 s + d1 s^2 + d2 s^3), s = |w|^2,
+///        + tangential (2 p0 x y + p1 (s + 2 x^2), 2 p1 x y + p0 (s + 2 y^2)) + prism s.
+/// Source: the camera models of COLMAP 3.8, see engine/data/lens.h.
+struct LensTerms {
+    bool active = false;  // false: a pinhole
+    double front_tan = 0, front_scale = 0;
+    std::array<double, 4> k{};
+    std::array<double, 3> d{};
+    glm::dvec2 tangential{0.0}, prism{0.0};
+    double fold = 0;                        // largest |w| that the lens maps one to one
+    glm::dvec2 ray_min{0.0}, ray_max{0.0};  // of the frame
+};
 
 struct Camera {
     int width = 0;                          // px
@@ -12,6 +29,7 @@ struct Camera {
     double fx = 0, fy = 0, cx = 0, cy = 0;  // px
     glm::dmat3 rotation{1.0};  // world to camera: p_camera = rotation * p_world + translation
     glm::dvec3 translation{0.0};
+    LensTerms lens;
 
     glm::dvec3 centre() const { return -(glm::transpose(rotation) * translation); }
 };

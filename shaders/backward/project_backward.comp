@@ -38,12 +38,16 @@ layout(set = 0, binding = 15, scalar) readonly buffer Partials { vec4 partials[]
 layout(set = 0, binding = 16, scalar) readonly buffer PartialRest { float partial_rest[]; };
 layout(set = 0, binding = 17, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
 layout(set = 0, binding = 18, scalar) buffer Status { FrameStatus status; };
+layout(set = 0, binding = 19, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
 
 const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
 const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 
+#include "effects/constants.glsl"
 #include "kernels/kernel.glsl"
 #include "lib/covariance.glsl"
+#include "effects/antialias.glsl"
+#include "effects/camera_model.glsl"
 #include "lib/linear_id.glsl"
 #include "lib/sh.glsl"
 #include "optim/adam.glsl"

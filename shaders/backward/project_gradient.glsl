@@ -26,13 +26,16 @@ void whitened_rows(Factor f, vec3 r1, vec3 r2, out vec3 n1, out vec3 n2) {
 }
 
 // dL/d(r1), dL/d(r2), the rows of M; dL/d(log scale), which is d_r1 r1 + d_r2 r2 without its cancellation; dL/dmean.
-void factor_gradient(Factor f, Partial p, vec3 r1, vec3 r2, out vec3 d_r1, out vec3 d_r2,
+// peak: what the opacity is before compensation(), whose share is added with ANTIALIAS.
+void factor_gradient(Factor f, Partial p, vec3 r1, vec3 r2, float peak, out vec3 d_r1, out vec3 d_r2,
                      out vec3 d_log_scale, out vec2 d_mean) {
     d_mean = 2.0 * vec2(f.l11 * p.a.x, f.l21 * p.a.x + f.l22 * f.l22 * p.a.w);
     vec3 n1, n2;
     whitened_rows(f, r1, r2, n1, n2);
     const float xx = p.a.y, xy = f.l22 * p.a.z, yy = f.l22 * f.l22 * p.b;  // sums of G (x, y)^T (x, y)
-    const vec3 p1 = -2.0 * (xx * n1 + xy * n2), p2 = -2.0 * (xy * n1 + yy * n2);
+    vec3 p1 = -2.0 * (xx * n1 + xy * n2), p2 = -2.0 * (xy * n1 + yy * n2);
+    if (ANTIALIAS == 1)
+        add_compensation_gradient(f, r1, r2, args.low_pass, p.d_opacity * peak, p1, p2);
     d_log_scale = p1 * n1 + p2 * n2;
     d_r1 = f.l11 * p1;
     d_r2 = f.l21 * p1 + f.l22 * p2;
@@ -51,21 +54,6 @@ vec4 quaternion_gradient(vec4 q, mat3 d) {
                     2.0 * z * (d[0][0] + d[1][1]));
 }
 
-// One row of the Jacobian, (f/z, ., -f ratio/z): its share of dL/d(coordinate) and dL/dz.
-// d: gradients of the row's first and last entry.
-vec2 jacobian_row_gradient(float focal, float coordinate, float z, float ratio, vec2 limits, vec2 d) {
-    const float inverse = 1.0 / z;
-    float d_z = focal * inverse * inverse * (ratio * d.y - d.x);
-    float d_coordinate = 0.0;
-    const float free_ratio = coordinate * inverse;
-    if (free_ratio > limits.x && free_ratio < limits.y) {
-        const float d_ratio = -focal * inverse * d.y;
-        d_coordinate = d_ratio * inverse;
-        d_z -= d_ratio * free_ratio * inverse;
-    }
-    return vec2(d_coordinate, d_z);
-}
-
 vec3 outside_is_zero(vec3 gradient, vec3 value, float limit) {
     return mix(vec3(0.0), gradient, lessThanEqual(abs(value), vec3(limit)));
 }
@@ -75,20 +63,26 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const vec3 world = vec3(position[3 * i], position[3 * i + 1], position[3 * i + 2]);
     const vec3 p = to_camera(camera, world) + camera.translation;
     const vec3 raw_scale = vec3(log_scale[3 * i], log_scale[3 * i + 1], log_scale[3 * i + 2]);
-    const vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
-                   sqrt(kernel_covariance_scale());
+    vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)), share = vec3(1.0);
+    float kept = 1.0;  // of the opacity, by the filters
+    if (SMOOTHING == 1) kept = smooth_scale(s, smoothing[i], share);
+    s *= sqrt(kernel_covariance_scale());
     vec4 unit;
     float norm;
     normalise_rotation(rotation[i], unit, norm);
     vec3 j0, j1;
-    vec2 ratio;
-    jacobian_rows(camera, p, j0, j1, ratio);
+    jacobian_rows(camera, p, j0, j1);
     const mat3 axes = rotation_matrix(unit);
     const vec3 t0 = to_world(camera, j0), t1 = to_world(camera, j1);
     const vec3 r1 = (t0 * axes) * s, r2 = (t1 * axes) * s;
     vec3 d_r1, d_r2, d_log_scale;
-    factor_gradient(cholesky_factor(r1, r2, args.low_pass), sums, r1, r2, d_r1, d_r2, d_log_scale,
-                    g.mean);
+    const float logit = opacity_logit[i];
+    const float o = 1.0 / (1.0 + exp(-logit)), rest = 1.0 / (1.0 + exp(logit));
+    const Factor f = cholesky_factor(r1, r2, args.low_pass);
+    factor_gradient(f, sums, r1, r2, o * kept, d_r1, d_r2, d_log_scale, g.mean);
+    if (ANTIALIAS == 1) kept *= compensation(r1, r2, f);
+    if (SMOOTHING == 1)
+        d_log_scale = d_log_scale * share + sums.d_opacity * o * kept * (1.0 - share);
 
     g.log_scale = outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT);
     const vec3 e1 = d_r1 * s, e2 = d_r2 * s;
@@ -97,18 +91,8 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     g.rotation = (d_unit - unit * dot(unit, d_unit)) / norm;
 
     const vec3 d_j0 = to_camera(camera, axes * e1), d_j1 = to_camera(camera, axes * e2);
-    const vec2 from_x = jacobian_row_gradient(camera.focal.x, p.x, p.z, ratio.x,
-                                              vec2(camera.ratio_min.x, camera.ratio_max.x), d_j0.xz);
-    const vec2 from_y = jacobian_row_gradient(camera.focal.y, p.y, p.z, ratio.y,
-                                              vec2(camera.ratio_min.y, camera.ratio_max.y), d_j1.yz);
-    const vec2 m = g.mean * camera.focal / p.z;
-    const vec3 d_p = vec3(from_x.x + m.x, from_y.x + m.y,
-                          from_x.y + from_y.y - dot(m, p.xy) / p.z);
-    g.position = to_world(camera, d_p);
-
-    const float logit = opacity_logit[i];
-    const float o = 1.0 / (1.0 + exp(-logit)), rest = 1.0 / (1.0 + exp(logit));
-    g.opacity_logit = abs(logit) <= OPACITY_LOGIT_LIMIT ? sums.d_opacity * o * rest : 0.0;
+    g.position = to_world(camera, camera_point_gradient(camera, p, d_j0, d_j1, g.mean));
+    g.opacity_logit = abs(logit) <= OPACITY_LOGIT_LIMIT ? sums.d_opacity * kept * o * rest : 0.0;
 
     const vec3 to_splat = world - camera.centre;
     const float range = length(to_splat);

@@ -13,12 +13,15 @@ layout(constant_id = 0) const uint THREADS = 64;
 layout(constant_id = 1) const int SH_DEGREE = 0;   // degree in use
 layout(constant_id = 2) const int SH_STORED = 0;   // degree of the buffer's layout
 
+#include "effects/constants.glsl"
 #include "kernels/kernel.glsl"
 #include "lib/linear_id.glsl"
 #include "lib/sh.glsl"
 #include "lib/covariance.glsl"
 #include "lib/tile.glsl"
 #include "lib/depth.glsl"
+#include "effects/antialias.glsl"
+#include "effects/camera_model.glsl"
 
 layout(push_constant, scalar) uniform Push { ProjectArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
@@ -37,6 +40,7 @@ layout(set = 0, binding = 10, scalar) writeonly buffer Cover { uvec4 cover[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer PairCount { uint pair_count[]; };
 layout(set = 0, binding = 12, scalar) writeonly buffer Visible { uint visible[]; };
 layout(set = 0, binding = 13, scalar) buffer Status { FrameStatus status; };
+layout(set = 0, binding = 14, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
 
 vec3 splat_colour(uint i, vec3 direction) {
     vec3 colour = 0.5 + SH_C0 * sh_dc[i];
@@ -116,17 +120,18 @@ uint project(uint i, out int reason) {
     const float logit = opacity_logit[i];
     float opacity =
         1.0 / (1.0 + exp(-clamp(logit, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT)));
-    if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);
-    const float reach = kernel_reach(opacity);
+    const bool factors = ANTIALIAS == 1 || SMOOTHING == 1;
+    if (STORAGE == STORAGE_FLOAT16 && !factors) opacity = round_half(opacity);
+    float reach = kernel_reach(opacity);
     if (!(reach > 0.0) || isnan(logit)) return 0u;
 
     reason = CULL_COVARIANCE;
     const vec3 raw_scale = log_scale[i];
-    const vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
-                   sqrt(kernel_covariance_scale());
+    vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)), share;
+    if (SMOOTHING == 1) opacity *= smooth_scale(s, smoothing[i], share);
+    s *= sqrt(kernel_covariance_scale());
     vec3 j0, j1;
-    vec2 ratio;
-    jacobian_rows(camera, p, j0, j1, ratio);
+    jacobian_rows(camera, p, j0, j1);
     const mat3 axes = rotation_matrix(unit);
     const vec3 r1 = (to_world(camera, j0) * axes) * s;
     const vec3 r2 = (to_world(camera, j1) * axes) * s;
@@ -135,8 +140,17 @@ uint project(uint i, out int reason) {
         any(isnan(raw_scale)))
         return 0u;
 
+    if (factors) {
+        reason = CULL_OPACITY;
+        if (ANTIALIAS == 1) opacity *= compensation(r1, r2, f);
+        if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);
+        reach = kernel_reach(opacity);
+        if (!(reach > 0.0)) return 0u;
+    }
+
     reason = CULL_OUTSIDE;
-    const vec2 mean = camera.focal * (p.xy / p.z) + camera.principal;
+    vec2 mean;
+    if (!pixel_of(camera, p, mean)) return 0u;
     TileCover c;
     const uint count = find_cover(camera, mean, f, reach, c);
     if (count == 0u) return 0u;

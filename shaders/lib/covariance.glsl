@@ -21,13 +21,6 @@ bool normalise_rotation(vec4 q, out vec4 unit, out float norm) {
     return norm * norm > ROTATION_MIN_SQUARE && largest < 1e30;
 }
 
-// Rows j0, j1 of the projection's Jacobian at camera-space p; ratio = clamped (x/z, y/z).
-void jacobian_rows(CameraData camera, vec3 p, out vec3 j0, out vec3 j1, out vec2 ratio) {
-    ratio = clamp(p.xy / p.z, camera.ratio_min, camera.ratio_max);
-    j0 = vec3(camera.focal.x / p.z, 0.0, -camera.focal.x * ratio.x / p.z);
-    j1 = vec3(0.0, camera.focal.y / p.z, -camera.focal.y * ratio.y / p.z);
-}
-
 vec3 to_camera(CameraData camera, vec3 v) {
     return vec3(dot(camera.row0, v), dot(camera.row1, v), dot(camera.row2, v));
 }

@@ -55,6 +55,13 @@ struct CameraData {
     uint tiles_x;
     uint tiles_y;
     float near_plane;  // world units along z
+    // The terms of engine/scene/camera.h's lens, read where the effect is on.
+    vec4 lens_radial;
+    vec3 lens_rational;
+    vec2 lens_tangential;
+    vec2 lens_prism;
+    vec2 lens_front;
+    float lens_fold;
 };
 
 // What one frame counts, written by the passes, read by later passes and by the host afterwards.
@@ -110,7 +117,7 @@ struct UpsampleArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(CameraData) == 112);
+static_assert(sizeof(CameraData) == 168);
 static_assert(sizeof(FrameStatus) == 52);
 static_assert(sizeof(FrameGroups) == 24);
 }  // namespace darb::gpu

@@ -69,7 +69,8 @@ inline PassState start_state(const SplatModel& model) {
 /// One run of the pass. update: Adam, else gradients into the first moments.
 inline PassState run_backward_pass(const SplatModel& model, const Camera& camera, int sh_degree,
                                    bool update, const PassState& before, const Partials& partials,
-                                   const AdamStep& step = {}) {
+                                   const AdamStep& step = {}, const ProjectionEffects& effects = {},
+                                   const std::vector<float>& filters = {0.0f}) {
     Device& device = shared_device();
     const auto n = static_cast<std::uint32_t>(model.size());
     SpecConstants constants = kernel_constants(model.kernel, model.footprint);
@@ -77,6 +78,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = model.sh_degree;
     constants["UPDATE"] = update ? 1 : 0;
+    add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);
     std::vector<float> sums, rest;
     for (const PairPartials& pair : partials.pairs) {
@@ -96,7 +98,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     const GuardedBuffer count(device, "pair count", partials.count),
         begin(device, "pair begin", partials.begin), sum(device, "partials", sums),
         rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
-        status(device, "status", std::vector{b.status});
+        status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters);
     const gpu::ProjectBackwardArgs args{n,
                                         0,
                                         static_cast<float>(LOW_PASS_DEFAULT),
@@ -113,8 +115,8 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     commands.begin();
     const Groups g = groups_for(n);
     commands.dispatch(pipeline, args,
-                      {cameras, p[0], p[1], p[2], p[3], p[4], p[5], m[0], m[1], m[2], m[3], m[4],
-                       m[5], count, begin, sum, rests, gradient, status},
+                      {cameras, p[0], p[1], p[2],  p[3],  p[4], p[5],  m[0],     m[1],   m[2],
+                       m[3],    m[4], m[5], count, begin, sum,  rests, gradient, status, smoothing},
                       g.x, g.y);
     commands.submit_and_wait();
     PassState after;
@@ -144,10 +146,12 @@ struct DoubleGradients {
 };
 
 inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera& camera,
-                                           int sh_degree, const Partials& partials) {
+                                           int sh_degree, const Partials& partials,
+                                           const std::vector<float>& filters = {}) {
     reference::RenderSettings settings;
     settings.sh_degree = sh_degree;
-    const auto splats = reference::make_splats<double>(model);
+    auto splats = reference::make_splats<double>(model);
+    splats.smoothing.assign(filters.begin(), filters.end());
     const auto& kernel = reference::kernel_table(model.kernel, model.footprint);
     reference::SplatGradients<double> out;
     out.resize_like(splats);

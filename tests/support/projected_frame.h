@@ -21,7 +21,9 @@ struct ProjectedFrame {
 };
 
 inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& camera,
-                                        int sh_degree = 3, int evaluation = EVALUATION_POLYNOMIAL) {
+                                        int sh_degree = 3, int evaluation = EVALUATION_POLYNOMIAL,
+                                        const ProjectionEffects& effects = {},
+                                        const std::vector<float>& filters = {0.0f}) {
     Device& device = shared_device();
     const auto n = static_cast<std::uint32_t>(model.size());
     SpecConstants constants = kernel_constants(model.kernel, model.footprint, evaluation, 5,
@@ -29,12 +31,14 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = std::min(sh_degree, model.sh_degree);
     constants["SH_STORED"] = model.sh_degree;
+    add_constants(effects, constants);
     const Pipeline pipeline(device, "project", constants);
     const GuardedBuffer cameras(device, "cameras", std::vector{camera_data(camera, model.origin)});
     const GuardedBuffer position(device, "position", model.position),
         log_scale(device, "log_scale", model.log_scale),
         rotation(device, "rotation", model.rotation), opacity(device, "opacity", model.opacity),
-        sh_dc(device, "sh_dc", model.sh_dc), sh_rest(device, "sh_rest", model.sh_rest);
+        sh_dc(device, "sh_dc", model.sh_dc), sh_rest(device, "sh_rest", model.sh_rest),
+        smoothing(device, "smoothing", filters);
     const GuardedBuffer shape(device, "shape", n * 16), light(device, "light", n * 16),
         bound(device, "bound", n * 16), cover(device, "cover", n * 16),
         pair_count(device, "pair count", n * 4), visible(device, "visible", n * 4),
@@ -44,12 +48,12 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
     const Groups g = groups_for(n);
     commands.dispatch(pipeline, gpu::ProjectArgs{n, 0, static_cast<float>(LOW_PASS_DEFAULT)},
                       {cameras, position, log_scale, rotation, opacity, sh_dc, sh_rest, shape,
-                       light, bound, cover, pair_count, visible, status},
+                       light, bound, cover, pair_count, visible, status, smoothing},
                       g.x, g.y);
     commands.submit_and_wait();
     for (const GuardedBuffer* b :
          {&cameras, &position, &log_scale, &rotation, &opacity, &sh_dc, &sh_rest, &shape, &light,
-          &bound, &cover, &pair_count, &visible, &status})
+          &bound, &cover, &pair_count, &visible, &status, &smoothing})
         EXPECT_TRUE(b->intact());
     return {shape.read<glm::vec4>(),           light.read<glm::vec4>(),
             bound.read<glm::vec4>(),           cover.read<glm::uvec4>(),

@@ -82,7 +82,7 @@ int dump_view(const CheckFlags& flags) {
                     "darb check --scene S.ply --cameras cameras.json --view 0 --dump DIR");
     if (!flags.json.empty())
         throw Error("darb check --json", "has nothing to say of --dump", "Leave one of them out.");
-    const SplatModel model = load_scene_to_render(flags.scene);
+    const SplatModel model = load_scene(flags.scene);
     const std::vector<View> views = load_cameras(flags.cameras, flags.data);
     if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())
         throw Error(flags.cameras.string(), fmt::format("there is no view {}", flags.view),

@@ -12,8 +12,10 @@
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
 #include "trainer/evaluation.h"
+#include "trainer/exposure_fit.h"
 
 namespace darb {
 
@@ -21,7 +23,8 @@ namespace {
 
 struct EvalFlags {
     std::filesystem::path scene, dataset, json;
-    std::string split = "test", device;
+    std::string split = "test", device, effects = "auto";
+    bool eval_exposure = false;
     bool white_background = false;
     DatasetOptions data;
     AccuracyFlags accuracy;
@@ -62,19 +65,29 @@ void print_table(const Evaluation& evaluation) {
 int eval(EvalFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
-    const SplatModel model = load_scene_to_render(flags.scene);
+    const EffectChoice choice = parse_effects(flags.effects);
+    SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
     const std::vector<View> views = views_of(dataset, flags);
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    Renderer renderer(device, model, accuracy);
+    const EffectPlan plan = plan_rendering(model, views, {}, choice);
+    apply_plan(plan, model);
+    ForwardOptions options;
+    options.effects = plan.projection();
+    Renderer renderer(device, model, accuracy, options);
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     Evaluation evaluation;
-    for (const View& view : views)
-        evaluation.views.push_back(compare_view(view.name, renderer.render(view.camera, background),
-                                                load_photo(view), background,
-                                                dataset.alpha_is_mask));
+    for (const View& view : views) {
+        const ImageU8 photo = load_photo(view);
+        ImageF image = renderer.render(view.camera, background);
+        if (flags.eval_exposure)
+            image = apply_exposure(fit_exposure(image, photo, background, dataset.alpha_is_mask),
+                                   image);
+        evaluation.views.push_back(
+            compare_view(view.name, image, photo, background, dataset.alpha_is_mask));
+    }
     take_means(evaluation);
     print_table(evaluation);
     if (!flags.json.empty())
@@ -109,6 +122,10 @@ void add_eval(CLI::App& app, Action& action) {
     command->add_flag("-w,--white-background", flags->white_background,
                       "white behind alpha, not black");
     add_accuracy_flags(*command, flags->accuracy);
+    add_effects_flag(*command, flags->effects);
+    add_lens_flag(*command, flags->data);
+    command->add_flag("--eval-exposure", flags->eval_exposure,
+                      "fit each picture's colours to its photo by an affine map before measuring");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     command->callback([flags, &action] { action = [flags] { return eval(*flags); }; });
 }

@@ -14,6 +14,8 @@
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/depth_file.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
 #include "trainer/evaluation.h"
 
@@ -26,6 +28,8 @@ struct RenderFlags {
     std::string device;
     bool white_background = false;
     float near_plane = static_cast<float>(NEAR_DEFAULT);
+    std::string effects = "auto", depth;
+    double depth_unit = 0.001;
     DatasetOptions data;
     AccuracyFlags accuracy;
 };
@@ -68,7 +72,8 @@ double median(std::vector<double> values) {
 
 int render(const RenderFlags& flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
-    const SplatModel model = load_scene_to_render(flags.scene);
+    const EffectChoice choice = parse_effects(flags.effects);
+    SplatModel model = load_scene(flags.scene);
     std::vector<View> views = load_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
     if (is_list)
@@ -76,7 +81,11 @@ int render(const RenderFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    Renderer renderer(device, model, accuracy);
+    const EffectPlan plan = plan_rendering(model, views, {.depth = !flags.depth.empty()}, choice);
+    apply_plan(plan, model);
+    ForwardOptions options;
+    options.effects = plan.projection();
+    Renderer renderer(device, model, accuracy, options);
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     std::set<std::string> used;
     std::vector<double> frame_ms;
@@ -86,8 +95,12 @@ int render(const RenderFlags& flags) {
         const std::chrono::duration<double, std::milli> ms =
             std::chrono::steady_clock::now() - start;
         frame_ms.push_back(ms.count());
-        write_png(flags.output / frame_name(view.name, used), to_8bit(image));
+        const auto file = flags.output / frame_name(view.name, used);
+        write_png(file, to_8bit(image));
+        if (plan.on(EFFECT_DEPTH))
+            write_depth(file, renderer.render_depth(), flags.depth == "npy", flags.depth_unit);
     }
+    fmt::print("effects: {}\n", plan_line(plan));
     fmt::print("{} frames in {}, median {:.2f} ms a frame on {}\n", views.size(),
                flags.output.string(), median(frame_ms), device.info().name);
     return 0;
@@ -113,6 +126,16 @@ void add_render(CLI::App& app, Action& action) {
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
     add_accuracy_flags(*command, flags->accuracy);
+    add_effects_flag(*command, flags->effects);
+    add_lens_flag(*command, flags->data);
+    command
+        ->add_option("--depth", flags->depth,
+                     "depth images beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) "
+                     "or npy (float32, world units)")
+        ->check(CLI::IsMember({"png", "npy"}));
+    command->add_option("--depth-unit", flags->depth_unit, "world units of one step of a depth PNG")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     command->callback([flags, &action] { action = [flags] { return render(*flags); }; });
 }

@@ -61,14 +61,4 @@ SplatModel load_scene(const fs::path& path, SplatFile* facts) {
     return model;
 }
 
-SplatModel load_scene_to_render(const fs::path& path) {
-    SplatModel model = load_scene(path);
-    if (model.antialias)
-        fmt::print(stderr,
-                   "warning: {}: was trained with anti-aliasing (SplatRenderMode mip), which this "
-                   "version does not render\n",
-                   find_scene(path).string());
-    return model;
-}
-
 }  // namespace darb

@@ -14,7 +14,4 @@ std::filesystem::path find_scene(const std::filesystem::path& path);
 /// load_splats of find_scene(path), with a warning on stderr for what was dropped or left out.
 SplatModel load_scene(const std::filesystem::path& path, SplatFile* facts = nullptr);
 
-/// And a warning where the scene asks for a render mode that this version does not have.
-SplatModel load_scene_to_render(const std::filesystem::path& path);
-
 }  // namespace darb

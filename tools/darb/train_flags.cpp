@@ -1,6 +1,7 @@
 #include "tools/darb/train_flags.h"
 
 #include "engine/core/error.h"
+#include "tools/darb/effect_flags.h"
 
 namespace darb {
 
@@ -109,9 +110,9 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     command.add_flag("-q,--quiet", f.run.quiet, "no progress");
     command.add_flag("--deterministic", f.deterministic,
                      "accepted: every run on one device already repeats bit by bit");
-    add_missing(command, "--antialiasing", "anti-aliasing");
-    add_missing(command, "--effects", "the effect plan");
-    add_missing(command, "--exposure-lr-init", "per-photo exposure");
+    add_effects_flag(command, f.effects);
+    add_lens_flag(command, f.data);
+    add_training_effect_flags(command, f.antialiasing, f.train);
     add_missing(command, "--depths,-d", "depth supervision");
 }
 

@@ -15,6 +15,8 @@ namespace darb {
 struct TrainFlags {
     std::string dataset;
     std::string device;
+    std::string effects = "auto";
+    bool antialiasing = false;  // as 3DGS spells +antialias
     bool resume = false;
     bool view = false;  // follow in a window
     bool sequential = false;

@@ -85,6 +85,7 @@ void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags)
                dataset.points.size());
     for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}\n", note);
     fmt::print(stderr, "device: {} ({})\n", device.info().name, device.info().driver);
+    fmt::print(stderr, "effects: {}\n", flags.run.effects);
     // A resumed run knows better: its progress shows the time left.
     if (flags.run.resume_from.empty() && held_out < dataset.views.size())
         print_forecast(device, dataset, flags);

@@ -1,0 +1,68 @@
+#include "engine/data/depth_io.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "engine/core/files.h"
+
+namespace darb {
+
+namespace {
+
+void put_u32(std::string& to, std::uint32_t value) {
+    for (int shift = 24; shift >= 0; shift -= 8) to += static_cast<char>(value >> shift & 0xff);
+}
+
+void put_chunk(std::string& to, const char* type, const std::string& data) {
+    put_u32(to, static_cast<std::uint32_t>(data.size()));
+    const std::string body = type + data;
+    to += body;
+    put_u32(to, static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(body.data()),
+                                                 static_cast<uInt>(body.size()))));
+}
+
+float first_channel(const ImageF& image, std::size_t pixel) {
+    return image.data[pixel * static_cast<std::size_t>(image.channels)];
+}
+
+}  // namespace
+
+void write_depth_png(const std::filesystem::path& path, const ImageF& depth, double unit) {
+    DARB_CHECK(unit > 0 && depth.channels >= 1, "unit {}, {} channels", unit, depth.channels);
+    std::string rows;
+    for (int y = 0; y < depth.height; ++y) {
+        rows += '\0';  // no filter
+        for (int x = 0; x < depth.width; ++x) {
+            const double steps =
+                first_channel(depth, static_cast<std::size_t>(y) * depth.width + x) / unit;
+            const auto grey = static_cast<std::uint32_t>(std::clamp(steps + 0.5, 0.0, 65535.0));
+            rows += static_cast<char>(grey >> 8);
+            rows += static_cast<char>(grey & 0xff);
+        }
+    }
+    uLongf bytes = compressBound(static_cast<uLong>(rows.size()));
+    std::string packed(bytes, '\0');
+    const int result =
+        compress(reinterpret_cast<Bytef*>(packed.data()), &bytes,
+                 reinterpret_cast<const Bytef*>(rows.data()), static_cast<uLong>(rows.size()));
+    DARB_CHECK(result == Z_OK, "zlib {}", result);
+    packed.resize(bytes);
+
+    std::string header, file = "\x89PNG\r\n\x1a\n";
+    put_u32(header, static_cast<std::uint32_t>(depth.width));
+    put_u32(header, static_cast<std::uint32_t>(depth.height));
+    header += std::string("\x10\0\0\0\0", 5);  // 16 bits, grey, the standard methods
+    put_chunk(file, "IHDR", header);
+    put_chunk(file, "tEXt",
+              std::string("DepthUnit") + '\0' + fmt::format("{} world units a step", unit));
+    put_chunk(file, "IDAT", packed);
+    put_chunk(file, "IEND", "");
+    write_file_atomic(path, file);
+}
+
+}  // namespace darb

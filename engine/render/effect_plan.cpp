@@ -1,0 +1,82 @@
+#include "engine/render/effect_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/core/error.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::string_view kNames[EFFECT_COUNT] = {"sh",   "antialias", "exposure", "off_centre",
+                                                   "lens", "alpha",     "depth"};
+
+std::string all_names() {
+    std::string text;
+    for (const std::string_view name : kNames) text += fmt::format(" {}", name);
+    return text;
+}
+
+}  // namespace
+
+std::string_view effect_name(int effect) {
+    return kNames[effect];
+}
+
+std::optional<int> effect_from_name(std::string_view name) {
+    for (int e = 0; e < EFFECT_COUNT; ++e)
+        if (kNames[e] == name) return e;
+    return std::nullopt;
+}
+
+EffectChoice parse_effects(std::string_view text) {
+    EffectChoice choice;
+    if (text == "auto") return choice;
+    if (text == "all" || text == "none") {
+        choice.base = text == "all" ? EffectChoice::Base::all : EffectChoice::Base::none;
+        return choice;
+    }
+    const std::string where = fmt::format("--effects {}", text);
+    const std::string hint =
+        "Use auto, all, none, or changes like +exposure,-sh; the effects are" + all_names() + ".";
+    if (text.empty()) throw Error(where, "names no effect", hint);
+    for (std::size_t at = 0; at <= text.size();) {
+        const std::size_t end = std::min(text.find(',', at), text.size());
+        const std::string_view word = text.substr(at, end - at);
+        const bool sign = !word.empty() && (word[0] == '+' || word[0] == '-');
+        const auto effect = sign ? effect_from_name(word.substr(1)) : std::nullopt;
+        if (!effect) throw Error(where, fmt::format("'{}' is no effect", word), hint);
+        choice.changed[static_cast<std::size_t>(*effect)] = word[0] == '+';
+        at = end + 1;
+    }
+    return choice;
+}
+
+void apply_plan(const EffectPlan& plan, SplatModel& model) {
+    if (!plan.on(EFFECT_ANTIALIAS)) model.antialias = false;
+    const int degree = plan.row(EFFECT_VIEW_COLOUR).degree;
+    if (degree >= model.sh_degree) return;
+    SplatModel low = model;
+    low.sh_degree = degree;
+    const auto stride = static_cast<std::size_t>(low.rest_count());
+    const auto stored = static_cast<std::size_t>(model.rest_count());
+    low.sh_rest.assign(model.size() * stride, 0.0f);
+    for (std::size_t i = 0; i < model.size(); ++i)
+        std::copy_n(model.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * stored), stride,
+                    low.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * stride));
+    model = std::move(low);
+}
+
+std::string plan_line(const EffectPlan& plan) {
+    std::string text;
+    for (int e = 0; e < EFFECT_COUNT; ++e) {
+        const EffectRow& row = plan.row(e);
+        if (!row.on) continue;
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", effect_name(e), row.reason);
+    }
+    return text.empty() ? "none is called for" : text;
+}
+
+}  // namespace darb

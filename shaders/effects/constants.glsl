@@ -1,0 +1,7 @@
+// The switches of the effects that live in the projection, forward and backward alike. A frozen 0 leaves no
+// instruction of the effect and no read of its data.
+
+layout(constant_id = 200) const int OFF_CENTRE = 1;  // 0: the principal point is the image's centre
+layout(constant_id = 201) const int ANTIALIAS = 0;   // opacity is compensated for the low-pass
+layout(constant_id = 202) const int SMOOTHING = 0;   // the 3D smoothing filter widens each splat
+layout(constant_id = 203) const int LENS = 0;        // the lens distorts the projection

@@ -1,0 +1,44 @@
+// The gradient of exposure.comp: d_image becomes that of the picture before the map, and every group leaves its sum
+// of the map's own gradient, the same in every run. Place: between loss and blend_backward.
+// Work: groups of EXPOSURE_THREADS walk over the pixels in strides. Shared memory: 12 floats a thread, reduced as a
+// tree. Reads the picture before the map, d_image; writes d_image, partial sums [groups][12].
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/effect_args.h"
+
+layout(local_size_x = EXPOSURE_THREADS) in;
+
+layout(push_constant, scalar) uniform Push { ExposureArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Maps { float maps[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer ImageIn { float image[]; };
+layout(set = 0, binding = 2, scalar) buffer Gradient { float d_image[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer Partials { float partials[]; };
+
+shared float sums[EXPOSURE_THREADS][EXPOSURE_TERMS];
+
+void main() {
+    const uint m = args.view * EXPOSURE_TERMS, lane = gl_LocalInvocationID.x;
+    float map[EXPOSURE_TERMS], sum[EXPOSURE_TERMS];
+    for (uint k = 0u; k < EXPOSURE_TERMS; ++k) {
+        map[k] = maps[m + k];
+        sum[k] = 0.0;
+    }
+    for (uint p = gl_WorkGroupID.x * EXPOSURE_THREADS + lane; p < args.pixels; p += args.groups * EXPOSURE_THREADS) {
+        const vec4 colour = vec4(image[p], image[args.pixels + p], image[2u * args.pixels + p], 1.0);
+        const vec3 d = vec3(d_image[p], d_image[args.pixels + p], d_image[2u * args.pixels + p]);
+        for (uint c = 0u; c < 3u; ++c) {
+            for (uint k = 0u; k < 4u; ++k) sum[4u * c + k] += d[c] * colour[k];
+            d_image[c * args.pixels + p] = map[c] * d.x + map[4u + c] * d.y + map[8u + c] * d.z;
+        }
+    }
+    for (uint k = 0u; k < EXPOSURE_TERMS; ++k) sums[lane][k] = sum[k];
+    for (uint half_count = EXPOSURE_THREADS / 2u; half_count > 0u; half_count /= 2u) {
+        barrier();
+        if (lane < half_count)
+            for (uint k = 0u; k < EXPOSURE_TERMS; ++k) sums[lane][k] += sums[lane + half_count][k];
+    }
+    barrier();
+    if (lane < EXPOSURE_TERMS) partials[gl_WorkGroupID.x * EXPOSURE_TERMS + lane] = sums[0][lane];
+}

@@ -1,0 +1,87 @@
+// Lens distortion in the projection: the models of engine/data/lens.h on the plane z = 1, their Jacobian and the
+// gradient through it. A lens is a front, u a(|u|^2) with a = atan(c r) / (w r) (fisheye, FOV; none where w = 0),
+// followed by w g(|w|^2) + tangential + thin prism with g a quotient of polynomials. Matrices: m[column][row].
+
+// a, a' and a'' of the front as functions of the squared radius.
+vec3 lens_front(CameraData camera, float square) {
+    const float c = camera.lens_front.x, w = camera.lens_front.y;
+    if (w == 0.0) return vec3(1.0, 0.0, 0.0);
+    const float t = c * c * square;  // below: atan(y) / y with t = y^2, and its derivatives by t
+    vec3 phi = vec3(0.0);
+    if (t < 0.15) {
+        for (int k = 12; k >= 0; --k) {  // the series sum (-t)^k / (2 k + 1), by Horner with derivatives
+            phi.z = phi.z * t + phi.y;
+            phi.y = phi.y * t + phi.x;
+            phi.x = phi.x * t + ((k & 1) == 0 ? 1.0 : -1.0) / float(2 * k + 1);
+        }
+        phi.z *= 2.0;
+    } else {
+        const float y = sqrt(t), inverse = 1.0 / (1.0 + t);
+        phi.x = atan(y) / y;
+        phi.y = (inverse - phi.x) / (2.0 * t);
+        phi.z = -(3.0 * phi.y + inverse * inverse) / (2.0 * t);
+    }
+    return c / w * phi * vec3(1.0, c * c, c * c * c * c);
+}
+
+// g, g' and g'' of the plane's radial factor.
+vec3 lens_radial(CameraData camera, float s) {
+    const vec4 k = camera.lens_radial;
+    const vec3 d = camera.lens_rational;
+    const float b = 1.0 + s * (d.x + s * (d.y + s * d.z));
+    const float b1 = d.x + s * (2.0 * d.y + s * 3.0 * d.z), b2 = 2.0 * d.y + s * 6.0 * d.z;
+    const float g = (1.0 + s * (k.x + s * (k.y + s * (k.z + s * k.w)))) / b;
+    const float t1 = k.x + s * (2.0 * k.y + s * (3.0 * k.z + s * 4.0 * k.w));
+    const float t2 = 2.0 * k.y + s * (6.0 * k.z + s * 12.0 * k.w);
+    const float g1 = (t1 - g * b1) / b;
+    return vec3(g, g1, (t2 - 2.0 * g1 * b1 - g * b2) / b);
+}
+
+mat2 radial_jacobian(vec2 v, vec3 g) { return mat2(g.x) + 2.0 * g.y * outerProduct(v, v); }
+
+// sum over i, j of C[j][i] d^2(v_i g) / (dv_j dv_k), for each k.
+vec2 radial_second(vec2 v, vec3 g, mat2 C) {
+    const vec2 along = C * v;
+    return 2.0 * g.y * ((C[0][0] + C[1][1]) * v + along + v * C) + 4.0 * g.z * dot(v, along) * v;
+}
+
+struct LensPoint {
+    vec2 w;      // after the front
+    vec2 value;  // the distorted ray
+    vec3 front, radial;
+    mat2 front_jacobian, plane_jacobian;
+};
+
+LensPoint lens_point(CameraData camera, vec2 ray) {
+    LensPoint at;
+    at.front = lens_front(camera, dot(ray, ray));
+    at.w = ray * at.front.x;
+    at.front_jacobian = radial_jacobian(ray, at.front);
+    const float x = at.w.x, y = at.w.y, s = dot(at.w, at.w);
+    at.radial = lens_radial(camera, s);
+    const vec2 p = camera.lens_tangential, prism = camera.lens_prism;
+    at.value = at.w * at.radial.x + 2.0 * x * y * p + (s + 2.0 * at.w * at.w) * p.yx + s * prism;
+    at.plane_jacobian = radial_jacobian(at.w, at.radial);
+    at.plane_jacobian[0] += vec2(2.0 * p.x * y + 6.0 * p.y * x, 2.0 * p.y * y + 2.0 * p.x * x) + 2.0 * x * prism;
+    at.plane_jacobian[1] += vec2(2.0 * p.x * x + 2.0 * p.y * y, 2.0 * p.y * x + 6.0 * p.x * y) + 2.0 * y * prism;
+    return at;
+}
+
+// Beyond the fold the distortion is no longer one to one: such rays reach no pixel.
+bool lens_sees(CameraData camera, LensPoint at) { return dot(at.w, at.w) <= camera.lens_fold * camera.lens_fold; }
+
+mat2 lens_jacobian(LensPoint at) { return at.plane_jacobian * at.front_jacobian; }
+
+// dL/d(ray) from C = dL/d(lens_jacobian).
+vec2 lens_second(CameraData camera, vec2 ray, LensPoint at, mat2 C) {
+    const mat2 d_plane = C * at.front_jacobian;  // the front's Jacobian is symmetric
+    const mat2 d_front = transpose(at.plane_jacobian) * C;
+    const vec2 p = camera.lens_tangential, prism = camera.lens_prism;
+    const float trace_x = d_plane[0][0], cross_x = d_plane[1][0] , trace_y = d_plane[1][1], cross_y = d_plane[0][1];
+    vec2 d_w = radial_second(at.w, at.radial, d_plane);
+    d_w.x += trace_x * (6.0 * p.y + 2.0 * prism.x) + cross_x * 2.0 * p.x +
+             cross_y * (2.0 * p.x + 2.0 * prism.y) + trace_y * 2.0 * p.y;
+    d_w.y += trace_x * 2.0 * p.x + cross_x * (2.0 * p.y + 2.0 * prism.x) + cross_y * 2.0 * p.y +
+             trace_y * (6.0 * p.x + 2.0 * prism.y);
+    return d_w * at.front_jacobian + radial_second(ray, at.front, d_front);
+}

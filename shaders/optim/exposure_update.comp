@@ -1,0 +1,35 @@
+// One Adam step of one photo's exposure, after which the mean of all maps is the identity again: a change common to
+// all photos is the scene's own. Place: after exposure_backward. Source: Kingma and Ba 2015.
+// Work: one group, a thread a term of the map. Shared memory: none. Does nothing when the frame overflowed its pair
+// buffers, as the step of the splats, or when the gradient is not finite. Reads partial sums; writes maps, moments.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/effect_args.h"
+#include "shared/render_args.h"
+
+layout(local_size_x = EXPOSURE_TERMS) in;
+
+const int UPDATE = 1;
+layout(push_constant, scalar) uniform Push { ExposureUpdateArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Partials { float partials[]; };
+layout(set = 0, binding = 1, scalar) buffer Maps { float maps[]; };        // [views][12]
+layout(set = 0, binding = 2, scalar) buffer Moments { vec2 moments[]; };   // [views][12]
+layout(set = 0, binding = 3, scalar) readonly buffer Status { FrameStatus status; };
+
+#include "optim/adam.glsl"
+
+void main() {
+    if (status.overflow != 0u) return;
+    const uint k = gl_LocalInvocationID.x, at = args.view * EXPOSURE_TERMS + k;
+    float gradient = 0.0;
+    for (uint g = 0u; g < args.groups; ++g) gradient += partials[g * EXPOSURE_TERMS + k];
+    if (!(abs(gradient) < 1e30)) return;
+    vec2 moment = moments[at];
+    const float change = adam_step(0.0, moment, gradient, args.rate);
+    moments[at] = moment;
+    maps[at] += change;
+    const float share = change / float(args.views);
+    for (uint v = 0u; v < args.views; ++v) maps[v * EXPOSURE_TERMS + k] -= share;
+}

@@ -1,0 +1,16 @@
+// The list of effects: what a scene may call for beyond plain splats. Each is compiled in, has its
+// buffers and its gradients only when it is on. The rules stand in
+// engine/render/effect_rules_*.cpp.
+#ifndef DARB_EFFECT_LIST_H
+#define DARB_EFFECT_LIST_H
+
+#define EFFECT_VIEW_COLOUR 0  // view-dependent colour by spherical harmonics of degree 1 to 3
+#define EFFECT_ANTIALIAS 1    // opacity compensation of the low-pass, and the 3D smoothing filter
+#define EFFECT_EXPOSURE 2     // an affine map of colours per photo
+#define EFFECT_OFF_CENTRE 3   // a principal point off the image's centre
+#define EFFECT_LENS 4         // lens distortion in the projection
+#define EFFECT_ALPHA 5        // photos with alpha or masks, and a background behind them
+#define EFFECT_DEPTH 6        // a picture of depths
+#define EFFECT_COUNT 7
+
+#endif

@@ -1,0 +1,183 @@
+// The effect plan: scenes and data sets made to need exactly one effect get exactly that one.
+#include "engine/render/effect_plan.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/core/error.h"
+#include "tests/support/random_scene.h"
+
+namespace darb::test {
+namespace {
+
+using On = std::vector<int>;
+
+On effects_on(const EffectPlan& plan) {
+    On on;
+    for (int e = 0; e < EFFECT_COUNT; ++e) {
+        EXPECT_FALSE(plan.row(e).reason.empty()) << effect_name(e);
+        if (plan.on(e)) on.push_back(e);
+    }
+    return on;
+}
+
+/// A matte scene before one centred pinhole.
+struct Scene {
+    SplatModel model;
+    std::vector<View> views{1};
+    Scene() {
+        const TestScene s = random_scene({.count = 20, .sh_degree = 3});
+        model = s.model;
+        model.sh_rest.assign(model.sh_rest.size(), 0.0f);
+        Camera& c = views[0].camera;
+        c = s.camera;
+        c.cx = 0.5 * c.width;
+        c.cy = 0.5 * c.height;
+        views[0].lens.parameters = {c.fx, c.fy, c.cx, c.cy};
+    }
+    On on(const RenderOutputs& outputs = {}) const {
+        return effects_on(plan_rendering(model, views, outputs));
+    }
+};
+
+TEST(EffectPlanOfScene, one_need_switches_on_one_effect_and_none_none) {
+    EXPECT_EQ(Scene().on(), On{});
+    using Change = void (*)(Scene&);
+    const std::pair<int, Change> cases[] = {
+        {EFFECT_VIEW_COLOUR, [](Scene& s) { s.model.sh_rest[2] = 0.1f; }},
+        {EFFECT_ANTIALIAS, [](Scene& s) { s.model.antialias = true; }},
+        {EFFECT_OFF_CENTRE, [](Scene& s) { s.views[0].camera.cx += 0.02; }},
+        {EFFECT_LENS, [](Scene& s) { s.views[0].camera.lens.active = true; }},
+    };
+    for (const auto& [effect, change] : cases) {
+        Scene s;
+        change(s);
+        EXPECT_EQ(s.on(), On{effect}) << effect_name(effect);
+    }
+    EXPECT_EQ(Scene().on({.depth = true}), On{EFFECT_DEPTH});
+    EXPECT_EQ(effects_on(plan_rendering(SplatModel{}, {}, {})), On{});
+}
+
+TEST(EffectPlanOfScene, what_changes_less_than_the_limit_is_off) {
+    Scene s;
+    s.views[0].camera.cy += 0.005;
+    s.model.sh_rest[0] = 0.003f;  // times sqrt(3 / 4 pi) = 0.0015, under 1/512
+    EXPECT_EQ(s.on(), On{});
+    s.model.sh_rest[0] = 0.0042f;  // 0.00205
+    EXPECT_EQ(s.on(), On{EFFECT_VIEW_COLOUR});
+}
+
+TEST(EffectPlanOfScene, degree_is_the_highest_band_that_shows) {
+    for (int band = 1; band <= 3; ++band) {
+        Scene s;
+        const auto first = static_cast<size_t>(band * band - 1);
+        s.model.sh_rest[45 * 7 + first * 3 + 1] = -0.2f;
+        const EffectPlan plan = plan_rendering(s.model, s.views, {});
+        EXPECT_EQ(plan.row(EFFECT_VIEW_COLOUR).degree, band);
+        apply_plan(plan, s.model);
+        EXPECT_EQ(s.model.sh_degree, band);
+        const auto rest = static_cast<size_t>(s.model.rest_count());
+        ASSERT_EQ(s.model.sh_rest.size(), s.model.size() * rest);
+        EXPECT_EQ(s.model.sh_rest[rest * 7 + first * 3 + 1], -0.2f);
+    }
+}
+
+/// A ring of cameras around points in a cube; grey photos; every photo sees every point.
+struct Capture {
+    Dataset dataset;
+    std::vector<ImageU8> photos;
+    explicit Capture(double far_factor = 1) {
+        constexpr int kViews = 12, kPoints = 60;
+        const TestScene points = random_scene({.count = kPoints, .seed = 3});
+        for (const float p : points.model.position) dataset.points.position.push_back(0.5 * p);
+        dataset.points.colour.assign(kPoints * 3, 120);
+        for (int v = 0; v < kViews; ++v) {
+            View view;
+            Camera& c = view.camera;
+            c.width = c.height = 64;
+            c.fx = c.fy = 60;
+            c.cx = c.cy = 32;
+            const double angle = 3.14159265358979 * v / kViews;
+            c.rotation = rotation_of(std::cos(angle), 0, std::sin(angle), 0);
+            c.translation = {0, 0, v % 2 == 0 ? 3.0 : 3.0 * far_factor};
+            view.lens.parameters = {c.fx, c.fy, c.cx, c.cy};
+            dataset.views.push_back(view);
+            photos.emplace_back(64, 64, 4);
+            photos.back().data.assign(64 * 64 * 4, 120);
+        }
+        dataset.points.seen_begin.push_back(0);
+        for (int p = 0; p < kPoints; ++p) {
+            for (std::uint32_t v = 0; v < kViews; ++v) dataset.points.seen_by.push_back(v);
+            dataset.points.seen_begin.push_back(dataset.points.seen_by.size());
+        }
+    }
+    void forget_tracks() {
+        dataset.points.seen_begin.clear();
+        dataset.points.seen_by.clear();
+    }
+    On on() const { return effects_on(plan_training(dataset, photos, 0)); }
+};
+
+TEST(EffectPlanOfDataset, footprints_that_differ_call_for_antialiasing) {
+    EXPECT_EQ(Capture().on(), On{});
+    EXPECT_EQ(Capture(1.3).on(), On{});
+    Capture wide(3.0);
+    EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
+    wide.forget_tracks();
+    EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
+}
+
+TEST(EffectPlanOfDataset, gains_that_differ_call_for_exposure_where_tracks_say_so) {
+    Capture c;
+    for (size_t v = 0; v < c.photos.size(); ++v)
+        for (std::uint8_t& value : c.photos[v].data) value = static_cast<std::uint8_t>(120 + 3 * v);
+    EXPECT_EQ(c.on(), On{EFFECT_EXPOSURE});
+    EXPECT_GT(plan_training(c.dataset, c.photos, 0).row(EFFECT_EXPOSURE).measured, 0.05);
+    c.forget_tracks();
+    EXPECT_EQ(c.on(), On{});
+    Capture odd;  // one photo alone says little about the others
+    for (std::uint8_t& value : odd.photos[4].data) value = 200;
+    EXPECT_EQ(odd.on(), On{});
+}
+
+TEST(EffectPlanOfDataset, alpha_centre_and_degree_each_alone) {
+    Capture alpha;
+    alpha.dataset.has_alpha = true;
+    EXPECT_EQ(alpha.on(), On{EFFECT_ALPHA});
+    Capture off;
+    off.dataset.views[3].camera.cy += 0.7;
+    EXPECT_EQ(off.on(), On{EFFECT_OFF_CENTRE});
+    const Capture plain;
+    EXPECT_EQ(effects_on(plan_training(plain.dataset, plain.photos, 2)), On{EFFECT_VIEW_COLOUR});
+}
+
+TEST(EffectChoice, words_override_the_rules) {
+    const Scene s;
+    const auto plan = [&](const char* text) {
+        return plan_rendering(s.model, s.views, {}, parse_effects(text));
+    };
+    EXPECT_EQ(effects_on(plan("all")), (On{EFFECT_VIEW_COLOUR, EFFECT_OFF_CENTRE, EFFECT_LENS}));
+    EXPECT_EQ(plan("all").row(EFFECT_VIEW_COLOUR).degree, 3);
+    EXPECT_EQ(effects_on(plan("none")), On{});
+    EXPECT_EQ(effects_on(plan("+off_centre,-sh")), On{EFFECT_OFF_CENTRE});
+    EXPECT_TRUE(plan("+off_centre").row(EFFECT_OFF_CENTRE).overridden);
+    EXPECT_FALSE(plan("+off_centre").row(EFFECT_LENS).overridden);
+    Scene mip;
+    mip.model.antialias = true;
+    EXPECT_EQ(effects_on(plan_rendering(mip.model, mip.views, {}, parse_effects("none"))), On{});
+}
+
+TEST(EffectChoice, what_is_no_effect_is_an_error_that_names_them) {
+    for (const char* text : {"", "sh", "+nothing", "auto,+sh", "+sh,", "+sh -lens"}) {
+        try {
+            parse_effects(text);
+            ADD_FAILURE() << text;
+        } catch (const Error& e) {
+            EXPECT_NE(std::string(e.what()).find("exposure"), std::string::npos) << e.what();
+        }
+    }
+}
+
+}  // namespace
+}  // namespace darb::test

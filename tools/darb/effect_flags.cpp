@@ -1,0 +1,57 @@
+#include "tools/darb/effect_flags.h"
+
+#include <utility>
+
+namespace darb {
+
+void add_effects_flag(CLI::App& command, std::string& text) {
+    command
+        .add_option("--effects", text,
+                    "auto: what the scene calls for, see `darb plan`; all; none; or changes to "
+                    "auto such as +exposure,-sh")
+        ->capture_default_str();
+}
+
+void add_lens_flag(CLI::App& command, DatasetOptions& data) {
+    command
+        .add_option_function<std::string>(
+            "--lens", [&data](const std::string& text) { data.original_lens = text == "original"; },
+            "undistort: straight pictures; original: distorted as the photos are")
+        ->check(CLI::IsMember({"undistort", "original"}))
+        ->default_str("undistort");
+}
+
+void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options) {
+    command.add_flag("--antialiasing", antialiasing, "as --effects +antialias");
+    for (auto [name, rate] : {std::pair{"--exposure-lr-init", &options.exposure_lr_init},
+                              {"--exposure-lr-final", &options.exposure_lr_final}})
+        command.add_option(name, *rate, "of the exposure of each photo, where that is trained")
+            ->capture_default_str()
+            ->check(CLI::PositiveNumber);
+}
+
+nlohmann::json plan_json(const EffectPlan& plan) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (int e = 0; e < EFFECT_COUNT; ++e) {
+        const EffectRow& row = plan.row(e);
+        rows.push_back({{"effect", effect_name(e)},
+                        {"on", row.on},
+                        {"overridden", row.overridden},
+                        {"measured", row.measured},
+                        {"reason", row.reason}});
+        if (e == EFFECT_VIEW_COLOUR) rows.back()["degree"] = row.degree;
+    }
+    return rows;
+}
+
+void apply_plan(const EffectPlan& plan, TrainOptions& options) {
+    const EffectRow& colour = plan.row(EFFECT_VIEW_COLOUR);
+    options.sh_degree = colour.degree;
+    options.probe_sh = colour.on && !colour.overridden;
+    options.antialias = plan.on(EFFECT_ANTIALIAS);
+    options.exposure = plan.on(EFFECT_EXPOSURE);
+    options.off_centre = plan.projection().off_centre;
+    options.lens = plan.on(EFFECT_LENS);
+}
+
+}  // namespace darb

@@ -1,0 +1,28 @@
+// --effects and what goes with it, for train, render, eval and plan.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "engine/render/effect_plan.h"
+#include "trainer/options.h"
+
+namespace darb {
+
+/// Adds --effects.
+void add_effects_flag(CLI::App& command, std::string& text);
+
+/// Adds --lens.
+void add_lens_flag(CLI::App& command, DatasetOptions& data);
+
+/// Adds --antialiasing and the rates of exposure.
+void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options);
+
+/// A row an effect: name, on, overridden, measured, reason.
+nlohmann::json plan_json(const EffectPlan& plan);
+
+/// The run as the plan wants it.
+void apply_plan(const EffectPlan& plan, TrainOptions& options);
+
+}  // namespace darb

@@ -1,0 +1,141 @@
+#include "tools/darb/plan_price.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "engine/render/renderer.h"
+#include "tools/darb/effect_flags.h"
+#include "trainer/initial_model.h"
+#include "trainer/trainer.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kFrames = 15, kWarmUp = 3;
+constexpr std::size_t kViews = 4;
+
+Measured summary(std::vector<double> ms, std::uint64_t bytes) {
+    std::sort(ms.begin(), ms.end());
+    const std::size_t n = ms.size();
+    return {ms[n / 2], 0.5 * (ms[n - 1 - n / 4] - ms[n / 4]), bytes};
+}
+
+double sum_of(const std::vector<PassTime>& passes) {
+    double ms = 0;
+    for (const PassTime& pass : passes) ms += pass.ms;
+    return ms;
+}
+
+}  // namespace
+
+std::vector<View> framing_views(const SplatModel& model) {
+    constexpr int kWidth = 640, kHeight = 480;
+    std::vector<View> views;
+    if (model.size() == 0) return views;
+    glm::dvec3 centre(0.0);
+    double radius2 = 0;
+    const auto at = [&](std::size_t i) {
+        return glm::dvec3(model.position[3 * i], model.position[3 * i + 1],
+                          model.position[3 * i + 2]);
+    };
+    for (std::size_t i = 0; i < model.size(); ++i) centre += at(i) / double(model.size());
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        const glm::dvec3 d = at(i) - centre;
+        radius2 += glm::dot(d, d) / double(model.size());
+    }
+    for (std::size_t v = 0; v < kViews; ++v) {
+        const double angle = 1.5707963267948966 * static_cast<double>(v);
+        View view;
+        Camera& c = view.camera;
+        c.width = kWidth;
+        c.height = kHeight;
+        c.fx = c.fy = kWidth;
+        c.cx = 0.5 * kWidth;
+        c.cy = 0.5 * kHeight;
+        const glm::dvec3 right(std::cos(angle), 0, -std::sin(angle)), down(0, 1, 0);
+        c.rotation = glm::transpose(glm::dmat3(right, down, glm::cross(right, down)));
+        c.translation =
+            glm::dvec3(0, 0, 3 * std::sqrt(radius2)) - c.rotation * (centre + model.origin);
+        views.push_back(view);
+    }
+    return views;
+}
+
+Measured measure_rendering(const DeviceOptions& device_options, const SplatModel& model,
+                           const std::vector<View>& views, const EffectPlan& plan) {
+    Device device(device_options);
+    SplatModel planned = model;
+    apply_plan(plan, planned);
+    ForwardOptions options;
+    options.effects = plan.projection();
+    Renderer renderer(device, planned, options);
+    std::vector<double> ms;
+    const std::size_t count = std::min(views.size(), kViews);
+    for (std::size_t frame = 0; frame < kWarmUp * count + kFrames; ++frame) {
+        renderer.render(views[frame % count].camera);
+        double frame_ms = sum_of(renderer.pass_times());
+        if (plan.on(EFFECT_DEPTH)) {
+            renderer.render_depth();
+            frame_ms += sum_of(renderer.pass_times());
+        }
+        if (frame >= kWarmUp * count) ms.push_back(frame_ms);
+    }
+    return summary(ms, device.peak_bytes());
+}
+
+Measured measure_training(const DeviceOptions& device_options, const Dataset& dataset,
+                          const TrainOptions& options, const EffectPlan& plan) {
+    Device device(device_options);
+    Dataset few = dataset;
+    std::erase_if(few.views, [](const View& v) { return v.is_test; });
+    few.views.resize(std::min(few.views.size(), kViews));
+    few.points.seen_begin.clear();
+    few.points.seen_by.clear();
+    std::vector<ImageU8> photos;
+    for (const View& v : few.views) {
+        photos.emplace_back(v.camera.width, v.camera.height, 4);
+        std::fill(photos.back().data.begin(), photos.back().data.end(), std::uint8_t{128});
+    }
+    TrainOptions planned = options;
+    apply_plan(plan, planned);
+    planned.probe_sh = false;
+    planned.densify_until = 0;
+    planned.sh_interval = 1;  // every band is in use after a few steps
+    Trainer trainer(device, few, photos, initial_model(few, planned), planned);
+    std::vector<double> ms;
+    for (int step = 0; step < 2 * static_cast<int>(kViews) + kFrames; ++step) {
+        const auto start = std::chrono::steady_clock::now();
+        trainer.step();
+        trainer.drain();
+        const std::chrono::duration<double, std::milli> took =
+            std::chrono::steady_clock::now() - start;
+        if (step >= 2 * static_cast<int>(kViews)) ms.push_back(took.count());
+    }
+    return summary(ms, device.peak_bytes());
+}
+
+EffectPrices price_effects(const EffectPlan& plan, bool training, int most_degree,
+                           const std::function<Measured(const EffectPlan&)>& with) {
+    EffectPrices prices(EFFECT_COUNT);
+    const Measured base = with(plan);
+    for (int e = 0; e < EFFECT_COUNT; ++e) {
+        const bool has = training ? e != EFFECT_DEPTH && e != EFFECT_ALPHA && e != EFFECT_LENS
+                                  : e != EFFECT_EXPOSURE && e != EFFECT_ALPHA;
+        if (!has || (e == EFFECT_VIEW_COLOUR && most_degree == 0)) continue;
+        EffectPlan other = plan;
+        EffectRow& row = other.row(e);
+        row.on = !row.on;
+        if (e == EFFECT_VIEW_COLOUR) row.degree = row.on ? most_degree : 0;
+        const Measured changed = with(other);
+        const double sign = plan.on(e) ? 1 : -1;
+        prices[static_cast<std::size_t>(e)] = {
+            sign * (base.ms - changed.ms),
+            static_cast<std::int64_t>(sign) *
+                (static_cast<std::int64_t>(base.bytes) - static_cast<std::int64_t>(changed.bytes))};
+    }
+    return prices;
+}
+
+}  // namespace darb

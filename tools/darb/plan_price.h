@@ -1,0 +1,40 @@
+// What each effect of a plan costs on this device: the same work with it and without it.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "engine/gpu/device.h"
+#include "engine/render/effect_plan.h"
+#include "trainer/options.h"
+
+namespace darb {
+
+struct EffectPrice {
+    double ms = 0;  // with the effect less without it; a frame, or an iteration of training
+    std::int64_t bytes = 0;  // of device memory, likewise
+};
+using EffectPrices = std::vector<std::optional<EffectPrice>>;  // [EFFECT_COUNT]
+
+struct Measured {
+    double ms = 0, spread_ms = 0;  // median and half of the middle half's width
+    std::uint64_t bytes = 0;       // peak of device memory
+};
+
+/// Frames of up to 4 views, drawn in turn.
+Measured measure_rendering(const DeviceOptions& device, const SplatModel& model,
+                           const std::vector<View>& views, const EffectPlan& plan);
+/// Iterations on the first views at the start of the run.
+Measured measure_training(const DeviceOptions& device, const Dataset& dataset,
+                          const TrainOptions& options, const EffectPlan& plan);
+
+/// with(plan) measures; every effect that can be switched is, one at a time. No value for those
+/// that this work does not have.
+EffectPrices price_effects(const EffectPlan& plan, bool training, int most_degree,
+                           const std::function<Measured(const EffectPlan&)>& with);
+
+/// Views that frame the splats from four sides, where no cameras are named.
+std::vector<View> framing_views(const SplatModel& model);
+
+}  // namespace darb

@@ -1,0 +1,84 @@
+#include "trainer/exposure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/check.h"
+#include "engine/render/groups.h"
+#include "shaders/shared/effect_args.h"
+#include "shaders/shared/render_args.h"
+
+namespace darb {
+
+namespace {
+
+std::uint32_t groups_of(std::uint32_t pixels) {
+    return std::clamp((pixels + EXPOSURE_THREADS - 1) / EXPOSURE_THREADS, 1u,
+                      static_cast<std::uint32_t>(EXPOSURE_MAX_GROUPS));
+}
+
+}  // namespace
+
+Exposure::Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels)
+    : photos_(photos),
+      map_(device, "exposure", {{"THREADS", SPLAT_GROUP}}),
+      backward_(device, "exposure_backward", {}, false),
+      update_(device, "exposure_update", {}, false),
+      maps_(device, "exposure maps", std::uint64_t{photos} * EXPOSURE_TERMS * 4),
+      moments_(device, "exposure moments", std::uint64_t{photos} * EXPOSURE_TERMS * 8),
+      mapped_(device, "mapped image", pixels * 12),
+      partials_(device, "exposure partials", EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS * 4) {
+    std::vector<float> start;
+    for (std::uint32_t p = 0; p < photos; ++p)
+        start.insert(start.end(), kIdentityColours.begin(), kIdentityColours.end());
+    start.resize(state_size(photos));
+    restore(start);
+}
+
+void Exposure::record(Commands& commands, const Buffer& image, std::uint32_t photo,
+                      std::uint32_t pixels) {
+    commands.pass("exposure");
+    const Groups g = groups_for(pixels);
+    commands.dispatch(map_, gpu::ExposureArgs{pixels, photo, groups_of(pixels)},
+                      {maps_, image, mapped_}, g.x, g.y);
+}
+
+void Exposure::record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
+                               const Buffer& status, std::uint32_t photo, std::uint32_t pixels,
+                               float rate, int visits) {
+    commands.pass("exposure");
+    const std::uint32_t groups = groups_of(pixels);
+    commands.dispatch(backward_, gpu::ExposureArgs{pixels, photo, groups},
+                      {maps_, image, d_image, partials_}, groups);
+    const double correction1 = 1.0 - std::pow(0.9, visits),
+                 correction2 = 1.0 - std::pow(0.999, visits);
+    const gpu::ExposureUpdateArgs args{photo, photos_, groups,
+                                       static_cast<float>(rate / correction1),
+                                       static_cast<float>(1.0 / std::sqrt(correction2))};
+    commands.dispatch(update_, args, {partials_, maps_, moments_, status}, 1);
+}
+
+std::vector<ColourMap> Exposure::maps() const {
+    const auto values = maps_.download<float>(std::size_t{photos_} * EXPOSURE_TERMS);
+    std::vector<ColourMap> maps(photos_);
+    for (std::size_t p = 0; p < maps.size(); ++p)
+        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(p * EXPOSURE_TERMS),
+                    EXPOSURE_TERMS, maps[p].begin());
+    return maps;
+}
+
+std::vector<float> Exposure::state() const {
+    auto values = maps_.download<float>(std::size_t{photos_} * EXPOSURE_TERMS);
+    const auto moments = moments_.download<float>(std::size_t{photos_} * EXPOSURE_TERMS * 2);
+    values.insert(values.end(), moments.begin(), moments.end());
+    return values;
+}
+
+void Exposure::restore(const std::vector<float>& state) {
+    DARB_CHECK(state.size() == state_size(photos_), "{} values, {} photos", state.size(), photos_);
+    const auto middle = state.begin() + std::ptrdiff_t{EXPOSURE_TERMS} * photos_;
+    maps_.upload(std::vector<float>(state.begin(), middle));
+    moments_.upload(std::vector<float>(middle, state.end()));
+}
+
+}  // namespace darb

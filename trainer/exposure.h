@@ -1,0 +1,41 @@
+// Per-photo exposure in training: an affine map of colours a photo between picture and loss,
+// trained by Adam beside the splats. Off in pictures for evaluation. The mean of all maps stays the
+// identity.
+#pragma once
+
+#include <vector>
+
+#include "engine/gpu/commands.h"
+#include "engine/gpu/pipeline.h"
+#include "trainer/exposure_fit.h"
+
+namespace darb {
+
+class Exposure {
+  public:
+    /// For `photos` photos of at most `pixels` pixels, all identities.
+    Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels);
+
+    /// image [3][H W] -> mapped(), the picture as this photo shows it.
+    void record(Commands& commands, const Buffer& image, std::uint32_t photo, std::uint32_t pixels);
+    const Buffer& mapped() const { return mapped_; }
+
+    /// d_image, dL/d(mapped), becomes dL/d(image); then the photo's Adam step. visits: of this
+    /// photo, from 1. status: gpu::FrameStatus of the frame.
+    void record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
+                         const Buffer& status, std::uint32_t photo, std::uint32_t pixels,
+                         float rate, int visits);
+
+    std::vector<ColourMap> maps() const;
+    /// maps and moments as one array, for checkpoints: [photos][12] maps, [photos][12][2] moments.
+    std::vector<float> state() const;
+    void restore(const std::vector<float>& state);
+    static std::size_t state_size(std::size_t photos) { return photos * 36; }
+
+  private:
+    std::uint32_t photos_;
+    Pipeline map_, backward_, update_;
+    Buffer maps_, moments_, mapped_, partials_;
+};
+
+}  // namespace darb

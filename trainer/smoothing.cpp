@@ -1,0 +1,51 @@
+#include "trainer/smoothing.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/check.h"
+#include "engine/render/groups.h"
+#include "shaders/shared/effect_args.h"
+
+namespace darb {
+
+SmoothingFilter::SmoothingFilter(Device& device, const ProjectionEffects& effects)
+    : device_(&device), commands_(device) {
+    SpecConstants constants{{"THREADS", SPLAT_GROUP}};
+    add_constants(effects, constants);
+    filter_ = Pipeline(device, "smoothing_filter", constants);
+}
+
+void SmoothingFilter::update(GpuSplats& splats, const Buffer& cameras, std::uint32_t camera_count) {
+    const std::uint64_t bytes = std::uint64_t{std::max(splats.count(), 1u)} * sizeof(float);
+    if (splats.smoothing().bytes() != bytes)
+        splats.smoothing() = Buffer(*device_, "smoothing", bytes);
+    if (splats.count() == 0) return;
+    const Groups g = groups_for(splats.count());
+    commands_.begin();
+    commands_.pass("smoothing filter");
+    commands_.dispatch(filter_, gpu::SmoothingArgs{splats.count(), camera_count},
+                       {cameras, splats.parameters(kPosition), splats.smoothing()}, g.x, g.y);
+    commands_.submit_and_wait();
+}
+
+SplatModel bake_smoothing(const SplatModel& model, const std::vector<float>& filter) {
+    DARB_CHECK(filter.size() >= model.size(), "{} filters, {} splats", filter.size(), model.size());
+    SplatModel baked = model;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        double kept = 1;
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double s = std::exp(
+                std::clamp<double>(model.log_scale[3 * i + c], -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT));
+            const double wide = std::hypot(s, double{filter[i]});
+            kept *= s / wide;
+            baked.log_scale[3 * i + c] = static_cast<float>(std::log(wide));
+        }
+        const double opacity = kept / (1 + std::exp(-double{model.opacity[i]}));
+        baked.opacity[i] = static_cast<float>(std::clamp(
+            std::log(opacity / (1 - opacity)), -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT));
+    }
+    return baked;
+}
+
+}  // namespace darb

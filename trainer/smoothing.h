@@ -1,0 +1,28 @@
+// The 3D smoothing filter of Mip-Splatting in training: its deviations on the device, and splats
+// with the filter worked in for files.
+#pragma once
+
+#include "engine/gpu/commands.h"
+#include "engine/render/forward.h"
+
+namespace darb {
+
+class SmoothingFilter {
+  public:
+    SmoothingFilter(Device& device, const ProjectionEffects& effects);
+
+    /// Sizes splats.smoothing() and fills it from its positions and these cameras. Waits.
+    void update(GpuSplats& splats, const Buffer& cameras, std::uint32_t camera_count);
+
+  private:
+    Device* device_;
+    Pipeline filter_;
+    Commands commands_;
+};
+
+/// The same splats without a filter beside them: standard deviations widened, opacities lowered.
+/// filter: [N] world units. They look the same through project.comp, up to rounding and to
+/// opacities whose logit float32 does not hold.
+SplatModel bake_smoothing(const SplatModel& model, const std::vector<float>& filter);
+
+}  // namespace darb
