@@ -72,7 +72,7 @@ TEST(Command, features_that_are_not_there_say_so) {
     std::vector<BadCommand> commands;
     for (const char* option :
          {"--strategy mcmc", "--strategy=budget", "--antialiasing", "--effects all",
-          "--exposure_lr_init 0.01", "-d depths", "--depths depths", "--view"})
+          "--exposure_lr_init 0.01", "-d depths", "--depths depths"})
         commands.push_back({train + option, "not part of this version"});
     expect_refused(commands);
 }
