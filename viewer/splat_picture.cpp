@@ -47,7 +47,7 @@ int fitting_degree(const Device& device, const SplatModel& model) {
 SplatPicture::SplatPicture(Device& device)
     : device_(&device),
       commands_(device),
-      depth_light_(device, "depth_light", {{"THREADS", VIEW_GROUP}}),
+      depth_light_(device, "view_depth", {{"THREADS", VIEW_GROUP}}),
       no_photo_(device, "no photo", 4) {}
 
 void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds) {

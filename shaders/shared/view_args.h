@@ -28,7 +28,7 @@ struct DisplayArgs {
     float background_r, background_g, background_b;
 };
 
-// depth_light: replaces each visible splat's colour by (depth between near and far, 1, 0).
+// view_depth: replaces each visible splat's colour by (depth between near and far, 1, 0).
 struct DepthLightArgs {
     uint splat_count;  // N
     float near_depth;  // world units
