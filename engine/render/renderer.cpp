@@ -8,13 +8,11 @@ namespace darb {
 
 namespace {
 
-FrameAccuracy accuracy_for(const SplatModel& model, const Accuracy& accuracy,
-                           ForwardOptions options) {
-    FrameAccuracy frame = frame_accuracy(accuracy, model);
-    set_options(accuracy, options);
-    options.kernel = model.kernel;
-    options.footprint = frame.footprint;
-    options.sh_stored = model.sh_degree;
+FrameAccuracy frame_of(const SplatModel& model, ForwardOptions options) {
+    FrameAccuracy frame = frame_accuracy({}, model);
+    options.kernel = frame.options.kernel;
+    options.footprint = frame.options.footprint;
+    options.sh_stored = frame.options.sh_stored;
     frame.options = options;
     return frame;
 }
@@ -41,10 +39,15 @@ ImageF planes_to_image(const std::vector<float>& planes, int width, int height) 
     return image;
 }
 
-Renderer::Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy,
-                   ForwardOptions options)
+Renderer::Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy)
+    : Renderer(device, model, frame_accuracy(accuracy, model)) {}
+
+Renderer::Renderer(Device& device, const SplatModel& model, const ForwardOptions& options)
+    : Renderer(device, model, frame_of(model, options)) {}
+
+Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy)
     : device_(&device),
-      accuracy_(accuracy_for(model, accuracy, options)),
+      accuracy_(accuracy),
       splats_(device, model, false),
       forward_(device, accuracy_.options),
       commands_(device) {

@@ -9,9 +9,10 @@ namespace darb {
 
 class Renderer {
   public:
-    /// Uploads the model. options holds what neither the model nor the accuracy decides.
-    Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {},
-             ForwardOptions options = {});
+    /// Uploads the model.
+    Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {});
+    /// options as they are, but for kernel, footprint and sh_stored, which are the model's.
+    Renderer(Device& device, const SplatModel& model, const ForwardOptions& options);
 
     /// RGB, not clamped. sh_degree -1: all that the accuracy allows. Grows its buffers and repeats
     /// the frame when it has more splat-tile pairs than before.
@@ -23,6 +24,7 @@ class Renderer {
     const std::vector<PassTime>& pass_times() const { return pass_times_; }
 
   private:
+    Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy);
     const Buffer& record_upsample(const Camera& rendered, const Camera& shown);
 
     Device* device_;
