@@ -40,10 +40,10 @@ GUARDS = [
      "project_backward_test", "ProjectBackward.splats_beyond_the_jacobian_clamp_match_double"),
     ("needles and discs to 1e6", "determinant_as_product", COVARIANCE,
      "dot(across, across) + low_pass * (n1 + n2) + low_pass * low_pass", "f.a * f.c - b * b",
-     "project_test", "Project.needles_and_discs_to_a_million_match_double"),
+     "hard_case_test", "every/HardCase.matches_double/needles_gaussian_psi"),
     ("needles and discs to 1e6", "whitened_gradient", GRADIENT,
      "(cross(r2, cross(r1, r2)) + args.low_pass * r1) * (f.l11 / f.c)", "f.l11 * r1 + f.l21 * r2",
-     "project_backward_test", "ProjectBackward.needles_and_discs_match_double"),
+     "walk_test", "WalkCases.needles_and_discs_match_double"),
     ("determinant tiny, huge or not positive", "determinant_limits", PROJECT,
      "f.determinant > DETERMINANT_MIN && f.determinant < DETERMINANT_MAX", "true",
      "project_test", "Project.each_cull_reason_is_counted"),
@@ -55,7 +55,7 @@ GUARDS = [
      "project_backward_test", "ProjectBackward.quaternions_of_any_norm_match_double"),
     ("log-scale of 50, opacity logit of 1e4", "scale_limit", PROJECT,
      "exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT))", "exp(raw_scale)",
-     "project_test", "Project.parameters_beyond_their_limits_act_as_at_the_limit"),
+     "hard_case_test", "every/HardCase.matches_double/longest_needle_gaussian_psi"),
     ("log-scale of 50, opacity logit of 1e4", "scale_limit_gradient", GRADIENT,
      "outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT)", "d_log_scale",
      "project_backward_test", "ProjectBackward.parameters_beyond_their_limits_have_no_gradient"),
@@ -76,8 +76,7 @@ GUARDS = [
      "blend_test", "every_kernel/Blend.opaque_stack_stops_before_the_transmittance_limit/gaussian_psi"),
     ("opacity at 1, thousands of opaque layers", "alpha_limit_gradient", BLEND_BACK,
      "counts && raw < ALPHA_MAX ? before * ahead : 0.0", "counts ? before * ahead : 0.0",
-     "blend_backward_test",
-     "every_kernel/BlendBackward.opaque_layers_match_double_through_clamp_and_stop/gaussian_psi"),
+     "hard_case_test", "every/HardCase.matches_double/opaque_layers_gaussian_psi"),
     ("10,000 thin layers in one pixel", "gradient_ends_where_the_pixel_ended", BLEND_BACK,
      "raw >= ALPHA_CUTOFF && number <= px.last[k]", "raw >= ALPHA_CUTOFF",
      "blend_backward_test", "BlendBackwardCases.pairs_behind_the_stop_get_zero"),
@@ -102,7 +101,7 @@ GUARDS = [
     ("0 or 1 splats, none visible, all too faint", "empty_model", "trainer/densify/density_control.cpp",
      "if (n == 0) return result;", "",
      "densify_test", "Densify.an_empty_model_stays_empty"),
-    ("coordinates at 1e6 m", "recentring", "engine/scene/ply.cpp",
+    ("coordinates at 1e6 m", "recentring", "engine/scene/edit_splats.cpp",
      "> kRecentreBeyond)", "> 1e300)",
      "ply_test", "Ply.map_coordinates_keep_millimetres"),
     ("odd image sizes, more than 65,536 tiles", "wide_tile_keys", "engine/render/forward.cpp",
@@ -111,8 +110,8 @@ GUARDS = [
     ("NaN or infinity in a PLY, points or pose", "finite_splats", "engine/scene/ply.cpp",
      "if (!all_finite(values, columns)) return;", "",
      "ply_test", "Ply.splats_with_nan_or_infinity_are_dropped_and_counted"),
-    ("NaN or infinity in a PLY, points or pose", "finite_opacity", PROJECT,
-     "|| isnan(logit)", "",
+    ("NaN or infinity in a PLY, points or pose", "finite_scale", PROJECT,
+     "any(isnan(raw_scale))", "false",
      "project_test", "Project.values_that_are_not_finite_are_culled_with_their_reason"),
     ("NaN or infinity in a PLY, points or pose", "finite_colour", PROJECT,
      "if (!all(lessThan(colour, vec3(1e30)))) return 0u;", "",
@@ -123,7 +122,7 @@ GUARDS = [
     ("NaN or infinite gradient", "too_many_bad_gradients", "trainer/trainer.cpp",
      "if (status.bad_gradients * kBadGradientShare <= splats) return;", "if (splats > 0) return;",
      "trainer_test", "Training.more_bad_gradients_than_one_in_a_thousand_stop_the_run"),
-    ("neighbours at distance 0, 1 point, no points", "least_distance", "trainer/initial_model.cpp",
+    ("neighbours at distance 0, 1 point, no points", "least_distance", "engine/data/point_splats.cpp",
      "result[i] = std::max(kMinDistance2, sum", "result[i] = std::max(0.0, sum",
      "initial_model_test", "InitialModel.duplicate_points_have_a_finite_scale"),
     ("Adam with v = 0 after a reset", "adam_epsilon", "shaders/optim/adam.glsl",
@@ -244,7 +243,8 @@ def run(names):
             os.makedirs(os.path.dirname(old), exist_ok=True)
             shutil.copyfile(new, old)
     build = os.path.join(ROOT, COPY, "build")
-    made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release"])
+    made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release",
+                  "-DDARB_WERROR=OFF"])
     if made.returncode:
         sys.exit(made.stdout)
     chosen = [g for g in GUARDS if not names or g[1] in names]

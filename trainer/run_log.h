@@ -29,8 +29,8 @@ class RunLog {
 
     void start(Device& device, const Dataset& dataset, const TrainOptions& options,
                std::uint32_t splats, const std::string& effects_json);
-    /// Keeps one line in kLogInterval. counters: of the run so far; totals: of the passes, as Trainer
-    /// sums them.
+    /// Keeps one line in kLogInterval. counters: of the run so far; totals: of the passes, as
+    /// Trainer sums them.
     void iteration(const IterationResult& result, const TrainCounters& counters, double seconds,
                    const std::vector<PassTotal>& totals);
     /// What ended the run before its time.

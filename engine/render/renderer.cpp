@@ -9,13 +9,19 @@ namespace darb {
 
 namespace {
 
-FrameAccuracy accuracy_for(const SplatModel& model, const Accuracy& accuracy,
-                           ForwardOptions options) {
+FrameAccuracy frame_of(const SplatModel& model, const Accuracy& accuracy,
+                       const ProjectionEffects& effects) {
     FrameAccuracy frame = frame_accuracy(accuracy, model);
-    set_options(accuracy, options);
-    options.kernel = model.kernel;
-    options.footprint = frame.footprint;
-    options.sh_stored = model.sh_degree;
+    frame.options.effects = effects;
+    frame.options.effects.antialias = model.antialias;
+    return frame;
+}
+
+FrameAccuracy frame_of(const SplatModel& model, ForwardOptions options) {
+    FrameAccuracy frame = frame_accuracy({}, model);
+    options.kernel = frame.options.kernel;
+    options.footprint = frame.options.footprint;
+    options.sh_stored = frame.options.sh_stored;
     options.effects.antialias = model.antialias;
     frame.options = options;
     return frame;
@@ -44,9 +50,15 @@ ImageF planes_to_image(const std::vector<float>& planes, int width, int height) 
 }
 
 Renderer::Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy,
-                   ForwardOptions options)
+                   const ProjectionEffects& effects)
+    : Renderer(device, model, frame_of(model, accuracy, effects)) {}
+
+Renderer::Renderer(Device& device, const SplatModel& model, const ForwardOptions& options)
+    : Renderer(device, model, frame_of(model, options)) {}
+
+Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy)
     : device_(&device),
-      accuracy_(accuracy_for(model, accuracy, options)),
+      accuracy_(accuracy),
       splats_(device, model, false),
       forward_(device, accuracy_.options),
       commands_(device) {

@@ -9,10 +9,13 @@ namespace darb {
 
 class Renderer {
   public:
-    /// Uploads the model. options holds what neither the model nor the accuracy decides. Cameras with
-    /// a lens need options.effects.lens.
+    /// Uploads the model; effects.antialias is taken from it. Cameras with a lens need
+    /// effects.lens.
     Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {},
-             ForwardOptions options = {});
+             const ProjectionEffects& effects = {});
+    /// options as they are, but for kernel, footprint, sh_stored and effects.antialias, which are
+    /// the model's.
+    Renderer(Device& device, const SplatModel& model, const ForwardOptions& options);
 
     /// RGB, not clamped. sh_degree -1: all that the accuracy allows. Grows its buffers and repeats
     /// the frame when it has more splat-tile pairs than before.
@@ -29,6 +32,7 @@ class Renderer {
     const std::vector<PassTime>& pass_times() const { return pass_times_; }
 
   private:
+    Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy);
     const Buffer& record_upsample(const Camera& rendered, const Camera& shown);
 
     Device* device_;

@@ -29,7 +29,7 @@ struct Camera {
     double fx = 0, fy = 0, cx = 0, cy = 0;  // px
     glm::dmat3 rotation{1.0};  // world to camera: p_camera = rotation * p_world + translation
     glm::dvec3 translation{0.0};
-    LensTerms lens;
+    LensTerms lens{};
 
     glm::dvec3 centre() const { return -(glm::transpose(rotation) * translation); }
 };

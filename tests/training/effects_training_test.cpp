@@ -165,7 +165,7 @@ TEST(EffectsRendering, auto_equals_all_in_the_picture) {
             EXPECT_EQ(planned.sh_degree, matte && choice == std::string("auto") ? 0 : 3);
             ForwardOptions options;
             options.effects = plan.projection();
-            Renderer renderer(shared_device(), planned, {}, options);
+            Renderer renderer(shared_device(), planned, options);
             pictures.push_back(renderer.render(view.camera));
         }
         EXPECT_EQ(pictures[0].data, pictures[1].data) << "identities, bit by bit";

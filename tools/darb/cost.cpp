@@ -54,7 +54,7 @@ int cost(const CostFlags& flags) {
     if (flags.scene.empty())
         throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
     const Extent extent = extent_of(flags);
-    const SplatModel model = load_scene_to_render(flags.scene);
+    const SplatModel model = load_scene(flags.scene);
     if (model.size() == 0)
         throw Error(flags.scene, "holds no splats", "There is nothing to measure.");
     const CostViews views = views_of(flags, model, extent.views);

@@ -74,9 +74,7 @@ int eval(EvalFlags flags) {
     Device device(device_options);
     const EffectPlan plan = plan_rendering(model, views, {}, choice);
     apply_plan(plan, model);
-    ForwardOptions options;
-    options.effects = plan.projection();
-    Renderer renderer(device, model, accuracy, options);
+    Renderer renderer(device, model, accuracy, plan.projection());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     Evaluation evaluation;
     for (const View& view : views) {

@@ -70,7 +70,7 @@ Measured measure_rendering(const DeviceOptions& device_options, const SplatModel
     apply_plan(plan, planned);
     ForwardOptions options;
     options.effects = plan.projection();
-    Renderer renderer(device, planned, {}, options);
+    Renderer renderer(device, planned, options);
     std::vector<double> ms;
     const std::size_t count = std::min(views.size(), kViews);
     for (std::size_t frame = 0; frame < kWarmUp * count + kFrames; ++frame) {

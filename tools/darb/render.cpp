@@ -83,9 +83,7 @@ int render(const RenderFlags& flags) {
     Device device(device_options);
     const EffectPlan plan = plan_rendering(model, views, {.depth = !flags.depth.empty()}, choice);
     apply_plan(plan, model);
-    ForwardOptions options;
-    options.effects = plan.projection();
-    Renderer renderer(device, model, accuracy, options);
+    Renderer renderer(device, model, accuracy, plan.projection());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     std::set<std::string> used;
     std::vector<double> frame_ms;
