@@ -37,7 +37,7 @@ struct RunOptions {
     std::filesystem::path resume_from;  // empty: start afresh
     bool quiet = false;
     std::function<void(const LiveStep&)> on_step;  // may be empty
-    std::string effects;          // the plan in a line, for the log
+    std::string effects;                           // the plan in a line, for the log
     std::string effects_json;     // the same as JSON, for metrics.json; may be empty
     std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
 };

@@ -33,6 +33,7 @@ ForwardOptions forward_options(const TrainOptions& options) {
 
 // More splats than this share with a gradient that is not finite: something is broken.
 constexpr std::uint64_t kBadGradientShare = 1'000;
+
 SplatModel start_model(SplatModel start, const TrainOptions& options) {
     start.antialias = options.antialias;
     if (options.probe_sh) {

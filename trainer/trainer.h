@@ -18,8 +18,8 @@
 #include "engine/render/forward.h"
 #include "engine/render/loss.h"
 #include "trainer/densify/density_control.h"
-#include "trainer/memory_plan.h"
 #include "trainer/exposure.h"
+#include "trainer/memory_plan.h"
 #include "trainer/options.h"
 #include "trainer/smoothing.h"
 

@@ -15,8 +15,8 @@ ForwardOptions forward_options(const SplatModel& model, const WalkSettings& sett
     options.alpha_cutoff = settings.alpha_cutoff;
     options.transmittance_stop = settings.transmittance_stop;
     options.sh_stored = model.sh_degree;
-    options.effects.antialias = model.antialias;
     options.store_for_backward = settings.depth_order != DEPTH_ORDER_PIXEL;
+    options.effects.antialias = model.antialias;
     return options;
 }
 

@@ -160,6 +160,7 @@ FrameAccuracy frame_accuracy(const Accuracy& accuracy, const SplatModel& model) 
     frame.options.kernel = model.kernel;
     frame.options.footprint = frame.footprint;
     frame.options.sh_stored = model.sh_degree;
+    frame.options.effects.antialias = model.antialias;
     return frame;
 }
 

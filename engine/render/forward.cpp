@@ -239,6 +239,7 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
 void Forward::record_depth(Commands& commands, std::uint32_t splats, const gpu::CameraData& data) {
     if (!depth_light_)
         depth_light_.emplace(*device_, "depth_light", SpecConstants{{"THREADS", SPLAT_GROUP}});
+    DARB_CHECK(options_.storage == STORAGE_FLOAT32, "depths need the range of float32");
     commands.pass("depth");
     if (splats > 0) {
         const Groups g = groups_for(splats);

@@ -5,3 +5,5 @@ layout(constant_id = 200) const int OFF_CENTRE = 1;  // 0: the principal point i
 layout(constant_id = 201) const int ANTIALIAS = 0;   // opacity is compensated for the low-pass
 layout(constant_id = 202) const int SMOOTHING = 0;   // the 3D smoothing filter widens each splat
 layout(constant_id = 203) const int LENS = 0;        // the lens distorts the projection
+
+const bool FILTERED = ANTIALIAS == 1 || SMOOTHING == 1;  // the opacity depends on the shape

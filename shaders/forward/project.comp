@@ -120,8 +120,7 @@ uint project(uint i, out int reason) {
     const float logit = opacity_logit[i];
     float opacity =
         1.0 / (1.0 + exp(-clamp(logit, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT)));
-    const bool factors = ANTIALIAS == 1 || SMOOTHING == 1;
-    if (STORAGE == STORAGE_FLOAT16 && !factors) opacity = round_half(opacity);
+    if (STORAGE == STORAGE_FLOAT16 && !FILTERED) opacity = round_half(opacity);
     float reach = kernel_reach(opacity);
     if (!(reach > 0.0) || isnan(logit)) return 0u;
 
@@ -140,7 +139,7 @@ uint project(uint i, out int reason) {
         any(isnan(raw_scale)))
         return 0u;
 
-    if (factors) {
+    if (FILTERED) {
         reason = CULL_OPACITY;
         if (ANTIALIAS == 1) opacity *= compensation(r1, r2, f);
         if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);

@@ -126,26 +126,17 @@ TEST(Training, frames_that_overflow_are_done_again_and_leave_no_trace) {
     EXPECT_EQ(tight.counters().culled, roomy.counters().culled);
 }
 
-// A colour of 1e25 makes SSIM, and with it dL/dimage, something that is no number.
+// A colour of 1e25 makes SSIM, and with it dL/dimage, something that is no number: the run ends,
+// the splats stay as they were.
 TEST(Training, gradients_that_are_not_finite_are_counted_over_the_whole_run) {
     const TinyTraining t = overflowing();
-    const auto poisoned = [&](Trainer& trainer) {
-        Trainer::State state = trainer.state();
-        for (size_t c = 0; c < 3; ++c) state.model.sh_dc[c] = 1e25f;
-        state.counters.bad_gradients = 1000;  // of the run until then
-        trainer.restore(state);
-        run_to(trainer, 8);
-        trainer.drain();
-        for (const float value : trainer.model().position) EXPECT_TRUE(std::isfinite(value));
-        return trainer.counters();
-    };
-    Trainer tight = t.trainer(), roomy = t.trainer();
-    for (const View& view : t.dataset.views) roomy.render(view.camera);
-    const TrainCounters a = poisoned(tight), b = poisoned(roomy);
-    EXPECT_GT(b.bad_gradients, 1000U);
-    EXPECT_GT(a.redone_iterations, 0U);
-    EXPECT_EQ(b.redone_iterations, 0U);
-    EXPECT_EQ(a.bad_gradients, b.bad_gradients);
+    Trainer trainer = t.trainer();
+    Trainer::State state = trainer.state();
+    for (size_t c = 0; c < 3; ++c) state.model.sh_dc[c] = 1e25f;
+    state.counters.bad_gradients = 1000;  // of the run until then
+    trainer.restore(state);
+    EXPECT_THROW(run_to(trainer, 8), Error);
+    EXPECT_GT(trainer.counters().bad_gradients, 1000U);
 }
 
 // As an exception leaves it; validation tells whether the device still used anything.

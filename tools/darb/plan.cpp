@@ -27,8 +27,9 @@ struct PlanFlags {
 };
 
 bool is_scene(const std::filesystem::path& path) {
-    return std::filesystem::is_regular_file(path) ? path.extension() == ".ply"
-                                                  : std::filesystem::exists(path / "point_cloud");
+    if (std::filesystem::is_regular_file(path)) return path.extension() != ".json";
+    return std::filesystem::exists(path / "point_cloud") ||  // of darb train
+           std::filesystem::exists(path / "meta.json");      // a SOG scene
 }
 
 struct Subject {
@@ -127,7 +128,9 @@ void add_plan(CLI::App& app, Action& action) {
     auto flags = std::make_shared<PlanFlags>();
     CLI::App* command = app.add_subcommand(
         "plan", "Which effects a data set or a scene calls for, why, and what each costs");
-    command->add_option("what", flags->what, "a data set, a PLY file, or an output folder")
+    command
+        ->add_option("what", flags->what,
+                     "a data set, a scene file, or the output folder of darb train")
         ->required();
     command->add_option("--cameras", flags->cameras,
                         "of a scene: the cameras that it will be rendered through");

@@ -73,6 +73,9 @@ double median(std::vector<double> values) {
 int render(const RenderFlags& flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const EffectChoice choice = parse_effects(flags.effects);
+    if (!flags.depth.empty() && accuracy.value(kStorage) != STORAGE_FLOAT32)
+        throw Error("--depth", "depths do not fit the float16 storage that was chosen",
+                    "Add --storage float32.");
     SplatModel model = load_scene(flags.scene);
     std::vector<View> views = load_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();

@@ -220,9 +220,7 @@ TEST(ColmapWrite, model_reads_back) {
     std::vector<View> views(3);
     for (std::size_t i = 0; i < 3; ++i) {
         views[i].name = "folder/photo " + std::to_string(i) + ".png";
-        Camera& c = views[i].camera;
-        c.width = 64, c.height = 48;
-        c.fx = 70, c.fy = 71, c.cx = 31, c.cy = 25;
+        views[i].camera = {.width = 64, .height = 48, .fx = 70, .fy = 71, .cx = 31, .cy = 25};
         views[i].camera.rotation =
             rotation_from_quaternion({0.1, 0.5 * static_cast<double>(i), -0.3, 0.8}, "test");
         views[i].camera.translation = {1e6, -2, static_cast<double>(i)};
