@@ -21,6 +21,7 @@ DOCS = "docs/hard_cases.md"
 COPY = "build-guards"
 
 PROJECT = "shaders/forward/project.comp"
+CAMERA = "shaders/effects/camera_model.glsl"
 COVARIANCE = "shaders/lib/covariance.glsl"
 GRADIENT = "shaders/backward/project_gradient.glsl"
 BLEND = "shaders/forward/blend.comp"
@@ -32,10 +33,11 @@ GUARDS = [
     ("splat behind or on the near plane", "near_plane", PROJECT,
      "p.z > camera.near_plane && p.z < 1e30", "p.z < 1e30",
      "project_test", "Project.each_cull_reason_is_counted"),
-    ("Jacobian beyond 1.3 tan(fov/2)", "jacobian_clamp", COVARIANCE,
-     "clamp(p.xy / p.z, camera.ratio_min, camera.ratio_max)", "p.xy / p.z",
+    ("Jacobian beyond 1.3 tan(fov/2)", "jacobian_clamp", CAMERA,
+     "return clamp(ratio, OFF_CENTRE == 1 ? camera.ratio_min : -camera.ratio_max, camera.ratio_max);",
+     "return ratio;",
      "project_test", "Project.wide_splats_outside_the_view_match_through_the_jacobian_clamp"),
-    ("Jacobian beyond 1.3 tan(fov/2)", "jacobian_clamp_gradient", GRADIENT,
+    ("Jacobian beyond 1.3 tan(fov/2)", "jacobian_clamp_gradient", CAMERA,
      "if (free_ratio > limits.x && free_ratio < limits.y)", "if (true)",
      "project_backward_test", "ProjectBackward.splats_beyond_the_jacobian_clamp_match_double"),
     ("needles and discs to 1e6", "determinant_as_product", COVARIANCE,

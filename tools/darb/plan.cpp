@@ -128,9 +128,7 @@ void add_plan(CLI::App& app, Action& action) {
     auto flags = std::make_shared<PlanFlags>();
     CLI::App* command = app.add_subcommand(
         "plan", "Which effects a data set or a scene calls for, why, and what each costs");
-    command
-        ->add_option("what", flags->what,
-                     "a data set, a scene file, or the output folder of darb train")
+    command->add_option("what", flags->what, "a data set, a scene, or an output folder")
         ->required();
     command->add_option("--cameras", flags->cameras,
                         "of a scene: the cameras that it will be rendered through");
