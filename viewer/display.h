@@ -1,9 +1,11 @@
 // DisplaySettings: how a scene is shown, as the panels edit it.
 #pragma once
 
+#include <array>
 #include <glm/glm.hpp>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/render/accuracy.h"
 #include "shaders/shared/limits.h"
 #include "shaders/shared/view_args.h"
 
@@ -18,7 +20,9 @@ struct DisplaySettings {
     SplatStyle style = SplatStyle::splats;
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
-    int sh_degree = 3;  // highest in use
+    bool antialias = false;  // opacity compensation of the low-pass
+    Accuracy accuracy;       // kernel evaluation, cut-offs, storage, depth order; the others unused
+    int sh_degree = 3;       // highest in use
     glm::vec3 background{0.0f};
     float near_plane = static_cast<float>(NEAR_DEFAULT);  // world units
     float error_max = 0.25f;   // mean absolute difference that is shown hottest
@@ -26,5 +30,10 @@ struct DisplaySettings {
 
     bool operator==(const DisplaySettings&) const = default;
 };
+
+/// The accuracy settings that the viewer switches; footprint, SH degree and resolution have
+/// controls of their own.
+inline constexpr std::array<int, 5> kShownAccuracy = {kEvaluation, kAlphaCutoff, kTransmittanceStop,
+                                                      kStorage, kDepthOrder};
 
 }  // namespace darb

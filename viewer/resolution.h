@@ -2,6 +2,8 @@
 // as the frame time allows; at rest, all of it.
 #pragma once
 
+#include <array>
+
 namespace darb {
 
 class ResolutionControl {
@@ -9,16 +11,26 @@ class ResolutionControl {
     /// target_ms: of a whole frame in motion.
     explicit ResolutionControl(double target_ms = 1000.0 / 30) : target_ms_(target_ms) {}
 
-    /// Share of the window's width and height that a frame in motion gets: [1/8, 1] in steps of
-    /// 1/32.
-    double moving_scale() const;
-    /// A frame in motion of `scale` took `ms`. Cost is taken as proportional to pixels, and the
-    /// step is bounded, so that one slow frame does not blur the next ten.
-    void measured(double scale, double ms);
+    /// Share of the window's width and height that a frame in motion gets: 1/8 to 1 in eighths.
+    double moving_scale() const { return double(step_) / kSteps; }
+
+    /// A frame in motion at moving_scale() took `ms`. One eighth up where there is time, one down
+    /// where there is not and it helps: much of a frame's cost goes with the splats, not with the
+    /// pixels, and pixels that cost nothing are not given away.
+    void measured(double ms);
 
   private:
+    static constexpr int kSteps = 8;
+    struct Known {
+        double ms = 0;
+        int at = -1'000;  // number of the measurement; old ones are forgotten
+    };
+    bool known(int step) const;
+
     double target_ms_;
-    double scale_ = 0.5;
+    int step_ = kSteps / 2;
+    int count_ = 0;
+    std::array<Known, kSteps + 2> known_{};
 };
 
 }  // namespace darb

@@ -63,8 +63,6 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     if (facts.dropped > 0)
         scene.notes.push_back(
             fmt::format("{} splats with NaN or infinity were dropped.", facts.dropped));
-    if (scene.model.antialias)
-        scene.notes.emplace_back("Trained with anti-aliasing, which is not rendered.");
     if (scene.is_points) scene.notes.emplace_back("Points are shown as opaque balls.");
     if (progress) progress(0.95, "measuring");
     scene.bounds = scene_bounds(scene.model);

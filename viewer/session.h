@@ -63,10 +63,18 @@ struct FrameTimes {
     std::deque<double> moving_ms;  // whole frames in motion, latest last
 };
 
+/// One choice of one accuracy setting, all others as they are, at one camera.
+struct MeasuredChoice {
+    int setting = 0, choice = 0;
+    double ms = 0;       // on the device, of the picture's passes
+    double psnr_db = 0;  // of its 8-bit picture against the exact preset; infinity where equal
+};
+
 /// What panels and keys ask for; the viewer does it after the panels of a frame and clears it.
 struct Requests {
     bool frame_all = false, take_picture = false, save = false, quit = false;
     bool full_screen = false, cancel_load = false, load_path = false, save_path = false;
+    bool measure = false;
     bool export_path = false, cancel_export = false, opacity_changed = false;
 };
 
@@ -90,6 +98,8 @@ struct Session {
     double load_share = -1;  // below 0: nothing is being loaded
     std::string load_stage;
     double export_share = -1;
+    double measure_share = -1;
+    std::vector<MeasuredChoice> measured;
     int shown_sh_degree = 0;
     bool panels = true;
     float gui_scale = 1;

@@ -76,8 +76,7 @@ void SplatPicture::set_live(const GpuSplats& splats, const Bounds& bounds) {
 void SplatPicture::clear() {
     own_.reset();
     styled_.reset();
-    forward_.reset();
-    key_ = Key();
+    slots_ = {};
     live_ = nullptr;
     model_ = nullptr;
 }
@@ -115,33 +114,50 @@ const GpuSplats& SplatPicture::styled(SplatStyle style) {
     return *styled_;
 }
 
-Forward& SplatPicture::forward_for(const GpuSplats& splats, const DisplaySettings& display) {
-    Key key{display.kernel, splats.sh_degree(), display.footprint,
-            static_cast<float>(ALPHA_CUTOFF_DEFAULT), display.mode == VIEW_COUNT};
-    if (display.style == SplatStyle::ellipsoids && own_) {
-        key.kernel = KERNEL_GAUSSIAN;
-        key.footprint = Footprint::psi;
-        key.alpha_cutoff = kEllipsoidCutoff;
-    }
-    if (forward_ && key == key_) return *forward_;
-    compiled_ = true;
-    forward_.reset();
+ForwardOptions SplatPicture::options_for(const Key& key) {
     ForwardOptions options;
+    set_options(key.accuracy, options);
     options.kernel = key.kernel;
     options.footprint = key.footprint;
     options.sh_stored = key.sh_stored;
-    options.alpha_cutoff = key.alpha_cutoff;
+    options.effects.antialias = key.antialias;
     options.store_for_backward = key.store;
-    forward_.emplace(*device_, options);
-    key_ = key;
-    return *forward_;
+    if (key.ellipsoids) options.alpha_cutoff = kEllipsoidCutoff;
+    // What the passes of these modes read and write is laid out like this.
+    if (key.store) options.depth_order = DEPTH_ORDER_CENTRE;
+    if (key.store || key.depth) options.storage = STORAGE_FLOAT32;
+    return options;
+}
+
+Forward& SplatPicture::forward_for(const GpuSplats& splats, const DisplaySettings& display,
+                                   bool moving) {
+    Key key;
+    key.kernel = display.kernel;
+    key.footprint = display.footprint;
+    key.sh_stored = splats.sh_degree();
+    key.accuracy = moving ? preset_accuracy(kFast) : display.accuracy;
+    key.antialias = display.antialias && display.style == SplatStyle::splats;
+    key.store = display.mode == VIEW_COUNT;
+    key.depth = display.mode == VIEW_DEPTH;
+    key.ellipsoids = display.style == SplatStyle::ellipsoids && own_;
+    if (key.ellipsoids) {
+        key.kernel = KERNEL_GAUSSIAN;
+        key.footprint = Footprint::psi;
+    }
+    Slot& slot = slots_[moving ? 1 : 0];
+    if (slot.forward && key == slot.key) return *slot.forward;
+    compiled_ = true;
+    slot.forward.reset();
+    slot.forward.emplace(*device_, options_for(key));
+    slot.key = key;
+    return *slot.forward;
 }
 
 void SplatPicture::render(const Camera& camera, const DisplaySettings& display,
-                          const PhotoOverlay& photo) {
+                          const PhotoOverlay& photo, bool moving) {
     compiled_ = false;
     const GpuSplats& shown = styled(display.style);
-    Forward& forward = forward_for(shown, display);
+    Forward& forward = forward_for(shown, display, moving);
     const gpu::CameraData data = camera_data(camera, shown.origin(), display.near_plane);
     const Buffer cameras = upload_cameras(*device_, {data});
     const int degree = std::min(display.sh_degree, shown.sh_degree());

@@ -2,6 +2,7 @@
 // engine's Forward, which it builds anew when kernel, footprint or what a mode needs changes.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <vector>
@@ -42,7 +43,9 @@ class SplatPicture {
     void set_removed(const std::vector<std::uint8_t>& removed);
 
     /// Renders and waits. camera: at the size of the frame that is wanted.
-    void render(const Camera& camera, const DisplaySettings& display, const PhotoOverlay& photo);
+    /// moving: with the fast accuracy settings, for a picture that is replaced at once.
+    void render(const Camera& camera, const DisplaySettings& display, const PhotoOverlay& photo,
+                bool moving = false);
 
     /// Of the last render: B8G8R8A8 [height][width], its size, counters, times of the passes.
     const Buffer& pixels() const { return pixels_; }
@@ -56,7 +59,7 @@ class SplatPicture {
   private:
     const GpuSplats* splats() const { return live_ ? live_ : own_ ? &*own_ : nullptr; }
     const GpuSplats& styled(SplatStyle style);
-    Forward& forward_for(const GpuSplats& splats, const DisplaySettings& display);
+    Forward& forward_for(const GpuSplats& splats, const DisplaySettings& display, bool moving);
     void record_display(Commands& commands, const Forward& forward, const gpu::CameraData& data,
                         const DisplaySettings& display, const PhotoOverlay& photo);
     void upload_opacity(GpuSplats& splats, const std::vector<float>& opacity);
@@ -64,10 +67,11 @@ class SplatPicture {
     struct Key {  // what a Forward is built for
         int kernel = -1, sh_stored = 0;
         Footprint footprint = Footprint::psi;
-        float alpha_cutoff = 0;
-        bool store = false;
+        Accuracy accuracy;
+        bool antialias = false, ellipsoids = false, store = false, depth = false;
         bool operator==(const Key&) const = default;
     };
+    static ForwardOptions options_for(const Key& key);
 
     Device* device_;
     Commands commands_;
@@ -79,8 +83,11 @@ class SplatPicture {
     SplatStyle styled_as_ = SplatStyle::splats;
     std::vector<std::uint8_t> removed_;
     Bounds bounds_;
-    std::optional<Forward> forward_;
-    Key key_;
+    struct Slot {
+        std::optional<Forward> forward;
+        Key key;
+    };
+    std::array<Slot, 2> slots_;  // at rest, moving
     Buffer pixels_, no_photo_;
     int width_ = 0, height_ = 0;
     bool compiled_ = false;

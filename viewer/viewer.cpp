@@ -109,6 +109,8 @@ void Viewer::adopt(Scene loaded) {
     DisplaySettings& d = session_.display;
     d.kernel = s.model.kernel;
     d.footprint = s.model.footprint;
+    d.antialias = s.model.antialias;
+    session_.measured.clear();
     d.near_plane =
         std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(s.bounds.radius * 0.1));
     session_.note = fmt::format("{}: {} splats in {:.2f} s", s.file.filename().string(),
@@ -131,6 +133,7 @@ void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
     session_.shown_sh_degree = splats.sh_degree();
     session_.display.kernel = splats.kernel();
     session_.display.footprint = splats.footprint();
+    session_.display.antialias = splats.antialias();
     session_.fly_speed = bounds.radius / 2;
     session_.requests.frame_all = session_.photos.current < 0;
     session_.navigation.distance =
@@ -309,13 +312,14 @@ PhotoOverlay Viewer::overlay(const Camera& camera, int width, int height) const 
     return o;
 }
 
-void Viewer::draw_picture(const PictureKey& key, double scale) {
+void Viewer::draw_picture(const PictureKey& key, double scale, bool moving) {
     const auto start = Clock::now();
     const Camera camera =
         resized(key.camera, std::max(1, static_cast<int>(std::lround(key.camera.width * scale))),
                 std::max(1, static_cast<int>(std::lround(key.camera.height * scale))));
     try {
-        picture_.render(camera, key.display, overlay(camera, key.camera.width, key.camera.height));
+        picture_.render(camera, key.display, overlay(camera, key.camera.width, key.camera.height),
+                        moving);
     } catch (const std::exception& e) {
         report(e);
         drawn_ = key;  // not again before something changes
@@ -352,6 +356,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     load_current_photo();
 
     drew_moving_ = false;
+    bool drew = false;
     if (picture_.empty()) return export_ || session_.path.playing ? 0 : kForever;
     PictureKey key{frame_camera(width, height), session_.display, session_.photos.current,
                    session_.photos.compare ? session_.photos.split : 0.0f, version_};
@@ -362,23 +367,24 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     const bool refine = full || rests >= kRest_s || drawn_scale_ == 0;
     if (!(key == drawn_) && !refine) {
         drew_moving_ = true;
-        draw_picture(key, resolution_.moving_scale());
+        draw_picture(key, resolution_.moving_scale(), true);
     } else if (full || (refine && (!(key == drawn_) || drawn_scale_ < 1))) {
-        draw_picture(key, 1);
+        draw_picture(key, 1, false);
+        drew = true;
     }
     const bool held =
         input.ahead || input.back || input.to_left || input.to_right || input.rise || input.sink;
-    continuous_ = held || session_.path.playing || export_;
+    continuous_ = held || session_.path.playing || export_ || measure_;
     if (continuous_) return 0;
     if (drawn_scale_ < 1 && session_.error.empty()) return std::max(0.001, kRest_s - rests);
-    return kForever;
+    return drew ? 0 : kForever;  // once more, so that the panels show this picture's times
 }
 
 void Viewer::presented() {
     FrameTimes& t = session_.times;
     t.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - frame_start_).count();
     if (!drew_moving_ || picture_.compiled()) return;
-    resolution_.measured(drawn_scale_, t.frame_ms);
+    resolution_.measured(t.frame_ms);
     t.moving_ms.push_back(t.frame_ms);
     if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();
 }

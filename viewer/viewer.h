@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "viewer/accuracy_measure.h"
 #include "viewer/canvas.h"
 #include "viewer/gui.h"
 #include "viewer/path_export.h"
@@ -84,8 +85,9 @@ class Viewer {
     void play_path(double seconds);
     Camera frame_camera(int width, int height) const;
     PhotoOverlay overlay(const Camera& camera, int width, int height) const;
-    void draw_picture(const PictureKey& key, double scale);
+    void draw_picture(const PictureKey& key, double scale, bool moving);
     void step_export();
+    void step_measure(int width, int height);
     void report(const std::exception& error);
 
     Device* device_;
@@ -98,6 +100,7 @@ class Viewer {
     std::unique_ptr<LoadJob> job_;
     std::vector<std::unique_ptr<LoadJob>> cancelled_;
     std::optional<PathExport> export_;
+    std::optional<AccuracyMeasure> measure_;
     PictureKey drawn_, last_;
     double drawn_scale_ = 0;
     int version_ = 0;  // of the scene and its edits

@@ -25,6 +25,7 @@ class GpuSplats {
     int sh_degree() const { return header_.sh_degree; }
     int kernel() const { return header_.kernel; }
     Footprint footprint() const { return header_.footprint; }
+    bool antialias() const { return header_.antialias; }
     const glm::dvec3& origin() const { return header_.origin; }
     bool has_moments() const { return static_cast<bool>(moments_[0]); }
 

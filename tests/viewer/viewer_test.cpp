@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/ply.h"
 #include "tests/support/random_scene.h"
@@ -298,9 +300,59 @@ TEST_F(ViewerTest, Picture_is_coarse_in_motion_and_refined_at_rest) {
     for (int i = 0; i < 1'000'000 && s.times.scale < 1; ++i)
         next = viewer_->frame({}, kWidth, kHeight, false);
     EXPECT_EQ(s.times.scale, 1);
+    EXPECT_EQ(next, 0);  // the panels show the times of the refined picture
+    next = viewer_->frame({}, kWidth, kHeight, false);
     EXPECT_EQ(next, std::numeric_limits<double>::infinity());  // then nothing is drawn any more
     s.navigation.orbit(-0.3, 0);
     EXPECT_LE(largest_difference(shot(), at_rest), 2);  // the turns cancel up to rounding
+}
+
+TEST_F(ViewerTest, Accuracy_switch_changes_the_picture_and_its_measure_says_how_much) {
+    load(file_);
+    Session& s = viewer_->session();
+    const ImageU8 before = shot();
+    s.requests.measure = true;
+    do shot();
+    while (s.measure_share >= 0);
+    size_t choices = 0;
+    for (const int setting : kShownAccuracy) choices += accuracy_settings()[setting].choices.size();
+    ASSERT_EQ(s.measured.size(), choices);
+    const Accuracy exact = preset_accuracy(kExact);
+    for (const MeasuredChoice& m : s.measured) {
+        const std::string name(accuracy_settings()[m.setting].choices[m.choice].name);
+        EXPECT_GT(m.psnr_db, 25) << name;
+        s.display.accuracy = {};
+        s.display.accuracy.choice[m.setting] = m.choice;
+        const ImageU8 picture = shot();
+        s.display.accuracy = exact;
+        const double expected = psnr(to_float(picture), to_float(shot()));
+        if (std::isinf(expected))
+            EXPECT_TRUE(std::isinf(m.psnr_db)) << name;
+        else
+            EXPECT_NEAR(m.psnr_db, expected, 1e-6) << name;
+    }
+    s.display.accuracy = {};
+    EXPECT_EQ(largest_difference(shot(), before), 0);
+    s.display.accuracy = preset_accuracy(kFast);
+    EXPECT_GT(largest_difference(shot(), before), 0);
+    s.display.mode = VIEW_COUNT;  // modes that need float32 and centre order go on working
+    s.display.accuracy.choice[kDepthOrder] = 2;
+    shot();
+    s.display.mode = VIEW_DEPTH;
+    shot();
+    EXPECT_TRUE(s.error.empty()) << s.error;
+}
+
+TEST_F(ViewerTest, Antialiasing_is_taken_from_the_file) {
+    scene_.model.antialias = true;
+    write_ply(file_, scene_.model);
+    load(file_);
+    EXPECT_TRUE(viewer_->session().display.antialias);
+    viewer_->choose_camera(0);
+    const ImageU8 with = shot();
+    EXPECT_LE(largest_difference(with, rendered(scene_.model, scene_.camera)), 1);
+    viewer_->session().display.antialias = false;
+    EXPECT_GT(largest_difference(with, shot()), 0);
 }
 
 TEST_F(ViewerTest, Path_export_writes_a_frame_for_each_time_step) {

@@ -12,13 +12,18 @@ namespace {
 constexpr float kWidth = 330;  // px at scale 1
 
 void progress_window(Session& s, float width, float height) {
-    if (s.load_share < 0 && s.export_share < 0) return;
+    if (s.load_share < 0 && s.export_share < 0 && s.measure_share < 0) return;
     ImGui::SetNextWindowPos(ImVec2(width / 2, height - 20), 0, ImVec2(0.5f, 1));
     ImGui::Begin("progress", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
     const bool loads = s.load_share >= 0;
-    ImGui::TextUnformatted(loads ? s.load_stage.c_str() : "exporting frames");
-    ImGui::ProgressBar(static_cast<float>(loads ? s.load_share : s.export_share),
+    const bool exports = s.export_share >= 0;
+    ImGui::TextUnformatted(loads     ? s.load_stage.c_str()
+                           : exports ? "exporting frames"
+                                     : "measuring accuracy settings");
+    ImGui::ProgressBar(static_cast<float>(loads     ? s.load_share
+                                          : exports ? s.export_share
+                                                    : s.measure_share),
                        ImVec2(kWidth * s.gui_scale, 0));
     ImGui::SameLine();
     if (ImGui::Button("Cancel")) (loads ? s.requests.cancel_load : s.requests.cancel_export) = true;
@@ -91,6 +96,7 @@ void draw_panels(Session& s, int width_px, int height_px) {
     display_panel(s);
     camera_panel(s);
     performance_panel(s);
+    accuracy_panel(s);
     edit_panel(s);
     path_panel(s);
     help(s);

@@ -9,6 +9,7 @@ void scene_panel(Session& session);
 void display_panel(Session& session);
 void camera_panel(Session& session);
 void performance_panel(Session& session);
+void accuracy_panel(Session& session);
 void edit_panel(Session& session);
 void path_panel(Session& session);
 void training_panel(Session& session);

@@ -22,6 +22,7 @@ void kernel_choice(Session& s) {
     int footprint = d.footprint == Footprint::exact ? 1 : 0;
     if (ImGui::Combo("footprint", &footprint, "psi\0exact\0"))
         d.footprint = footprint == 1 ? Footprint::exact : Footprint::psi;
+    ImGui::Checkbox("anti-aliasing", &d.antialias);
     if (!s.scene) return;
     const SplatModel& m = s.scene->model;
     if (m.kernel == d.kernel && m.footprint == d.footprint) return;

@@ -1,0 +1,35 @@
+// AccuracyMeasure: what each choice of each shown accuracy setting costs and changes, at the camera
+// of the moment; one choice a call so that a window stays alive.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "viewer/session.h"
+
+namespace darb {
+
+class AccuracyMeasure {
+  public:
+    struct Frame {
+        ImageU8 picture;
+        double ms = 0;
+    };
+    /// display: as it is now; each choice is put in its place alone.
+    explicit AccuracyMeasure(const DisplaySettings& display);
+
+    bool done() const { return next_ > todo_.size(); }
+    double share() const { return double(next_) / double(todo_.size() + 1); }
+    /// The exact preset first, then one choice a call.
+    void step(const std::function<Frame(const DisplaySettings&)>& render);
+    const std::vector<MeasuredChoice>& results() const { return results_; }
+
+  private:
+    DisplaySettings display_;
+    std::vector<MeasuredChoice> todo_, results_;
+    size_t next_ = 0;  // 0: the exact picture; else the number of choices measured + 1
+    ImageF exact_;
+};
+
+}  // namespace darb
