@@ -25,7 +25,7 @@ struct TrainOptions {
     bool probe_sh = false;
     bool antialias = false;  // opacity compensation and the 3D smoothing filter of Mip-Splatting
     bool exposure = false;   // an affine map of colours per photo, trained beside the splats
-    float exposure_lr_init = 0.01f, exposure_lr_final = 0.001f;
+    float exposure_lr_init = 0.001f, exposure_lr_final = 0.0001f;
     bool off_centre = true;         // false: every principal point is the centre of its photo
     bool lens = false;              // cameras have Camera::lens
     bool white_background = false;  // what pictures are compared over; black otherwise

@@ -29,8 +29,7 @@ Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult
 
 void Backward::make_blend(bool segmented) {
     SpecConstants blend = kernel_constants(options_);
-    const std::uint32_t subgroup = blend_subgroup(*device_);
-    blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    const std::uint32_t subgroup = add_block_constants(*device_, blend);
     blend["THREADS"] = static_cast<std::int32_t>(subgroup);
     blend["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     blend_ = Pipeline(*device_, "blend_backward", blend, true, subgroup);

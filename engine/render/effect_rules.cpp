@@ -15,7 +15,9 @@ constexpr double kColourStep = 1.0 / 512;  // half of an 8-bit step
 constexpr double kCentreStep_px = 0.01;    // a shift by it changes no 8-bit picture
 constexpr double kFootprintRatio = 2.0;    // largest pixel footprint of a point over its smallest
 constexpr double kFootprintShare = 0.1;    // of the points
-constexpr double kGainSpread = 0.02;
+// Exposures are off in evaluation, and those of neighbouring photos drift together: on a plush toy
+// whose gains spread by 2 % they cost 2.8 dB on held-out views.
+constexpr double kGainSpread = 0.05;
 constexpr std::size_t kGainViews = 3;              // that see a point, at least
 constexpr std::size_t kGainPoints = 20;            // of a photo, at least
 constexpr double kDarkest = 10, kBrightest = 245;  // of 255: sensors are linear in between
@@ -209,7 +211,7 @@ EffectRow exposure_rule(const Dataset& dataset, const std::vector<ImageU8>& phot
     const double spread = gains[gains.size() - 1 - quarter] - gains[quarter];
     row.measured = spread / gains[gains.size() / 2] / 1.349;
     row.on = row.measured > kGainSpread;
-    row.reason = fmt::format("gains of {} photos over shared points spread by {:.1f} %, limit 2 %",
+    row.reason = fmt::format("gains of {} photos over shared points spread by {:.1f} %, limit 5 %",
                              gains.size(), 100 * row.measured);
     return row;
 }

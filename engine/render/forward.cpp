@@ -81,6 +81,13 @@ std::uint32_t blend_subgroup(const Device& device) {
     return std::clamp(device.info().subgroup_size, 4u, 64u);
 }
 
+std::uint32_t add_block_constants(const Device& device, SpecConstants& constants) {
+    const std::uint32_t subgroup = blend_subgroup(device);
+    constants["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    constants["LOCKSTEP"] = device.info().type == "cpu" ? 1 : 0;
+    return subgroup;
+}
+
 Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
     DARB_CHECK(!options.store_for_backward || options.depth_order != DEPTH_ORDER_PIXEL,
@@ -111,8 +118,7 @@ void Forward::make_blend(std::uint32_t segments) {
     SpecConstants blend = kernel_constants(options_);
     blend["MIN_TRANSMITTANCE"] = options_.transmittance_stop;
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
-    const std::uint32_t subgroup = blend_subgroup(*device_);
-    blend["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    const std::uint32_t subgroup = add_block_constants(*device_, blend);
     blend["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
     blend["SEGMENT"] = segments > 1 ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     blend_ = Pipeline(*device_, "blend", blend, true, subgroup);

@@ -50,6 +50,8 @@ Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& camera
 
 /// The subgroup size that the blend passes are compiled for and require.
 std::uint32_t blend_subgroup(const Device& device);
+/// Sets what shaders/lib/block.glsl asks for; returns the subgroup size to require.
+std::uint32_t add_block_constants(const Device& device, SpecConstants& constants);
 
 class Forward {
   public:

@@ -38,13 +38,22 @@ const uint CHUNK = 128u;  // pairs looked at before those found are worked off
 shared uint hit_pair[THREADS / SUBGROUP_SIZE * CHUNK];
 shared uint hit_index[THREADS / SUBGROUP_SIZE * CHUNK];
 
+// 1: a subgroup's threads are the lanes of one vector, as on lavapipe, and need no barrier among them. lavapipe of
+// Mesa 25.0 makes one of the whole workgroup, and loses the subgroups that go on after another has ended.
+layout(constant_id = 5) const int LOCKSTEP = 0;
+
+void order_within_subgroup() {
+    subgroupMemoryBarrierShared();
+    if (LOCKSTEP == 0) subgroupBarrier();
+}
+
 uint hits_base() {
     return gl_SubgroupID * CHUNK;
 }
 
 // Fills the subgroup's lists from pairs [begin, end), at most CHUNK of them; returns how many hit.
 uint collect_hits(uint begin, uint end, uint bit) {
-    subgroupBarrier();  // the lists may still be read
+    order_within_subgroup();  // the lists may still be read
     uint count = 0u;
     for (uint batch = begin; batch < end; batch += SUBGROUP_SIZE) {
         const uint j = batch + gl_SubgroupInvocationID;
@@ -59,7 +68,6 @@ uint collect_hits(uint begin, uint end, uint bit) {
         }
         count += subgroupBallotBitCount(hits);
     }
-    subgroupMemoryBarrierShared();
-    subgroupBarrier();
+    order_within_subgroup();
     return count;
 }

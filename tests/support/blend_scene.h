@@ -168,15 +168,14 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
                                    bool store = true, const std::vector<float>& d_image = {},
                                    bool all_blocks = false) {
     Device& device = shared_device();
-    const auto subgroup = static_cast<std::int32_t>(blend_subgroup(device));
     SpecConstants constants =
         kernel_constants(scene.kernel, scene.footprint, scene.evaluation, 5, scene.cutoff);
     constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
     constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
-    constants["SUBGROUP_SIZE"] = subgroup;
-    constants["THREADS"] = subgroup * 4;
+    const std::uint32_t subgroup = add_block_constants(device, constants);
+    constants["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
     const Pipeline blend(device, "blend", constants, true, subgroup);
-    constants["THREADS"] = subgroup;
+    constants["THREADS"] = static_cast<std::int32_t>(subgroup);
     const Pipeline backward(device, "blend_backward", constants, true, subgroup);
 
     const ShuffledPairs shuffled(scene, lists, all_blocks);

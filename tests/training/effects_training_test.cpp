@@ -85,6 +85,8 @@ TEST(ExposureTraining, finds_the_gains_of_the_photos) {
     t.options.probe_sh = false;
     t.options.sh_degree = 0;
     t.options.exposure = true;
+    t.options.exposure_lr_init = 0.01f;  // there in 400 steps
+    t.options.exposure_lr_final = 0.001f;
     const auto gain_of = [](size_t v) { return v % 2 == 0 ? 0.8 : 1.1; };
     for (size_t v = 0; v < t.photos.size(); ++v)
         for (size_t i = 0; i < t.photos[v].data.size(); ++i)
