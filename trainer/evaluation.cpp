@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
@@ -11,13 +12,6 @@ namespace darb {
 namespace {
 
 constexpr float kErrorGain = 4.0f;
-
-std::string file_stem(const std::string& view_name) {
-    std::string stem = std::filesystem::path(view_name).replace_extension().string();
-    std::replace_if(
-        stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
-    return stem;
-}
 
 ImageU8 side_by_side(const ImageF& photo, const ImageF& render) {
     ImageF all(photo.width * 3, photo.height, 3);
@@ -106,10 +100,11 @@ std::vector<std::filesystem::path> write_side_by_side(Trainer& trainer, const Da
                                                       const std::vector<ImageU8>& photos,
                                                       const std::filesystem::path& folder) {
     std::vector<std::filesystem::path> files;
+    std::set<std::string> used;
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
         if (!view.is_test) continue;
-        const auto path = folder / (file_stem(view.name) + ".png");
+        const auto path = folder / picture_name(view.name, used);
         write_png(path, side_by_side(composite(photos[i], trainer.background()),
                                      trainer.render(view.camera)));
         files.push_back(path);

@@ -47,10 +47,11 @@ double peak_host_bytes() {
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
                      const std::filesystem::path& output) {
     return fmt::format(
-        "Namespace(sh_degree={}, source_path='{}', model_path='{}', images='images', "
-        "resolution=-1, white_background={}, data_device='cpu', eval={})",
+        "Namespace(sh_degree={}, source_path='{}', model_path='{}', images='{}', "
+        "resolution={}, white_background={}, data_device='cpu', eval={})",
         options.sh_degree, std::filesystem::absolute(dataset.root).string(),
-        std::filesystem::absolute(output).string(), options.white_background ? "True" : "False",
+        std::filesystem::absolute(output).string(), dataset.options.images_folder,
+        dataset.options.resolution, options.white_background ? "True" : "False",
         std::any_of(dataset.views.begin(), dataset.views.end(),
                     [](const View& v) { return v.is_test; })
             ? "True"

@@ -106,6 +106,7 @@ void index_tracks(Dataset& dataset) {
 Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
     size_at_resolution(1, 1, options.resolution);  // a bad option fails before any reading
     Dataset dataset = load_source(path, options);
+    dataset.options = options;
     std::stable_sort(dataset.views.begin(), dataset.views.end(),
                      [](const View& a, const View& b) { return a.name < b.name; });
     index_tracks(dataset);

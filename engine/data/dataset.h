@@ -43,16 +43,6 @@ struct PointCloud {
     std::size_t size() const { return colour.size() / 3; }
 };
 
-struct Dataset {
-    std::filesystem::path root;
-    std::string source;              // "COLMAP binary", "COLMAP text", "transforms.json", ...
-    std::vector<View> views;         // by name, ascending
-    PointCloud points;               // may be empty
-    bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
-    bool alpha_is_mask = false;      // alpha comes from masks or gaps alone: pixels to leave out
-    std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
-};
-
 struct DatasetOptions {
     std::string images_folder = "images";  // COLMAP: images, images_2, ...
     int resolution =
@@ -61,6 +51,17 @@ struct DatasetOptions {
                             // with a test file of their own use that in either case
     bool require_photos = true;  // false: cameras only (render)
     bool original_lens = false;  // true: distorted photos stay so, and their cameras have the lens
+};
+
+struct Dataset {
+    std::filesystem::path root;
+    DatasetOptions options;          // that it was loaded with
+    std::string source;              // "COLMAP binary", "COLMAP text", "transforms.json", ...
+    std::vector<View> views;         // by name, ascending
+    PointCloud points;               // may be empty
+    bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
+    bool alpha_is_mask = false;      // alpha comes from masks or gaps alone: pixels to leave out
+    std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
 };
 
 /// DATASET is a COLMAP project folder (sparse/0, sparse, or the model files themselves), a folder

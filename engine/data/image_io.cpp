@@ -112,4 +112,14 @@ void write_png(const std::filesystem::path& path, const ImageU8& image) {
     write_file_atomic(path, file);
 }
 
+std::string picture_name(const std::string& view_name, std::set<std::string>& used) {
+    std::string stem = std::filesystem::path(view_name).replace_extension().string();
+    std::replace_if(
+        stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
+    if (stem.empty()) stem = "view";
+    std::string name = stem;
+    for (int n = 2; !used.insert(name).second; ++n) name = fmt::format("{}_{}", stem, n);
+    return name + ".png";
+}
+
 }  // namespace darb

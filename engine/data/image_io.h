@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <set>
 #include <span>
 #include <string>
 
@@ -33,5 +34,9 @@ ImageU8 orient_image(const ImageU8& image, int orientation);
 
 /// 1, 3 or 4 channels; through write_file_atomic, so makes missing folders.
 void write_png(const std::filesystem::path& path, const ImageU8& image);
+
+/// File name for a picture of a view: the view's name without extension, folders joined by "_",
+/// then "_2", "_3" where `used` has the name, then ".png". Adds it to `used`.
+std::string picture_name(const std::string& view_name, std::set<std::string>& used);
 
 }  // namespace darb

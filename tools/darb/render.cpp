@@ -34,17 +34,6 @@ struct RenderFlags {
     AccuracyFlags accuracy;
 };
 
-// The view's name without its extension and folders; "_2", "_3" where it was there before.
-std::string frame_name(const std::string& view_name, std::set<std::string>& used) {
-    std::string stem = std::filesystem::path(view_name).replace_extension().string();
-    std::replace_if(
-        stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
-    if (stem.empty()) stem = "view";
-    std::string name = stem;
-    for (int n = 2; !used.insert(name).second; ++n) name = fmt::format("{}_{}", stem, n);
-    return name + ".png";
-}
-
 // -r of a camera list, which states sizes rather than photos: divisor up to 8, width above.
 void scale_camera(Camera& camera, int resolution) {
     if (resolution == -1) return;
@@ -96,7 +85,7 @@ int render(const RenderFlags& flags) {
         const std::chrono::duration<double, std::milli> ms =
             std::chrono::steady_clock::now() - start;
         frame_ms.push_back(ms.count());
-        const auto file = flags.output / frame_name(view.name, used);
+        const auto file = flags.output / picture_name(view.name, used);
         write_png(file, to_8bit(image));
         if (plan.on(EFFECT_DEPTH))
             write_depth(file, renderer.render_depth(), flags.depth == "npy", flags.depth_unit);

@@ -133,6 +133,14 @@ TEST(Exif, the_declared_camera_decides_whether_a_photo_is_turned) {
     }
 }
 
+TEST(ImageIo, pictures_of_views_never_share_a_name) {
+    std::set<std::string> used;
+    EXPECT_EQ(picture_name("left/01.jpg", used), "left_01.png");
+    EXPECT_EQ(picture_name("left_01.png", used), "left_01_2.png");
+    EXPECT_EQ(picture_name("01.jpg", used), "01.png");
+    EXPECT_EQ(picture_name("01.png", used), "01_2.png");
+}
+
 TEST(ImageIo, png_round_trips_with_each_channel_count) {
     for (const int channels : {1, 3, 4}) {
         ImageU8 image(5, 3, channels);
