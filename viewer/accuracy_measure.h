@@ -1,4 +1,4 @@
-// AccuracyMeasure: what each choice of each shown accuracy setting costs and changes, at the camera
+// AccuracyMeasure: what each choice of each accuracy setting and effect costs and changes, at the camera
 // of the moment; one choice a call so that a window stays alive.
 #pragma once
 
@@ -16,17 +16,18 @@ class AccuracyMeasure {
         ImageU8 picture;
         double ms = 0;
     };
-    /// display: as it is now; each choice is put in its place alone.
-    explicit AccuracyMeasure(const DisplaySettings& display);
+    /// display: as it is now; each choice is put in its place alone. own: as the scene is meant to
+    /// be shown; with the exact preset, what the error is against.
+    AccuracyMeasure(const DisplaySettings& display, const DisplaySettings& own);
 
     bool done() const { return next_ > todo_.size(); }
     double share() const { return double(next_) / double(todo_.size() + 1); }
-    /// The exact preset first, then one choice a call.
+    /// The exact picture first, then one choice a call.
     void step(const std::function<Frame(const DisplaySettings&)>& render);
     const std::vector<MeasuredChoice>& results() const { return results_; }
 
   private:
-    DisplaySettings display_;
+    DisplaySettings display_, reference_;
     std::vector<MeasuredChoice> todo_, results_;
     size_t next_ = 0;  // 0: the exact picture; else the number of choices measured + 1
     ImageF exact_;

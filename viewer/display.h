@@ -1,7 +1,6 @@
 // DisplaySettings: how a scene is shown, as the panels edit it.
 #pragma once
 
-#include <array>
 #include <glm/glm.hpp>
 
 #include "engine/kernels/kernel_family.h"
@@ -30,10 +29,5 @@ struct DisplaySettings {
 
     bool operator==(const DisplaySettings&) const = default;
 };
-
-/// The accuracy settings that the viewer switches; footprint, SH degree and resolution have
-/// controls of their own.
-inline constexpr std::array<int, 5> kShownAccuracy = {kEvaluation, kAlphaCutoff, kTransmittanceStop,
-                                                      kStorage, kDepthOrder};
 
 }  // namespace darb

@@ -15,7 +15,8 @@ enum class Key {
     next_camera,  // ]
     last_camera,  // [
     add_key,      // K
-    play,         // space
+    play,         // space: a path, or a training run that is paused
+    step,         // . : one step of a training run, which then pauses
     remove,       // Delete
     undo,         // Ctrl Z
     redo,         // Ctrl Y

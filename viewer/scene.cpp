@@ -10,6 +10,7 @@
 #include "engine/data/point_cloud_ply.h"
 #include "engine/data/point_splats.h"
 #include "engine/scene/splat_file.h"
+#include "viewer/importance.h"
 
 namespace darb {
 
@@ -17,8 +18,8 @@ namespace {
 
 struct Cancelled {};
 
-constexpr std::size_t kReadBlock = 8 << 20;  // bytes between two reports
-constexpr double kReadShare = 0.4;           // of the time, by experience; the rest is decoding
+constexpr std::size_t kReadBlock = 8 << 20;             // bytes between two reports
+constexpr double kReadShare = 0.4, kDecodeShare = 0.5;  // of the time, by experience
 
 std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
                                       const LoadProgress& progress) {
@@ -33,7 +34,7 @@ std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
         in.read(reinterpret_cast<char*>(bytes.data() + at), static_cast<std::streamsize>(count));
         if (!in) throw Error(file.string(), "cannot be read to its end");
         if (progress)
-            progress(kReadShare * static_cast<double>(at + count) / static_cast<double>(size),
+            progress(kReadShare * (static_cast<double>(at + count) / static_cast<double>(size)),
                      "reading");
     }
     return bytes;
@@ -51,12 +52,15 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
         scene.model = load_splats(file, &facts);
     } else {
         const std::vector<std::byte> bytes = read_in_blocks(file, progress);
-        if (progress) progress(kReadShare, "decoding");
+        const ReadProgress decoding = [&](double share) {
+            if (progress) progress(kReadShare + kDecodeShare * share, "decoding");
+        };
+        decoding(0);
         scene.is_points = is_point_cloud(bytes);
         scene.model =
             scene.is_points
                 ? points_as_splats(parse_point_cloud_ply(bytes, file.string(), facts.dropped))
-                : parse_splats(bytes, file.string(), &facts);
+                : parse_splats(bytes, file.string(), &facts, decoding);
     }
     scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
     scene.notes = facts.notes;
@@ -66,6 +70,8 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     if (scene.is_points) scene.notes.emplace_back("Points are shown as opaque balls.");
     if (progress) progress(0.95, "measuring");
     scene.bounds = scene_bounds(scene.model);
+    scene.important = most_important(scene.model, scene.bounds,
+                                     std::min(scene.model.size() / 2, kMostMoving));
     scene.load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return scene;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <mutex>
@@ -21,6 +22,7 @@ struct Scene {
     Bounds bounds;
     std::string format;      // as format_name says it
     bool is_points = false;  // a point cloud: no splat parameters in the file
+    std::vector<std::uint32_t> important;  // what is drawn in motion, most important first
     double load_s = 0;
     std::vector<std::string> notes;  // what was dropped or cannot be shown, a sentence each
 };

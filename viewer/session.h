@@ -15,6 +15,7 @@
 #include "viewer/display.h"
 #include "viewer/edit.h"
 #include "viewer/input.h"
+#include "viewer/motion.h"
 #include "viewer/navigation.h"
 #include "viewer/scene.h"
 
@@ -57,23 +58,23 @@ struct FrameTimes {
     std::vector<PassTime> passes;  // of the last picture
     double picture_ms = 0;         // wall clock, of the last picture
     double frame_ms = 0;           // the whole frame: picture, panels, presentation
-    double scale = 1;              // share of the resolution it had
+    MotionQuality quality;         // that it had
     std::uint32_t visible = 0, pairs = 0;
     double full_ms = 0;            // of the last picture at full resolution
     std::deque<double> moving_ms;  // whole frames in motion, latest last
 };
 
-/// One choice of one accuracy setting, all others as they are, at one camera.
+/// One choice of one switch, all others as they are, at one camera.
 struct MeasuredChoice {
-    int setting = 0, choice = 0;
-    double ms = 0;       // on the device, of the picture's passes
-    double psnr_db = 0;  // of its 8-bit picture against the exact preset; infinity where equal
+    int row = 0, choice = 0;  // viewer/switches.h
+    double ms = 0;            // on the device, of the picture's passes
+    double psnr_db = 0;       // of its 8-bit picture against the exact one; infinity where equal
 };
 
 /// What panels and keys ask for; the viewer does it after the panels of a frame and clears it.
 struct Requests {
     bool frame_all = false, take_picture = false, save = false, quit = false;
-    bool full_screen = false, cancel_load = false, load_path = false, save_path = false;
+    bool full_screen = false, leave_full_screen = false, cancel_load = false, load_path = false, save_path = false;
     bool measure = false;
     bool export_path = false, cancel_export = false, opacity_changed = false;
 };
@@ -86,7 +87,7 @@ struct Session {
     std::filesystem::path save_file;
     Navigation navigation;
     double fly_speed = 1;  // world units a second
-    DisplaySettings display;
+    DisplaySettings display, own;  // own: as the scene is meant to be shown
     Photos photos;
     PathState path;
     TrainingCurves training;
@@ -105,7 +106,8 @@ struct Session {
     float gui_scale = 1;
 };
 
-/// The panels of one frame. Needs an ImGui frame.
+/// The panels of one frame; progress and errors also where session.panels is off. Needs an ImGui
+/// frame.
 void draw_panels(Session& session, int width, int height);
 
 }  // namespace darb

@@ -1,9 +1,12 @@
 #include "viewer/splat_picture.h"
 
 #include <algorithm>
+#include <tuple>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/render/groups.h"
+#include "viewer/importance.h"
 
 namespace darb {
 
@@ -11,6 +14,7 @@ namespace {
 
 constexpr float kRemovedLogit = -100;  // clamped to -30: far below any cut-off
 constexpr float kOpaqueLogit = 8;
+constexpr float kTransparentLogit = -2.2f;  // an opacity of a tenth
 // Ellipsoids: cut where alpha falls below 0.9. A Gaussian is there at sqrt(2 ln(1/0.9)) = 0.459
 // standard deviations, so they are drawn 2 / 0.459 times as large.
 constexpr float kEllipsoidCutoff = 0.9f;
@@ -32,6 +36,20 @@ SplatModel with_sh_degree(const SplatModel& m, int degree) {
     return out;
 }
 
+SplatModel in_style(const SplatModel& own, SplatStyle style) {
+    if (style == SplatStyle::splats) return own;
+    SplatModel model = with_sh_degree(own, 0);
+    std::fill(model.opacity.begin(), model.opacity.end(), kOpaqueLogit);
+    for (float& s : model.log_scale)
+        s = style == SplatStyle::points ? kPointLogScale : s + kEllipsoidGrowth;
+    if (style == SplatStyle::ellipsoids) {  // what is nearly transparent would hide the rest
+        for (size_t i = 0; i < model.size(); ++i)
+            if (own.opacity[i] < kTransparentLogit) model.opacity[i] = kRemovedLogit;
+        model.kernel = KERNEL_GAUSSIAN;
+    }
+    return model;
+}
+
 // The highest degree whose buffers the device can bind.
 int fitting_degree(const Device& device, const SplatModel& model) {
     for (int degree = model.sh_degree; degree >= 0; --degree)
@@ -50,7 +68,8 @@ SplatPicture::SplatPicture(Device& device)
       depth_light_(device, "view_depth", {{"THREADS", VIEW_GROUP}}),
       no_photo_(device, "no photo", 4) {}
 
-void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds) {
+void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
+                             std::vector<std::uint32_t> important) {
     const int degree = fitting_degree(*device_, model);
     std::optional<GpuSplats> next;
     if (degree == model.sh_degree)
@@ -59,16 +78,16 @@ void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds) {
         next.emplace(*device_, with_sh_degree(model, degree), false);
     own_ = std::move(next);
     styled_.reset();
+    some_.reset();
     live_ = nullptr;
     model_ = &model;
     bounds_ = bounds;
     removed_.clear();
+    important_ = std::move(important);
 }
 
 void SplatPicture::set_live(const GpuSplats& splats, const Bounds& bounds) {
-    own_.reset();
-    styled_.reset();
-    model_ = nullptr;
+    clear();
     live_ = &splats;
     bounds_ = bounds;
 }
@@ -76,42 +95,57 @@ void SplatPicture::set_live(const GpuSplats& splats, const Bounds& bounds) {
 void SplatPicture::clear() {
     own_.reset();
     styled_.reset();
+    some_.reset();
+    important_.clear();
     slots_ = {};
     live_ = nullptr;
     model_ = nullptr;
 }
 
-void SplatPicture::upload_opacity(GpuSplats& splats, const std::vector<float>& opacity) {
-    std::vector<float> values = opacity;
-    for (size_t i = 0; i < removed_.size(); ++i)
-        if (removed_[i] != 0) values[i] = kRemovedLogit;
-    if (!values.empty()) splats.parameters(kOpacity).upload(values);
-}
-
 void SplatPicture::set_removed(const std::vector<std::uint8_t>& removed) {
     if (!own_) return;
     removed_ = removed;
-    upload_opacity(*own_, model_->opacity);
+    std::vector<float> opacity = model_->opacity;
+    for (size_t i = 0; i < removed_.size(); ++i)
+        if (removed_[i] != 0) opacity[i] = kRemovedLogit;
+    if (!opacity.empty()) own_->parameters(kOpacity).upload(opacity);
     styled_.reset();
+    some_.reset();
 }
 
 const GpuSplats& SplatPicture::styled(SplatStyle style) {
     if (style == SplatStyle::splats || !own_) return *splats();
     if (styled_ && styled_as_ == style) return *styled_;
-    SplatModel model = with_sh_degree(*model_, 0);
-    std::fill(model.opacity.begin(), model.opacity.end(), kOpaqueLogit);
-    for (float& s : model.log_scale)
-        s = style == SplatStyle::points ? kPointLogScale : s + kEllipsoidGrowth;
-    if (style == SplatStyle::ellipsoids) {  // what is nearly transparent would hide the rest
-        for (size_t i = 0; i < model.size(); ++i)
-            if (model_->opacity[i] < -2.2f) model.opacity[i] = kRemovedLogit;
-        model.kernel = KERNEL_GAUSSIAN;
-    }
+    SplatModel model = in_style(*model_, style);
+    for (size_t i = 0; i < removed_.size(); ++i)
+        if (removed_[i] != 0) model.opacity[i] = kRemovedLogit;
     styled_.reset();
     styled_.emplace(*device_, model, false);
     styled_as_ = style;
-    upload_opacity(*styled_, model.opacity);
     return *styled_;
+}
+
+// A share of the splats is the beginning of a copy in the order of importance.
+const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
+    if (share >= 1 || important_.empty() || !own_) return styled(style);
+    if (!some_ || some_as_ != style) {
+        SplatModel model =
+            in_style(with_sh_degree(picked(*model_, important_), own_->sh_degree()), style);
+        for (size_t i = 0; i < important_.size() && !removed_.empty(); ++i)
+            if (removed_[important_[i]] != 0) model.opacity[i] = kRemovedLogit;
+        compiled_ = true;
+        some_.reset();
+        some_.emplace(*device_, model, false);
+        some_as_ = style;
+    }
+    const double count = share * static_cast<double>(model_->size());
+    some_->set_count(
+        static_cast<std::uint32_t>(std::clamp(count, 1.0, double(important_.size()))));
+    return *some_;
+}
+
+double SplatPicture::most_moving() const {
+    return important_.empty() ? 1 : double(important_.size()) / double(splat_count());
 }
 
 ForwardOptions SplatPicture::options_for(const Key& key) {
@@ -129,12 +163,12 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
     return options;
 }
 
-Forward& SplatPicture::forward_for(const GpuSplats& splats, const DisplaySettings& display,
-                                   bool moving) {
+SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool moving) const {
     Key key;
     key.kernel = display.kernel;
     key.footprint = display.footprint;
-    key.sh_stored = splats.sh_degree();
+    const bool plain = display.style == SplatStyle::splats || !own_;
+    key.sh_stored = plain ? shown_sh_degree() : 0;
     key.accuracy = moving ? preset_accuracy(kFast) : display.accuracy;
     key.antialias = display.antialias && display.style == SplatStyle::splats;
     key.store = display.mode == VIEW_COUNT;
@@ -144,20 +178,55 @@ Forward& SplatPicture::forward_for(const GpuSplats& splats, const DisplaySetting
         key.kernel = KERNEL_GAUSSIAN;
         key.footprint = Footprint::psi;
     }
+    return key;
+}
+
+Forward& SplatPicture::forward_for(const GpuSplats& splats, const DisplaySettings& display,
+                                   bool moving) {
+    const Key key = key_for(display, moving);
+    const int degree = std::min(display.sh_degree, splats.sh_degree());
     Slot& slot = slots_[moving ? 1 : 0];
-    if (slot.forward && key == slot.key) return *slot.forward;
-    compiled_ = true;
+    const bool same = slot.forward && key == slot.key;
+    compiled_ |= !same || slot.degree != degree;
+    slot.degree = degree;
+    if (same) return *slot.forward;
     slot.forward.reset();
     slot.forward.emplace(*device_, options_for(key));
     slot.key = key;
     return *slot.forward;
 }
 
+bool SplatPicture::ready_to_move(const DisplaySettings& display) const {
+    const Slot& slot = slots_[1];
+    const bool some = important_.empty() || !own_ || (some_ && some_as_ == display.style);
+    return some && slot.forward && slot.key == key_for(display, true) &&
+           slot.degree == std::min(display.sh_degree, slot.key.sh_stored);
+}
+
+std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const DisplaySettings& display,
+                                             double moving) {
+    Buffer kept = std::exchange(pixels_, Buffer());
+    const auto before = std::tuple(width_, height_, status_);
+    const auto put_back = [&] {
+        pixels_ = std::move(kept);
+        std::tie(width_, height_, status_) = before;
+    };
+    try {
+        render(camera, display, {}, moving);
+    } catch (...) {
+        put_back();
+        throw;
+    }
+    put_back();
+    return pass_times_;
+}
+
 void SplatPicture::render(const Camera& camera, const DisplaySettings& display,
-                          const PhotoOverlay& photo, bool moving) {
+                          const PhotoOverlay& photo, std::optional<double> moving) {
     compiled_ = false;
-    const GpuSplats& shown = styled(display.style);
-    Forward& forward = forward_for(shown, display, moving);
+    const GpuSplats& shown =
+        moving ? some_styled(display.style, *moving) : styled(display.style);
+    Forward& forward = forward_for(shown, display, moving.has_value());
     const gpu::CameraData data = camera_data(camera, shown.origin(), display.near_plane);
     const Buffer cameras = upload_cameras(*device_, {data});
     const int degree = std::min(display.sh_degree, shown.sh_degree());

@@ -29,7 +29,9 @@ class SplatPicture {
     /// Uploads a scene; the model must stay where it is as long as it is shown. Where a device's
     /// buffers cannot hold all view-dependent colour, higher degrees are left out: see
     /// shown_sh_degree. Throws Error and keeps the scene before.
-    void set_scene(const SplatModel& model, const Bounds& bounds);
+    /// important: what to draw in motion, most important first; may be none.
+    void set_scene(const SplatModel& model, const Bounds& bounds,
+                   std::vector<std::uint32_t> important = {});
     /// Shows splats that someone else owns and changes (a training run); display styles that
     /// need the model on the host fall back to splats.
     void set_live(const GpuSplats& splats, const Bounds& bounds);
@@ -42,10 +44,19 @@ class SplatPicture {
     /// Deleted splats (1) vanish, the others are as in the model.
     void set_removed(const std::vector<std::uint8_t>& removed);
 
-    /// Renders and waits. camera: at the size of the frame that is wanted.
-    /// moving: with the fast accuracy settings, for a picture that is replaced at once.
+    /// Renders and waits. camera: at the size of the frame that is wanted. moving: with the fast
+    /// accuracy settings and this share of the splats, for a picture that is replaced at once.
     void render(const Camera& camera, const DisplaySettings& display, const PhotoOverlay& photo,
-                bool moving = false);
+                std::optional<double> moving = {});
+
+    /// Whether a picture in motion needs nothing that is not there yet: pipelines, uploads.
+    bool ready_to_move(const DisplaySettings& display) const;
+    /// Renders in motion; pixels, size and counters stay those of the last render. Returns the times
+    /// of the passes.
+    std::vector<PassTime> rehearse(const Camera& camera, const DisplaySettings& display,
+                                   double moving);
+    /// The largest share below 1 of the splats that render takes as `moving`.
+    double most_moving() const;
 
     /// Of the last render: B8G8R8A8 [height][width], its size, counters, times of the passes.
     const Buffer& pixels() const { return pixels_; }
@@ -59,10 +70,10 @@ class SplatPicture {
   private:
     const GpuSplats* splats() const { return live_ ? live_ : own_ ? &*own_ : nullptr; }
     const GpuSplats& styled(SplatStyle style);
+    const GpuSplats& some_styled(SplatStyle style, double share);
     Forward& forward_for(const GpuSplats& splats, const DisplaySettings& display, bool moving);
     void record_display(Commands& commands, const Forward& forward, const gpu::CameraData& data,
                         const DisplaySettings& display, const PhotoOverlay& photo);
-    void upload_opacity(GpuSplats& splats, const std::vector<float>& opacity);
 
     struct Key {  // what a Forward is built for
         int kernel = -1, sh_stored = 0;
@@ -71,6 +82,7 @@ class SplatPicture {
         bool antialias = false, ellipsoids = false, store = false, depth = false;
         bool operator==(const Key&) const = default;
     };
+    Key key_for(const DisplaySettings& display, bool moving) const;
     static ForwardOptions options_for(const Key& key);
 
     Device* device_;
@@ -79,13 +91,15 @@ class SplatPicture {
     std::map<int, Pipeline> display_pipelines_;  // by mode * 2 + whether there is a photo
     const SplatModel* model_ = nullptr;
     const GpuSplats* live_ = nullptr;
-    std::optional<GpuSplats> own_, styled_;
-    SplatStyle styled_as_ = SplatStyle::splats;
+    std::optional<GpuSplats> own_, styled_, some_;  // all; all in a style; the important ones
+    SplatStyle styled_as_ = SplatStyle::splats, some_as_ = SplatStyle::splats;
+    std::vector<std::uint32_t> important_;
     std::vector<std::uint8_t> removed_;
     Bounds bounds_;
     struct Slot {
         std::optional<Forward> forward;
         Key key;
+        int degree = -1;  // of the last picture: it has a pipeline of its own
     };
     std::array<Slot, 2> slots_;  // at rest, moving
     Buffer pixels_, no_photo_;

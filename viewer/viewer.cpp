@@ -16,6 +16,7 @@ namespace {
 constexpr double kRest_s = 0.12;  // without change, before the picture is refined
 constexpr double kStep_s = 1.0 / 60;
 constexpr size_t kTimesKept = 60;  // frames in motion that the panel averages over
+constexpr int kRehearsals = 8;   // of motion, after the one that compiles
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 glm::dvec3 start_up(const ViewerOptions& options) {
@@ -23,6 +24,16 @@ glm::dvec3 start_up(const ViewerOptions& options) {
     glm::dvec3 sum(0.0);
     for (const View& view : options.views) sum -= glm::transpose(view.camera.rotation)[1];
     return glm::length(sum) > 1e-3 ? glm::normalize(sum) : glm::dvec3(0, -1, 0);
+}
+
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+        .count();
+}
+
+Camera scaled(const Camera& camera, double scale) {
+    const auto px = [&](int full) { return std::max(1, static_cast<int>(std::lround(full * scale))); };
+    return resized(camera, px(camera.width), px(camera.height));
 }
 
 }  // namespace
@@ -39,12 +50,12 @@ Viewer::Viewer(Device& device, ViewerOptions options, GLFWwindow* window)
     : device_(&device),
       options_(std::move(options)),
       canvas_(device),
-      gui_(device, canvas_.render_pass(), options_.gui_scale, window),
+      gui_(device, canvas_.render_pass(), options_.gui_scale > 0 ? options_.gui_scale : 1, window),
       picture_(device) {
     session_.photos.views = options_.views;
     session_.navigation.up = start_up(options_);
     session_.device_name = device.info().name;
-    session_.gui_scale = options_.gui_scale;
+    session_.gui_scale = options_.gui_scale > 0 ? options_.gui_scale : 1;
     last_frame_ = changed_at_ = Clock::now();
 }
 
@@ -96,7 +107,8 @@ void Viewer::poll_load() {
 // The device's copy first: when that fails, the scene before is still there.
 void Viewer::adopt(Scene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded));
-    picture_.set_scene(scene->model, scene->bounds);
+    picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
+    motion_.start(picture_.most_moving());
     const bool first = session_.scene == nullptr;
     session_.scene = std::move(scene);
     const Scene& s = *session_.scene;
@@ -110,6 +122,8 @@ void Viewer::adopt(Scene loaded) {
     d.kernel = s.model.kernel;
     d.footprint = s.model.footprint;
     d.antialias = s.model.antialias;
+    d.sh_degree = session_.shown_sh_degree;
+    session_.own = d;
     session_.measured.clear();
     d.near_plane =
         std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(s.bounds.radius * 0.1));
@@ -129,11 +143,16 @@ void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
     if (first) picture_.set_live(splats, bounds);
     session_.training.live = true;
     ++version_;
-    if (!first) return;
+    if (first || session_.display.sh_degree == session_.shown_sh_degree)
+        session_.display.sh_degree = splats.sh_degree();  // grows with the training
     session_.shown_sh_degree = splats.sh_degree();
+    session_.own.sh_degree = splats.sh_degree();
+    if (!first) return;
+    motion_.start(1);
     session_.display.kernel = splats.kernel();
     session_.display.footprint = splats.footprint();
     session_.display.antialias = splats.antialias();
+    session_.own = session_.display;
     session_.fly_speed = bounds.radius / 2;
     session_.requests.frame_all = session_.photos.current < 0;
     session_.navigation.distance =
@@ -218,7 +237,16 @@ void Viewer::handle_keys(const Input& input) {
                 s.path.path.add(s.navigation, s.path.seconds_per_key);
                 break;
             case Key::play:
+                if (s.training.live && !s.training.finished) {
+                    s.training.paused = !s.training.paused;
+                    break;
+                }
                 s.path.playing = !s.path.playing && !s.path.path.keys.empty();
+                break;
+            case Key::step:
+                if (!s.training.live || s.training.finished) break;
+                s.training.paused = true;
+                ++s.training.steps_to_go;
                 break;
             case Key::remove:
                 if (s.scene && s.show_region && s.edit.remove(s.scene->model, s.region, true) > 0)
@@ -241,6 +269,7 @@ void Viewer::handle_keys(const Input& input) {
             case Key::escape:
                 s.path.playing = false;
                 s.requests.cancel_load = s.requests.cancel_export = true;
+                s.requests.leave_full_screen = true;
                 s.error.clear();
                 break;
         }
@@ -312,29 +341,52 @@ PhotoOverlay Viewer::overlay(const Camera& camera, int width, int height) const 
     return o;
 }
 
-void Viewer::draw_picture(const PictureKey& key, double scale, bool moving) {
+void Viewer::draw_picture(const PictureKey& key, bool moving) {
     const auto start = Clock::now();
-    const Camera camera =
-        resized(key.camera, std::max(1, static_cast<int>(std::lround(key.camera.width * scale))),
-                std::max(1, static_cast<int>(std::lround(key.camera.height * scale))));
+    const MotionQuality quality = moving ? motion_.quality() : MotionQuality();
+    const Camera camera = scaled(key.camera, quality.scale);
+    drawn_ = key;
+    drawn_any_ = true;
+    drawn_moving_ = moving;
     try {
         picture_.render(camera, key.display, overlay(camera, key.camera.width, key.camera.height),
-                        moving);
+                        moving ? std::optional(quality.splats) : std::nullopt);
     } catch (const std::exception& e) {
         report(e);
-        drawn_ = key;  // not again before something changes
-        drawn_scale_ = 1;
+        drawn_moving_ = false;  // not again before something changes
         return;
     }
     FrameTimes& t = session_.times;
     t.passes = picture_.pass_times();
-    t.picture_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-    if (scale == 1) t.full_ms = t.picture_ms;
-    t.scale = scale;
+    t.picture_ms = milliseconds_since(start);
+    if (!moving) t.full_ms = t.picture_ms;
+    t.quality = quality;
     t.visible = picture_.status().visible;
     t.pairs = picture_.status().pairs;
-    drawn_ = key;
-    drawn_scale_ = scale;
+}
+
+// Once after what a picture needs has changed: pipelines compile at their first use, and the first
+// frames in motion are drawn at a quality that was found before them.
+void Viewer::rehearse_motion(const PictureKey& key) {
+    const FrameTimes& t = session_.times;
+    const double besides_ms = std::max(0.0, t.frame_ms - t.picture_ms);
+    try {
+        for (int i = 0; i <= kRehearsals; ++i) {
+            const MotionQuality quality = motion_.quality();
+            const auto start = Clock::now();
+            const std::vector<PassTime> passes = picture_.rehearse(
+                scaled(key.camera, quality.scale), key.display, quality.splats);
+            if (picture_.compiled()) continue;
+            motion_.measured(motion_cost(besides_ms + milliseconds_since(start), passes));
+        }
+    } catch (const std::exception& e) {
+        report(e);
+    }
+}
+
+bool Viewer::at_rest() const {
+    return !job_ && drawn_any_ && !drawn_moving_ && last_ == drawn_ &&
+           picture_.ready_to_move(session_.display);
 }
 
 double Viewer::frame(const Input& input, int width, int height, bool full) {
@@ -350,7 +402,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     play_path(seconds);
     canvas_.resize(width, height);
     gui_.begin(width, height);
-    if (session_.panels) draw_panels(session_, width, height);
+    draw_panels(session_, width, height);
     gui_.end();
     act_on_requests(width, height);
     load_current_photo();
@@ -364,27 +416,30 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     if (!(key == last_)) changed_at_ = frame_start_;
     last_ = key;
     const double rests = std::chrono::duration<double>(frame_start_ - changed_at_).count();
-    const bool refine = full || rests >= kRest_s || drawn_scale_ == 0;
+    const bool refine = full || rests >= kRest_s || !drawn_any_;
     if (!(key == drawn_) && !refine) {
         drew_moving_ = true;
-        draw_picture(key, resolution_.moving_scale(), true);
-    } else if (full || (refine && (!(key == drawn_) || drawn_scale_ < 1))) {
-        draw_picture(key, 1, false);
+        draw_picture(key, true);
+    } else if (full || (refine && (!(key == drawn_) || drawn_moving_))) {
+        draw_picture(key, false);
         drew = true;
+    } else if (!drawn_moving_ && session_.error.empty() &&
+               !picture_.ready_to_move(session_.display)) {
+        rehearse_motion(key);
     }
     const bool held =
         input.ahead || input.back || input.to_left || input.to_right || input.rise || input.sink;
     continuous_ = held || session_.path.playing || export_ || measure_;
     if (continuous_) return 0;
-    if (drawn_scale_ < 1 && session_.error.empty()) return std::max(0.001, kRest_s - rests);
+    if (drawn_moving_ && session_.error.empty()) return std::max(0.001, kRest_s - rests);
     return drew ? 0 : kForever;  // once more, so that the panels show this picture's times
 }
 
 void Viewer::presented() {
     FrameTimes& t = session_.times;
-    t.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - frame_start_).count();
+    t.frame_ms = milliseconds_since(frame_start_);
     if (!drew_moving_ || picture_.compiled()) return;
-    resolution_.measured(t.frame_ms);
+    motion_.measured(motion_cost(t.frame_ms, t.passes));
     t.moving_ms.push_back(t.frame_ms);
     if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();
 }

@@ -11,8 +11,8 @@
 #include "viewer/accuracy_measure.h"
 #include "viewer/canvas.h"
 #include "viewer/gui.h"
+#include "viewer/motion.h"
 #include "viewer/path_export.h"
-#include "viewer/resolution.h"
 #include "viewer/session.h"
 #include "viewer/splat_picture.h"
 
@@ -21,7 +21,7 @@ namespace darb {
 struct ViewerOptions {
     std::vector<View> views;  // cameras of a data set, may be none
     std::string up;           // x, -x, ...; "" = from the cameras, else -y
-    float gui_scale = 1;
+    float gui_scale = 0;      // size of the panels; 0: as the display wants it
     /// The file that a path means (an output folder names its last scene). Throws Error.
     std::function<std::filesystem::path(const std::filesystem::path&)> resolve;
     /// Called from other threads when there is something to show.
@@ -63,6 +63,8 @@ class Viewer {
     Gui& gui() { return gui_; }
     /// Exports the session's path; blocks. For use without a window.
     void export_path_now();
+    /// The picture is whole, and one in motion would have nothing to wait for.
+    bool at_rest() const;
 
   private:
     using Clock = std::chrono::steady_clock;
@@ -85,7 +87,8 @@ class Viewer {
     void play_path(double seconds);
     Camera frame_camera(int width, int height) const;
     PhotoOverlay overlay(const Camera& camera, int width, int height) const;
-    void draw_picture(const PictureKey& key, double scale, bool moving);
+    void draw_picture(const PictureKey& key, bool moving);
+    void rehearse_motion(const PictureKey& key);
     void step_export();
     void step_measure(int width, int height);
     void report(const std::exception& error);
@@ -96,15 +99,15 @@ class Viewer {
     Canvas canvas_;
     Gui gui_;
     SplatPicture picture_;
-    ResolutionControl resolution_;
+    MotionControl motion_;
     std::unique_ptr<LoadJob> job_;
     std::vector<std::unique_ptr<LoadJob>> cancelled_;
     std::optional<PathExport> export_;
     std::optional<AccuracyMeasure> measure_;
     PictureKey drawn_, last_;
-    double drawn_scale_ = 0;
-    int version_ = 0;  // of the scene and its edits
-    bool drew_moving_ = false;
+    bool drawn_any_ = false, drawn_moving_ = false;  // what the picture now is
+    int version_ = 0;                                // of the scene and its edits
+    bool drew_moving_ = false;                       // in this frame
     bool continuous_ = false;  // the last frame wanted this one at once
     Clock::time_point frame_start_, changed_at_, last_frame_;
 };

@@ -45,6 +45,7 @@ void Viewer::act_on_requests(int width, int height) {
     s.requests = Requests();
     s.requests.quit = r.quit;
     s.requests.full_screen = r.full_screen;  // the window's
+    s.requests.leave_full_screen = r.leave_full_screen;
     try {
         if (r.frame_all) {
             leave_photo();
@@ -89,7 +90,7 @@ void Viewer::act_on_requests(int width, int height) {
         if (r.export_path) export_.emplace(s.path.path, s.path.folder, s.path.fps);
         if (r.cancel_export) export_.reset();
         if (export_) step_export();
-        if (r.measure && !picture_.empty()) measure_.emplace(s.display);
+        if (r.measure && !picture_.empty()) measure_.emplace(s.display, s.own);
         if (r.cancel_export) measure_.reset();
         if (measure_) step_measure(width, height);
     } catch (const std::exception& e) {
@@ -107,8 +108,7 @@ void Viewer::step_export() {
         picture_.render(camera_of(key, p.export_width, p.export_height), session_.display, {});
         return read_pixels(picture_);
     });
-    drawn_ = PictureKey();  // the picture is one of the export now
-    drawn_scale_ = 0;
+    drawn_any_ = false;  // the picture is one of the export now
     if (!export_->done()) return;
     session_.note = export_->summary();
     export_.reset();
@@ -127,7 +127,7 @@ void Viewer::step_measure(int width, int height) {
         }
         return AccuracyMeasure::Frame{read_pixels(picture_), ms};
     });
-    drawn_ = PictureKey();
+    drawn_any_ = false;
     session_.measured = measure_->results();
     if (measure_->done()) measure_.reset();
 }

@@ -57,6 +57,8 @@ std::optional<Key> key_for(int key, bool control) {
             return Key::add_key;
         case GLFW_KEY_SPACE:
             return Key::play;
+        case GLFW_KEY_PERIOD:
+            return Key::step;
         case GLFW_KEY_DELETE:
             return Key::remove;
         case GLFW_KEY_ESCAPE:
@@ -121,7 +123,7 @@ struct ViewerWindow::State {
         glfwSetWindowUserPointer(window.handle, this);
         install_callbacks();
         ViewerOptions mine = options;
-        mine.gui_scale = content_scale(window.handle);
+        if (!(mine.gui_scale > 0)) mine.gui_scale = content_scale(window.handle);
         mine.wake = [this] {
             woken = true;
             glfwPostEmptyEvent();
@@ -277,7 +279,10 @@ void ViewerWindow::State::draw() {
     if (!swapchain.present(viewer->canvas(), [&] { return viewer->compose(); })) dirty = true;
     viewer->presented();
     Requests& requests = viewer->session().requests;
-    if (std::exchange(requests.full_screen, false)) toggle_full_screen();
+    const bool leave = std::exchange(requests.leave_full_screen, false);
+    if (std::exchange(requests.full_screen, false) ||
+        (leave && glfwGetWindowMonitor(window.handle) != nullptr))
+        toggle_full_screen();
     if (requests.quit) glfwSetWindowShouldClose(window.handle, GLFW_TRUE);
 }
 

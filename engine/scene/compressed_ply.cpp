@@ -231,7 +231,8 @@ bool is_compressed_ply(const PlyHeader& header) {
 }
 
 SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader& header,
-                                const std::string& where, std::size_t* dropped) {
+                                const std::string& where, std::size_t* dropped,
+                                const ReadProgress& progress) {
     const PlyElement& vertex = *header.find("vertex");
     const PlyElement& chunk = *header.find("chunk");
     check_ply_size(file, header, vertex, where);
@@ -248,12 +249,13 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
     SplatModel model;
     read_ply_comments(header, where, model);
     model.resize(vertex.count);
-    read_ply_rows(file, header, vertex, where, [&](std::size_t row, const double* values) {
+    const PlyRow row = [&](std::size_t i, const double* values) {
         std::array<std::uint32_t, 4> packed{};
-        for (std::size_t i = 0; i < 4; ++i)
-            packed[i] = static_cast<std::uint32_t>(values[columns[i]]);
-        unpack_splat(packed, chunks[row / kChunk], row, model);
-    });
+        for (std::size_t word = 0; word < 4; ++word)
+            packed[word] = static_cast<std::uint32_t>(values[columns[word]]);
+        unpack_splat(packed, chunks[i / kChunk], i, model);
+    };
+    read_ply_rows(file, header, vertex, where, row, progress);
     if (const PlyElement* sh = header.find("sh")) read_sh(file, header, *sh, where, model);
     const std::size_t gone = drop_non_finite(model);
     if (dropped) *dropped = gone;

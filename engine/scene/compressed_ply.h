@@ -21,7 +21,8 @@ bool is_compressed_ply(const PlyHeader& header);
 
 /// Same contract as parse_ply (ply.h), which calls it.
 SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader& header,
-                                const std::string& where, std::size_t* dropped);
+                                const std::string& where, std::size_t* dropped,
+                                const ReadProgress& progress = {});
 
 /// Splats in Morton order, so that those of a chunk lie close together. Per chunk, the error of a
 /// position is at most its size / 4094 (y: 2046), of a log scale the range / 4094 (2046), of a

@@ -116,11 +116,12 @@ std::byte* put(std::byte* to, const T* values, std::size_t count) {
 }  // namespace
 
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
-                     std::size_t* dropped) {
+                     std::size_t* dropped, const ReadProgress& progress) {
     const PlyHeader header = parse_ply_header(file, where);
     const PlyElement* vertex = header.find("vertex");
     if (!vertex) throw Error(where, "has no element vertex", "A splat scene is needed.");
-    if (is_compressed_ply(header)) return parse_compressed_ply(file, header, where, dropped);
+    if (is_compressed_ply(header))
+        return parse_compressed_ply(file, header, where, dropped, progress);
     const Columns columns = find_columns(*vertex, where);
     check_ply_size(file, header, *vertex, where);
 
@@ -131,11 +132,12 @@ SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
     std::vector<double> positions;
     positions.reserve(vertex->count * 3);
     std::size_t kept = 0;
-    read_ply_rows(file, header, *vertex, where, [&](std::size_t, const double* values) {
+    const PlyRow row = [&](std::size_t, const double* values) {
         if (!all_finite(values, columns)) return;
         for (const int column : columns.position) positions.push_back(values[column]);
         store_splat(values, columns, kept++, model);
-    });
+    };
+    read_ply_rows(file, header, *vertex, where, row, progress);
     if (dropped) *dropped = vertex->count - kept;
     model.resize(kept);
     set_positions(positions, model);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/scene/ply_table.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -20,8 +21,9 @@ namespace darb {
 /// SplatModel::origin, computed in double. Throws Error naming the file, the record and the reason.
 SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped = nullptr);
 /// The same from memory; `where` stands for the file name in errors.
+/// progress as read_ply_rows takes it.
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
-                     std::size_t* dropped = nullptr);
+                     std::size_t* dropped = nullptr, const ReadProgress& progress = {});
 
 /// Little-endian float32; x y z are double where origin + position is no float32 (scenes at map
 /// coordinates). A file that was read without recentring is written back bit-equal in its values.

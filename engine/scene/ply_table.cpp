@@ -16,6 +16,7 @@ static_assert(std::endian::native == std::endian::little);
 namespace {
 
 constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
+constexpr std::size_t kProgressRows = 1 << 16;  // between two reports
 constexpr const char* kCopyAgain = "Export or copy the file again.";
 
 std::size_t type_size(PlyType type) {
@@ -285,13 +286,16 @@ void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
 }
 
 void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
-                   const PlyElement& element, const std::string& where, const PlyRow& row) {
+                   const PlyElement& element, const std::string& where, const PlyRow& row,
+                   const ReadProgress& progress) {
     check_ply_size(file, header, element, where);
     RowReader reader(file, header, where);
     for (const PlyElement& candidate : header.elements) {
         std::vector<double> values(candidate.properties.size());
         const bool wanted = &candidate == &element;
         for (std::size_t i = 0; i < candidate.count; ++i) {
+            if (wanted && progress && i % kProgressRows == 0)
+                progress(static_cast<double>(i) / static_cast<double>(candidate.count));
             reader.read(candidate, i, values.data());
             if (wanted) row(i, values.data());
         }

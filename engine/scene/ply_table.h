@@ -48,8 +48,11 @@ void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
 
 /// Calls row(i, values) for i = 0 .. count-1 of the element; values[c] is column c (0 for lists).
 /// Elements before it are skipped. Throws Error naming the row where the file ends or is no number.
+/// progress: called now and then with the share of its rows that are read; throws to stop.
 using PlyRow = std::function<void(std::size_t row, const double* values)>;
+using ReadProgress = std::function<void(double share)>;
 void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
-                   const PlyElement& element, const std::string& where, const PlyRow& row);
+                   const PlyElement& element, const std::string& where, const PlyRow& row,
+                   const ReadProgress& progress = {});
 
 }  // namespace darb

@@ -42,7 +42,8 @@ std::string encoding_of(const PlyHeader& header) {
     return header.format == PlyFormat::big_endian ? "binary, big-endian" : "binary, little-endian";
 }
 
-SplatModel load_ply(Bytes bytes, const std::string& where, SplatFile& file) {
+SplatModel load_ply(Bytes bytes, const std::string& where, SplatFile& file,
+                    const ReadProgress& progress) {
     const PlyHeader header = parse_ply_header(bytes, where);
     file.format = is_compressed_ply(header) ? SplatFormat::compressed_ply : SplatFormat::ply;
     file.details = encoding_of(header);
@@ -50,7 +51,7 @@ SplatModel load_ply(Bytes bytes, const std::string& where, SplatFile& file) {
         throw Error(where, "is a point cloud: its vertices have no opacity, scale and rotation",
                     "darb train starts from it where it lies beside the cameras; a viewer shows it "
                     "as points.");
-    return parse_ply(bytes, where, &file.dropped);
+    return parse_ply(bytes, where, &file.dropped, progress);
 }
 
 SplatModel load_spz(Bytes bytes, const std::string& where, SplatFile& file) {
@@ -136,12 +137,13 @@ bool is_point_cloud(Bytes bytes) {
            vertex->find("scale_0") < 0 && vertex->find("f_dc_0") < 0 && !is_compressed_ply(header);
 }
 
-SplatModel parse_splats(Bytes bytes, const std::string& where, SplatFile* file) {
+SplatModel parse_splats(Bytes bytes, const std::string& where, SplatFile* file,
+                        const ReadProgress& progress) {
     SplatFile unused;
     SplatFile& facts = file ? *file : unused;
     facts.bytes = bytes.size();
     if (starts_with(bytes, "ply\n") || starts_with(bytes, "ply\r"))
-        return load_ply(bytes, where, facts);
+        return load_ply(bytes, where, facts, progress);
     if (looks_like_spz(bytes)) return load_spz(bytes, where, facts);
     if (looks_like_zip(bytes)) return load_sog(bytes, where, facts);
     if (lower(where).ends_with(".splat") || looks_like_dot_splat(bytes))

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/scene/ply_table.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -33,9 +34,10 @@ struct SplatFile {
 /// meta.json. The content decides; the name counts for .splat alone, which has nothing to know it
 /// by. Throws Error naming file, place, reason and remedy; of a point cloud it says that it is one.
 SplatModel load_splats(const std::filesystem::path& path, SplatFile* file = nullptr);
-/// The same from memory, but for folders. A name that ends in .splat is believed.
+/// The same from memory, but for folders. A name that ends in .splat is believed. progress: as
+/// read_ply_rows takes it; of PLY and compressed PLY alone, the others are small or quick.
 SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& where,
-                        SplatFile* file = nullptr);
+                        SplatFile* file = nullptr, const ReadProgress& progress = {});
 
 /// A folder with meta.json.
 bool is_sog_folder(const std::filesystem::path& path);

@@ -1,211 +1,70 @@
-// The viewer in a real window under Xvfb, driven by xdotool's mouse and keys; what the display
-// shows is read from Xvfb's frame buffer file and compared with a headless screenshot.
-#include <fcntl.h>
+// The viewer in a real window under Xvfb, driven by mouse, keys and drops; what the display shows is
+// compared with a headless screenshot.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <array>
-#include <chrono>
-#include <csignal>
-#include <cstring>
-#include <filesystem>
-#include <functional>
-#include <optional>
-#include <string>
-#include <thread>
-#include <vector>
+#include <fstream>
 
-#include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/scene/ply.h"
+#include "engine/scene/splat_file.h"
 #include "tests/support/random_scene.h"
+#include "tests/support/test_data.h"
+#include "tests/support/window_fixture.h"
+#include "tests/support/x_drop.h"
 
 namespace darb::test {
 namespace {
 
 namespace fs = std::filesystem;
-using Words = std::vector<std::string>;
 
 constexpr int kWidth = 640, kHeight = 480;
-constexpr auto kPatience = std::chrono::seconds(60);  // for a loaded machine
 
-bool on_path(const std::string& program) {
-    const char* list = std::getenv("PATH");
-    std::string rest = list != nullptr ? list : "";
-    while (!rest.empty()) {
-        const size_t end = std::min(rest.find(':'), rest.size());
-        if (::access((fs::path(rest.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
-        rest.erase(0, std::min(end + 1, rest.size()));
-    }
-    return false;
-}
-
-// A child process; `out` is its standard output where that is read.
-class Process {
-  public:
-    Process(const Words& words, const fs::path& log) {
-        std::vector<char*> argv;
-        for (const std::string& w : words) argv.push_back(const_cast<char*>(w.c_str()));
-        argv.push_back(nullptr);
-        pid_ = ::fork();
-        if (pid_ != 0) return;
-        const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
-        ::dup2(file, STDOUT_FILENO);
-        ::dup2(file, STDERR_FILENO);
-        ::execvp(argv[0], argv.data());
-        ::_exit(127);
-    }
-    ~Process() {
-        if (running()) {
-            ::kill(pid_, SIGKILL);
-            wait();
-        }
-    }
-    Process(const Process&) = delete;
-    Process& operator=(const Process&) = delete;
-    bool running() {
-        if (pid_ > 0 && ::waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
-        return pid_ > 0;
-    }
-    void terminate() { ::kill(pid_, SIGTERM); }
-    int wait() {
-        if (pid_ > 0) ::waitpid(pid_, &status_, 0);
-        pid_ = 0;
-        return WIFEXITED(status_) ? WEXITSTATUS(status_) : -1;
-    }
-
-  private:
-    pid_t pid_ = 0;
-    int status_ = 0;
-};
-
-bool eventually(const std::function<bool()>& condition) {
-    const auto end = std::chrono::steady_clock::now() + kPatience;
-    while (std::chrono::steady_clock::now() < end) {
-        if (condition()) return true;
-        std::this_thread::sleep_for(std::chrono::milliseconds(30));
-    }
-    return false;
-}
-
-std::uint32_t big_endian(const std::vector<std::byte>& bytes, size_t word) {
-    std::uint32_t value = 0;
-    for (size_t i = 0; i < 4; ++i)
-        value = value << 8 | std::to_integer<std::uint32_t>(bytes[word * 4 + i]);
-    return value;
-}
-
-int largest_difference(const ImageU8& a, const ImageU8& b) {
-    if (a.width != b.width || a.height != b.height) return 256;
-    int largest = 0;
-    for (size_t i = 0; i < a.data.size(); ++i)
-        largest = std::max(largest, std::abs(int(a.data[i]) - int(b.data[i])));
-    return largest;
-}
-
-class WindowTest : public ::testing::Test {
+class WindowTest : public DisplayTest {
   protected:
     void SetUp() override {
-        if (!on_path("Xvfb") || !on_path("xdotool"))
-            GTEST_SKIP() << "no Xvfb or xdotool: tools/setup.sh installs them";
-        folder_ = fs::temp_directory_path() / ("darb_window_" + std::to_string(::getpid()));
-        fs::create_directories(folder_);
+        DisplayTest::SetUp();
+        if (IsSkipped()) return;
         SceneOptions options;
         options.count = 300;
-        write_ply(folder_ / "scene.ply", random_scene(options).model);
-        start_display();
+        model_ = random_scene(options).model;
+        write_ply(folder_ / "scene.ply", model_);
     }
-    void TearDown() override {
-        view_.reset();
-        if (display_) display_->terminate();
-        display_.reset();
-        if (!folder_.empty()) fs::remove_all(folder_);
-    }
-
-    // Xvfb chooses a free display number and writes it to the descriptor.
-    void start_display() {
-        int ends[2];
-        ASSERT_EQ(::pipe(ends), 0);
-        display_.emplace(
-            Words{"Xvfb", "-displayfd", std::to_string(ends[1]), "-screen", "0", "800x600x24",
-                  "-fbdir", folder_.string(), "-nocursor", "-nolisten", "tcp"},
-            folder_ / "xvfb.log");
-        ::close(ends[1]);
-        char text[16] = {};
-        const ssize_t count = ::read(ends[0], text, sizeof text - 1);
-        ::close(ends[0]);
-        ASSERT_GT(count, 0) << "Xvfb did not start: " << log("xvfb.log");
-        ::setenv("DISPLAY", (":" + std::to_string(std::atoi(text))).c_str(), 1);
-    }
-    std::string log(const char* name) const {
-        return fs::exists(folder_ / name) ? read_text_file(folder_ / name) : "";
-    }
-    Words command(const Words& more) const {
-        Words words{
-            DARB_COMMAND,  "view",   (folder_ / "scene.ply").string(),
-            "--no-panels", "--size", std::to_string(kWidth) + "x" + std::to_string(kHeight)};
+    Words command(const fs::path& scene, const Words& more) const {
+        Words words{DARB_COMMAND, "view", scene.string()};
         words.insert(words.end(), more.begin(), more.end());
         return words;
     }
-    ImageU8 headless() {
+    ImageU8 headless(const fs::path& scene, const Words& more = {}, int width = kWidth,
+                     int height = kHeight) {
         const fs::path file = folder_ / "headless.png";
-        Process run(command({"--screenshot", file.string()}), folder_ / "headless.log");
+        Words words = command(scene, {"--no-panels", "--screenshot", file.string(), "--size",
+                                      std::to_string(width) + "x" + std::to_string(height)});
+        words.insert(words.end(), more.begin(), more.end());
+        Process run(words, folder_ / "headless.log");
         EXPECT_EQ(run.wait(), 0) << log("headless.log");
         return read_image(file);
     }
-    void start() {
-        view_.emplace(command({}), folder_ / "view.log");
+    ImageU8 headless() { return headless(folder_ / "scene.ply"); }
+    void start(const Words& more = {"--no-panels"}, const std::string& size = "640x480") {
+        Words words = command(folder_ / "scene.ply", {"--size", size});
+        words.insert(words.end(), more.begin(), more.end());
+        program_.emplace(words, folder_ / "view.log");
         ASSERT_TRUE(eventually([&] { return log("view.log").find("loaded") != std::string::npos; }))
             << log("view.log");
     }
-    void xdo(const Words& words) {
-        Words all{"xdotool"};
-        all.insert(all.end(), words.begin(), words.end());
-        Process run(all, folder_ / "xdotool.log");
-        ASSERT_EQ(run.wait(), 0) << log("xdotool.log");
-    }
-    // The top left part of the display, where the window is.
-    ImageU8 screen() const {
-        const std::vector<std::byte> xwd = read_file(folder_ / "Xvfb_screen0");
-        const size_t data = big_endian(xwd, 0) + big_endian(xwd, 19) * 12;
-        const size_t line = big_endian(xwd, 12);
-        ImageU8 image(kWidth, kHeight, 3);
-        for (int y = 0; y < kHeight; ++y)
-            for (int x = 0; x < kWidth; ++x)
-                for (int c = 0; c < 3; ++c)
-                    image.at(x, y, c) = std::to_integer<std::uint8_t>(
-                        xwd[data + size_t(y) * line + size_t(x) * 4 + size_t(2 - c)]);
-        return image;
-    }
-    // The display once it has been the same for some looks in a row.
-    ImageU8 settled() {
-        ImageU8 last = screen();
-        int same = 0;
-        EXPECT_TRUE(eventually([&] {
-            const ImageU8 now = screen();
-            same = largest_difference(now, last) == 0 ? same + 1 : 0;
-            last = now;
-            return same >= 15;
-        }));
-        return last;
-    }
-    bool shows(const ImageU8& wanted) {
-        return eventually([&] { return largest_difference(screen(), wanted) == 0; });
-    }
+    ImageU8 window() const { return screen(kWidth, kHeight); }
 
-    fs::path folder_;
-    std::optional<Process> display_, view_;
+    SplatModel model_;
 };
 
 TEST_F(WindowTest, Window_shows_the_headless_screenshot_and_closes_with_0_slow) {
     const ImageU8 wanted = headless();
     start();
-    EXPECT_TRUE(shows(wanted)) << "differs by " << largest_difference(screen(), wanted) << "\n"
+    EXPECT_TRUE(shows(wanted)) << "differs by " << largest_difference(window(), wanted) << "\n"
                                << log("view.log");
     xdo({"key", "ctrl+q"});
-    EXPECT_TRUE(eventually([&] { return !view_->running(); }));
-    EXPECT_EQ(view_->wait(), 0) << log("view.log");
+    EXPECT_TRUE(eventually([&] { return !program_->running(); }));
+    EXPECT_EQ(program_->wait(), 0) << log("view.log");
 }
 
 TEST_F(WindowTest, Mouse_and_keys_move_the_camera_slow) {
@@ -213,16 +72,16 @@ TEST_F(WindowTest, Mouse_and_keys_move_the_camera_slow) {
     start();
     ASSERT_TRUE(shows(wanted));
     xdo({"mousemove", "300", "200", "mousedown", "1", "mousemove", "360", "220", "mouseup", "1"});
-    EXPECT_TRUE(eventually([&] { return largest_difference(screen(), wanted) > 20; })) << "orbit";
+    EXPECT_TRUE(changes_from(wanted, 20)) << "orbit";
     const ImageU8 turned = settled();
     xdo({"keydown", "w", "sleep", "0.3", "keyup", "w"});
-    EXPECT_TRUE(eventually([&] { return largest_difference(screen(), turned) > 20; })) << "fly";
+    EXPECT_TRUE(changes_from(turned, 20)) << "fly";
     const ImageU8 flown = settled();
     xdo({"click", "4"});
-    EXPECT_TRUE(eventually([&] { return largest_difference(screen(), flown) > 5; })) << "wheel";
+    EXPECT_TRUE(changes_from(flown, 5)) << "wheel";
     const ImageU8 zoomed = settled();
     xdo({"key", "h"});
-    EXPECT_TRUE(eventually([&] { return largest_difference(screen(), zoomed) > 50; })) << "panels";
+    EXPECT_TRUE(changes_from(zoomed, 50)) << "panels";
 }
 
 TEST_F(WindowTest, Resize_storm_ends_with_the_right_picture_slow) {
@@ -237,8 +96,65 @@ TEST_F(WindowTest, Resize_storm_ends_with_the_right_picture_slow) {
     xdo({"search", "--name", "darb", "windowsize", std::to_string(kWidth),
          std::to_string(kHeight)});
     // The camera's field of view is vertical, so the same size gives the same picture again.
-    EXPECT_TRUE(shows(wanted)) << "differs by " << largest_difference(screen(), wanted);
-    EXPECT_TRUE(view_->running()) << log("view.log");
+    EXPECT_TRUE(shows(wanted)) << "differs by " << largest_difference(window(), wanted);
+    EXPECT_TRUE(program_->running()) << log("view.log");
+}
+
+TEST_F(WindowTest, Full_screen_and_back_slow) {
+    const ImageU8 wanted = headless();
+    const ImageU8 whole = headless(folder_ / "scene.ply", {}, kDisplayWidth, kDisplayHeight);
+    start();
+    ASSERT_TRUE(shows(wanted));
+    xdo({"key", "F11"});
+    EXPECT_TRUE(shows(whole)) << "differs by " << largest_difference(screen(), whole);
+    xdo({"key", "Escape"});
+    EXPECT_TRUE(shows(wanted)) << "differs by " << largest_difference(window(), wanted);
+}
+
+// At twice the dots per inch the side panel, 330 px wide at 96, covers x = 500.
+TEST_F(WindowTest, Panels_grow_with_the_dots_per_inch_slow) {
+    const ImageU8 bare =
+        headless(folder_ / "scene.ply", {"-w"}, kDisplayWidth, kDisplayHeight);
+    set_display_dpi(192);
+    start({"-w"}, "800x600");
+    EXPECT_TRUE(eventually([&] {
+        const ImageU8 now = screen();
+        return now.at(720, 590, 0) == bare.at(720, 590, 0) && now.at(500, 24, 0) < 100;
+    })) << log("view.log");
+    EXPECT_GT(bare.at(500, 24, 0), 120);
+}
+
+// Each format in turn dropped on one running viewer; between them a file that is none.
+TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_slow) {
+    std::vector<fs::path> files;
+    for (const char* name : {"a.compressed.ply", "a.spz", "a.splat"}) {
+        files.push_back(folder_ / name);
+        save_splats(files.back(), *format_to_write(files.back()), model_);
+    }
+    files.push_back(folder_ / "cloud.ply");
+    std::ofstream(files.back()) << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                                   "property float y\nproperty float z\nproperty uchar red\n"
+                                   "property uchar green\nproperty uchar blue\nend_header\n"
+                                   "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0.5 0 0 255\n";
+    if (const auto data = test_data_folder())
+        files.push_back(*data / "splats" / "Unicorn_Stuffy_cleaned.sog");
+    const fs::path bad = folder_ / "bad name.ply";
+    std::ofstream(bad) << "ply\nformat binary_little_endian 1.0\nelement vertex 5\nend_header\n";
+    start();
+    ImageU8 before = headless();
+    ASSERT_TRUE(shows(before));
+    for (const fs::path& file : files) {
+        ASSERT_TRUE(drop_on_window("darb", bad));
+        EXPECT_TRUE(changes_from(before, 100)) << "no message at " << file;
+        xdo({"key", "Escape"});
+        EXPECT_TRUE(shows(before)) << "the scene before is gone at " << file;
+        const ImageU8 wanted = headless(file);
+        ASSERT_TRUE(drop_on_window("darb", file));
+        EXPECT_TRUE(shows(wanted)) << file << " differs by "
+                                   << largest_difference(window(), wanted);
+        before = wanted;
+    }
+    EXPECT_TRUE(program_->running()) << log("view.log");
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "tools/darb/commands.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
+#include "tools/darb/view_times.h"
 #include "viewer/window.h"
 
 namespace darb {
@@ -46,6 +47,7 @@ int view(const ViewFlags& flags) {
     const PixelSize size = parse_size(flags.size);
     ViewerOptions options;
     options.up = flags.up;
+    options.gui_scale = flags.gui_scale;
     if (!flags.up.empty()) up_from_name(flags.up);
     options.views = find_views(flags);
     options.resolve = find_scene;
@@ -61,6 +63,10 @@ int view(const ViewFlags& flags) {
     if (!flags.scene.empty()) {
         window.viewer().open(flags.scene);
         window.set_title(flags.scene.filename().string() + " - darb");
+    }
+    if (!flags.times.empty()) {
+        write_view_times(window, device, flags.times);
+        return 0;
     }
     while (window.pump(std::numeric_limits<double>::infinity())) {
     }

@@ -80,6 +80,9 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     c.add_option("--fps", flags.fps, "frames a second of --export")
         ->check(CLI::Range(1, 240))
         ->capture_default_str();
+    c.add_option("--times", flags.times,
+                 "orbit for some seconds, rest, write frame times to this JSON, and close")
+        ->needs(c.get_option("scene"));
     c.add_option("--show", flags.show, "what is drawn")
         ->check(CLI::IsMember({"picture", "error", "depth", "work"}))
         ->capture_default_str();
@@ -88,6 +91,8 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
         ->capture_default_str();
     c.add_flag("--compare", flags.compare, "photo beside the picture, at a camera of the data set");
     c.add_flag("--no-panels", flags.no_panels, "start with the panels hidden (key H)");
+    c.add_option("--gui-scale", flags.gui_scale, "size of the panels (default: the display's)")
+        ->check(CLI::Range(0.5, 4.0));
     c.add_flag("-w,--white-background", flags.white_background, "white, not black");
     c.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
 }

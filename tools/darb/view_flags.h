@@ -11,9 +11,10 @@
 namespace darb {
 
 struct ViewFlags {
-    std::filesystem::path scene, cameras, screenshot, path, frames;
+    std::filesystem::path scene, cameras, screenshot, path, frames, times;
     std::string device, up, size = "1280x720", show = "picture", style = "splats";
     int camera = -1, fps = 30;
+    float gui_scale = 0;  // of the panels; 0: the display's
     bool white_background = false, compare = false, no_panels = false;
 };
 

@@ -58,9 +58,11 @@ void help(const Session& s) {
         "F  L               frame all, level\n"
         "[  ]               camera of the data set\n"
         "K  space           add key frame, play\n"
+        "space  .           training: pause, step\n"
         "Delete             delete the selection\n"
         "Ctrl+Z Y S Q       undo, redo, save, quit\n"
-        "P  H  F11          picture, panels, full screen");
+        "P  H  F11          picture, panels, full screen\n"
+        "Esc                stop, cancel, leave full screen");
     ImGui::TextDisabled("Drop a file to open it. %s", s.device_name.c_str());
 }
 
@@ -72,20 +74,7 @@ void empty_hint(const Session& s, float width, float height) {
                                             IM_COL32(200, 200, 200, 255), text);
 }
 
-}  // namespace
-
-void path_field(const char* label, std::filesystem::path& path) {
-    char text[1024];
-    const std::string now = path.string();
-    std::strncpy(text, now.c_str(), sizeof text - 1);
-    text[sizeof text - 1] = '\0';
-    if (ImGui::InputText(label, text, sizeof text)) path = text;
-}
-
-void draw_panels(Session& s, int width_px, int height_px) {
-    const float width = static_cast<float>(width_px), height = static_cast<float>(height_px);
-    if (s.show_region) draw_region(s, width_px, height_px);
-    empty_hint(s, width, height);
+void side_panel(Session& s, float height) {
     ImGui::SetNextWindowPos(ImVec2(8, 8), ImGuiCond_FirstUseEver);
     ImGui::SetNextWindowSizeConstraints(ImVec2(kWidth * s.gui_scale, 0),
                                         ImVec2(kWidth * s.gui_scale, height - 16));
@@ -106,6 +95,25 @@ void draw_panels(Session& s, int width_px, int height_px) {
     }
     ImGui::PopItemWidth();
     ImGui::End();
+}
+
+}  // namespace
+
+void path_field(const char* label, std::filesystem::path& path) {
+    char text[1024];
+    const std::string now = path.string();
+    std::strncpy(text, now.c_str(), sizeof text - 1);
+    text[sizeof text - 1] = '\0';
+    if (ImGui::InputText(label, text, sizeof text)) path = text;
+}
+
+void draw_panels(Session& s, int width_px, int height_px) {
+    const float width = static_cast<float>(width_px), height = static_cast<float>(height_px);
+    empty_hint(s, width, height);
+    if (s.panels) {
+        if (s.show_region) draw_region(s, width_px, height_px);
+        side_panel(s, height);
+    }
     progress_window(s, width, height);
     error_window(s, width, height);
 }

@@ -17,7 +17,9 @@ void performance_panel(Session& s) {
     } else {
         ImGui::TextDisabled("in motion: not moved yet");
     }
-    ImGui::Text("at rest: %.1f ms, picture at %.0f %% now", t.full_ms, t.scale * 100);
+    ImGui::Text("at rest: %.1f ms", t.full_ms);
+    ImGui::Text("now: %.0f %% of the size, %.0f %% of the splats", t.quality.scale * 100,
+                t.quality.splats * 100);
     ImGui::Text("%u visible, %u splat-tile pairs", t.visible, t.pairs);
     double total = 0;
     for (const PassTime& pass : t.passes) total += pass.ms;

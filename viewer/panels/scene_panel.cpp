@@ -72,7 +72,10 @@ void display_panel(Session& s) {
             d.style = static_cast<SplatStyle>(style);
     }
     kernel_choice(s);
-    ImGui::SliderInt("SH degree", &d.sh_degree, 0, 3);
+    if (s.shown_sh_degree > 0)
+        ImGui::SliderInt("SH degree", &d.sh_degree, 0, s.shown_sh_degree);
+    else
+        ImGui::TextDisabled("no view-dependent colour");
     ImGui::ColorEdit3("background", &d.background.x);
 }
 

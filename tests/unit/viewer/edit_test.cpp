@@ -1,10 +1,9 @@
-// Selection, deletion, undo; resolution control; cameras for a window; picking.
+// Selection, deletion, undo; cameras for a window; picking.
 #include "viewer/edit.h"
 
 #include <gtest/gtest.h>
 
 #include "viewer/bounds.h"
-#include "viewer/resolution.h"
 #include "viewer/view_camera.h"
 
 namespace darb {
@@ -106,26 +105,6 @@ TEST(Bounds, Far_background_does_not_shrink_the_scene) {
     EXPECT_NEAR(b.centre.x, 0.5, 0.02);
     EXPECT_NEAR(b.centre.y, 0, 1e-6);
     EXPECT_NEAR(b.radius, 0.5, 0.05);
-}
-
-TEST(ResolutionControl, Slow_pixels_lower_it_and_fast_ones_raise_it_again) {
-    ResolutionControl control(33);
-    const auto scale = [&] { return control.moving_scale(); };
-    for (int i = 0; i < 40; ++i) control.measured(400 * scale() * scale());  // 0.4 s at full size
-    EXPECT_EQ(scale(), 2.0 / 8);
-    for (int i = 0; i < 300; ++i) control.measured(1);
-    EXPECT_EQ(scale(), 1);
-}
-
-// Cost of the splats, whatever the size: a coarser picture would be no faster.
-TEST(ResolutionControl, Pixels_that_cost_nothing_are_not_given_away) {
-    ResolutionControl control(33);
-    double lowest = 1;
-    for (int i = 0; i < 200; ++i) {
-        control.measured(50 + 4 * control.moving_scale());
-        lowest = std::min(lowest, control.moving_scale());
-    }
-    EXPECT_GE(lowest, 3.0 / 8);
 }
 
 TEST(ViewCamera, Fitted_photo_camera_centres_its_frame) {

@@ -1,0 +1,123 @@
+// The control of frames in motion on modelled devices, and the order of importance.
+#include "viewer/motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "viewer/importance.h"
+
+namespace darb {
+namespace {
+
+// A device on which a whole picture takes so long for its splats and its pixels.
+struct Modelled {
+    double fixed_ms, splats_ms, pixels_ms;
+    MotionCost cost(const MotionQuality& q) const {
+        return {fixed_ms, splats_ms * q.splats, pixels_ms * q.scale * q.scale};
+    }
+};
+
+MotionQuality after(MotionControl& control, const Modelled& device, int frames) {
+    for (int i = 0; i < frames; ++i) control.measured(device.cost(control.quality()));
+    return control.quality();
+}
+
+TEST(MotionControl, Every_slow_device_ends_within_the_target) {
+    for (const Modelled& device :
+         {Modelled{5, 80, 10}, Modelled{5, 10, 300}, Modelled{10, 90, 90}, Modelled{2, 900, 60}}) {
+        MotionControl control(33);
+        control.start(0.5);
+        const double ms = device.cost(after(control, device, 300)).total_ms();
+        EXPECT_LE(ms, 33) << device.splats_ms << ", " << device.pixels_ms;
+        EXPECT_GE(ms, 15) << device.splats_ms << ", " << device.pixels_ms;
+    }
+}
+
+TEST(MotionControl, What_costs_more_is_what_is_given_up) {
+    MotionControl control(33);
+    control.start(1);
+    const MotionQuality many = after(control, {5, 200, 5}, 300);
+    EXPECT_LT(many.splats, 0.25);
+    EXPECT_GE(many.scale, 0.5);
+    control.start(1);
+    const MotionQuality large = after(control, {5, 5, 200}, 300);
+    EXPECT_GE(large.splats, 0.25);
+    EXPECT_LT(large.scale, 0.5);
+}
+
+TEST(MotionControl, A_quick_device_gets_the_whole_picture_within_a_second) {
+    MotionControl control(33);
+    control.start(0.5);
+    EXPECT_EQ(after(control, {1, 2, 3}, 120), MotionQuality());
+}
+
+// Between the share that is held in order and all splats there is nothing: no change to and fro.
+TEST(MotionControl, It_comes_to_rest) {
+    for (const Modelled& device : {Modelled{2, 45, 2}, Modelled{5, 30, 30}, Modelled{20, 5, 5}}) {
+        MotionControl control(33);
+        control.start(0.5);
+        const MotionQuality settled = after(control, device, 300);
+        for (int i = 0; i < 200; ++i) EXPECT_EQ(after(control, device, 1), settled) << i;
+    }
+}
+
+TEST(MotionControl, One_slow_frame_changes_nothing) {
+    MotionControl control(33);
+    control.start(0.5);
+    const Modelled device{5, 20, 20};
+    const MotionQuality settled = after(control, device, 300);
+    control.measured({500, 20, 20});
+    EXPECT_EQ(after(control, device, 1), settled);
+}
+
+TEST(MotionControl, Where_nothing_helps_a_fifth_of_the_time_is_left_for_the_picture) {
+    MotionControl control(33);
+    control.start(1);
+    const Modelled device{80, 10, 10};
+    const MotionCost cost = device.cost(after(control, device, 300));
+    EXPECT_GT(cost.splats_ms + cost.pixels_ms, 3);
+}
+
+TEST(MotionCost, Passes_are_told_apart) {
+    const std::vector<PassTime> passes = {{"project", 4}, {"emit", 2}, {"blend", 8}};
+    const MotionCost cost = motion_cost(20, passes);
+    EXPECT_DOUBLE_EQ(cost.splats_ms, 5);
+    EXPECT_DOUBLE_EQ(cost.pixels_ms, 9);
+    EXPECT_DOUBLE_EQ(cost.total_ms(), 20);
+}
+
+// Splat i: opacity logit and log scale as given, one unit wide in the third axis.
+SplatModel scene(const std::vector<std::array<float, 3>>& splats) {
+    SplatModel m;
+    m.sh_degree = 1;
+    m.resize(splats.size());
+    for (size_t i = 0; i < splats.size(); ++i) {
+        m.opacity[i] = splats[i][0];
+        for (size_t c = 0; c < 2; ++c) m.log_scale[3 * i + c] = splats[i][1];
+        m.log_scale[3 * i + 2] = -20;
+        m.position[3 * i] = splats[i][2];
+        for (size_t c = 0; c < 9; ++c) m.sh_rest[9 * i + c] = static_cast<float>(i);
+    }
+    return m;
+}
+
+TEST(Importance, Large_opaque_and_near_come_first) {
+    const SplatModel m = scene({{-4, 0, 0},      // nearly transparent
+                                {2, -3, 0},      // small
+                                {2, 0, 0},       // the most
+                                {2, 1, 1000},    // large and very far
+                                {1, 0, 0}});     // less opaque
+    const Bounds bounds{glm::dvec3(0.0), 1};
+    EXPECT_EQ(most_important(m, bounds, 5), (std::vector<std::uint32_t>{2, 4, 0, 1, 3}));
+    EXPECT_EQ(most_important(m, bounds, 2), (std::vector<std::uint32_t>{2, 4}));
+    EXPECT_TRUE(most_important(m, bounds, 0).empty());
+    const SplatModel two = picked(m, {3, 1});
+    ASSERT_EQ(two.size(), 2u);
+    EXPECT_EQ(two.position[0], 1000);
+    EXPECT_EQ(two.sh_rest[9], 1);
+    EXPECT_EQ(two.log_scale[3], -3);
+}
+
+}  // namespace
+}  // namespace darb

@@ -1,0 +1,34 @@
+#!/bin/sh
+# tools/view_times.sh OUT.json SCENE...: frame times of darb view at 1280x720 in a window, for each
+# scene; on a virtual display where there is none. On a machine that does nothing else.
+set -eu
+if [ $# -lt 2 ]; then
+    echo "usage: tools/view_times.sh OUT.json SCENE..." >&2
+    exit 2
+fi
+darb=${DARB:-$(dirname "$0")/../build/darb}
+out=$1
+shift
+folder=$(mktemp -d)
+xvfb=
+trap 'rm -rf "$folder"; [ -z "$xvfb" ] || kill "$xvfb"' EXIT
+if [ -z "${DISPLAY:-}" ]; then
+    Xvfb -displayfd 3 -screen 0 1600x900x24 -nolisten tcp 3>"$folder/display" 2>"$folder/xvfb.log" &
+    xvfb=$!
+    while [ ! -s "$folder/display" ]; do sleep 0.1; done
+    DISPLAY=:$(cat "$folder/display")
+    export DISPLAY
+fi
+n=0
+for scene in "$@"; do
+    n=$((n + 1))
+    "$darb" view "$scene" --size 1280x720 --times "$folder/$n.json"
+done
+{
+    echo "["
+    for i in $(seq "$n"); do
+        [ "$i" = 1 ] || echo ","
+        cat "$folder/$i.json"
+    done
+    echo "]"
+} >"$out"
