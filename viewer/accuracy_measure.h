@@ -1,5 +1,5 @@
-// AccuracyMeasure: what each choice of each accuracy setting and effect costs and changes, at the camera
-// of the moment; one choice a call so that a window stays alive.
+// AccuracyMeasure: what each choice of each accuracy setting and effect costs and changes, at the
+// camera of the moment; one choice a call so that a window stays alive.
 #pragma once
 
 #include <functional>

@@ -70,8 +70,8 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     if (scene.is_points) scene.notes.emplace_back("Points are shown as opaque balls.");
     if (progress) progress(0.95, "measuring");
     scene.bounds = scene_bounds(scene.model);
-    scene.important = most_important(scene.model, scene.bounds,
-                                     std::min(scene.model.size() / 2, kMostMoving));
+    scene.important =
+        most_important(scene.model, scene.bounds, std::min(scene.model.size() / 2, kMostMoving));
     scene.load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return scene;
 }

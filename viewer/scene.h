@@ -20,8 +20,8 @@ struct Scene {
     std::filesystem::path file;
     SplatModel model;
     Bounds bounds;
-    std::string format;      // as format_name says it
-    bool is_points = false;  // a point cloud: no splat parameters in the file
+    std::string format;                    // as format_name says it
+    bool is_points = false;                // a point cloud: no splat parameters in the file
     std::vector<std::uint32_t> important;  // what is drawn in motion, most important first
     double load_s = 0;
     std::vector<std::string> notes;  // what was dropped or cannot be shown, a sentence each

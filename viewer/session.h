@@ -74,7 +74,8 @@ struct MeasuredChoice {
 /// What panels and keys ask for; the viewer does it after the panels of a frame and clears it.
 struct Requests {
     bool frame_all = false, take_picture = false, save = false, quit = false;
-    bool full_screen = false, leave_full_screen = false, cancel_load = false, load_path = false, save_path = false;
+    bool full_screen = false, leave_full_screen = false, cancel_load = false, load_path = false,
+         save_path = false;
     bool measure = false;
     bool export_path = false, cancel_export = false, opacity_changed = false;
 };
@@ -86,7 +87,7 @@ struct Session {
     bool show_region = false;
     std::filesystem::path save_file;
     Navigation navigation;
-    double fly_speed = 1;  // world units a second
+    double fly_speed = 1;          // world units a second
     DisplaySettings display, own;  // own: as the scene is meant to be shown
     Photos photos;
     PathState path;

@@ -139,8 +139,7 @@ const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
         some_as_ = style;
     }
     const double count = share * static_cast<double>(model_->size());
-    some_->set_count(
-        static_cast<std::uint32_t>(std::clamp(count, 1.0, double(important_.size()))));
+    some_->set_count(static_cast<std::uint32_t>(std::clamp(count, 1.0, double(important_.size()))));
     return *some_;
 }
 
@@ -224,8 +223,7 @@ std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const Display
 void SplatPicture::render(const Camera& camera, const DisplaySettings& display,
                           const PhotoOverlay& photo, std::optional<double> moving) {
     compiled_ = false;
-    const GpuSplats& shown =
-        moving ? some_styled(display.style, *moving) : styled(display.style);
+    const GpuSplats& shown = moving ? some_styled(display.style, *moving) : styled(display.style);
     Forward& forward = forward_for(shown, display, moving.has_value());
     const gpu::CameraData data = camera_data(camera, shown.origin(), display.near_plane);
     const Buffer cameras = upload_cameras(*device_, {data});

@@ -51,8 +51,8 @@ class SplatPicture {
 
     /// Whether a picture in motion needs nothing that is not there yet: pipelines, uploads.
     bool ready_to_move(const DisplaySettings& display) const;
-    /// Renders in motion; pixels, size and counters stay those of the last render. Returns the times
-    /// of the passes.
+    /// Renders in motion; pixels, size and counters stay those of the last render. Returns the
+    /// times of the passes.
     std::vector<PassTime> rehearse(const Camera& camera, const DisplaySettings& display,
                                    double moving);
     /// The largest share below 1 of the splats that render takes as `moving`.

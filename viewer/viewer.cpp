@@ -16,7 +16,7 @@ namespace {
 constexpr double kRest_s = 0.12;  // without change, before the picture is refined
 constexpr double kStep_s = 1.0 / 60;
 constexpr size_t kTimesKept = 60;  // frames in motion that the panel averages over
-constexpr int kRehearsals = 8;   // of motion, after the one that compiles
+constexpr int kRehearsals = 8;     // of motion, after the one that compiles
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 glm::dvec3 start_up(const ViewerOptions& options) {
@@ -32,7 +32,9 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 Camera scaled(const Camera& camera, double scale) {
-    const auto px = [&](int full) { return std::max(1, static_cast<int>(std::lround(full * scale))); };
+    const auto px = [&](int full) {
+        return std::max(1, static_cast<int>(std::lround(full * scale)));
+    };
     return resized(camera, px(camera.width), px(camera.height));
 }
 
@@ -374,8 +376,8 @@ void Viewer::rehearse_motion(const PictureKey& key) {
         for (int i = 0; i <= kRehearsals; ++i) {
             const MotionQuality quality = motion_.quality();
             const auto start = Clock::now();
-            const std::vector<PassTime> passes = picture_.rehearse(
-                scaled(key.camera, quality.scale), key.display, quality.splats);
+            const std::vector<PassTime> passes =
+                picture_.rehearse(scaled(key.camera, quality.scale), key.display, quality.splats);
             if (picture_.compiled()) continue;
             motion_.measured(motion_cost(besides_ms + milliseconds_since(start), passes));
         }

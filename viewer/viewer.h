@@ -108,7 +108,7 @@ class Viewer {
     bool drawn_any_ = false, drawn_moving_ = false;  // what the picture now is
     int version_ = 0;                                // of the scene and its edits
     bool drew_moving_ = false;                       // in this frame
-    bool continuous_ = false;  // the last frame wanted this one at once
+    bool continuous_ = false;                        // the last frame wanted this one at once
     Clock::time_point frame_start_, changed_at_, last_frame_;
 };
 

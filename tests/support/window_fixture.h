@@ -32,7 +32,8 @@ inline bool on_path(const std::string& program) {
     std::string rest = list != nullptr ? list : "";
     while (!rest.empty()) {
         const size_t end = std::min(rest.find(':'), rest.size());
-        if (::access((std::filesystem::path(rest.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
+        if (::access((std::filesystem::path(rest.substr(0, end)) / program).c_str(), X_OK) == 0)
+            return true;
         rest.erase(0, std::min(end + 1, rest.size()));
     }
     return false;
@@ -106,8 +107,8 @@ class DisplayTest : public ::testing::Test {
     void SetUp() override {
         if (!on_path("Xvfb") || !on_path("xdotool"))
             GTEST_SKIP() << "no Xvfb or xdotool: tools/setup.sh installs them";
-        folder_ = std::filesystem::temp_directory_path() /
-                  ("darb_window_" + std::to_string(::getpid()));
+        folder_ =
+            std::filesystem::temp_directory_path() / ("darb_window_" + std::to_string(::getpid()));
         std::filesystem::create_directories(folder_);
         start_display();
     }
@@ -169,14 +170,12 @@ class DisplayTest : public ::testing::Test {
         return last;
     }
     bool changes_from(const ImageU8& image, int by) {
-        return eventually([&] {
-            return largest_difference(screen(image.width, image.height), image) > by;
-        });
+        return eventually(
+            [&] { return largest_difference(screen(image.width, image.height), image) > by; });
     }
     bool shows(const ImageU8& wanted) {
-        return eventually([&] {
-            return largest_difference(screen(wanted.width, wanted.height), wanted) == 0;
-        });
+        return eventually(
+            [&] { return largest_difference(screen(wanted.width, wanted.height), wanted) == 0; });
     }
 
     std::filesystem::path folder_;

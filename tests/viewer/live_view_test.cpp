@@ -11,10 +11,10 @@ using LiveViewTest = DisplayTest;
 
 TEST_F(LiveViewTest, Run_pauses_steps_and_goes_on_when_the_window_is_closed_slow) {
     const std::filesystem::path out = folder_ / "run";
-    program_.emplace(Words{DARB_COMMAND, "train", DARB_SOURCE_DIR "/assets/scene", "-o",
-                           out.string(), "--iterations", "400", "-r", "8", "--effects", "none",
-                           "--view"},
-                     folder_ / "train.log");
+    program_.emplace(
+        Words{DARB_COMMAND, "train", DARB_SOURCE_DIR "/assets/scene", "-o", out.string(),
+              "--iterations", "200", "-r", "8", "--effects", "none", "--view"},
+        folder_ / "train.log");
     const ImageU8 empty(kDisplayWidth, kDisplayHeight, 3);
     ASSERT_TRUE(changes_from(empty, 100)) << log("train.log");
     xdo({"mousemove", "600", "400", "key", "space"});
@@ -30,8 +30,7 @@ TEST_F(LiveViewTest, Run_pauses_steps_and_goes_on_when_the_window_is_closed_slow
     EXPECT_TRUE(shows(empty)) << "the window is still there";
     EXPECT_TRUE(eventually([&] { return !program_->running(); }));
     EXPECT_EQ(program_->wait(), 0) << log("train.log");
-    EXPECT_TRUE(std::filesystem::exists(
-        out / "point_cloud" / "iteration_400" / "point_cloud.ply"))
+    EXPECT_TRUE(std::filesystem::exists(out / "point_cloud" / "iteration_200" / "point_cloud.ply"))
         << log("train.log");
 }
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -320,7 +321,8 @@ TEST_F(ViewerTest, Picture_is_coarse_in_motion_and_refined_at_rest) {
     EXPECT_LE(largest_difference(shot(), at_rest), 2);  // the turns cancel up to rounding
 }
 
-// What a first frame in motion needs is made while nothing moves; the picture does not change by it.
+// What a first frame in motion needs is made while nothing moves; the picture does not change by
+// it.
 TEST_F(ViewerTest, The_first_frame_in_motion_has_nothing_to_wait_for) {
     load(file_);
     DisplaySettings& d = viewer_->session().display;
@@ -346,8 +348,7 @@ TEST_F(ViewerTest, Motion_shows_the_important_splats_and_no_deleted_ones) {
     const ImageU8 whole = shot();
     SplatPicture picture(shared_device());
     const Scene& s = *viewer_->session().scene;
-    picture.set_scene(s.model, s.bounds,
-                      most_important(s.model, s.bounds, s.model.size() / 2));
+    picture.set_scene(s.model, s.bounds, most_important(s.model, s.bounds, s.model.size() / 2));
     EXPECT_DOUBLE_EQ(picture.most_moving(), 0.5);
     const auto light = [&](std::optional<double> moving) {
         picture.render(scene_.camera, viewer_->session().display, {}, moving);
@@ -386,9 +387,9 @@ TEST_F(ViewerTest, Load_reports_progress_and_is_cancelled_while_it_decodes) {
     std::vector<double> shares;
     load_scene_file(file_, [&](double share, const char*) { shares.push_back(share); });
     EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
-    EXPECT_GE(std::count_if(shares.begin(), shares.end(),
-                            [](double s) { return s > 0.41 && s < 0.94; }),
-              2);
+    EXPECT_GE(
+        std::count_if(shares.begin(), shares.end(), [](double s) { return s > 0.41 && s < 0.94; }),
+        2);
     struct Stop {};
     EXPECT_THROW(load_scene_file(file_,
                                  [](double share, const char*) {
@@ -465,6 +466,17 @@ TEST_F(ViewerTest, Path_export_writes_a_frame_for_each_time_step) {
     EXPECT_FALSE(fs::exists(s.path.folder / "frame_00003.png"));
     const ImageU8 last = read_image(s.path.folder / "frame_00002.png");
     EXPECT_EQ(largest_difference(last, shot()), 0);  // the camera is at the last key
+    const bool has_ffmpeg = std::system("command -v ffmpeg > /dev/null") == 0;
+    const fs::path video = s.path.folder / "video.mp4";
+    EXPECT_EQ(fs::exists(video) && fs::file_size(video) > 0, has_ffmpeg) << s.note;
+
+    s.path.folder = folder_ / "no_ffmpeg";
+    const std::string programs = std::getenv("PATH");
+    ::setenv("PATH", folder_.c_str(), 1);
+    viewer_->export_path_now();
+    ::setenv("PATH", programs.c_str(), 1);
+    EXPECT_TRUE(fs::exists(s.path.folder / "frame_00002.png"));
+    EXPECT_NE(s.note.find("no video, ffmpeg is not installed"), std::string::npos) << s.note;
 }
 
 }  // namespace

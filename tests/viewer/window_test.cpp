@@ -1,5 +1,5 @@
-// The viewer in a real window under Xvfb, driven by mouse, keys and drops; what the display shows is
-// compared with a headless screenshot.
+// The viewer in a real window under Xvfb, driven by mouse, keys and drops; what the display shows
+// is compared with a headless screenshot.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -113,8 +113,7 @@ TEST_F(WindowTest, Full_screen_and_back_slow) {
 
 // At twice the dots per inch the side panel, 330 px wide at 96, covers x = 500.
 TEST_F(WindowTest, Panels_grow_with_the_dots_per_inch_slow) {
-    const ImageU8 bare =
-        headless(folder_ / "scene.ply", {"-w"}, kDisplayWidth, kDisplayHeight);
+    const ImageU8 bare = headless(folder_ / "scene.ply", {"-w"}, kDisplayWidth, kDisplayHeight);
     set_display_dpi(192);
     start({"-w"}, "800x600");
     EXPECT_TRUE(eventually([&] {
@@ -150,8 +149,8 @@ TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_slow) {
         EXPECT_TRUE(shows(before)) << "the scene before is gone at " << file;
         const ImageU8 wanted = headless(file);
         ASSERT_TRUE(drop_on_window("darb", file));
-        EXPECT_TRUE(shows(wanted)) << file << " differs by "
-                                   << largest_difference(window(), wanted);
+        EXPECT_TRUE(shows(wanted))
+            << file << " differs by " << largest_difference(window(), wanted);
         before = wanted;
     }
     EXPECT_TRUE(program_->running()) << log("view.log");

@@ -1,4 +1,5 @@
-// Accuracy settings and effects as switches, each choice with its measured time and error beside it.
+// Accuracy settings and effects as switches, each choice with its measured time and error beside
+// it.
 #include <imgui.h>
 
 #include <cmath>

@@ -103,11 +103,11 @@ SplatModel scene(const std::vector<std::array<float, 3>>& splats) {
 }
 
 TEST(Importance, Large_opaque_and_near_come_first) {
-    const SplatModel m = scene({{-4, 0, 0},      // nearly transparent
-                                {2, -3, 0},      // small
-                                {2, 0, 0},       // the most
-                                {2, 1, 1000},    // large and very far
-                                {1, 0, 0}});     // less opaque
+    const SplatModel m = scene({{-4, 0, 0},    // nearly transparent
+                                {2, -3, 0},    // small
+                                {2, 0, 0},     // the most
+                                {2, 1, 1000},  // large and very far
+                                {1, 0, 0}});   // less opaque
     const Bounds bounds{glm::dvec3(0.0), 1};
     EXPECT_EQ(most_important(m, bounds, 5), (std::vector<std::uint32_t>{2, 4, 0, 1, 3}));
     EXPECT_EQ(most_important(m, bounds, 2), (std::vector<std::uint32_t>{2, 4}));
