@@ -60,7 +60,8 @@ Json header_of(const Checkpoint& c) {
                 {"counters", {n.redone_iterations, n.bad_gradients, n.cloned_or_split, n.pruned}},
                 {"culled", n.culled},
                 {"overflows", n.overflows},
-                {"longest_list", n.longest_list}};
+                {"longest_list", n.longest_list},
+                {"huge_splats", n.huge_splats}};
 }
 
 void read_header(const Json& h, Checkpoint& c, const std::string& where) {
@@ -89,6 +90,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     n.pruned = h.at("counters").at(3).get<std::uint64_t>();
     n.overflows = h.value("overflows", std::uint64_t{0});  // absent in earlier files
     n.longest_list = h.value("longest_list", 0u);
+    n.huge_splats = h.value("huge_splats", 0u);
     n.culled = h.at("culled").get<decltype(n.culled)>();
 }
 
@@ -193,6 +195,8 @@ std::string settings_text(const TrainOptions& o) {
                   {"exposure", o.exposure},
                   {"off_centre", o.off_centre},
                   {"lens", o.lens},
+                  {"alpha", o.alpha},
+                  {"near", o.near_care},
                   {"exposure_lr", {o.exposure_lr_init, o.exposure_lr_final}}}},
                 {"white_background", o.white_background},
                 {"random_background", o.random_background},

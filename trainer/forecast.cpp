@@ -177,14 +177,13 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
                            bool measure) {
     const SplatModel start = initial_model(dataset, options);
     Forecast f;
-    add_photos(dataset.views, f.demand);
+    add_photos(dataset.views, options, f.demand);
     f.start_splats = static_cast<std::uint32_t>(start.size());
     const std::uint32_t limit =
         std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);
     f.demand.splats = f.splats;
     f.demand.pairs = std::uint64_t{kMinPairsPerSplat} * f.splats;
-    f.demand.sh_degree = options.sh_degree;
     f.demand.densifies = options.densify_end() > options.densify_from;
     if (measure && f.demand.photo_pixels > 0) try {
             measure_both(scratch, dataset, start, options, f);

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "shaders/shared/effect_args.h"
+#include "shaders/shared/render_args.h"
+
 namespace darb {
 
 namespace {
@@ -19,6 +22,11 @@ constexpr std::uint64_t kPhotoBytes = 4;  // RGBA
 constexpr std::uint64_t kImageBytes = 2 * 12 + 2 * 4;
 // Five words and two offsets into sources, two words each for up to twice the splats.
 constexpr std::uint64_t kDensifyBytes = 5 * 4 + 2 * 2 * 4;
+// Exposure: a second picture of three planes; a map and two moments a photo; partial sums.
+constexpr std::uint64_t kMappedBytes = 12, kMapBytes = 3 * EXPOSURE_TERMS * 4,
+                        kMapPartials = EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS * 4;
+// The 3D filter: a deviation a splat, and the cameras a second time.
+constexpr std::uint64_t kDeviationBytes = 4;
 // Counters of sort and scan, smaller than a word per splat or pair together.
 constexpr double kCounters = 0.25;
 
@@ -38,6 +46,12 @@ MemoryPlan plan_memory(const MemoryDemand& demand) {
                  static_cast<std::uint64_t>(kCounters * static_cast<double>(demand.pairs));
     plan.photos = demand.photo_pixels * kPhotoBytes;
     plan.images = demand.image_pixels * kImageBytes;
+    if (demand.exposure_photos > 0)
+        plan.effects += demand.image_pixels * kMappedBytes + demand.exposure_photos * kMapBytes +
+                        kMapPartials;
+    if (demand.smoothing_photos > 0)
+        plan.effects +=
+            n * kDeviationBytes + demand.smoothing_photos * sizeof(gpu::CameraData);
     // Attributes are replaced one at a time: the largest, the moments of one, exists twice.
     if (demand.densifies)
         plan.densify = n * (kDensifyBytes + 2 * kFloat * std::max<std::uint64_t>(rest, 4));
@@ -55,12 +69,18 @@ std::uint64_t splats_within(const MemoryDemand& demand, std::uint64_t budget_byt
                                       static_cast<double>(bytes));
 }
 
-void add_photos(const std::vector<View>& views, MemoryDemand& demand) {
+void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand) {
+    demand.sh_degree = options.sh_degree;
+    std::uint64_t training = 0;
     for (const View& view : views) {
         const std::uint64_t pixels = std::uint64_t(view.camera.width) * view.camera.height;
         demand.image_pixels = std::max(demand.image_pixels, pixels);
-        if (!view.is_test) demand.photo_pixels += pixels;
+        if (view.is_test) continue;
+        demand.photo_pixels += pixels;
+        ++training;
     }
+    demand.exposure_photos = options.exposure ? training : 0;
+    demand.smoothing_photos = options.antialias ? training : 0;
 }
 
 }  // namespace darb

@@ -173,7 +173,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     progress_.finish();
     summary_.iteration = trainer_.iteration();
     summary_.seconds = seconds_;
-    summary_.report = log_.finish(summary_, trainer_, device_);
+    summary_.report = log_.finish(summary_, trainer_, device_, run_.report);
     return summary_;
 }
 

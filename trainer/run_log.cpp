@@ -125,6 +125,20 @@ void RunLog::start(Device& device, const Dataset& dataset, const TrainOptions& o
     write(start_);
 }
 
+namespace {
+
+// Floats to six digits: 0.01 rather than 0.009999999776.
+std::string setting_text(const Json& value) {
+    if (value.is_string()) return value.get<std::string>();
+    if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
+    if (!value.is_array()) return value.dump();
+    std::string text;
+    for (const Json& item : value) text += (text.empty() ? "" : ", ") + setting_text(item);
+    return text;
+}
+
+}  // namespace
+
 void RunLog::failure(int iteration, const std::string& what) {
     write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
 }
@@ -198,15 +212,18 @@ ReportData RunLog::report_data(const RunSummary& summary, const Json& metrics) c
             "measured at the start: {:.1f} GB/s of copies, {:.1f} billion multiply-adds a second.",
             1e-9 * rates_.bytes_per_s, 1e-9 * rates_.fma_per_s));
     for (const auto& [name, value] : start_["settings"].items())
-        data.settings.emplace_back(name,
-                                   value.is_string() ? value.get<std::string>() : value.dump());
+        if (name != "effects") data.settings.emplace_back(name, setting_text(value));
+    for (const Json& effect : start_.value("effects", Json::array()))
+        data.settings.emplace_back("effect " + effect.value("effect", ""),
+                                   (effect.value("on", false) ? "on: " : "off: ") +
+                                       effect.value("reason", ""));
     data.pictures = summary.pictures;
     for (const Json& note : start_["notes"]) data.notes.push_back(note.get<std::string>());
     return data;
 }
 
 std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& trainer,
-                                     const Device& device) {
+                                     const Device& device, bool with_report) {
     const TrainCounters& c = trainer.counters();
     Json passes = Json::array();
     FrameCounts mean = counts_;
@@ -242,6 +259,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"redone_iterations", c.redone_iterations},
         {"overflows", c.overflows},
         {"longest_list", c.longest_list},
+        {"huge_splats", c.huge_splats},
         {"splats_stopped_by_memory", trainer.stopped_by_memory()},
         {"bad_gradients", c.bad_gradients},
         {"cloned_or_split", c.cloned_or_split},
@@ -252,6 +270,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"sh_degree", trainer.sh_degree()},
         {"evaluations", evaluations}};
     write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
+    if (!with_report) return {};
     const auto report = folder_ / "report.html";
     write_report(report, report_data(summary, metrics));
     return report;

@@ -36,9 +36,9 @@ class RunLog {
     /// What ended the run before its time.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);
-    /// metrics.json and report.html; returns the report's path.
+    /// metrics.json and, with_report, report.html; returns the path of the report, if any.
     std::filesystem::path finish(const RunSummary& summary, const Trainer& trainer,
-                                 const Device& device);
+                                 const Device& device, bool with_report);
 
     static constexpr int kLogInterval = 50;  // iterations a line, values averaged over them
 

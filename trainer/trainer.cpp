@@ -26,7 +26,8 @@ ForwardOptions forward_options(const TrainOptions& options) {
     set_options(options.accuracy, f);
     f.sh_stored = options.probe_sh ? 0 : options.sh_degree;
     f.effects = {options.off_centre || options.lens, options.antialias, options.antialias,
-                 options.lens};
+                 options.lens, options.near_care};
+    f.crowds = options.crowds;
     f.store_for_backward = true;
     return f;
 }
@@ -67,11 +68,12 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options), BackwardResult::update),
       loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height),
-            LossOptions{.use_mask = dataset.alpha_is_mask}),
+            LossOptions{.use_alpha = options.alpha,
+                        .use_mask = options.alpha && dataset.alpha_is_mask}),
       density_(device, options.kernel),
       flights_{Flight(device), Flight(device)} {
     if (options_.max_memory_bytes > 0) device.set_memory_budget(options_.max_memory_bytes);
-    add_photos(dataset.views, demand_);
+    add_photos(dataset.views, options, demand_);
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
                dataset.views.size());
     std::uint64_t pixels = 1;
@@ -221,6 +223,8 @@ gpu::FrameStatus Trainer::finish(Flight& flight) {
     for (size_t r = 0; r < counters_.culled.size(); ++r) counters_.culled[r] += status.culled[r];
     counters_.bad_gradients += status.bad_gradients;
     counters_.longest_list = std::max(counters_.longest_list, status.longest_list);
+    counters_.huge_splats = std::max(counters_.huge_splats, status.huge_splats);
+    forward_.note_crowds(status);
     check_gradients(iteration, status);
     for (const PassTime& pass : flight.commands.pass_times()) {
         const auto known = std::find_if(pass_totals_.begin(), pass_totals_.end(),
@@ -275,7 +279,6 @@ std::uint32_t Trainer::splats_within_memory() const {
     MemoryDemand demand = demand_;
     demand.splats = splats_.count();
     demand.pairs = forward_.pair_capacity();
-    demand.sh_degree = options_.sh_degree;
     const MemoryPlan plan = plan_memory(demand);
     const std::uint64_t in_use = device_->allocated_bytes();
     const std::uint64_t extra = in_use - std::min(in_use, plan.total() - plan.densify);

@@ -37,6 +37,7 @@ struct IterationResult {
 struct TrainCounters {
     std::uint64_t redone_iterations = 0, overflows = 0;  // an overflow redoes one or two iterations
     std::uint32_t longest_list = 0;                      // pairs of one tile, most in any frame
+    std::uint32_t huge_splats = 0;                       // most in any frame
     std::uint64_t bad_gradients = 0;
     std::uint64_t cloned_or_split = 0, pruned = 0;
     std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason

@@ -1,6 +1,6 @@
 // Dataset: photos with their cameras and the sparse points, from any of the supported sources.
 // Cameras are pinholes in the frame of engine/scene/camera.h, at the size the photos load with;
-// with DatasetOptions::original_lens those of distorted photos have the lens before them.
+// with DatasetOptions::original_lens or original_where_wide those of distorted photos have the lens before them.
 #pragma once
 
 #include <cstdint>
@@ -51,6 +51,7 @@ struct DatasetOptions {
                             // with a test file of their own use that in either case
     bool require_photos = true;  // false: cameras only (render)
     bool original_lens = false;  // true: distorted photos stay so, and their cameras have the lens
+    bool original_where_wide = false;  // true: so do those of too_wide_to_undistort
 };
 
 struct Dataset {

@@ -19,7 +19,7 @@ constexpr int kDefaultWidth = 1600;  // px; wider photos are scaled down unless 
 /// What happened to how many photos, for the notes.
 struct Tally {
     bool own_alpha = false;  // some photo has an alpha channel of its own
-    std::size_t resized = 0, unturned = 0, undistorted = 0, downscaled = 0;
+    std::size_t resized = 0, unturned = 0, undistorted = 0, too_wide = 0, downscaled = 0;
     std::string resize_example;
 };
 
@@ -103,6 +103,10 @@ void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& datas
     if (tally.undistorted > 0)
         dataset.notes.push_back(
             fmt::format("Undistorted at load: {}.", counted(tally.undistorted, "photo")));
+    if (tally.too_wide > 0)
+        dataset.notes.push_back(
+            fmt::format("Kept with their fisheye lens, too wide for flat pictures: {}.",
+                        counted(tally.too_wide, "photo")));
     if (tally.downscaled > 0 && options.resolution == -1)
         dataset.notes.push_back(
             fmt::format("Scaled down at load: {} wider than {} px; -r 1 keeps the size.",
@@ -141,11 +145,15 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
         std::vector<double> key = view.lens.parameters;
         key.insert(key.end(), {double(view.lens.width), double(view.lens.height)});
         const auto [at, is_new] = frames.try_emplace({view.lens.model, std::move(key)});
+        const bool kept_as_wide = !options.original_lens && options.original_where_wide &&
+                                  too_wide_to_undistort(view.lens);
+        const bool original = options.original_lens || kept_as_wide;
         if (is_new)
-            at->second = options.original_lens ? original_frame(view.lens)
-                                               : undistorted_frame(view.lens, view.name);
+            at->second =
+                original ? original_frame(view.lens) : undistorted_frame(view.lens, view.name);
         dataset.has_alpha |= at->second.has_gaps;
-        if (view.lens.distorted() && !options.original_lens) ++tally.undistorted;
+        if (kept_as_wide) ++tally.too_wide;
+        if (view.lens.distorted() && !original) ++tally.undistorted;
         set_intrinsics(view, at->second, options.resolution, tally);
     }
     dataset.alpha_is_mask = dataset.has_alpha && !tally.own_alpha;

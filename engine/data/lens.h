@@ -26,6 +26,10 @@ int lens_parameter_count(std::string_view model);
 /// finite, a focal length is not positive, or the size is not between 1 and 100,000 px.
 void check_lens(const LensModel& lens, const std::string& where);
 
+/// A fisheye (or FOV) whose photo reaches more than 60 degrees to some side, where a flat picture
+/// ends (see load_photo): undistorted it would lose its borders.
+bool too_wide_to_undistort(const LensModel& lens);
+
 /// The lens of the same photo scaled to width x height.
 LensModel scale_lens(const LensModel& lens, int width, int height);
 

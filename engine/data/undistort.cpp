@@ -91,6 +91,21 @@ Sample sample(const ImageU8& rgba, glm::dvec2 pixel) {
 
 }  // namespace
 
+bool too_wide_to_undistort(const LensModel& model) {
+    if (!model.distorted() || !(model.model.ends_with("FISHEYE") || model.model == "FOV"))
+        return false;
+    const Lens lens(model);
+    const glm::dvec2 middle = glm::clamp(lens.principal, glm::dvec2(0.5),
+                                         glm::dvec2(model.width - 0.5, model.height - 0.5));
+    for (const glm::dvec2 border :
+         {glm::dvec2(0.5, middle.y), glm::dvec2(model.width - 0.5, middle.y),
+          glm::dvec2(middle.x, 0.5), glm::dvec2(middle.x, model.height - 0.5)}) {
+        const auto ray = lens.unproject(border);
+        if (!ray || std::max(std::abs(ray->x), std::abs(ray->y)) > kMaxTangent) return true;
+    }
+    return false;
+}
+
 UndistortedFrame undistorted_frame(const LensModel& model, const std::string& where) {
     const Lens lens(model);
     UndistortedFrame frame;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include "engine/render/effects.h"
 #include "engine/scene/splat_model.h"
 #include "shaders/shared/effect_list.h"
+#include "shaders/shared/limits.h"
 
 namespace darb {
 
@@ -36,11 +38,22 @@ struct EffectPlan {
     const EffectRow& row(int effect) const { return rows[static_cast<std::size_t>(effect)]; }
     ProjectionEffects projection() const {
         return {on(EFFECT_OFF_CENTRE) || on(EFFECT_LENS), on(EFFECT_ANTIALIAS), false,
-                on(EFFECT_LENS)};
+                on(EFFECT_LENS), on(EFFECT_NEAR)};
     }
+    /// Counters decide, frame by frame, where the command line does not.
+    Crowds crowds() const {
+        if (!row(EFFECT_HUGE).overridden) return Crowds::by_counters;
+        return on(EFFECT_HUGE) ? Crowds::always : Crowds::never;
+    }
+    /// EFFECT_HUGE as the counters of a frame say; the most of several frames counts.
+    void note_frame(std::uint32_t huge_splats, std::uint32_t longest_list);
+
+  private:
+    std::uint32_t most_huge_ = 0, longest_list_ = 0;  // of the frames that were noted
 };
 
-/// "auto", "all", "none", or changes to auto: "+exposure,-sh".
+/// "auto", "all", "none", or changes to one of them, auto where none is named: "+exposure,-sh",
+/// "all,-lens".
 struct EffectChoice {
     enum class Base { automatic, all, none } base = Base::automatic;
     std::array<std::optional<bool>, EFFECT_COUNT> changed{};
@@ -51,9 +64,11 @@ EffectChoice parse_effects(std::string_view text);
 /// What a rendering asks for beside the pictures themselves.
 struct RenderOutputs {
     bool depth = false;
+    float near_plane = static_cast<float>(NEAR_DEFAULT);
 };
 
-/// For pictures of a scene through these cameras (none: only what the file decides). An effect that
+/// For pictures of a scene through these cameras (none: only what the file decides, and care for the
+/// near plane). An effect that
 /// is an identity where the rule says off may be forced on; anti-aliasing is as the file says, as
 /// another choice would show another scene: `all` leaves it alone, `none` and -antialias drop it.
 EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& views,
@@ -66,6 +81,8 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
 
 /// The model as the plan wants it: higher bands and the render mode dropped.
 void apply_plan(const EffectPlan& plan, SplatModel& model);
+/// The cameras as the plan wants them: pinholes where lenses are off.
+void apply_plan(const EffectPlan& plan, std::vector<View>& views);
 
 /// One line: the effects that are on, with their reasons.
 std::string plan_line(const EffectPlan& plan);

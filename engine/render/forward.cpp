@@ -99,10 +99,13 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     gather_counts_ = Pipeline(device, "gather_counts", per_item);
     groups_visible_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 0}}, false);
     groups_pairs_ = Pipeline(device, "frame_groups", {{"THREADS", 1}, {"STAGE", 1}}, false);
-    emit_ = Pipeline(device, "emit", of_splat);
     tile_ranges_ = Pipeline(device, "tile_ranges", per_item);
     list_lengths_ = Pipeline(device, "list_lengths", per_item);
-    make_blend(1);
+    emit_ = Pipeline(device, "emit", of_splat);
+    no_huge_rank_ = Buffer(device, "no huge splats", 4);
+    cooperates_ = options.crowds == Crowds::always;
+    if (cooperates_) make_cooperation();
+    make_blend(options.crowds == Crowds::always ? 2 : 1);
 
     status_ = Buffer(device, "frame status", sizeof(gpu::FrameStatus));
     groups_ = Buffer(device, "frame groups", sizeof(gpu::FrameGroups));
@@ -125,7 +128,28 @@ void Forward::make_blend(std::uint32_t segments) {
     list_segments_ = segments;
 }
 
+// At most so many huge splats begin within the capacity, each with more than HUGE_PAIRS pairs.
+void Forward::make_cooperation() {
+    if (!emit_huge_) {
+        SpecConstants constants = kernel_constants(options_);
+        constants["THREADS"] = SPLAT_GROUP;
+        constants["COOPERATE"] = 1;
+        emit_others_.emplace(*device_, "emit", constants);
+        emit_huge_.emplace(*device_, "emit_huge", kernel_constants(options_));
+    }
+    const std::uint64_t bytes = (std::uint64_t{pair_capacity_} / HUGE_PAIRS + 1) * 4;
+    if (!huge_rank_ || huge_rank_.bytes() < bytes)
+        huge_rank_ = Buffer(*device_, "huge splats", bytes);
+}
+
+void Forward::note_crowds(const gpu::FrameStatus& status) {
+    if (options_.crowds != Crowds::by_counters) return;
+    cooperates_ = status.huge_splats > 0;
+    if (cooperates_ && !emit_huge_) make_cooperation();
+}
+
 bool Forward::make_room(const gpu::FrameStatus& status) {
+    note_crowds(status);
     if (status.overflow == 0) return false;
     const std::uint32_t most = max_pairs(*device_);
     const std::uint32_t wanted =
@@ -202,6 +226,7 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         pair_splat_ = Buffer(d, "pair splat", k * 4);
         pair_order_ = Buffer(d, "pair order", k * 4);
         tile_sort_.emplace(d, pair_capacity_);
+        if (emit_huge_) make_cooperation();
     }
     if (tile_count > tile_capacity_) {
         tile_capacity_ = tile_count;
@@ -296,10 +321,16 @@ void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std:
                                offsetof(gpu::FrameGroups, visible_x));
     scan_->record(commands, pair_count_sorted_, pair_offset_, visible_in_use_, 0, pairs_total_);
     commands.dispatch(groups_pairs_, args, {status_, groups_, pairs_total_, pairs_in_use_}, 1);
-    commands.dispatch_indirect(emit_, args,
+    commands.dispatch_indirect(cooperates_ ? *emit_others_ : emit_, args,
                                {status_, depth_order_, pair_offset_, cover_, pair_tile_,
-                                pair_splat_, pair_begin_, splat_shape_, splat_bound_},
+                                pair_splat_, pair_begin_, splat_shape_, splat_bound_,
+                                cooperates_ ? huge_rank_ : no_huge_rank_},
                                groups_, offsetof(gpu::FrameGroups, visible_x));
+    if (cooperates_)
+        commands.dispatch(*emit_huge_, args,
+                          {status_, depth_order_, pair_offset_, cover_, pair_tile_, pair_splat_,
+                           huge_rank_, splat_shape_, splat_bound_},
+                          EMIT_HUGE_GROUPS);
 
     commands.pass("tile sort");
     tile_sort_->record(commands, pair_tile_, pair_order_, pairs_in_use_, 0, bits_for(tile_count),

@@ -36,6 +36,7 @@ struct ForwardOptions {
     int sh_stored = 0;                     // degree of the buffers
     ProjectionEffects effects;
     bool store_for_backward = false;
+    Crowds crowds = Crowds::by_counters;
 };
 
 /// The constants of these options that several passes share: kernel, storage and depth order.
@@ -66,6 +67,11 @@ class Forward {
     /// wanted and clears the status; the frame must then be recorded again. Throws Error where it
     /// can never fit. The queue must be idle.
     bool make_room(const gpu::FrameStatus& status);
+    /// Whether the next frame is emitted with a workgroup for each huge splat. note_crowds: the
+    /// counters of a frame decide on the next, where the options leave it to them; make_room calls
+    /// it. The queue may be busy.
+    bool cooperates() const { return cooperates_; }
+    void note_crowds(const gpu::FrameStatus& status);
     /// The most pairs that this device's buffer bindings allow.
     static std::uint32_t max_pairs(const Device& device);
 
@@ -111,6 +117,7 @@ class Forward {
     void record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t splat_count);
     void record_blend(Commands& commands, const gpu::CameraData& data, const glm::vec3& background);
     void make_blend(std::uint32_t segments);
+    void make_cooperation();
 
     Device* device_;
     ForwardOptions options_;
@@ -118,6 +125,8 @@ class Forward {
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
         list_lengths_, blend_;
     std::optional<Pipeline> depth_light_;  // made when a depth image is first asked for
+    std::optional<Pipeline> emit_others_, emit_huge_;  // made when a frame first has huge splats
+    bool cooperates_ = false;
     std::optional<Scan> scan_;
     std::optional<RadixSort> depth_sort_, tile_sort_;
     std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0, tile_capacity_ = 0;
@@ -129,6 +138,7 @@ class Forward {
     Buffer splat_shape_, splat_light_, splat_bound_, cover_, pair_count_, visible_, visible_offset_;
     Buffer depth_key_, depth_order_, pair_count_sorted_, pair_offset_, pair_begin_;
     Buffer pair_tile_, pair_splat_, pair_order_, tile_range_;
+    Buffer huge_rank_, no_huge_rank_;  // [pair capacity / HUGE_PAIRS + 1] once there are any; a word
     Buffer image_, final_transmittance_, last_pair_;
 };
 

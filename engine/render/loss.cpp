@@ -67,7 +67,8 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
     const SpecConstants constants = {{"THREADS", threads_},
                                      {"LANES", lanes_},
                                      {"COLUMNS", columns_},
-                                     {"USE_MASK", options.use_mask ? 1 : 0}};
+                                     {"USE_MASK", options.use_mask ? 1 : 0},
+                                     {"USE_ALPHA", options.use_alpha ? 1 : 0}};
     loss_ = Pipeline(device, "loss", constants);
     sum_ = Pipeline(device, "loss_sum", {}, false);
     // The most strips that any size up to the largest can be cut into.

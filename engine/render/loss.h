@@ -15,6 +15,8 @@
 namespace darb {
 
 struct LossOptions {
+    // false: the photo is opaque, whatever its alpha says; the rest is not used.
+    bool use_alpha = true;
     // false: the photo is y = rgb * alpha + background * (1 - alpha).
     // true: alpha is a mask. Where it is below 128, both images count as 0 (as the zero padding
     // around the image does), the gradient is 0 and L1 and squared error are left out of the sums;

@@ -10,9 +10,10 @@ namespace darb {
 namespace {
 
 FrameAccuracy frame_of(const SplatModel& model, const Accuracy& accuracy,
-                       const ProjectionEffects& effects) {
+                       const ProjectionEffects& effects, Crowds crowds) {
     FrameAccuracy frame = frame_accuracy(accuracy, model);
     frame.options.effects = effects;
+    frame.options.crowds = crowds;
     frame.options.effects.antialias = model.antialias;
     return frame;
 }
@@ -50,8 +51,8 @@ ImageF planes_to_image(const std::vector<float>& planes, int width, int height) 
 }
 
 Renderer::Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy,
-                   const ProjectionEffects& effects)
-    : Renderer(device, model, frame_of(model, accuracy, effects)) {}
+                   const ProjectionEffects& effects, Crowds crowds)
+    : Renderer(device, model, frame_of(model, accuracy, effects, crowds)) {}
 
 Renderer::Renderer(Device& device, const SplatModel& model, const ForwardOptions& options)
     : Renderer(device, model, frame_of(model, options)) {}

@@ -12,7 +12,7 @@ class Renderer {
     /// Uploads the model; effects.antialias is taken from it. Cameras with a lens need
     /// effects.lens.
     Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {},
-             const ProjectionEffects& effects = {});
+             const ProjectionEffects& effects = {}, Crowds crowds = Crowds::by_counters);
     /// options as they are, but for kernel, footprint, sh_stored and effects.antialias, which are
     /// the model's.
     Renderer(Device& device, const SplatModel& model, const ForwardOptions& options);

@@ -7,8 +7,10 @@ vec2 principal_point(CameraData camera) {
     return OFF_CENTRE == 1 ? camera.principal : 0.5 * vec2(camera.width, camera.height);
 }
 
-// (x/z, y/z) as the Jacobian sees them: within the image and a margin around it.
+// (x/z, y/z) as the Jacobian sees them: within the image and a margin around it. Without the clamp a splat beside
+// the camera, large against its depth, would fan out over the picture; it costs nothing where there is none.
 vec2 clamped_ratio(CameraData camera, vec2 ratio) {
+    if (NEAR_CARE == 0) return ratio;
     return clamp(ratio, OFF_CENTRE == 1 ? camera.ratio_min : -camera.ratio_max, camera.ratio_max);
 }
 
@@ -43,7 +45,7 @@ vec2 jacobian_row_gradient(float focal, float coordinate, float z, float ratio, 
     float d_z = focal * inverse * inverse * (ratio * d.y - d.x);
     float d_coordinate = 0.0;
     const float free_ratio = coordinate * inverse;
-    if (free_ratio > limits.x && free_ratio < limits.y) {
+    if (NEAR_CARE == 0 || (free_ratio > limits.x && free_ratio < limits.y)) {
         const float d_ratio = -focal * inverse * d.y;
         d_coordinate = d_ratio * inverse;
         d_z -= d_ratio * free_ratio * inverse;
@@ -61,7 +63,7 @@ vec3 lens_point_gradient(CameraData camera, vec3 p, vec3 d_j0, vec3 d_j1, vec2 d
                         f.x * (d_j0.y - ratio.y * d_j0.z), f.y * (d_j1.y - ratio.y * d_j1.z));
     const vec2 d_row = -f * vec2(d_j0.z, d_j1.z);
     vec2 d_ratio = d_row * d + lens_second(camera, ratio, at, C);
-    d_ratio = mix(vec2(0.0), d_ratio, equal(ratio, free));
+    if (NEAR_CARE == 1) d_ratio = mix(vec2(0.0), d_ratio, equal(ratio, free));
     // The Jacobian as a whole goes with 1/z.
     const float along = C[0][0] * d[0][0] + C[0][1] * d[0][1] + C[1][0] * d[1][0] + C[1][1] * d[1][1];
     const vec2 d_free = (camera.focal * d_pixel) * lens_jacobian(lens_point(camera, free)) + d_ratio;

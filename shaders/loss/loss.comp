@@ -19,6 +19,7 @@ layout(constant_id = 0) const uint THREADS = 8;
 layout(constant_id = 1) const int LANES = 8;    // a power of two, at most the subgroup size
 layout(constant_id = 2) const int COLUMNS = 8;  // LANES * COLUMNS > 2 * LOSS_HALO
 layout(constant_id = 3) const int USE_MASK = 0;  // 1: alpha < 128 makes x = y = 0; else alpha blends y
+layout(constant_id = 4) const int USE_ALPHA = 1; // 0: photos are opaque, neither alpha nor background is read
 
 layout(push_constant, scalar) uniform Push { LossArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer ImageIn { float image[]; };  // [3][H][W]
@@ -63,9 +64,9 @@ vec2 sum_and_difference(Strip s, int k, int row, float background) {
     const uint rgba = photo[at];
     float y = float(bitfieldExtract(rgba, s.channel * 8, 8)) * (1.0 / 255.0);
     bool counts = inside;
-    if (USE_MASK == 0) {
+    if (USE_ALPHA == 1 && USE_MASK == 0) {
         y = mix(background, y, float(rgba >> 24) * (1.0 / 255.0));
-    } else {
+    } else if (USE_ALPHA == 1) {
         counts = inside && rgba >= 0x80000000u;
     }
     return counts ? vec2(x + y, x - y) : vec2(0.0);
@@ -132,7 +133,7 @@ void main() {
                             b[0][k] * step_down(past[2], k, d_bb[k]);
             if (owns(s, k) && out_row >= s.first && s.left + k < int(args.width)) {
                 const uint at = uint(out_row) * args.width + uint(s.left + k);
-                const bool counts = USE_MASK == 0 || photo[at] >= 0x80000000u;
+                const bool counts = USE_ALPHA == 0 || USE_MASK == 0 || photo[at] >= 0x80000000u;
                 const float x = 0.5 * (a[0][k] + b[0][k]);
                 const float error = b[0][k] + clamp(x, 0.0, 1.0) - x;
                 sums += counts ? vec4(abs(b[0][k]), 0.0, error * error, 1.0) : vec4(0.0);

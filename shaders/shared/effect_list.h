@@ -1,6 +1,6 @@
 // The list of effects: what a scene may call for beyond plain splats. Each is compiled in, has its
 // buffers and its gradients only when it is on. The rules stand in
-// engine/render/effect_rules_*.cpp.
+// engine/render/effect_rules.cpp.
 #ifndef DARB_EFFECT_LIST_H
 #define DARB_EFFECT_LIST_H
 
@@ -11,6 +11,8 @@
 #define EFFECT_LENS 4         // lens distortion in the projection
 #define EFFECT_ALPHA 5        // photos with alpha or masks, and a background behind them
 #define EFFECT_DEPTH 6        // a picture of depths
-#define EFFECT_COUNT 7
+#define EFFECT_HUGE 7         // splats over very many tiles, and tiles' lists of very many pairs
+#define EFFECT_NEAR 8         // splats beside the picture that reach into it: the Jacobian is clamped
+#define EFFECT_COUNT 9
 
 #endif

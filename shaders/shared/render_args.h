@@ -22,6 +22,12 @@
 // dispatch that takes seconds.
 #define LIST_SEGMENT 8192u
 
+// A splat of more pairs than this is huge: one thread would write them long after all others are done. With
+// COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one cell of the cover a thread.
+#define HUGE_PAIRS 256u
+#define EMIT_HUGE_THREADS 64   // cells of a cover
+#define EMIT_HUGE_GROUPS 64u   // that share the huge splats of a frame
+
 // What did not fit into a frame; bits of FrameStatus.overflow.
 #define OVERFLOW_PAIRS 1u  // more pairs than their buffers hold
 #define OVERFLOW_LISTS 2u  // a tile's list is longer than the blend dispatches take on
@@ -72,6 +78,7 @@ struct FrameStatus {
     uint bad_gradients;  // splats whose gradient was not finite
     uint culled[CULL_REASONS];
     uint longest_list;  // pairs of the tile that has most
+    uint huge_splats;   // of more than HUGE_PAIRS pairs
 };
 
 // VkDispatchIndirectCommand of the passes over V and over K.
@@ -118,7 +125,7 @@ struct UpsampleArgs {
 
 #ifdef __cplusplus
 static_assert(sizeof(CameraData) == 168);
-static_assert(sizeof(FrameStatus) == 52);
+static_assert(sizeof(FrameStatus) == 56);
 static_assert(sizeof(FrameGroups) == 24);
 }  // namespace darb::gpu
 #endif

@@ -37,6 +37,9 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {train + "--sh_degree 4", "--sh-degree"},
                     {train + "--kernel no_such", "no such kernel"},
                     {train + "--footprint no_such", "psi, exact"},
+                    {train + "--effects no_such", "'no_such' is no effect"},
+                    {train + "--effects lens", "+lens or -lens"},
+                    {train + "--effects -no_such", "'-no_such' is no effect"},
                     {train + "--accuracy high", "fast, balanced or exact"},
                     {train + "--alpha-cutoff 1/2", "1/255, 1/1024, 1/64"},
                     {train + "--depth-order pixel", "no backward pass"},
@@ -156,6 +159,30 @@ TEST(Command, info_warns_of_odd_splats) {
     const Outcome empty = darb("info " + none);
     EXPECT_EQ(empty.code, 0) << empty.err;
     EXPECT_NE(empty.out.find("there are no splats"), std::string::npos) << empty.out;
+}
+
+TEST(Command, effects_begin_with_a_minus_or_a_base) {
+    for (const char* effects : {"--effects -near", "--effects=-near", "--effects auto,-near"}) {
+        const Outcome o = darb("plan " + kScene + " --no-price " + effects);
+        EXPECT_EQ(o.code, 0) << effects << ": " << o.err;
+        EXPECT_NE(o.out.find("near        off"), std::string::npos) << o.out;
+        EXPECT_NE(o.out.find("alpha       off"), std::string::npos) << o.out;
+    }
+    const Outcome o = darb("plan " + kScene + " --no-price --effects none,+lens --json");
+    EXPECT_EQ(o.code, 0) << o.err;
+    for (const json& row : json::parse(o.out)["effects"])
+        EXPECT_EQ(row["on"].get<bool>(), row["effect"] == "lens") << row.dump();
+}
+
+TEST(Command, train_without_a_report_writes_none) {
+    const fs::path out = scratch() / "no_report";
+    const std::string train =
+        fmt::format("train {} -o {} -r 8 --iterations 1 -q ", kScene, out.string());
+    EXPECT_EQ(darb(train + "--no-report").code, 0);
+    EXPECT_TRUE(fs::exists(out / "metrics.json"));
+    EXPECT_FALSE(fs::exists(out / "report.html"));
+    EXPECT_EQ(darb(train).code, 0);
+    EXPECT_TRUE(fs::exists(out / "report.html"));
 }
 
 TEST(Command, train_begins_with_a_forecast) {

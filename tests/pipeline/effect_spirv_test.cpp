@@ -1,5 +1,5 @@
-// An effect that is off costs nothing: the SPIR-V of the projection passes with the effects'
-// constants frozen and optimised holds no instruction of it and reads none of its data.
+// An effect that is off costs nothing: the SPIR-V of a pass with the effects' constants frozen and
+// optimised holds no instruction of it and reads none of its data.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -20,7 +20,12 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Constants {
-    int degree = 0, off_centre = 0, antialias = 0, smoothing = 0, lens = 0;
+    int degree = 0, off_centre = 0, antialias = 0, smoothing = 0, lens = 0, near_care = 0;
+    /// As spirv-opt takes them: id:value.
+    std::string values() const {
+        return fmt::format("1:{0} 2:{0} 200:{1} 201:{2} 202:{3} 203:{4} 204:{5}", degree,
+                           off_centre, antialias, smoothing, lens, near_care);
+    }
 };
 
 /// What an optimised shader still holds.
@@ -28,6 +33,9 @@ struct Left {
     std::size_t instructions = 0;
     std::size_t atan = 0;             // only lenses need it
     std::size_t length_or_cross = 0;  // the compensation has one more than the factor
+    std::size_t shifts = 0;           // to the right by an amount: a photo's alpha is rgba >> 24
+    std::size_t accesses = 0;         // of push constants and buffers
+    bool alpha_mask = false;          // compares with 0x80000000, an alpha of 128
     std::set<int> bindings;
     std::set<int> camera_members;  // of CameraData, by index
 };
@@ -37,29 +45,28 @@ bool has_tools() {
            std::system("spirv-dis --version > /dev/null 2>&1") == 0;
 }
 
-/// The disassembly of a shader of the table with its constants frozen.
-std::string optimised(const std::string& shader, const Constants& c) {
+/// The disassembly of a shader of the table with its constants frozen at values.
+std::string optimised(const std::string& shader, const std::string& values) {
     const fs::path folder = fs::temp_directory_path() / fmt::format("darb_spirv_{}", ::getpid());
     fs::create_directories(folder);
     const fs::path in = folder / "in.spv", text = folder / "out.txt";
     for (const ShaderBinary& binary : shader_table())
         if (binary.name == shader) write_file_atomic(in, std::as_bytes(binary.words));
     const std::string command = fmt::format(
-        "spirv-opt --set-spec-const-default-value '1:{0} 2:{0} 200:{1} 201:{2} 202:{3} 203:{4}' "
-        "--freeze-spec-const --fold-spec-const-op-composite -O -O {5} -o - | spirv-dis "
-        "--no-indent --raw-id -o {6} -",
-        c.degree, c.off_centre, c.antialias, c.smoothing, c.lens, in.string(), text.string());
+        "spirv-opt --set-spec-const-default-value '{}' --freeze-spec-const "
+        "--fold-spec-const-op-composite -O -O {} -o - | spirv-dis --no-indent --raw-id -o {} -",
+        values, in.string(), text.string());
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
     std::string result = read_text_file(text);
     fs::remove_all(folder);
     return result;
 }
 
-Left left_in(const std::string& shader, const Constants& c) {
+Left left_in(const std::string& shader, const std::string& values) {
     Left left;
     std::string camera_struct;
     std::set<std::string> cameras;  // ids of loaded cameras
-    std::istringstream lines(optimised(shader, c));
+    std::istringstream lines(optimised(shader, values));
     for (std::string line; std::getline(lines, line);) {
         std::istringstream words(line);
         std::vector<std::string> w;
@@ -75,6 +82,9 @@ Left left_in(const std::string& shader, const Constants& c) {
             line.find(" Length ") != std::string::npos || line.find(" Cross ") != std::string::npos
                 ? 1
                 : 0;
+        left.shifts += op("OpShiftRightLogical") ? 1 : 0;
+        left.accesses += op("OpAccessChain") ? 1 : 0;
+        left.alpha_mask |= op("OpConstant") && w.back() == "2147483648";
         if (w[0] == "OpDecorate" && w.size() == 4 && w[2] == "Binding")
             left.bindings.insert(std::stoi(w[3]));
         if (w[0] == "OpName" && w.size() == 3 && w[2] == "\"CameraData\"")
@@ -88,16 +98,16 @@ Left left_in(const std::string& shader, const Constants& c) {
     return left;
 }
 
-constexpr int kPrincipal = 6, kRatioMin = 7, kFirstLens = 14;
+constexpr int kPrincipal = 6, kRatioMin = 7, kRatioMax = 8, kFirstLens = 14;
 
 class EffectSpirv : public testing::TestWithParam<const char*> {
   protected:
     void SetUp() override {
         if (!has_tools()) GTEST_SKIP() << "spirv-opt and spirv-dis (spirv-tools) are missing";
-        none = left_in(GetParam(), {});
+        none = left_in(GetParam(), Constants{}.values());
         backward = std::string(GetParam()) == "project_backward";
     }
-    Left with(const Constants& c) const { return left_in(GetParam(), c); }
+    Left with(const Constants& c) const { return left_in(GetParam(), c.values()); }
     bool reads_lens(const Left& left) const {
         return left.camera_members.lower_bound(kFirstLens) != left.camera_members.end();
     }
@@ -113,6 +123,7 @@ TEST_P(EffectSpirv, what_is_off_leaves_no_instruction_and_no_read) {
     EXPECT_FALSE(none.bindings.count(rest));
     EXPECT_FALSE(none.camera_members.count(kPrincipal));
     EXPECT_FALSE(none.camera_members.count(kRatioMin));
+    EXPECT_FALSE(none.camera_members.count(kRatioMax));
     EXPECT_GT(none.camera_members.size(), 5u) << "the test no longer finds the camera's loads";
 
     // The same signs are there where the effect is on: the test can fail.
@@ -121,8 +132,11 @@ TEST_P(EffectSpirv, what_is_off_leaves_no_instruction_and_no_read) {
     EXPECT_TRUE(reads_lens(lens));
     EXPECT_TRUE(with({.smoothing = 1}).bindings.count(smoothing));
     EXPECT_TRUE(with({.degree = 3}).bindings.count(rest));
-    const Left centre = with({.off_centre = 1});
-    EXPECT_TRUE(centre.camera_members.count(backward ? kRatioMin : kPrincipal));
+    if (!backward) {
+        EXPECT_TRUE(with({.off_centre = 1}).camera_members.count(kPrincipal));
+    }
+    EXPECT_TRUE(with({.off_centre = 1, .near_care = 1}).camera_members.count(kRatioMin));
+    EXPECT_TRUE(with({.near_care = 1}).camera_members.count(kRatioMax));
     EXPECT_GT(with({.antialias = 1}).length_or_cross, none.length_or_cross);
 }
 
@@ -131,12 +145,46 @@ TEST_P(EffectSpirv, every_effect_that_computes_adds_instructions) {
     EXPECT_GT(with({.antialias = 1}).instructions, none.instructions);
     EXPECT_GT(with({.smoothing = 1}).instructions, none.instructions);
     EXPECT_GT(with({.off_centre = 1, .lens = 1}).instructions, none.instructions);
-    const Left all = with({3, 1, 1, 1, 1});
+    EXPECT_GT(with({.near_care = 1}).instructions, none.instructions);
+    const Left all = with({3, 1, 1, 1, 1, 1});
     EXPECT_GT(all.instructions, none.instructions * 5 / 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(Passes, EffectSpirv, testing::Values("project", "project_backward"),
                          [](const auto& i) { return std::string(i.param); });
+
+class PassSpirv : public testing::Test {
+  protected:
+    void SetUp() override {
+        if (!has_tools()) GTEST_SKIP() << "spirv-opt and spirv-dis (spirv-tools) are missing";
+    }
+};
+
+// Constant 3 of the loss is USE_MASK, 4 is USE_ALPHA; args has the background's three members.
+TEST_F(PassSpirv, loss_without_alpha_reads_neither_alpha_nor_background) {
+    const Left none = left_in("loss", "3:0 4:0"), masked_none = left_in("loss", "3:1 4:0");
+    const Left blended = left_in("loss", "3:0 4:1"), masked = left_in("loss", "3:1 4:1");
+    EXPECT_EQ(none.shifts, 0u);
+    EXPECT_FALSE(none.alpha_mask);
+    EXPECT_EQ(masked_none.instructions, none.instructions);
+    EXPECT_GT(blended.shifts, 0u);
+    EXPECT_GE(blended.accesses, none.accesses + 3) << "the background's";
+    EXPECT_GT(blended.instructions, none.instructions);
+    EXPECT_TRUE(masked.alpha_mask);
+    EXPECT_GT(masked.instructions, none.instructions);
+}
+
+// Constant 1 of emit is COOPERATE, 4 of blend is SEGMENT.
+TEST_F(PassSpirv, frames_without_crowds_know_no_list_of_huge_splats_and_no_segments) {
+    const Left alone = left_in("emit", "1:0"), cooperating = left_in("emit", "1:1");
+    EXPECT_FALSE(alone.bindings.count(9));
+    EXPECT_TRUE(cooperating.bindings.count(9));
+    EXPECT_GT(cooperating.instructions, alone.instructions);
+    const Left whole = left_in("blend", "4:0"), parts = left_in("blend", "4:8192");
+    EXPECT_FALSE(whole.bindings.count(7)) << "the pixels' transmittance between dispatches";
+    EXPECT_TRUE(parts.bindings.count(7));
+    EXPECT_GT(parts.instructions, whole.instructions);
+}
 
 }  // namespace
 }  // namespace darb::test

@@ -140,7 +140,7 @@ struct Emitted {
     gpu::FrameStatus status;
 };
 
-Emitted emit(const EmitInput& in, std::uint32_t capacity) {
+Emitted emit(const EmitInput& in, std::uint32_t capacity, bool cooperate = false) {
     Device& device = shared_device();
     const auto visible = static_cast<std::uint32_t>(in.order.size());
     std::vector<gpu::FrameStatus> counts(1);
@@ -150,9 +150,21 @@ Emitted emit(const EmitInput& in, std::uint32_t capacity) {
         offset(device, "offset", in.offset), cover(device, "cover", in.frame.cover),
         tile(device, "pair tile", capacity * 4), splat(device, "pair splat", capacity * 4),
         begin(device, "pair begin", in.frame.visible.size() * 4),
-        shape(device, "shape", in.frame.shape), bound(device, "bound", in.frame.bound);
-    run("emit", gpu::PairArgs{capacity, in.tiles_x, 0, 0},
-        {status, order, offset, cover, tile, splat, begin, shape, bound}, visible);
+        shape(device, "shape", in.frame.shape), bound(device, "bound", in.frame.bound),
+        huge(device, "huge splats", (capacity / HUGE_PAIRS + 1) * 4);
+    const gpu::PairArgs args{capacity, in.tiles_x, 0, 0};
+    run("emit", args, {status, order, offset, cover, tile, splat, begin, shape, bound, huge},
+        visible, {{"COOPERATE", cooperate ? 1 : 0}});
+    if (cooperate) {
+        const Pipeline pipeline(device, "emit_huge");
+        Commands commands(device);
+        commands.begin();
+        commands.dispatch(pipeline, args,
+                          {status, order, offset, cover, tile, splat, huge, shape, bound},
+                          EMIT_HUGE_GROUPS);
+        commands.submit_and_wait();
+    }
+    EXPECT_TRUE(huge.intact());
     EXPECT_TRUE(tile.intact() && splat.intact() && begin.intact());
     return {tile.read<std::uint32_t>(), splat.read<std::uint32_t>(), begin.read<std::uint32_t>(),
             status.read<gpu::FrameStatus>()[0]};
@@ -184,6 +196,44 @@ TEST(Emit, pairs_follow_depth_and_cover) {
     EXPECT_EQ(slot, in.pairs);
     EXPECT_EQ(out.status.overflow, 0U);
     EXPECT_EQ(out.status.pairs, in.pairs);
+}
+
+// Splats over hundreds of tiles: their pairs come from emit_huge, in the same slots.
+TEST(Emit, huge_splats_get_the_same_pairs_from_a_workgroup_each) {
+    SceneOptions options = kEmitScene;
+    options.width = 900;
+    options.height = 620;
+    options.min_log_scale = -2.5;
+    options.max_log_scale = 1;
+    const EmitInput in(options);
+    const Emitted alone = emit(in, in.pairs), together = emit(in, in.pairs, true);
+    std::uint32_t huge = 0, most = 0;
+    for (const std::uint32_t i : in.order) {
+        huge += in.frame.pair_count[i] > HUGE_PAIRS ? 1 : 0;
+        most = std::max(most, in.frame.pair_count[i]);
+    }
+    EXPECT_GT(huge, 20U);
+    EXPECT_LT(huge, in.order.size()) << "some are meant to be small";
+    EXPECT_EQ(most, 57U * 39U) << "one is meant to cover every tile";
+    EXPECT_EQ(alone.status.huge_splats, huge);
+    EXPECT_EQ(together.status.huge_splats, huge);
+    EXPECT_EQ(alone.tile, together.tile);
+    EXPECT_EQ(alone.splat, together.splat);
+    EXPECT_EQ(alone.begin, together.begin);
+    for (const std::uint32_t capacity : {1U, 300U, in.pairs / 2}) {  // guard words stand behind
+        const Emitted cut = emit(in, capacity, true);
+        EXPECT_TRUE(std::equal(cut.tile.begin(), cut.tile.end(), alone.tile.begin()));
+        EXPECT_TRUE(std::equal(cut.splat.begin(), cut.splat.end(), alone.splat.begin()));
+    }
+}
+
+TEST(Emit, a_scene_without_huge_splats_counts_none) {
+    SceneOptions options = kEmitScene;
+    options.max_log_scale = -2;
+    const EmitInput in(options);
+    for (const std::uint32_t count : in.frame.pair_count) ASSERT_LE(count, HUGE_PAIRS);
+    EXPECT_EQ(emit(in, in.pairs).status.huge_splats, 0U);
+    EXPECT_EQ(emit(in, in.pairs, true).splat, emit(in, in.pairs).splat);
 }
 
 // The sum of the counts leaves 32 bits between two splats, or after the last one.

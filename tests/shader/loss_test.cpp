@@ -248,6 +248,24 @@ TEST(Loss_opaquePhoto_ignoresBackground, matches_brute_force) {
     expect_matches({.width = 61, .height = 43, .opaque = true});
 }
 
+// Photos without alpha: what reads it is compiled out, and the results are the same bits.
+TEST(Loss_opaquePhoto_withoutAlpha, is_bit_equal) {
+    const Case c{.width = 61, .height = 43, .opaque = true};
+    const Data data = make_data(c);
+    const Output with = run(c, data);
+    Loss loss(device(), c.width, c.height, {.use_alpha = false});
+    const Output without = run(loss, c, data);
+    EXPECT_EQ(with.gradient, without.gradient);
+    EXPECT_EQ(with.result.l1, without.result.l1);
+    EXPECT_EQ(with.result.ssim, without.result.ssim);
+    EXPECT_EQ(with.result.mse, without.result.mse);
+    EXPECT_EQ(without.result.weight, 1.0f);
+    const Case seen{.width = 61, .height = 43};
+    Loss blind(device(), c.width, c.height, {.use_alpha = false});
+    EXPECT_NE(run(blind, seen, make_data(seen)).gradient, run(seen, make_data(seen)).gradient)
+        << "photos with alpha are meant to need it";
+}
+
 TEST(Loss_lambda, both_ends_match_brute_force) {
     expect_matches({.width = 33, .height = 29, .lambda = 0.0f});
     expect_matches({.width = 33, .height = 29, .lambda = 1.0f});

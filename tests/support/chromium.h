@@ -23,6 +23,7 @@ inline std::string chromium() {
 struct OpenedPage {
     int plots = 0, drawn = 0;  // SVG elements; those with a visible curve, dot or area
     int pictures = 0;          // elements with a background picture of some size
+    int cut = 0, overlaps = 0;  // texts of plots that reach over the plot's edge; over one another
     std::string console;       // what was written to it; empty: nothing
 };
 
@@ -34,7 +35,13 @@ inline OpenedPage open_page(const std::string& html, const std::filesystem::path
         "document.title='PLOTS '+all.length+' '+all.filter(s=>seen(s)&&[...s.querySelectorAll("
         "'path.line,path.area,circle')].some(seen)).length+' '+[...document.querySelectorAll("
         "'.pane')].filter(e=>seen(e)&&getComputedStyle(e).backgroundImage.startsWith('url'))"
-        ".length+' END'</script>";
+        ".length;"
+        "let cut=0,over=0;for(const s of all){const f=s.getBoundingClientRect();"
+        "const t=[...s.querySelectorAll('text')].map(e=>e.getBoundingClientRect());"
+        "t.forEach((a,i)=>{if(a.left<f.left-1||a.right>f.right+1||a.top<f.top-1||"
+        "a.bottom>f.bottom+1)cut++;t.slice(i+1).forEach(b=>{if(Math.min(a.right,b.right)-"
+        "Math.max(a.left,b.left)>1&&Math.min(a.bottom,b.bottom)-Math.max(a.top,b.top)>"
+        "0.35*a.height)over++})})}document.title+=' '+cut+' '+over+' END'</script>";
     const auto page = folder / fmt::format("page_{}.html", ::getpid());
     const auto dom = folder / fmt::format("dom_{}.html", ::getpid());
     const auto log = folder / fmt::format("log_{}.txt", ::getpid());
@@ -52,8 +59,8 @@ inline OpenedPage open_page(const std::string& html, const std::filesystem::path
     const std::string text = read_text_file(dom), said = read_text_file(log);
     const size_t at = text.find("PLOTS ");
     if (at != std::string::npos)
-        std::sscanf(text.c_str() + at, "PLOTS %d %d %d END", &opened.plots, &opened.drawn,
-                    &opened.pictures);
+        std::sscanf(text.c_str() + at, "PLOTS %d %d %d %d %d END", &opened.plots, &opened.drawn,
+                    &opened.pictures, &opened.cut, &opened.overlaps);
     if (const size_t line = said.find("CONSOLE"); line != std::string::npos)
         opened.console += said.substr(line, 400);
     for (const auto& file : {page, dom, log}) std::filesystem::remove(file);

@@ -24,7 +24,7 @@ Dataset small_scene() {
 void compare_with_run(const TrainOptions& options) {
     const Dataset dataset = small_scene();
     MemoryDemand demand;
-    add_photos(dataset.views, demand);
+    add_photos(dataset.views, options, demand);
     Device device;
     Trainer trainer(device, dataset, load_photos(dataset.views), initial_model(dataset, options),
                     options);
@@ -35,7 +35,6 @@ void compare_with_run(const TrainOptions& options) {
     trainer.drain();
     demand.splats = trainer.splat_count();
     demand.pairs = std::max(demand.pairs, demand.splats * 4);  // what the trainer reserves
-    demand.sh_degree = options.sh_degree;
     demand.densifies = options.densify_end() > options.densify_from;
     const auto peak = static_cast<double>(device.peak_bytes());
     const auto planned = static_cast<double>(plan_memory(demand).total());
@@ -57,6 +56,22 @@ TEST(MemoryPlan, run_of_degree_0_is_met) {
     compare_with_run(options);
 }
 
+TEST(MemoryPlan, run_with_exposure_and_antialiasing_is_met) {
+    TrainOptions options;
+    options.iterations = 3;
+    options.densify_until = 0;
+    options.sh_degree = 0;  // few other bytes: the effects' are a larger share
+    options.exposure = options.antialias = true;
+    compare_with_run(options);
+    MemoryDemand with, without;
+    const Dataset dataset = small_scene();
+    add_photos(dataset.views, options, with);
+    add_photos(dataset.views, {}, without);
+    with.splats = without.splats = 4'000;
+    EXPECT_GT(plan_memory(with).effects, 100U * 75U * 12U + 4'000U * 4U);
+    EXPECT_EQ(plan_memory(without).effects, 0U);
+}
+
 TEST(MemoryPlan, run_with_density_control_is_met) {
     TrainOptions options;
     options.iterations = 20;
@@ -72,15 +87,15 @@ TEST(MemoryPlan, run_with_density_control_is_met) {
 TEST(MemoryPlan, photos_count_only_where_they_are_trained_on) {
     Dataset dataset = small_scene();
     MemoryDemand all, some;
-    add_photos(dataset.views, all);
+    add_photos(dataset.views, {}, all);
     dataset.views[0].is_test = true;
-    add_photos(dataset.views, some);
+    add_photos(dataset.views, {}, some);
     EXPECT_EQ(all.photo_pixels - some.photo_pixels, 100U * 75U);
     EXPECT_EQ(some.image_pixels, 100U * 75U);
 }
 
 TEST(MemoryPlan, splats_within_a_budget_meet_it) {
-    MemoryDemand demand{1'000'000, 6'000'000, 3, 50'000'000, 1'000'000, true};
+    MemoryDemand demand{1'000'000, 6'000'000, 3, 50'000'000, 1'000'000, true, 50, 50};
     const std::uint64_t budget = std::uint64_t{900} << 20;
     const std::uint64_t splats = splats_within(demand, budget);
     ASSERT_GT(splats, 0U);

@@ -13,6 +13,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "tests/support/chromium.h"
 #include "trainer/report/html.h"
 #include "trainer/report/svg_plot.h"
 
@@ -97,6 +98,17 @@ TEST(Report_example, is_well_formed_and_without_outside_resources) {
     EXPECT_EQ(html.find("inf"), std::string::npos);
 }
 
+TEST(Report_inChromium, draws_every_plot_and_picture) {
+    if (test::chromium().empty()) GTEST_SKIP() << "no Chromium to open the page with";
+    const test::OpenedPage page = test::open_page(report_html(example()), testing::TempDir());
+    EXPECT_EQ(page.console, "");
+    EXPECT_EQ(page.plots, 7);
+    EXPECT_EQ(page.drawn, 7);
+    EXPECT_EQ(page.pictures, 3);
+    EXPECT_EQ(page.cut, 0) << "texts that the plot's edge cuts";
+    EXPECT_EQ(page.overlaps, 0) << "texts over one another";
+}
+
 TEST(Report_emptyRun, leaves_parts_out) {
     const std::string html = report_html({});
     EXPECT_EQ(first_fault(html), "");
@@ -121,6 +133,25 @@ TEST(Report_oneSample, has_axes) {
     const std::string html = report_html(data);
     EXPECT_EQ(first_fault(html), "");
     EXPECT_NE(html.find("<svg"), std::string::npos);
+}
+
+TEST(SvgPlot_legend, stands_below_the_title_in_lines_that_fit) {
+    Plot plot{"A title that takes most of the line", "x", "y", {}};
+    for (const char* name : {"settings alone", "combinations of some settings", "the front of all"})
+        plot.series.push_back({name, {{1, 1}, {2, 2}}});
+    const std::string svg = svg_plot(plot);
+    EXPECT_NE(svg.find("y='34.0'>settings alone<"), std::string::npos);
+    EXPECT_NE(svg.find("y='49.0'>the front of all<"), std::string::npos) << "the second line";
+}
+
+TEST(SvgBars_longNames, are_cut_and_whole_under_the_pointer) {
+    const std::string name(90, 'n');
+    BarPlot plot{"bars", "ms", {"a"}, {{name, {1.0}}, {"b", {1.2}}, {"c", {1.1}}, {"far", {50.0}}}};
+    const std::string svg = svg_bars(plot);
+    EXPECT_EQ(svg.find(name + "<title>"), std::string::npos);
+    EXPECT_NE(svg.find("n\u2026<title>" + name + "</title>"), std::string::npos);
+    EXPECT_NE(svg.find("\u2192 50<"), std::string::npos) << "the bar that the axis cuts says so";
+    EXPECT_EQ(svg.find("\u2192 1"), std::string::npos);
 }
 
 TEST(Report_missingPicture, is_an_error_with_its_name) {

@@ -7,18 +7,24 @@ namespace darb {
 void add_effects_flag(CLI::App& command, std::string& text) {
     command
         .add_option("--effects", text,
-                    "auto: what the scene calls for, see `darb plan`; all; none; or changes to "
-                    "auto such as +exposure,-sh")
+                    "auto: what the scene calls for, see `darb plan`; all; none; or changes to one "
+                    "of them, auto where none is named: +exposure,-sh or all,-lens")
         ->capture_default_str();
 }
 
 void add_lens_flag(CLI::App& command, DatasetOptions& data) {
+    data.original_where_wide = true;
     command
         .add_option_function<std::string>(
-            "--lens", [&data](const std::string& text) { data.original_lens = text == "original"; },
-            "undistort: straight pictures; original: distorted as the photos are")
-        ->check(CLI::IsMember({"undistort", "original"}))
-        ->default_str("undistort");
+            "--lens",
+            [&data](const std::string& text) {
+                data.original_lens = text == "original";
+                data.original_where_wide = text == "auto";
+            },
+            "undistort: straight pictures; original: distorted as the photos are; auto: original "
+            "for a fisheye that sees more than 60 degrees to a side, straight for all others")
+        ->check(CLI::IsMember({"auto", "undistort", "original"}))
+        ->default_str("auto");
 }
 
 void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options) {
@@ -52,6 +58,9 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
     options.exposure = plan.on(EFFECT_EXPOSURE);
     options.off_centre = plan.projection().off_centre;
     options.lens = plan.on(EFFECT_LENS);
+    options.alpha = plan.on(EFFECT_ALPHA);
+    options.near_care = plan.on(EFFECT_NEAR);
+    options.crowds = plan.crowds();
 }
 
 }  // namespace darb

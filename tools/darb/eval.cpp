@@ -68,13 +68,14 @@ int eval(EvalFlags flags) {
     const EffectChoice choice = parse_effects(flags.effects);
     SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
-    const std::vector<View> views = views_of(dataset, flags);
+    std::vector<View> views = views_of(dataset, flags);
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
     const EffectPlan plan = plan_rendering(model, views, {}, choice);
     apply_plan(plan, model);
-    Renderer renderer(device, model, accuracy, plan.projection());
+    apply_plan(plan, views);
+    Renderer renderer(device, model, accuracy, plan.projection(), plan.crowds());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     Evaluation evaluation;
     for (const View& view : views) {

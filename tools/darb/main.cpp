@@ -25,8 +25,20 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
     return arguments;
 }
 
+// A value that begins with a minus reads like an option: "--effects -sh" becomes "--effects=-sh".
+void join_effects(std::vector<std::string>& arguments) {
+    for (size_t i = 0; i + 1 < arguments.size(); ++i) {
+        const std::string& value = arguments[i + 1];
+        if (arguments[i] != "--effects" || value.size() < 3 || value[0] != '-' || value[1] == '-')
+            continue;
+        arguments[i] += "=" + value;
+        arguments.erase(arguments.begin() + static_cast<std::ptrdiff_t>(i + 1));
+    }
+}
+
 int run(int argc, char** argv) {
-    const std::vector<std::string> arguments = with_dashes(argc, argv);
+    std::vector<std::string> arguments = with_dashes(argc, argv);
+    join_effects(arguments);
     CLI::App app(
         "Train, render and measure 3D splat scenes with a choice of kernel, on any Vulkan device.",
         "darb");

@@ -45,7 +45,8 @@ Subject open(const PlanFlags& flags) {
     s.training = !is_scene(flags.what);
     if (s.training) {
         s.dataset = load_dataset(flags.what, flags.data);
-        if (!s.dataset.points.seen_begin.empty()) s.photos = load_photos(s.dataset.views);
+        if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
+            s.photos = load_photos(s.dataset.views);
         return s;
     }
     s.model = load_scene(flags.what);
@@ -106,12 +107,16 @@ json compare_choices(const Subject& s, const PlanFlags& flags) {
 int run_plan(const PlanFlags& flags) {
     const EffectChoice choice = parse_effects(flags.effects);
     const Subject s = open(flags);
-    const EffectPlan plan = plan_of(s, flags, choice);
+    EffectPlan plan = plan_of(s, flags, choice);
     const bool empty = !s.training && s.model.size() == 0;
     EffectPrices prices;
-    if (!flags.no_price && !empty)
-        prices = price_effects(plan, s.training, s.training ? flags.sh_degree : s.model.sh_degree,
-                               [&](const EffectPlan& p) { return measure(s, flags, p); });
+    if (!empty && (!flags.no_price || flags.compare)) {
+        const Measured base = measure(s, flags, plan);
+        plan.note_frame(base.huge_splats, base.longest_list);
+        const int most_degree = s.training ? flags.sh_degree : s.model.sh_degree;
+        const auto with = [&](const EffectPlan& p) { return measure(s, flags, p); };
+        if (!flags.no_price) prices = price_effects(plan, base, s.training, most_degree, with);
+    }
     if (!flags.as_json) print_rows(plan, prices, s.training);
     json result{{"path", flags.what.string()},
                 {"kind", s.training ? "data set" : "scene"},

@@ -19,7 +19,7 @@ constexpr std::size_t kViews = 4;
 Measured summary(std::vector<double> ms, std::uint64_t bytes) {
     std::sort(ms.begin(), ms.end());
     const std::size_t n = ms.size();
-    return {ms[n / 2], 0.5 * (ms[n - 1 - n / 4] - ms[n / 4]), bytes};
+    return {ms[n / 2], 0.5 * (ms[n - 1 - n / 4] - ms[n / 4]), bytes, 0, 0};
 }
 
 double sum_of(const std::vector<PassTime>& passes) {
@@ -68,21 +68,27 @@ Measured measure_rendering(const DeviceOptions& device_options, const SplatModel
     Device device(device_options);
     SplatModel planned = model;
     apply_plan(plan, planned);
-    ForwardOptions options;
-    options.effects = plan.projection();
-    Renderer renderer(device, planned, options);
+    std::vector<View> seen = views;
+    apply_plan(plan, seen);
+    Renderer renderer(device, planned, Accuracy{}, plan.projection(), plan.crowds());
     std::vector<double> ms;
+    std::uint32_t huge = 0, longest = 0;
     const std::size_t count = std::min(views.size(), kViews);
     for (std::size_t frame = 0; frame < kWarmUp * count + kFrames; ++frame) {
-        renderer.render(views[frame % count].camera);
+        renderer.render(seen[frame % count].camera);
         double frame_ms = sum_of(renderer.pass_times());
+        huge = std::max(huge, renderer.status().huge_splats);
+        longest = std::max(longest, renderer.status().longest_list);
         if (plan.on(EFFECT_DEPTH)) {
             renderer.render_depth();
             frame_ms += sum_of(renderer.pass_times());
         }
         if (frame >= kWarmUp * count) ms.push_back(frame_ms);
     }
-    return summary(ms, device.peak_bytes());
+    Measured result = summary(ms, device.peak_bytes());
+    result.huge_splats = huge;
+    result.longest_list = longest;
+    return result;
 }
 
 Measured measure_training(const DeviceOptions& device_options, const Dataset& dataset,
@@ -90,6 +96,7 @@ Measured measure_training(const DeviceOptions& device_options, const Dataset& da
     Device device(device_options);
     Dataset few = dataset;
     std::erase_if(few.views, [](const View& v) { return v.is_test; });
+    apply_plan(plan, few.views);
     few.views.resize(std::min(few.views.size(), kViews));
     few.points.seen_begin.clear();
     few.points.seen_by.clear();
@@ -113,20 +120,24 @@ Measured measure_training(const DeviceOptions& device_options, const Dataset& da
             std::chrono::steady_clock::now() - start;
         if (step >= 2 * static_cast<int>(kViews)) ms.push_back(took.count());
     }
-    return summary(ms, device.peak_bytes());
+    Measured result = summary(ms, device.peak_bytes());
+    result.huge_splats = trainer.counters().huge_splats;
+    result.longest_list = trainer.counters().longest_list;
+    return result;
 }
 
-EffectPrices price_effects(const EffectPlan& plan, bool training, int most_degree,
+EffectPrices price_effects(const EffectPlan& plan, const Measured& base, bool training,
+                           int most_degree,
                            const std::function<Measured(const EffectPlan&)>& with) {
     EffectPrices prices(EFFECT_COUNT);
-    const Measured base = with(plan);
     for (int e = 0; e < EFFECT_COUNT; ++e) {
-        const bool has = training ? e != EFFECT_DEPTH && e != EFFECT_ALPHA && e != EFFECT_LENS
+        const bool has = training ? e != EFFECT_DEPTH && e != EFFECT_LENS
                                   : e != EFFECT_EXPOSURE && e != EFFECT_ALPHA;
         if (!has || (e == EFFECT_VIEW_COLOUR && most_degree == 0)) continue;
         EffectPlan other = plan;
         EffectRow& row = other.row(e);
         row.on = !row.on;
+        row.overridden = true;
         if (e == EFFECT_VIEW_COLOUR) row.degree = row.on ? most_degree : 0;
         const Measured changed = with(other);
         const double sign = plan.on(e) ? 1 : -1;

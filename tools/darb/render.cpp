@@ -73,9 +73,11 @@ int render(const RenderFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    const EffectPlan plan = plan_rendering(model, views, {.depth = !flags.depth.empty()}, choice);
+    EffectPlan plan = plan_rendering(
+        model, views, {.depth = !flags.depth.empty(), .near_plane = flags.near_plane}, choice);
     apply_plan(plan, model);
-    Renderer renderer(device, model, accuracy, plan.projection());
+    apply_plan(plan, views);
+    Renderer renderer(device, model, accuracy, plan.projection(), plan.crowds());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     std::set<std::string> used;
     std::vector<double> frame_ms;
@@ -85,6 +87,7 @@ int render(const RenderFlags& flags) {
         const std::chrono::duration<double, std::milli> ms =
             std::chrono::steady_clock::now() - start;
         frame_ms.push_back(ms.count());
+        plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
         const auto file = flags.output / picture_name(view.name, used);
         write_png(file, to_8bit(image));
         if (plan.on(EFFECT_DEPTH))

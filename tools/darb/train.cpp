@@ -69,10 +69,11 @@ EffectChoice training_choice(const TrainFlags& flags) {
 }
 
 // The photos stay for the run where the plan had to look at them.
-void plan_effects(const Dataset& dataset, const EffectChoice& choice, TrainFlags& flags) {
-    if (!dataset.points.seen_begin.empty()) flags.run.photos = load_photos(dataset.views);
+void plan_effects(Dataset& dataset, const EffectChoice& choice, TrainFlags& flags) {
+    if (!dataset.points.seen_begin.empty() || dataset.has_alpha) flags.run.photos = load_photos(dataset.views);
     const EffectPlan plan = plan_training(dataset, flags.run.photos, flags.train.sh_degree, choice);
     apply_plan(plan, flags.train);
+    apply_plan(plan, dataset.views);
     flags.run.effects = plan_line(plan);
     flags.run.effects_json =
         plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -90,7 +91,7 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
     const EffectChoice choice = training_choice(flags);
-    const Dataset dataset = load_training_data(flags);
+    Dataset dataset = load_training_data(flags);
     plan_effects(dataset, choice, flags);
     if (!recalled)  // only now: a command that fails above leaves that of an earlier run
         write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());

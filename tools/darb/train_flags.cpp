@@ -107,6 +107,8 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     command.add_option("--seed", f.train.seed)->capture_default_str();
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`");
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training");
+    command.add_flag("--report,!--no-report", f.run.report,
+                     "write OUT/report.html at the end (default): curves, time by pass, pictures");
     command.add_flag("-q,--quiet", f.run.quiet, "no progress");
     command.add_flag("--deterministic", f.deterministic,
                      "accepted: every run on one device already repeats bit by bit");

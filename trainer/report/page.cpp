@@ -23,7 +23,8 @@ p{margin:.3rem 0}.soft{color:var(--soft)}
 .cards div{background:var(--card);border-radius:8px;padding:.6rem .9rem;min-width:7.5rem;flex:1}
 .cards b{display:block;font-size:1.3rem;font-variant-numeric:tabular-nums}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:1rem}
-svg{width:100%;height:auto;background:var(--card);border-radius:8px;break-inside:avoid}
+svg{width:100%;max-width:720px;height:auto;background:var(--card);border-radius:8px;break-inside:avoid}
+svg.bars{max-width:900px;grid-column:1/-1}
 svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .name{font-weight:600;font-size:13px}
 svg .tick,svg .label{fill:var(--soft);font-size:11px}
 .grid{stroke:var(--line)}.axis{stroke:var(--soft);fill:none}.line{fill:none;stroke-width:1.8;stroke-linejoin:round}
@@ -55,6 +56,8 @@ figure{margin:0 0 1.2rem;break-inside:avoid}
 .render{position:absolute;inset:0;background-position:50% 0;clip-path:inset(0 calc(100% - var(--x)) 0 0)}
 .error{background-position:100% 0}
 figcaption{display:flex;justify-content:space-between;color:var(--soft);margin-bottom:.25rem;gap:1rem}
+@media print{body{max-width:none;padding:0;font-size:11px}h2{break-after:avoid}.wide{overflow:visible}
+th,td{padding-right:.5rem}.area,circle,.line,.cards div{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 .parts{display:grid;grid-template-columns:1fr 1fr;gap:.5rem;color:var(--soft);font-size:.85rem}
 )css";
 

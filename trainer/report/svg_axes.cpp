@@ -12,6 +12,8 @@ namespace darb {
 
 namespace {
 
+constexpr double kCharacterWidth = 6.3;  // of the ticks' font at 11 px, user units
+
 std::string tick_text(double v) {
     if (std::abs(v) >= 1e6) return fmt::format("{:g}M", v / 1e6);
     if (std::abs(v) >= 1e4) return fmt::format("{:g}k", v / 1e3);
@@ -80,27 +82,56 @@ std::string draw_axes(const std::string& x_label, const std::string& y_label, co
                      (y.from + y.to) / 2, html_escape(y_label));
 }
 
-std::string open_plot(const std::string& title, double height) {
+std::string open_plot(const std::string& title, double height, double width,
+                      const std::string& kind) {
     return fmt::format(
-        "<svg viewBox='0 0 {} {}' role='img' aria-label='{}'>"
+        "<svg{} viewBox='0 0 {} {}' role='img' aria-label='{}'>"
         "<text class='name' x='{}' y='18'>{}</text>",
-        kPlotWidth, height, html_escape(title), kPlotLeft, html_escape(title));
+        kind.empty() ? "" : fmt::format(" class='{}'", kind), width, height, html_escape(title),
+        kPlotLeft, html_escape(title));
 }
 
-std::string draw_legend(const std::vector<std::string>& names, bool filled) {
-    if (names.size() < 2) return {};
-    std::string svg;
-    double right = kPlotWidth - kPlotRight;
-    for (std::size_t i = names.size(); i-- > 0;) {
-        svg += fmt::format("<text class='tick' text-anchor='end' x='{:.1f}' y='18'>{}</text>",
-                           right, html_escape(names[i]));
-        right -= 6.2 * static_cast<double>(names[i].size()) + 8;
-        const char* swatch = filled ? "9h-9v9h9z" : "14h-14";
-        svg += fmt::format("<path class='{} s{}' d='M{:.1f} {}'/>", filled ? "area" : "line", i,
-                           right, swatch);
-        right -= filled ? 20 : 26;
+double text_width(const std::string& text) {
+    return kCharacterWidth * static_cast<double>(text.size());
+}
+
+std::string fit_text(const std::string& text, double width) {
+    if (text_width(text) <= width) return text;
+    const auto most = static_cast<std::size_t>(width / kCharacterWidth);
+    return text.substr(0, most > 1 ? most - 1 : 0) + "\u2026";
+}
+
+Legend draw_legend(const std::vector<LegendEntry>& entries, double width) {
+    constexpr double kLine = 15, kSwatch = 19, kBetween = 14;
+    Legend legend;
+    if (entries.size() < 2) return legend;
+    double x = kPlotLeft, y = 34;
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+        const double wide = kSwatch + text_width(entries[i].name) + kBetween;
+        if (x > kPlotLeft && x + wide - kBetween > width - 6) {
+            x = kPlotLeft;
+            y += kLine;
+        }
+        switch (entries[i].swatch) {
+            case LegendEntry::Swatch::line:
+                legend.svg += fmt::format("<path class='line s{}' d='M{:.1f} {:.1f}h14'/>", i, x,
+                                          y - 4);
+                break;
+            case LegendEntry::Swatch::dot:
+                legend.svg += fmt::format("<circle class='s{}' cx='{:.1f}' cy='{:.1f}' r='3.5'/>",
+                                          i, x + 7, y - 4);
+                break;
+            case LegendEntry::Swatch::area:
+                legend.svg += fmt::format("<path class='area s{}' d='M{:.1f} {:.1f}h10v-9h-10z'/>",
+                                          i, x + 4, y);
+                break;
+        }
+        legend.svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}</text>",
+                                  x + kSwatch, y, html_escape(entries[i].name));
+        x += wide;
     }
-    return svg;
+    legend.height = y - 34 + kLine;
+    return legend;
 }
 
 }  // namespace darb

@@ -26,9 +26,24 @@ std::vector<double> ticks_of(const Axis& axis);
 /// Grid, ticks, both axes and their labels.
 std::string draw_axes(const std::string& x_label, const std::string& y_label, const Axis& x,
                       const Axis& y);
-/// The opening tag and the title.
-std::string open_plot(const std::string& title, double height = kPlotHeight);
-/// Names with a swatch each, right-aligned beside the title; empty for a single one.
-std::string draw_legend(const std::vector<std::string>& names, bool filled = false);
+/// The opening tag and the title. kind: a CSS class of the element.
+std::string open_plot(const std::string& title, double height = kPlotHeight,
+                      double width = kPlotWidth, const std::string& kind = {});
+
+struct LegendEntry {
+    std::string name;
+    enum class Swatch { line, dot, area } swatch = Swatch::line;
+};
+/// Names with a swatch each under the title, in as many lines as they need; nothing for a single
+/// one.
+struct Legend {
+    std::string svg;
+    double height = 0;  // that the plot begins lower by
+};
+Legend draw_legend(const std::vector<LegendEntry>& entries, double width = kPlotWidth);
+/// Of a text in the font of ticks and legends.
+double text_width(const std::string& text);
+/// The text, or its beginning and an ellipsis where it is wider than that.
+std::string fit_text(const std::string& text, double width);
 
 }  // namespace darb

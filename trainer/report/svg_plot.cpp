@@ -89,15 +89,18 @@ std::string svg_plot(const Plot& plot) {
     }
     x.from = kPlotLeft;
     x.to = kPlotWidth - kPlotRight;
-    y.from = kPlotHeight - kPlotBottom;
-    y.to = kPlotTop;
-    std::string svg = open_plot(plot.title) + draw_axes(plot.x_label, plot.y_label, x, y);
-    std::vector<std::string> names;
-    for (std::size_t i = 0; i < plot.series.size(); ++i) {
+    std::vector<LegendEntry> entries;
+    for (const PlotSeries& series : plot.series)
+        entries.push_back(
+            {series.name, series.line ? LegendEntry::Swatch::line : LegendEntry::Swatch::dot});
+    const Legend legend = draw_legend(entries);
+    y.to = kPlotTop + legend.height;
+    y.from = kPlotHeight + legend.height - kPlotBottom;
+    std::string svg = open_plot(plot.title, kPlotHeight + legend.height) + legend.svg +
+                      draw_axes(plot.x_label, plot.y_label, x, y);
+    for (std::size_t i = 0; i < plot.series.size(); ++i)
         svg += draw_series(plot.series[i], i, x, y);
-        names.push_back(plot.series[i].name);
-    }
-    return svg + draw_legend(names) + "</svg>\n";
+    return svg + "</svg>\n";
 }
 
 std::string svg_stack(const StackPlot& plot) {
@@ -116,9 +119,14 @@ std::string svg_stack(const StackPlot& plot) {
     y.widen();
     x.from = kPlotLeft;
     x.to = kPlotWidth - kPlotRight;
-    y.from = kPlotHeight - kPlotBottom;
-    y.to = kPlotTop + 12;  // room for a second line of names
-    std::string svg = open_plot(plot.title) + draw_axes(plot.x_label, plot.y_label, x, y);
+    std::vector<LegendEntry> entries;
+    for (const std::string& name : plot.names)
+        entries.push_back({name, LegendEntry::Swatch::area});
+    const Legend legend = draw_legend(entries);
+    y.to = kPlotTop + legend.height;
+    y.from = kPlotHeight + legend.height - kPlotBottom;
+    std::string svg = open_plot(plot.title, kPlotHeight + legend.height) + legend.svg +
+                      draw_axes(plot.x_label, plot.y_label, x, y);
     std::vector<double> base(plot.x.size(), 0.0);
     const std::size_t stride = (plot.x.size() + kMaxPoints - 1) / kMaxPoints;
     for (std::size_t l = 0; l < plot.layers.size(); ++l) {

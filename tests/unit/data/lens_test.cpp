@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
 
+#include "engine/core/files.h"
 #include "engine/data/resample.h"
 #include "tests/unit/data/data_files.h"
 
@@ -154,6 +157,45 @@ TEST(Undistort, strong_fisheye_is_capped_at_sixty_degrees) {
     EXPECT_NEAR(frame.camera.width, 2 * std::sqrt(3.0) * 150, 2);
     EXPECT_NEAR(frame.camera.height, 2 * std::sqrt(3.0) * 150, 2);
     EXPECT_FALSE(frame.has_gaps);
+}
+
+TEST(Undistort, only_a_fisheye_that_sees_more_than_sixty_degrees_to_a_side_is_too_wide) {
+    const auto fisheye = [](double focal) {
+        return LensModel{"OPENCV_FISHEYE", {focal, focal, 320, 240, 0, 0, 0, 0}, 640, 480};
+    };
+    const double limit = 319.5 / 1.0471975511965976;  // the border's pixel centre at 60 degrees
+    EXPECT_TRUE(too_wide_to_undistort(fisheye(150)));  // 122 degrees: no ray at all
+    EXPECT_TRUE(too_wide_to_undistort(fisheye(limit * 0.99)));
+    EXPECT_FALSE(too_wide_to_undistort(fisheye(limit * 1.01)));
+    EXPECT_FALSE(too_wide_to_undistort(make("FOV", {350, 355, 321, 239, 0.9})));
+    EXPECT_TRUE(too_wide_to_undistort(make("FOV", {250, 250, 320, 240, 1.2})));
+    for (const char* model : {"PINHOLE", "OPENCV"}) {  // wide, but flat already or nearly so
+        std::vector<double> parameters = {100, 100, 320, 240};
+        if (std::string(model) == "OPENCV") parameters.insert(parameters.end(), {0.01, 0, 0, 0});
+        EXPECT_FALSE(too_wide_to_undistort(make(model, parameters))) << model;
+    }
+}
+
+TEST(Undistort, a_fisheye_too_wide_keeps_its_lens_where_that_is_asked_for) {
+    const auto load = [](double focal, DatasetOptions options) {
+        const auto folder = test_folder();
+        write_file_atomic(
+            folder / "transforms.json",
+            fmt::format(R"({{"is_fisheye": true, "w": 640, "h": 480, "fl_x": {}, "k1": 0,
+                "frames": [{{"file_path": "a.png", "transform_matrix":
+                [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}]}})",
+                        focal));
+        options.require_photos = false;
+        return load_dataset(folder, options);
+    };
+    const Dataset wide = load(150, {.original_where_wide = true});
+    EXPECT_TRUE(wide.views[0].camera.lens.active);
+    EXPECT_EQ(wide.views[0].camera.width, 640);
+    ASSERT_FALSE(wide.notes.empty());
+    EXPECT_NE(wide.notes.back().find("fisheye"), std::string::npos) << wide.notes.back();
+    EXPECT_FALSE(load(150, {}).views[0].camera.lens.active);
+    EXPECT_FALSE(load(400, {.original_where_wide = true}).views[0].camera.lens.active);
+    EXPECT_TRUE(load(400, {.original_lens = true}).views[0].camera.lens.active);
 }
 
 TEST(Undistort, pixels_beyond_the_fold_are_transparent) {

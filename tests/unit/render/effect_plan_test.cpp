@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "shaders/shared/render_args.h"
 #include "tests/support/random_scene.h"
 
 namespace darb::test {
@@ -27,8 +28,10 @@ struct Scene {
     SplatModel model;
     std::vector<View> views{1};
     Scene() {
-        const TestScene s = random_scene({.count = 20, .sh_degree = 3});
+        const TestScene s = random_scene(
+            {.count = 20, .sh_degree = 3, .min_log_scale = -4, .max_log_scale = -2.5});
         model = s.model;
+        for (float& p : model.position) p *= 0.4f;  // in the middle of the picture
         model.sh_rest.assign(model.sh_rest.size(), 0.0f);
         Camera& c = views[0].camera;
         c = s.camera;
@@ -48,7 +51,23 @@ TEST(EffectPlanOfScene, one_need_switches_on_one_effect_and_none_none) {
         {EFFECT_VIEW_COLOUR, [](Scene& s) { s.model.sh_rest[2] = 0.1f; }},
         {EFFECT_ANTIALIAS, [](Scene& s) { s.model.antialias = true; }},
         {EFFECT_OFF_CENTRE, [](Scene& s) { s.views[0].camera.cx += 0.02; }},
-        {EFFECT_LENS, [](Scene& s) { s.views[0].camera.lens.active = true; }},
+        {EFFECT_LENS,
+         [](Scene& s) {
+             LensTerms& lens = s.views[0].camera.lens;
+             lens.active = true;
+             lens.ray_min = glm::dvec2(-2);
+             lens.ray_max = glm::dvec2(2);
+         }},
+        {EFFECT_NEAR,
+         [](Scene& s) {  // half a unit beside the camera and as wide as that
+             const Camera& c = s.views[0].camera;
+             const glm::dvec3 at =
+                 glm::transpose(c.rotation) * (glm::dvec3(0.5, 0, 0.25) - c.translation);
+             for (int k = 0; k < 3; ++k) {
+                 s.model.position[3 + k] = static_cast<float>(at[k]);
+                 s.model.log_scale[3 + k] = -1;
+             }
+         }},
     };
     for (const auto& [effect, change] : cases) {
         Scene s;
@@ -57,6 +76,49 @@ TEST(EffectPlanOfScene, one_need_switches_on_one_effect_and_none_none) {
     }
     EXPECT_EQ(Scene().on({.depth = true}), On{EFFECT_DEPTH});
     EXPECT_EQ(effects_on(plan_rendering(SplatModel{}, {}, {})), On{});
+}
+
+TEST(EffectPlanOfScene, counters_of_frames_call_for_cooperation) {
+    const Scene s;
+    EffectPlan plan = plan_rendering(s.model, s.views, {});
+    plan.note_frame(0, 100);
+    EXPECT_EQ(effects_on(plan), On{});
+    plan.note_frame(0, LIST_SEGMENT + 1);
+    plan.note_frame(0, 10);
+    EXPECT_EQ(effects_on(plan), On{EFFECT_HUGE});
+    EXPECT_EQ(plan.crowds(), Crowds::by_counters);
+    plan = plan_rendering(s.model, s.views, {});
+    plan.note_frame(2, 10);
+    EXPECT_EQ(effects_on(plan), On{EFFECT_HUGE});
+    EXPECT_EQ(plan.row(EFFECT_HUGE).measured, 2);
+    plan = plan_rendering(s.model, s.views, {}, parse_effects("-huge"));
+    plan.note_frame(2, 10);
+    EXPECT_EQ(effects_on(plan), On{});
+    EXPECT_EQ(plan.crowds(), Crowds::never);
+    EXPECT_EQ(plan_rendering(s.model, s.views, {}, parse_effects("+huge")).crowds(),
+              Crowds::always);
+}
+
+TEST(EffectPlanOfScene, near_plane_care_counts_what_lies_beside_a_camera) {
+    Scene s;
+    EXPECT_EQ(plan_rendering(s.model, s.views, {}).row(EFFECT_NEAR).measured, 0);
+    EXPECT_TRUE(plan_rendering(s.model, {}, {}).on(EFFECT_NEAR)) << "cameras are not known";
+    const Camera& c = s.views[0].camera;
+    const auto put = [&](glm::dvec3 camera_space, float log_scale) {
+        const glm::dvec3 at = glm::transpose(c.rotation) * (camera_space - c.translation);
+        for (int k = 0; k < 3; ++k) {
+            s.model.position[k] = static_cast<float>(at[k]);
+            s.model.log_scale[k] = log_scale;
+        }
+        s.model.opacity[0] = 3;
+        return plan_rendering(s.model, s.views, {}).row(EFFECT_NEAR).measured;
+    };
+    EXPECT_EQ(put({1, 0, 0.25}, -1), 1);
+    EXPECT_EQ(put({1, 0, 0.25}, -6), 0) << "too small to reach the picture";
+    EXPECT_EQ(put({1, 0, 0.15}, -1), 0) << "before the near plane: no part of the frame";
+    EXPECT_EQ(plan_rendering(s.model, s.views, {.near_plane = 0.1f}).row(EFFECT_NEAR).measured, 1);
+    EXPECT_EQ(put({0, 0, 0.25}, -1), 0) << "in the picture";
+    EXPECT_EQ(put({1, 0, -0.25}, 2), 0) << "behind";
 }
 
 TEST(EffectPlanOfScene, what_changes_less_than_the_limit_is_off) {
@@ -105,6 +167,7 @@ struct Capture {
             dataset.views.push_back(view);
             photos.emplace_back(64, 64, 4);
             photos.back().data.assign(64 * 64 * 4, 120);
+            for (size_t i = 3; i < photos.back().data.size(); i += 4) photos.back().data[i] = 255;
         }
         dataset.points.seen_begin.push_back(0);
         for (int p = 0; p < kPoints; ++p) {
@@ -116,13 +179,21 @@ struct Capture {
         dataset.points.seen_begin.clear();
         dataset.points.seen_by.clear();
     }
-    On on() const { return effects_on(plan_training(dataset, photos, 0)); }
+    EffectPlan plan() const { return plan_training(dataset, photos, 0); }
+    /// Beside near-plane care, which training always has.
+    On on() const {
+        On on = effects_on(plan());
+        std::erase(on, EFFECT_NEAR);
+        return on;
+    }
 };
 
 TEST(EffectPlanOfDataset, footprints_that_differ_call_for_antialiasing) {
+    EXPECT_EQ(effects_on(Capture().plan()), On{EFFECT_NEAR}) << "splats that move need it";
     EXPECT_EQ(Capture().on(), On{});
     EXPECT_EQ(Capture(1.3).on(), On{});
-    Capture wide(3.0);
+    EXPECT_EQ(Capture(1.6).on(), On{});
+    Capture wide(4.0);
     EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
     wide.forget_tracks();
     EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
@@ -144,12 +215,17 @@ TEST(EffectPlanOfDataset, gains_that_differ_call_for_exposure_where_tracks_say_s
 TEST(EffectPlanOfDataset, alpha_centre_and_degree_each_alone) {
     Capture alpha;
     alpha.dataset.has_alpha = true;
+    EXPECT_EQ(alpha.on(), On{}) << "a channel that is opaque everywhere";
+    alpha.photos[5].data[7] = 254;
     EXPECT_EQ(alpha.on(), On{EFFECT_ALPHA});
+    alpha.photos.clear();
+    EXPECT_EQ(alpha.on(), On{EFFECT_ALPHA}) << "nobody looked";
     Capture off;
     off.dataset.views[3].camera.cy += 0.7;
     EXPECT_EQ(off.on(), On{EFFECT_OFF_CENTRE});
     const Capture plain;
-    EXPECT_EQ(effects_on(plan_training(plain.dataset, plain.photos, 2)), On{EFFECT_VIEW_COLOUR});
+    EXPECT_EQ(effects_on(plan_training(plain.dataset, plain.photos, 2)),
+              (On{EFFECT_VIEW_COLOUR, EFFECT_NEAR}));
 }
 
 TEST(EffectChoice, words_override_the_rules) {
@@ -157,7 +233,12 @@ TEST(EffectChoice, words_override_the_rules) {
     const auto plan = [&](const char* text) {
         return plan_rendering(s.model, s.views, {}, parse_effects(text));
     };
-    EXPECT_EQ(effects_on(plan("all")), (On{EFFECT_VIEW_COLOUR, EFFECT_OFF_CENTRE, EFFECT_LENS}));
+    EXPECT_EQ(effects_on(plan("all")), (On{EFFECT_VIEW_COLOUR, EFFECT_OFF_CENTRE, EFFECT_LENS,
+                                           EFFECT_HUGE, EFFECT_NEAR}));
+    EXPECT_EQ(effects_on(plan("all,-lens,-sh")), (On{EFFECT_OFF_CENTRE, EFFECT_HUGE, EFFECT_NEAR}));
+    EXPECT_EQ(effects_on(plan("none,+near")), On{EFFECT_NEAR});
+    EXPECT_EQ(effects_on(plan("auto,-sh,+off_centre")), On{EFFECT_OFF_CENTRE});
+    EXPECT_EQ(effects_on(plan("auto")), On{});
     EXPECT_EQ(plan("all").row(EFFECT_VIEW_COLOUR).degree, 3);
     EXPECT_EQ(effects_on(plan("none")), On{});
     EXPECT_EQ(effects_on(plan("+off_centre,-sh")), On{EFFECT_OFF_CENTRE});
@@ -169,7 +250,7 @@ TEST(EffectChoice, words_override_the_rules) {
 }
 
 TEST(EffectChoice, what_is_no_effect_is_an_error_that_names_them) {
-    for (const char* text : {"", "sh", "+nothing", "auto,+sh", "+sh,", "+sh -lens"}) {
+    for (const char* text : {"", "sh", "+nothing", "+sh,auto", "all,none", "+sh,", "auto,", "+sh -lens"}) {
         try {
             parse_effects(text);
             ADD_FAILURE() << text;

@@ -1,0 +1,55 @@
+// The pairs of the splats that emit.comp left over: the same pairs in the same slots, so that the lists are bit-equal.
+// Place: after emit.comp, in frames whose predecessor had huge splats. Work: a workgroup takes every
+// EMIT_HUGE_GROUPS-th huge splat, a thread one of the 64 cells of its cover. Shared memory: none. Reads covers and
+// projected splats; writes pairs.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/limits.h"
+#include "shared/render_args.h"
+
+layout(local_size_x = EMIT_HUGE_THREADS) in;
+
+#include "lib/tile.glsl"
+
+layout(push_constant, scalar) uniform Push { PairArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer Status { FrameStatus status; };
+layout(set = 0, binding = 1, scalar) readonly buffer DepthOrder { uint depth_order[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer PairOffset { uint pair_offset[]; };  // by rank
+layout(set = 0, binding = 3, scalar) readonly buffer Cover { uvec4 cover[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer PairTile { uint pair_tile[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer PairSplat { uint pair_splat[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer HugeRank { uint huge_rank[]; };
+#define SHAPE_BINDING 7
+#define BOUND_BINDING 8
+#include "lib/projected.glsl"
+#include "forward/emit_cell.glsl"
+
+bool has_cell(TileCover c, uint cell) {
+    return ((cell < 32u ? c.bits.x >> cell : c.bits.y >> (cell - 32u)) & 1u) != 0u;
+}
+
+uint cell_tiles(TileCover c, uint cell) {
+    const uvec2 size = cell_size(c.extent);
+    const uvec2 first = uvec2(cell & 7u, cell >> 3) * size;
+    const uvec2 tiles = min(first + size, c.extent) - first;
+    return tiles.x * tiles.y;
+}
+
+void main() {
+    const uint mine = gl_LocalInvocationID.x;
+    for (uint k = gl_WorkGroupID.x; k < status.huge_splats; k += EMIT_HUGE_GROUPS) {
+        const uint rank = huge_rank[k];
+        const uint splat = depth_order[rank];
+        const TileCover c = unpack_cover(cover[splat]);
+        if (!has_cell(c, mine)) continue;
+        uint slot = pair_offset[rank];
+        for (uint cell = 0u; cell < mine; ++cell)
+            if (has_cell(c, cell)) slot += cell_tiles(c, cell);
+        Ellipse e;
+        e.shape = load_shape(splat, e.bound.x);
+        e.bound.y = splat_bound[splat].y;
+        emit_cell(c, mine, splat, e, slot);
+    }
+}

@@ -1,0 +1,272 @@
+// Each effect on a scene that needs it and on one that does not: the plan is right on both, the
+// picture of auto is that of all, and without the effect the picture of the first is another one.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "engine/render/effect_plan.h"
+#include "engine/render/renderer.h"
+#include "tests/support/compare.h"
+#include "tests/support/random_scene.h"
+#include "tests/support/shared_device.h"
+#include "tests/support/test_lenses.h"
+#include "tests/support/tiny_training.h"
+
+namespace darb::test {
+namespace {
+
+/// Small matte splats before a centred pinhole: calls for nothing.
+struct Scene {
+    SplatModel model;
+    std::vector<View> views{1};
+    Scene() {
+        const TestScene s = random_scene({.count = 300,
+                                          .width = 120,
+                                          .height = 80,
+                                          .sh_degree = 3,
+                                          .min_log_scale = -4,
+                                          .max_log_scale = -2.5});
+        model = s.model;
+        model.sh_rest.assign(model.sh_rest.size(), 0.0f);
+        for (size_t i = 0; i < model.size() * 3; ++i)  // all in view, none at its border
+            model.position[i] *= 0.4f;
+        Camera& c = views[0].camera;
+        c = s.camera;
+        c.cx = 0.5 * c.width;
+        c.cy = 0.5 * c.height;
+        views[0].lens.parameters = {c.fx, c.fy, c.cx, c.cy};
+    }
+    Camera& camera() { return views[0].camera; }
+};
+
+struct Drawn {
+    EffectPlan plan;
+    ImageF picture;
+    bool cooperates = false;
+};
+
+Drawn draw(const Scene& scene, const char* effects) {
+    Drawn drawn;
+    drawn.plan = plan_rendering(scene.model, scene.views, {}, parse_effects(effects));
+    SplatModel model = scene.model;
+    std::vector<View> views = scene.views;
+    apply_plan(drawn.plan, model);
+    apply_plan(drawn.plan, views);
+    Renderer renderer(shared_device(), model, Accuracy{}, drawn.plan.projection(),
+                      drawn.plan.crowds());
+    for (int frame = 0; frame < 2; ++frame) {  // the counters of the first decide on the second
+        drawn.picture = renderer.render(views[0].camera);
+        drawn.plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
+    }
+    return drawn;
+}
+
+void expect_another_picture(const ImageF& a, const ImageF& b) {
+    double largest = 0;
+    for (size_t i = 0; i < a.data.size(); ++i)
+        largest = std::max(largest, double{std::abs(a.data[i] - b.data[i])});
+    EXPECT_GT(largest, 0.01) << "the scene is meant to need the effect";
+}
+
+using Change = void (*)(Scene&);
+
+/// needs: makes the plain scene need the effect. Without lenses `all` leaves every bit alone.
+void expect_right_on_both(int effect, Change needs) {
+    SCOPED_TRACE(effect_name(effect));
+    const std::string without = fmt::format("auto,-{}", effect_name(effect));
+    const std::string all = effect == EFFECT_LENS ? "all" : "all,-lens";
+    const Scene plain;
+    const Drawn off = draw(plain, "auto"), forced = draw(plain, all.c_str());
+    EXPECT_FALSE(off.plan.on(effect));
+    if (effect == EFFECT_LENS)  // the arithmetic of a lens without terms rounds otherwise
+        EXPECT_TRUE(
+            compare("all", off.picture.data, forced.picture.data, tolerance("image_float32")));
+    else
+        EXPECT_EQ(off.picture.data, forced.picture.data) << "an identity, bit by bit";
+
+    Scene scene;
+    needs(scene);
+    const Drawn on = draw(scene, "auto");
+    for (int e = 0; e < EFFECT_COUNT; ++e)
+        EXPECT_EQ(on.plan.on(e), e == effect) << effect_name(e) << ": " << on.plan.row(e).reason;
+    const ImageF whole = draw(scene, all.c_str()).picture;
+    if (effect == EFFECT_LENS)
+        EXPECT_TRUE(compare("all", on.picture.data, whole.data, tolerance("image_float32")));
+    else
+        EXPECT_EQ(on.picture.data, whole.data);
+    if (effect == EFFECT_HUGE)  // how pairs are written changes no picture
+        EXPECT_EQ(on.picture.data, draw(scene, without.c_str()).picture.data);
+    else
+        expect_another_picture(on.picture, draw(scene, without.c_str()).picture);
+}
+
+TEST(EffectPicture, view_dependent_colour) {
+    expect_right_on_both(EFFECT_VIEW_COLOUR, [](Scene& s) {
+        for (size_t i = 0; i < s.model.sh_rest.size(); ++i)
+            s.model.sh_rest[i] = i % 2 == 0 ? 0.2f : -0.2f;
+    });
+}
+
+TEST(EffectPicture, antialias) {
+    expect_right_on_both(EFFECT_ANTIALIAS, [](Scene& s) { s.model.antialias = true; });
+}
+
+TEST(EffectPicture, off_centre) {
+    expect_right_on_both(EFFECT_OFF_CENTRE, [](Scene& s) { s.camera().cx += 3.5; });
+}
+
+TEST(EffectPicture, lens) {
+    expect_right_on_both(EFFECT_LENS, [](Scene& s) {
+        s.camera().lens = test_lenses()[2].second;
+        s.camera().lens.ray_min = glm::dvec2(-2);  // every splat well within the picture
+        s.camera().lens.ray_max = glm::dvec2(2);
+    });
+}
+
+TEST(EffectPicture, huge_splats_and_long_lists) {
+    expect_right_on_both(EFFECT_HUGE, [](Scene& s) {
+        Camera& c = s.camera();  // more tiles, and a few splats over all of them
+        c.width = c.width * 4;
+        c.height = c.height * 4;
+        c.cx *= 4, c.cy *= 4, c.fx *= 4, c.fy *= 4;
+        s.views[0].lens.parameters = {c.fx, c.fy, c.cx, c.cy};
+        for (size_t i = 0; i < 9; ++i) s.model.log_scale[i] = 1.5f;
+    });
+}
+
+// A large splat to the left of the camera, hardly before it: its affine picture without the clamp
+// is a fan from the left border across the whole picture.
+TEST(EffectPicture, near_plane) {
+    expect_right_on_both(EFFECT_NEAR, [](Scene& s) {
+        const Camera& c = s.camera();
+        const glm::dvec3 at =
+            glm::transpose(c.rotation) * (glm::dvec3(-1.2, 0, 0.35) - c.translation);
+        for (size_t k = 0; k < 3; ++k) {
+            s.model.position[k] = static_cast<float>(at[static_cast<int>(k)]);
+            s.model.log_scale[k] = -1.2f;
+            s.model.sh_dc[k] = 2;
+        }
+        s.model.opacity[0] = 4;
+    });
+}
+
+TEST(EffectPicture, a_depth_image_leaves_the_picture_alone) {
+    const Scene scene;
+    EXPECT_FALSE(plan_rendering(scene.model, scene.views, {}).on(EFFECT_DEPTH));
+    EXPECT_TRUE(plan_rendering(scene.model, scene.views, {.depth = true}).on(EFFECT_DEPTH));
+    Renderer renderer(shared_device(), scene.model);
+    const ImageF before = renderer.render(scene.views[0].camera);
+    for (const PassTime& pass : renderer.pass_times())
+        EXPECT_NE(pass.name, "depth") << "nobody asked for it";
+    renderer.render_depth();
+    EXPECT_EQ(renderer.pass_times()[0].name, "depth");
+    EXPECT_EQ(renderer.render(scene.views[0].camera).data, before.data);
+}
+
+TEST(EffectMemory, frames_hold_no_buffer_of_an_effect_that_is_off) {
+    const Scene scene;
+    const auto bytes = [&](const char* effects) {
+        Device device;
+        const EffectPlan plan = plan_rendering(scene.model, scene.views, {}, parse_effects(effects));
+        SplatModel model = scene.model;
+        apply_plan(plan, model);
+        Renderer renderer(device, model, Accuracy{}, plan.projection(), plan.crowds());
+        renderer.render(scene.views[0].camera);
+        return device.peak_bytes();
+    };
+    const std::uint64_t none = bytes("none"), automatic = bytes("auto");
+    EXPECT_EQ(none, automatic) << "the scene calls for nothing";
+    EXPECT_GE(bytes("+sh"), automatic + scene.model.sh_rest.size() * sizeof(float));
+    const size_t pixels = 120 * 80;  // the state of long lists, and the huge splats' list
+    EXPECT_GE(bytes("+huge"), automatic + pixels * 4);
+}
+
+TrainOptions plain_options() {
+    TrainOptions options;
+    options.iterations = 400;
+    options.densify_until = 0;
+    options.sh_degree = 0;
+    options.random_background = false;
+    return options;
+}
+
+/// bytes, passes: what the run took of the device, and the names of its passes.
+std::vector<float> trained(const TinyTraining& t, const TrainOptions& options, int steps,
+                           std::uint64_t* bytes = nullptr,
+                           std::set<std::string>* passes = nullptr) {
+    Device device;
+    Trainer trainer(device, t.dataset, t.photos, t.start(), options);
+    for (int i = 0; i < steps; ++i) trainer.step();
+    trainer.drain();
+    if (bytes) *bytes = device.peak_bytes();
+    for (const PassTotal& pass : trainer.pass_totals())
+        if (passes) passes->insert(pass.name);
+    const SplatModel model = trainer.state().model;
+    std::vector<float> values;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float>& from = attribute_values(model, a);
+        values.insert(values.end(), from.begin(), from.end());
+    }
+    return values;
+}
+
+TEST(EffectTraining, alpha_of_opaque_photos_is_an_identity_and_of_others_is_needed) {
+    TinyTraining t = tiny_training();
+    TrainOptions on = plain_options(), off = on;
+    off.alpha = false;
+    EXPECT_EQ(trained(t, on, 5), trained(t, off, 5)) << "opaque photos";
+    for (ImageU8& photo : t.photos)
+        for (size_t i = 3; i < photo.data.size(); i += 8) photo.data[i] = 0;
+    EXPECT_NE(trained(t, on, 5), trained(t, off, 5));
+    Dataset& d = t.dataset;
+    EXPECT_FALSE(plan_training(d, t.photos, 0).on(EFFECT_ALPHA)) << "no channel, no effect";
+    d.has_alpha = true;
+    EXPECT_TRUE(plan_training(d, t.photos, 0).on(EFFECT_ALPHA));
+    for (ImageU8& photo : t.photos)
+        for (size_t i = 3; i < photo.data.size(); i += 4) photo.data[i] = 255;
+    EXPECT_FALSE(plan_training(d, t.photos, 0).on(EFFECT_ALPHA)) << "opaque everywhere";
+}
+
+TEST(EffectTraining, exposure_begins_as_an_identity) {
+    const TinyTraining t = tiny_training();
+    TrainOptions on = plain_options();
+    on.exposure = true;
+    std::uint64_t with = 0, without = 0;
+    std::set<std::string> passes_with, passes_without;
+    EXPECT_EQ(trained(t, on, 1, &with, &passes_with),
+              trained(t, plain_options(), 1, &without, &passes_without));
+    EXPECT_GE(with, without + 64 * 48 * 12) << "the mapped picture";
+    EXPECT_TRUE(passes_with.contains("exposure"));
+    EXPECT_FALSE(passes_without.contains("exposure"));
+}
+
+TEST(EffectTraining, near_plane_care_changes_no_bit_where_no_splat_is_beside_a_camera) {
+    const TinyTraining t = tiny_training();
+    TrainOptions off = plain_options();
+    off.near_care = false;
+    const EffectPlan plan = plan_rendering(t.start(), t.dataset.views, {});
+    ASSERT_FALSE(plan.on(EFFECT_NEAR)) << plan.row(EFFECT_NEAR).reason;
+    EXPECT_EQ(trained(t, off, 3), trained(t, plain_options(), 3));
+    EXPECT_TRUE(plan_training(t.dataset, t.photos, 0).on(EFFECT_NEAR));
+}
+
+TEST(EffectTraining, cooperation_and_segments_change_no_bit) {
+    TinyTraining t = tiny_training({.width = 400, .height = 300});
+    TrainOptions always = plain_options(), never = always;
+    always.crowds = Crowds::always;
+    never.crowds = Crowds::never;
+    EXPECT_EQ(trained(t, always, 3), trained(t, never, 3));
+}
+
+TEST(EffectTraining, antialiasing_that_is_off_has_no_filter) {
+    const TinyTraining t = tiny_training();
+    TrainOptions on = plain_options();
+    on.antialias = true;
+    std::uint64_t with = 0, without = 0;
+    EXPECT_NE(trained(t, on, 3, &with), trained(t, plain_options(), 3, &without));
+    EXPECT_GE(with, without + 4 * t.start().size());
+}
+
+}  // namespace
+}  // namespace darb::test
