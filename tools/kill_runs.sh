@@ -5,19 +5,20 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+darb=${DARB:-build/darb} # the command under test
 kills=${1:-50}
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 options=(assets/scene -r 8 -q --iterations 1000 --checkpoint-interval 5 --densify-from-iter 20
     --densification-interval 20 --opacity-reset-interval 50)
 scene=point_cloud/iteration_1000/point_cloud.ply
-build/darb train "${options[@]}" -o "$out/whole" >/dev/null
+"$darb" train "${options[@]}" -o "$out/whole" >/dev/null
 killed=0 tries=0
 while ((killed < kills)); do
     resume=()
     [[ ! -f $out/killed/checkpoint.darb ]] || resume=(--resume)
     ((++tries <= kills * 4)) || { echo "the run ends before it is killed"; exit 1; }
-    build/darb train "${options[@]}" "${resume[@]}" -o "$out/killed" >"$out/log" 2>&1 &
+    "$darb" train "${options[@]}" "${resume[@]}" -o "$out/killed" >"$out/log" 2>&1 &
     run=$!
     sleep "$((RANDOM % 3)).$((RANDOM % 10))$((RANDOM % 10))"
     if kill -9 $run 2>/dev/null; then killed=$((killed + 1)); fi
@@ -34,6 +35,6 @@ while ((killed < kills)); do
         rm -rf "$out/killed"
     fi
 done
-build/darb train "${options[@]}" $([[ -f $out/killed/checkpoint.darb ]] && echo --resume) -o "$out/killed" >/dev/null
+"$darb" train "${options[@]}" $([[ -f $out/killed/checkpoint.darb ]] && echo --resume) -o "$out/killed" >/dev/null
 cmp "$out/whole/$scene" "$out/killed/$scene"
 echo "$killed of $kills kills survived, the scene is the same to the byte"
