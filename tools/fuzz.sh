@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Fuzzes every reader of files with libFuzzer (clang): splat scenes, COLMAP, transforms.json, checkpoints; and, where
 # the tests are built, the pipeline with random scenes that hold poison (tests/pipeline/scene_fuzz_test.cpp).
-#   tools/fuzz.sh [MINUTES]      of each (default 10; fractions are legal); 0.05 is what the test gate does
+#   tools/fuzz.sh [MINUTES]      of each (default 10; fractions are legal); 0.02 is what the test gate does
 # Seeds: the shipped scene and what darb writes. What is learned stays in build-asan/corpus, findings in
 # build-asan/crashes.
 set -euo pipefail

@@ -15,7 +15,7 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full)
   gpu        tests of shaders, pipelines, pictures and training
   clang      build with clang, warnings are errors, with ASan and UBSan, and the fuzzers
   sanitize   unit tests and the quick device tests of that build
-  fuzz       the fuzzers of that build, 3 seconds each (tools/fuzz.sh)
+  fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   sync       unit tests and the quick device tests under Vulkan synchronization validation
   quick      = setup style release unit
 TEXT
@@ -73,7 +73,7 @@ do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
         run_ctest build-asan -L '^(unit|shader|pipeline)$' -E '_slow(/|$)' --timeout 300
 }
-do_fuzz() { tools/fuzz.sh 0.05; }
+do_fuzz() { tools/fuzz.sh 0.02; }
 do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E '_slow(/|$)' --timeout 300; }
 
 started=$SECONDS

@@ -74,8 +74,9 @@ def guards(text):
 
 
 def kills(text):
-    survived, killed = re.search(r"^(\d+) of (\d+) kills survived, the scene is the same", text, re.M).groups()
-    return {"kills": int(killed), "survived": int(survived)}
+    found = re.search(r"^(\d+) of (\d+) kills survived, (\d+) of them with a checkpoint to resume; the scene is the same",
+                      text, re.M)
+    return {"kills": int(found[2]), "survived": int(found[1]), "with_a_checkpoint": int(found[3])}
 
 
 def soak(text):
@@ -140,7 +141,9 @@ def run_table(figures):
     line("`tools/fuzz.sh`", "fuzz",
          lambda f: f"{f['executions']:,} executions in {f['hours']} h, {f['findings']} findings left: " +
          ", ".join(f"{n} {r['executions']:,}" for n, r in f["of"].items()))
-    line("`tools/kill_runs.sh`", "kills", lambda f: f"{f['survived']} of {f['kills']} kills resumed to the same bytes")
+    line("`tools/kill_runs.sh`", "kills",
+         lambda f: f"{f['survived']} of {f['kills']} kills resumed to the same bytes, {f['with_a_checkpoint']} of them "
+         "from a checkpoint")
     line("`tools/soak.sh`", "soak",
          lambda f: f"{f['iterations']:,} iterations: {f['mib_in_the_fourth_fifth']} MiB, "
          f"then {f['mib_in_the_last_fifth']} MiB")

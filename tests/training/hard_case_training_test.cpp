@@ -11,7 +11,7 @@
 namespace darb::test {
 namespace {
 
-constexpr int kSteps = 4;
+constexpr int kSteps = 4, kIterations = 10;  // the rest with density control
 
 struct Training {
     Dataset dataset;
@@ -41,7 +41,7 @@ Training training_of(const check::HardCase& c) {
     t.photo = photo_for(view.camera);
     t.photos = {with_alpha(t.photo), with_alpha(t.photo)};
     TrainOptions& o = t.options;
-    o.iterations = kSteps;
+    o.iterations = kIterations;
     o.kernel = c.scene.model.kernel;
     o.footprint = c.scene.model.footprint;
     o.sh_degree = c.scene.model.sh_degree;
@@ -50,7 +50,14 @@ Training training_of(const check::HardCase& c) {
     o.position_lr_init = o.position_lr_final = 1e-3f;
     o.final_lr_share = 1;
     o.opacity_weight = o.scale_weight = 0;
-    o.densify_until = 0;
+    o.densify_from = kSteps;
+    o.densify_until = kIterations + 1;
+    o.densify_interval = 2;
+    o.densify_grad_threshold = 1e-7f;
+    o.opacity_reset_interval = 5;
+    o.prune_opacity = 0.01f;
+    o.prune_extent = 1e9f;
+    o.max_splats = static_cast<std::uint32_t>(2 * c.scene.model.size() + 10);
     return t;
 }
 
@@ -121,39 +128,32 @@ void adapt_cutoff(check::HardCase& c, TrainOptions& options) {
     std::fill(c.scene.model.opacity.begin(), c.scene.model.opacity.end(), -6.7f);
 }
 
-TEST(HardCaseTraining, losses_of_a_few_steps_match_double) {
-    for (check::HardCase c : check::hard_cases(KERNEL_RAISED_COSINE, Footprint::psi)) {
-        SCOPED_TRACE(c.name);
-        Training t = training_of(c);
-        adapt_cutoff(c, t.options);
-        const Result result = train(t, c.scene.model);
-        ASSERT_EQ(result.loss.size(), size_t{kSteps});
-        EXPECT_TRUE(compare(c.name, losses_in_double(t, c, scene_extent(t.dataset.views)),
-                            result.loss, tolerance("training_loss_float32")));
-        EXPECT_TRUE(result.finite);
-        EXPECT_EQ(result.bad_gradients, 0U);
-        if (c.expects_splats) EXPECT_NE(result.loss[kSteps - 1], result.loss[0]) << "nothing moved";
-    }
+// The steps before which a scene has gradients that float32 knows and an order of its splats: equal
+// depths differ by rounding after the first.
+size_t comparable_steps(const check::HardCase& c) {
+    return !c.gradient || c.name == "equal_depths" ? 1 : kSteps;
 }
 
-TEST(HardCaseTraining, density_control_and_resets_leave_everything_finite) {
-    std::uint32_t grown = 0;
+TEST(HardCaseTraining, losses_match_double_and_density_control_leaves_everything_finite) {
+    size_t grown = 0;
     for (check::HardCase c : check::hard_cases(KERNEL_RAISED_COSINE, Footprint::psi)) {
         SCOPED_TRACE(c.name);
         Training t = training_of(c);
         adapt_cutoff(c, t.options);
-        t.options.iterations = t.options.densify_until = 7;
-        t.options.densify_from = 1;
-        t.options.densify_interval = 2;
-        t.options.opacity_reset_interval = 3;
-        t.options.densify_grad_threshold = 1e-7f;
-        t.options.prune_opacity = 0.01f;
-        t.options.prune_extent = 1e9f;
-        t.options.max_splats = static_cast<std::uint32_t>(2 * c.scene.model.size() + 10);
         const Result result = train(t, c.scene.model);
+        ASSERT_EQ(result.loss.size(), size_t{kIterations});
         EXPECT_TRUE(result.finite);
         EXPECT_EQ(result.bad_gradients, 0U);
         grown += result.splats > c.scene.model.size() ? 1 : 0;
+
+        std::vector<double> expected = losses_in_double(t, c, scene_extent(t.dataset.views));
+        const size_t steps = comparable_steps(c);
+        expected.resize(steps);
+        EXPECT_TRUE(compare(c.name, expected, std::span(result.loss).first(steps),
+                            tolerance("training_loss_float32")));
+        if (c.expects_splats) {
+            EXPECT_NE(result.loss[kSteps - 1], result.loss[0]) << "nothing moved";
+        }
     }
     EXPECT_GT(grown, 10U) << "density control must take part";
 }
