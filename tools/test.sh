@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
-all_steps="setup style release unit gpu clang sanitize sync"
+all_steps="setup style release unit gpu clang sanitize fuzz sync"
 usage() {
     cat <<TEXT
 usage: tools/test.sh [full | quick | STEP...]      (default: full)
@@ -13,8 +13,9 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full)
   release    build with gcc, warnings are errors
   unit       tests that need no device
   gpu        tests of shaders, pipelines, pictures and training
-  clang      build with clang, warnings are errors, with ASan and UBSan
+  clang      build with clang, warnings are errors, with ASan and UBSan, and the fuzzers
   sanitize   unit tests and the quick device tests of that build
+  fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   sync       unit tests and the quick device tests under Vulkan synchronization validation
   quick      = setup style release unit
 TEXT
@@ -72,14 +73,15 @@ do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
         run_ctest build-asan -L '^(unit|shader|pipeline)$' -E '_slow(/|$)' --timeout 300
 }
+do_fuzz() { tools/fuzz.sh 0.02; }
 do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E '_slow(/|$)' --timeout 300; }
 
 started=$SECONDS
 for step in $steps; do
     echo "=== $step"
     begun=$SECONDS
-    if [[ $step == sanitize && " ${failures[*]-} " == *" clang "* ]]; then
-        echo "=== sanitize: left out, its build failed"
+    if [[ " sanitize fuzz " == *" $step "* && " ${failures[*]-} " == *" clang "* ]]; then
+        echo "=== $step: left out, its build failed"
         continue
     fi
     "do_$step"
