@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tools/paper/pictures.h"
+#include "tools/paper/rings.h"
 #include "trainer/report/html.h"
 #include "trainer/report/page.h"
 #include "trainer/report/svg_plot.h"
@@ -69,15 +70,15 @@ std::string footprints(const PsiResult& r, const DerivedKernel& kernel) {
     };
     const double end = shown_radius(kernel) * std::sqrt(std::max({1.0, r.exact, r.best}));
     const std::string x = "distance d (standard deviations)";
-    Plot both{r.kernel + ": projection and splats", x, "", {}};
+    Plot both{"Projection and splats", x, "", {}};
     both.series = {curve("projection", end, truth), curve("psi", end, splat(r.exact)),
                    curve("least squares", end, splat(r.best))};
-    Plot rest{r.kernel + ": splat less projection", x, "", {}};
+    Plot rest{"Splat less projection", x, "", {}};
     const auto error = [&](double scale) {
         return [&, scale](double q) { return splat(scale)(q) - truth(q); };
     };
     rest.series = {curve("psi", end, error(r.exact)), curve("least squares", end, error(r.best)),
-                   curve("covariance as it is", end, error(1))};
+                   curve("as it is", end, error(1))};
     return "<div class='plots'>" + svg_plot(both) + svg_plot(rest) + "</div>\n";
 }
 
@@ -129,6 +130,27 @@ std::string spread_text(const PsiSpread& s) {
     return fmt::format("{:.5f} ± {:.5f}", s.median, s.deviation);
 }
 
+std::string rings_part() {
+    Plot plot{"Beyond the first pulse", "distance d (standard deviations)", "w", {}};
+    for (const bool sinc : {false, true}) {
+        PlotSeries series{sinc ? "|sinc|" : "raised cosine"};
+        const double end = ring_radius(sinc, 3);
+        for (int i = 0; i <= 2 * kPoints; ++i) {
+            const double d = end * i / (2 * kPoints);
+            series.points.emplace_back(d, ring_value(sinc, 3, d));
+        }
+        plot.series.push_back(std::move(series));
+    }
+    std::string html =
+        "<h2>Rings that the limit removes</h2><table><tr><th>kernel</th><th>pulses</th>"
+        "<th>radius</th><th>psi</th><th>of the mass beyond the first</th></tr>\n";
+    for (const Rings& r : all_rings())
+        html += fmt::format(
+            "<tr><td>{}</td><td>{}</td><td>{:.1f}</td><td>{:.6f}</td><td>{:.1f} %</td></tr>\n",
+            r.kernel, r.pulses, r.radius, r.psi, 100 * r.outside);
+    return html + "</table>\n<div class='plots'>" + svg_plot(plot) + "</div>\n";
+}
+
 std::string html_table(const std::vector<PsiResult>& results) {
     std::string html =
         "<div class='wide'><table><tr><th>kernel</th><th>grid xx</th><th>grid xy</th>"
@@ -166,6 +188,11 @@ std::string psi_table(const std::vector<PsiResult>& results) {
             r.by_psi.l2, r.by_psi.linf, r.by_best.l2, r.by_best.linf, r.by_exact_footprint.l2,
             r.by_exact_footprint.linf, "  standard deviation", r.grid[0].deviation,
             r.grid[1].deviation, r.grid[2].deviation);
+    text += fmt::format("\n{:<22} {:>8} {:>9} {:>9} {:>16}\n", "with more pulses", "pulses",
+                        "radius", "psi", "mass beyond one");
+    for (const Rings& r : all_rings())
+        text += fmt::format("{:<22} {:>8} {:>9.1f} {:>9.6f} {:>14.1f} %\n", r.kernel, r.pulses,
+                            r.radius, r.psi, 100 * r.outside);
     return text;
 }
 
@@ -186,11 +213,15 @@ nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOpti
                {"least_squares", distance_json(r.by_best)},
                {"covariance_as_it_is", distance_json(r.by_one)},
                {"exact_footprint_float32", distance_json(r.by_exact_footprint)}}}});
-    return {{"version", DARB_VERSION},
-            {"samples", options.samples},
-            {"cells", options.cells},
-            {"seed", options.seed},
-            {"kernels", kernels}};
+    nlohmann::json rings = nlohmann::json::array();
+    for (const Rings& r : all_rings())
+        rings.push_back({{"kernel", r.kernel},
+                         {"pulses", r.pulses},
+                         {"radius", r.radius},
+                         {"psi", r.psi},
+                         {"mass_beyond_first", r.outside}});
+    return {{"version", DARB_VERSION}, {"rings", rings},       {"samples", options.samples},
+            {"cells", options.cells},  {"seed", options.seed}, {"kernels", kernels}};
 }
 
 std::string psi_html(const std::vector<PsiResult>& results,
@@ -200,15 +231,20 @@ std::string psi_html(const std::vector<PsiResult>& results,
     for (std::size_t i = 0; i < results.size(); ++i)
         body += "<h2>" + html_escape(results[i].kernel) + "</h2>" +
                 fields(results[i], *kernels[i]) + footprints(results[i], *kernels[i]);
-    body += fmt::format(
-        "<h2>How to read it</h2><p>Grid: the paper's experiment, {} random covariances on {}^3 "
-        "cells: density within the support, summed along z, its weighted 2D covariance over the "
-        "2x2 block of the 3D one; median and standard deviation, for xx, xy and yy apart. Exact: a "
-        "third of the ratio of the fourth and the second radial moment. Least squares: the scale "
-        "of the covariance that brings the splat nearest to the projection.</p><p>Distances: "
-        "between profiles with peak 1 over the image plane, relative L2 and largest. The exact "
-        "footprint is evaluated in float32, as the shaders have it.</p>\n",
-        options.samples, options.cells);
+    body +=
+        rings_part() +
+        fmt::format(
+            "<h2>How to read it</h2><p>Grid: the paper's experiment, {} random covariances on {}^3 "
+            "cells: density within the support, summed along z, its weighted 2D covariance over "
+            "the "
+            "2x2 block of the 3D one; median and standard deviation, for xx, xy and yy apart. "
+            "Exact: a "
+            "third of the ratio of the fourth and the second radial moment. Least squares: the "
+            "scale "
+            "of the covariance that brings the splat nearest to the projection.</p><p>Distances: "
+            "between profiles with peak 1 over the image plane, relative L2 and largest. The exact "
+            "footprint is evaluated in float32, as the shaders have it.</p>\n",
+            options.samples, options.cells);
     return html_page("The correction factor psi",
                      "The kernel's splat beside the true projection of the same 3D kernel", body);
 }
