@@ -14,7 +14,7 @@ nlohmann::json read_json(const fs::path& path) {
 
 const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
 
-TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated) {
+TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
     const fs::path out = scratch() / "compare";
     const std::string command =
         "compare " + kScene + " --kernels gaussian,sinc --iterations 10,20 -r 8 -o " +
@@ -57,7 +57,7 @@ TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated) {
         << other.out;
 }
 
-TEST(CompareCommand, RunOfDarbTrain_counts) {
+TEST(CompareCommand, RunOfDarbTrain_counts_slow) {
     const fs::path out = scratch() / "compare_train";
     const std::string options = " --iterations 12 -r 8 --effects=none ";
     ASSERT_EQ(darb("train " + kScene + " --eval --kernel parabolic -q" + options + " -o " +
@@ -77,6 +77,14 @@ TEST(CompareCommand, BadInput_isNamedWithExitCode2) {
     const Outcome bad = darb("compare " + kScene + " -o x --train-options=--frobnicate");
     EXPECT_EQ(bad.code, 2);
     EXPECT_NE(bad.err.find("frobnicate"), std::string::npos) << bad.err;
+}
+
+TEST(CompareCommand, DataSetThatCannotBeLoaded_isAFailureInTheReport) {
+    const fs::path empty = scratch() / "empty_set", out = scratch() / "compare_empty";
+    fs::create_directories(empty);
+    const Outcome one = darb("compare " + empty.string() + " -o " + out.string());
+    EXPECT_EQ(one.code, 1) << one.err;
+    EXPECT_NE(read_text_file(out / "compare.html").find("every kernel"), std::string::npos);
 }
 
 TEST(PsiCommand, TableJsonAndPage_agree) {

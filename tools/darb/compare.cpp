@@ -76,6 +76,8 @@ int compare(CompareFlags flags) {
     const std::vector<int> kernels = kernels_from_list("--kernels", flags.kernels);
     Comparison comparison;
     const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
+    for (const std::string& dataset : flags.datasets)  // bad options end it before it begins
+        train_flags_of(flags, dataset, kernels.front(), 0);
     for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
     comparison.iterations = flags.iterations;
     comparison.seeds = flags.seeds;

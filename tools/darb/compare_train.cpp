@@ -1,6 +1,8 @@
 // The training runs of a comparison, through the code of `darb train`.
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/compare_flags.h"
@@ -97,11 +99,21 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
                            const std::vector<int>& kernels, const Lpips* lpips,
                            const std::atomic<bool>& stop) {
     ComparedDataset result{dataset_name(dataset), dataset, {}};
-    Comparer comparer(flags, dataset, kernels.front(), lpips);
+    std::optional<Comparer> comparer;
+    try {
+        comparer.emplace(flags, dataset, kernels.front(), lpips);
+    } catch (const Error& e) {
+        ComparedRun failed;
+        failed.kernel = "every kernel";
+        failed.failure = e.what();
+        fmt::print(stderr, "failed: {}\n", e.what());
+        result.runs.push_back(std::move(failed));
+        return result;
+    }
     for (int seed = 0; seed < flags.seeds; ++seed)
         for (const int kernel : kernels) {
             if (stop) return result;
-            result.runs.push_back(comparer.run(kernel, static_cast<std::uint64_t>(seed), stop));
+            result.runs.push_back(comparer->run(kernel, static_cast<std::uint64_t>(seed), stop));
         }
     return result;
 }
