@@ -104,7 +104,9 @@ std::string fit_text(const std::string& text, double width) {
 Legend draw_legend(const std::vector<LegendEntry>& entries, double width) {
     constexpr double kLine = 15, kSwatch = 19, kBetween = 14;
     Legend legend;
-    if (entries.size() < 2) return legend;
+    const bool named = std::any_of(entries.begin(), entries.end(),
+                                   [](const LegendEntry& e) { return !e.name.empty(); });
+    if (entries.size() < 2 || !named) return legend;
     double x = kPlotLeft, y = 34;
     for (std::size_t i = 0; i < entries.size(); ++i) {
         const double wide = kSwatch + text_width(entries[i].name) + kBetween;
