@@ -1,5 +1,6 @@
 // MemoryPlan: how much device memory a training run takes, from the sizes of its buffers (those of
-// trainer.cpp, exposure.cpp, smoothing.cpp, gpu_splats.cpp, forward.cpp, backward.cpp, radix_sort.cpp and density_control.cpp).
+// trainer.cpp, exposure.cpp, smoothing.cpp, gpu_splats.cpp, forward.cpp, backward.cpp,
+// radix_sort.cpp and density_control.cpp).
 #pragma once
 
 #include <cstdint>
@@ -12,12 +13,12 @@ namespace darb {
 
 /// What decides the size of a run.
 struct MemoryDemand {
-    std::uint64_t splats = 0;        // N
-    std::uint64_t pairs = 0;         // K that the buffers hold
-    int sh_degree = 3;               // of the buffers
-    std::uint64_t photo_pixels = 0;  // of all training photos together
-    std::uint64_t image_pixels = 0;  // of the largest view: its width times its height
-    bool densifies = true;           // density control runs at this N
+    std::uint64_t splats = 0;            // N
+    std::uint64_t pairs = 0;             // K that the buffers hold
+    int sh_degree = 3;                   // of the buffers
+    std::uint64_t photo_pixels = 0;      // of all training photos together
+    std::uint64_t image_pixels = 0;      // of the largest view: its width times its height
+    bool densifies = true;               // density control runs at this N
     std::uint64_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
     std::uint64_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
 };
@@ -44,8 +45,8 @@ MemoryPlan plan_memory(const MemoryDemand& demand);
 /// splats; 0 where the photos alone exceed it.
 std::uint64_t splats_within(const MemoryDemand& demand, std::uint64_t budget_bytes);
 
-/// What a data set and the run's effects demand: all but splats, pairs and densifies. sh_degree: the
-/// highest that the run may reach.
+/// What a data set and the run's effects demand: all but splats, pairs and densifies. sh_degree:
+/// the highest that the run may reach.
 void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand);
 
 }  // namespace darb

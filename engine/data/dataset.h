@@ -1,6 +1,7 @@
 // Dataset: photos with their cameras and the sparse points, from any of the supported sources.
 // Cameras are pinholes in the frame of engine/scene/camera.h, at the size the photos load with;
-// with DatasetOptions::original_lens or original_where_wide those of distorted photos have the lens before them.
+// with DatasetOptions::original_lens or original_where_wide those of distorted photos have the lens
+// before them.
 #pragma once
 
 #include <cstdint>

@@ -67,10 +67,10 @@ struct RenderOutputs {
     float near_plane = static_cast<float>(NEAR_DEFAULT);
 };
 
-/// For pictures of a scene through these cameras (none: only what the file decides, and care for the
-/// near plane). An effect that
-/// is an identity where the rule says off may be forced on; anti-aliasing is as the file says, as
-/// another choice would show another scene: `all` leaves it alone, `none` and -antialias drop it.
+/// For pictures of a scene through these cameras (none: only what the file decides, and care for
+/// the near plane). An effect that is an identity where the rule says off may be forced on;
+/// anti-aliasing is as the file says, as another choice would show another scene: `all` leaves it
+/// alone, `none` and -antialias drop it.
 EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& views,
                           const RenderOutputs& outputs, const EffectChoice& choice = {});
 

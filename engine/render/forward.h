@@ -124,7 +124,7 @@ class Forward {
     std::map<int, Pipeline> project_;  // by SH degree in use
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
         list_lengths_, blend_;
-    std::optional<Pipeline> depth_light_;  // made when a depth image is first asked for
+    std::optional<Pipeline> depth_light_;              // made when a depth image is first asked for
     std::optional<Pipeline> emit_others_, emit_huge_;  // made when a frame first has huge splats
     bool cooperates_ = false;
     std::optional<Scan> scan_;
@@ -138,7 +138,8 @@ class Forward {
     Buffer splat_shape_, splat_light_, splat_bound_, cover_, pair_count_, visible_, visible_offset_;
     Buffer depth_key_, depth_order_, pair_count_sorted_, pair_offset_, pair_begin_;
     Buffer pair_tile_, pair_splat_, pair_order_, tile_range_;
-    Buffer huge_rank_, no_huge_rank_;  // [pair capacity / HUGE_PAIRS + 1] once there are any; a word
+    Buffer huge_rank_,
+        no_huge_rank_;  // [pair capacity / HUGE_PAIRS + 1] once there are any; a word
     Buffer image_, final_transmittance_, last_pair_;
 };
 

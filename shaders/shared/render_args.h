@@ -22,11 +22,12 @@
 // dispatch that takes seconds.
 #define LIST_SEGMENT 8192u
 
-// A splat of more pairs than this is huge: one thread would write them long after all others are done. With
-// COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one cell of the cover a thread.
+// A splat of more pairs than this is huge: one thread would write them long after all others are
+// done. With COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one cell of the
+// cover a thread.
 #define HUGE_PAIRS 256u
-#define EMIT_HUGE_THREADS 64   // cells of a cover
-#define EMIT_HUGE_GROUPS 64u   // that share the huge splats of a frame
+#define EMIT_HUGE_THREADS 64  // cells of a cover
+#define EMIT_HUGE_GROUPS 64u  // that share the huge splats of a frame
 
 // What did not fit into a frame; bits of FrameStatus.overflow.
 #define OVERFLOW_PAIRS 1u  // more pairs than their buffers hold

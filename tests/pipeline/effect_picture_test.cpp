@@ -168,7 +168,8 @@ TEST(EffectMemory, frames_hold_no_buffer_of_an_effect_that_is_off) {
     const Scene scene;
     const auto bytes = [&](const char* effects) {
         Device device;
-        const EffectPlan plan = plan_rendering(scene.model, scene.views, {}, parse_effects(effects));
+        const EffectPlan plan =
+            plan_rendering(scene.model, scene.views, {}, parse_effects(effects));
         SplatModel model = scene.model;
         apply_plan(plan, model);
         Renderer renderer(device, model, Accuracy{}, plan.projection(), plan.crowds());

@@ -48,7 +48,8 @@ class Comparer {
 };
 
 void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
-    if (plan_sees_photos_) f.run.photos = photos_;  // else the plan of `darb train` has not seen them
+    if (plan_sees_photos_)
+        f.run.photos = photos_;  // else the plan of `darb train` has not seen them
     plan_effects(dataset_, f);
     f.run.photos = photos_;
     const std::string settings = settings_text(f.train);

@@ -18,8 +18,8 @@ struct EffectPrice {
 using EffectPrices = std::vector<std::optional<EffectPrice>>;  // [EFFECT_COUNT]
 
 struct Measured {
-    double ms = 0, spread_ms = 0;  // median and half of the middle half's width
-    std::uint64_t bytes = 0;       // peak of device memory
+    double ms = 0, spread_ms = 0;                     // median and half of the middle half's width
+    std::uint64_t bytes = 0;                          // peak of device memory
     std::uint32_t huge_splats = 0, longest_list = 0;  // the most of any frame
 };
 
@@ -30,11 +30,10 @@ Measured measure_rendering(const DeviceOptions& device, const SplatModel& model,
 Measured measure_training(const DeviceOptions& device, const Dataset& dataset,
                           const TrainOptions& options, const EffectPlan& plan);
 
-/// with(plan) measures; base: what it said of the plan itself. Every effect that can be switched is,
-/// one at a time. No value for those that this work does not have.
+/// with(plan) measures; base: what it said of the plan itself. Every effect that can be switched
+/// is, one at a time. No value for those that this work does not have.
 EffectPrices price_effects(const EffectPlan& plan, const Measured& base, bool training,
-                           int most_degree,
-                           const std::function<Measured(const EffectPlan&)>& with);
+                           int most_degree, const std::function<Measured(const EffectPlan&)>& with);
 
 /// Views that frame the splats from four sides, where no cameras are named.
 std::vector<View> framing_views(const SplatModel& model);
