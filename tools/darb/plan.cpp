@@ -26,12 +26,6 @@ struct PlanFlags {
     DatasetOptions data;
 };
 
-bool is_scene(const std::filesystem::path& path) {
-    if (std::filesystem::is_regular_file(path)) return path.extension() != ".json";
-    return std::filesystem::exists(path / "point_cloud") ||  // of darb train
-           std::filesystem::exists(path / "meta.json");      // a SOG scene
-}
-
 struct Subject {
     bool training = false;
     SplatModel model;
@@ -75,18 +69,17 @@ json rows_json(const EffectPlan& plan, const EffectPrices& prices) {
 }
 
 void print_rows(const EffectPlan& plan, const EffectPrices& prices, bool training) {
-    fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  reason\n", "effect", "",
-               training ? "ms/iter" : "ms/frame", "MB");
+    const char* ms_of = training ? "ms/iter" : "ms/frame";
+    fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  reason\n", "effect", "", ms_of, "MB");
     for (int e = 0; e < EFFECT_COUNT; ++e) {
         const EffectRow& row = plan.row(e);
         std::string ms = "-", mb = "-";
-        if (!prices.empty() && prices[static_cast<std::size_t>(e)]) {
-            ms = fmt::format("{:+.2f}", prices[static_cast<std::size_t>(e)]->ms);
-            mb = fmt::format("{:+.2f}",
-                             static_cast<double>(prices[static_cast<std::size_t>(e)]->bytes) / 1e6);
+        if (const auto at = static_cast<std::size_t>(e); at < prices.size() && prices[at]) {
+            ms = fmt::format("{:+.2f}", prices[at]->ms);
+            mb = fmt::format("{:+.2f}", static_cast<double>(prices[at]->bytes) / 1e6);
         }
-        fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), row.on ? "on" : "off", ms,
-                   mb, row.reason);
+        const char* state = row.on ? "on" : "off";
+        fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), state, ms, mb, row.reason);
     }
 }
 
@@ -97,9 +90,9 @@ json compare_choices(const Subject& s, const PlanFlags& flags) {
         const Measured m = measure(s, flags, plan_of(s, flags, parse_effects(name)));
         list.push_back(
             {{"effects", name}, {"ms", m.ms}, {"spread_ms", m.spread_ms}, {"peak_bytes", m.bytes}});
-        if (!flags.as_json)
-            fmt::print("{:<5} {:>9.2f} ms (spread {:.2f})  {:>9.2f} MB at the peak\n", name, m.ms,
-                       m.spread_ms, static_cast<double>(m.bytes) / 1e6);
+        if (flags.as_json) continue;
+        fmt::print("{:<5} {:>9.2f} ms (spread {:.2f})  {:>9.2f} MB at the peak\n", name, m.ms,
+                   m.spread_ms, static_cast<double>(m.bytes) / 1e6);
     }
     return list;
 }
@@ -114,13 +107,14 @@ int run_plan(const PlanFlags& flags) {
         const Measured base = measure(s, flags, plan);
         plan.note_frame(base.huge_splats, base.longest_list);
         const int most_degree = s.training ? flags.sh_degree : s.model.sh_degree;
-        const auto with = [&](const EffectPlan& p) { return measure(s, flags, p); };
-        if (!flags.no_price) prices = price_effects(plan, base, s.training, most_degree, with);
+        if (!flags.no_price)
+            prices = price_effects(plan, base, s.training, most_degree,
+                                   [&](const EffectPlan& p) { return measure(s, flags, p); });
     }
     if (!flags.as_json) print_rows(plan, prices, s.training);
-    json result{{"path", flags.what.string()},
-                {"kind", s.training ? "data set" : "scene"},
-                {"effects", rows_json(plan, prices)}};
+    const char* kind = s.training ? "data set" : "scene";
+    json result{
+        {"path", flags.what.string()}, {"kind", kind}, {"effects", rows_json(plan, prices)}};
     if (flags.compare && !empty) result["compared"] = compare_choices(s, flags);
     if (flags.as_json)
         fmt::print("{}\n", result.dump(2, ' ', false, json::error_handler_t::replace));
@@ -131,8 +125,8 @@ int run_plan(const PlanFlags& flags) {
 
 void add_plan(CLI::App& app, Action& action) {
     auto flags = std::make_shared<PlanFlags>();
-    CLI::App* command = app.add_subcommand(
-        "plan", "Which effects a data set or a scene calls for, why, and what each costs");
+    CLI::App* command =
+        app.add_subcommand("plan", "Which effects a data set or a scene calls for, and their cost");
     command->add_option("what", flags->what, "a data set, a scene, or an output folder")
         ->required();
     command->add_option("--cameras", flags->cameras,

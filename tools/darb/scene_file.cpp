@@ -48,6 +48,11 @@ fs::path find_scene(const fs::path& path) {
     return found;
 }
 
+bool is_scene(const fs::path& path) {
+    if (fs::is_regular_file(path)) return path.extension() != ".json";
+    return fs::exists(path / "point_cloud") || fs::exists(path / "meta.json");
+}
+
 SplatModel load_scene(const fs::path& path, SplatFile* facts) {
     const fs::path file = find_scene(path);
     SplatFile unused;
