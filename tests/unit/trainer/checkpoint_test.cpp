@@ -36,7 +36,7 @@ class CheckpointFile : public testing::Test {
             c.state.moments.push_back(moments);
         }
         c.state.gradient_sum.assign(splats * 2, 0.5f);
-        c.state.counters = {1, 8, 9, 2, 3, 4, {5, 6, 7}};
+        c.state.counters = {1, 8, 9, 10, 2, 3, 4, {5, 6, 7}};
         c.settings = settings_text({});
         c.dataset = "0123456789abcdef";
         c.seconds = 98.5;
