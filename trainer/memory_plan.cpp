@@ -47,11 +47,10 @@ MemoryPlan plan_memory(const MemoryDemand& demand) {
     plan.photos = demand.photo_pixels * kPhotoBytes;
     plan.images = demand.image_pixels * kImageBytes;
     if (demand.exposure_photos > 0)
-        plan.effects += demand.image_pixels * kMappedBytes + demand.exposure_photos * kMapBytes +
-                        kMapPartials;
-    if (demand.smoothing_photos > 0)
         plan.effects +=
-            n * kDeviationBytes + demand.smoothing_photos * sizeof(gpu::CameraData);
+            demand.image_pixels * kMappedBytes + demand.exposure_photos * kMapBytes + kMapPartials;
+    if (demand.smoothing_photos > 0)
+        plan.effects += n * kDeviationBytes + demand.smoothing_photos * sizeof(gpu::CameraData);
     // Attributes are replaced one at a time: the largest, the moments of one, exists twice.
     if (demand.densifies)
         plan.densify = n * (kDensifyBytes + 2 * kFloat * std::max<std::uint64_t>(rest, 4));

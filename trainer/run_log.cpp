@@ -213,9 +213,9 @@ ReportData RunLog::report_data(const RunSummary& summary, const Json& metrics) c
     for (const auto& [name, value] : start_["settings"].items())
         if (name != "effects") data.settings.emplace_back(name, setting_text(value));
     for (const Json& effect : start_.value("effects", Json::array()))
-        data.settings.emplace_back("effect " + effect.value("effect", ""),
-                                   (effect.value("on", false) ? "on: " : "off: ") +
-                                       effect.value("reason", ""));
+        data.settings.emplace_back(
+            "effect " + effect.value("effect", ""),
+            (effect.value("on", false) ? "on: " : "off: ") + effect.value("reason", ""));
     data.pictures = summary.pictures;
     for (const Json& note : start_["notes"]) data.notes.push_back(note.get<std::string>());
     return data;

@@ -11,8 +11,8 @@ namespace darb {
 
 namespace {
 
-constexpr std::string_view kNames[EFFECT_COUNT] = {"sh",    "antialias", "exposure", "off_centre", "lens",
-                                                   "alpha", "depth",     "huge",     "near"};
+constexpr std::string_view kNames[EFFECT_COUNT] = {
+    "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near"};
 
 std::string all_names() {
     std::string text;

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kColourStep = 1.0 / 512;  // half of an 8-bit step
 constexpr double kCentreStep_px = 0.01;    // a shift by it changes no 8-bit picture
-// Largest pixel footprint of a point over its smallest. Captures at one distance and size stay below
-// it and lose by anti-aliasing, those that vary both lie above and gain: docs/effects.md.
+// Largest pixel footprint of a point over its smallest. Captures at one distance and size stay
+// below it and lose by anti-aliasing, those that vary both lie above and gain: docs/effects.md.
 constexpr double kFootprintRatio = 2.5;
 constexpr double kFootprintShare = 0.05;  // of the points
 // Exposures are off in evaluation, and those of neighbouring photos drift together: on a plush toy

@@ -33,15 +33,14 @@ Ball ball_of(const SplatModel& model, std::size_t i) {
     const float* s = &model.log_scale[3 * i];
     Ball ball;
     ball.centre = glm::dvec3(p[0], p[1], p[2]) + model.origin;
-    const double logit = std::clamp(double{model.opacity[i]}, -OPACITY_LOGIT_LIMIT,
-                                    OPACITY_LOGIT_LIMIT);
+    const double logit =
+        std::clamp(double{model.opacity[i]}, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT);
     const double opacity = 1 / (1 + std::exp(-logit)), support = kernel_support(model.kernel);
     const double gaussian = 2 * std::log(opacity / kSmallestCutoff);
     ball.reach2 = opacity > kSmallestCutoff ? (std::isfinite(support) ? support : gaussian) : 0;
-    const double largest = std::clamp(double{std::max({s[0], s[1], s[2]})}, -LOG_SCALE_LIMIT,
-                                      LOG_SCALE_LIMIT);
-    ball.deviation =
-        std::exp(largest) * std::sqrt(covariance_scale(model.kernel, model.footprint));
+    const double largest =
+        std::clamp(double{std::max({s[0], s[1], s[2]})}, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT);
+    ball.deviation = std::exp(largest) * std::sqrt(covariance_scale(model.kernel, model.footprint));
     return ball;
 }
 

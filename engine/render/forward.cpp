@@ -321,11 +321,11 @@ void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std:
                                offsetof(gpu::FrameGroups, visible_x));
     scan_->record(commands, pair_count_sorted_, pair_offset_, visible_in_use_, 0, pairs_total_);
     commands.dispatch(groups_pairs_, args, {status_, groups_, pairs_total_, pairs_in_use_}, 1);
-    commands.dispatch_indirect(cooperates_ ? *emit_others_ : emit_, args,
-                               {status_, depth_order_, pair_offset_, cover_, pair_tile_,
-                                pair_splat_, pair_begin_, splat_shape_, splat_bound_,
-                                cooperates_ ? huge_rank_ : no_huge_rank_},
-                               groups_, offsetof(gpu::FrameGroups, visible_x));
+    commands.dispatch_indirect(
+        cooperates_ ? *emit_others_ : emit_, args,
+        {status_, depth_order_, pair_offset_, cover_, pair_tile_, pair_splat_, pair_begin_,
+         splat_shape_, splat_bound_, cooperates_ ? huge_rank_ : no_huge_rank_},
+        groups_, offsetof(gpu::FrameGroups, visible_x));
     if (cooperates_)
         commands.dispatch(*emit_huge_, args,
                           {status_, depth_order_, pair_offset_, cover_, pair_tile_, pair_splat_,

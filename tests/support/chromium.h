@@ -21,10 +21,10 @@ inline std::string chromium() {
 }
 
 struct OpenedPage {
-    int plots = 0, drawn = 0;  // SVG elements; those with a visible curve, dot or area
-    int pictures = 0;          // elements with a background picture of some size
+    int plots = 0, drawn = 0;   // SVG elements; those with a visible curve, dot or area
+    int pictures = 0;           // elements with a background picture of some size
     int cut = 0, overlaps = 0;  // texts of plots that reach over the plot's edge; over one another
-    std::string console;       // what was written to it; empty: nothing
+    std::string console;        // what was written to it; empty: nothing
 };
 
 /// The page gets a script of the test's at its end, which writes what it finds into the title.

@@ -52,8 +52,7 @@ std::string pass_bars(const CostResult& result, bool combinations, const std::st
         if (combinations && !row.on_front && row.accuracy != preset_accuracy(kFast) &&
             row.accuracy != preset_accuracy(kExact))
             continue;
-        BarPlot::Row bar{row.name, std::vector<double>(names.size(), 0.0), row.ms.low,
-                         row.ms.high};
+        BarPlot::Row bar{row.name, std::vector<double>(names.size(), 0.0), row.ms.low, row.ms.high};
         for (const auto& [name, spread] : row.passes)
             bar.parts[static_cast<size_t>(std::find(names.begin(), names.end(), name) -
                                           names.begin())] = spread.median;

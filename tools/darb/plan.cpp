@@ -79,12 +79,9 @@ void print_rows(const EffectPlan& plan, const EffectPrices& prices, bool trainin
                training ? "ms/iter" : "ms/frame", "MB");
     for (int e = 0; e < EFFECT_COUNT; ++e) {
         const EffectRow& row = plan.row(e);
-        std::string ms = "-", mb = "-";
-        if (!prices.empty() && prices[static_cast<std::size_t>(e)]) {
-            ms = fmt::format("{:+.2f}", prices[static_cast<std::size_t>(e)]->ms);
-            mb = fmt::format("{:+.2f}",
-                             static_cast<double>(prices[static_cast<std::size_t>(e)]->bytes) / 1e6);
-        }
+        const auto price = prices.empty() ? std::nullopt : prices[static_cast<std::size_t>(e)];
+        const std::string ms = price ? fmt::format("{:+.2f}", price->ms) : "-";
+        const std::string mb = price ? fmt::format("{:+.2f}", double(price->bytes) / 1e6) : "-";
         fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), row.on ? "on" : "off", ms,
                    mb, row.reason);
     }
@@ -118,9 +115,8 @@ int run_plan(const PlanFlags& flags) {
         if (!flags.no_price) prices = price_effects(plan, base, s.training, most_degree, with);
     }
     if (!flags.as_json) print_rows(plan, prices, s.training);
-    json result{{"path", flags.what.string()},
-                {"kind", s.training ? "data set" : "scene"},
-                {"effects", rows_json(plan, prices)}};
+    const char* kind = s.training ? "data set" : "scene";
+    json result{{"path", flags.what.string()}, {"kind", kind}, {"effects", rows_json(plan, prices)}};
     if (flags.compare && !empty) result["compared"] = compare_choices(s, flags);
     if (flags.as_json)
         fmt::print("{}\n", result.dump(2, ' ', false, json::error_handler_t::replace));

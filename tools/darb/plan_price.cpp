@@ -16,10 +16,11 @@ namespace {
 constexpr int kFrames = 15, kWarmUp = 3;
 constexpr std::size_t kViews = 4;
 
-Measured summary(std::vector<double> ms, std::uint64_t bytes) {
+Measured summary(std::vector<double> ms, std::uint64_t bytes, std::uint32_t huge,
+                 std::uint32_t longest) {
     std::sort(ms.begin(), ms.end());
     const std::size_t n = ms.size();
-    return {ms[n / 2], 0.5 * (ms[n - 1 - n / 4] - ms[n / 4]), bytes, 0, 0};
+    return {ms[n / 2], 0.5 * (ms[n - 1 - n / 4] - ms[n / 4]), bytes, huge, longest};
 }
 
 double sum_of(const std::vector<PassTime>& passes) {
@@ -85,10 +86,7 @@ Measured measure_rendering(const DeviceOptions& device_options, const SplatModel
         }
         if (frame >= kWarmUp * count) ms.push_back(frame_ms);
     }
-    Measured result = summary(ms, device.peak_bytes());
-    result.huge_splats = huge;
-    result.longest_list = longest;
-    return result;
+    return summary(ms, device.peak_bytes(), huge, longest);
 }
 
 Measured measure_training(const DeviceOptions& device_options, const Dataset& dataset,
@@ -120,10 +118,8 @@ Measured measure_training(const DeviceOptions& device_options, const Dataset& da
             std::chrono::steady_clock::now() - start;
         if (step >= 2 * static_cast<int>(kViews)) ms.push_back(took.count());
     }
-    Measured result = summary(ms, device.peak_bytes());
-    result.huge_splats = trainer.counters().huge_splats;
-    result.longest_list = trainer.counters().longest_list;
-    return result;
+    const TrainCounters& counters = trainer.counters();
+    return summary(ms, device.peak_bytes(), counters.huge_splats, counters.longest_list);
 }
 
 EffectPrices price_effects(const EffectPlan& plan, const Measured& base, bool training,

@@ -70,7 +70,8 @@ EffectChoice training_choice(const TrainFlags& flags) {
 
 // The photos stay for the run where the plan had to look at them.
 void plan_effects(Dataset& dataset, const EffectChoice& choice, TrainFlags& flags) {
-    if (!dataset.points.seen_begin.empty() || dataset.has_alpha) flags.run.photos = load_photos(dataset.views);
+    if (!dataset.points.seen_begin.empty() || dataset.has_alpha)
+        flags.run.photos = load_photos(dataset.views);
     const EffectPlan plan = plan_training(dataset, flags.run.photos, flags.train.sh_degree, choice);
     apply_plan(plan, flags.train);
     apply_plan(plan, dataset.views);

@@ -114,8 +114,8 @@ Legend draw_legend(const std::vector<LegendEntry>& entries, double width) {
         }
         switch (entries[i].swatch) {
             case LegendEntry::Swatch::line:
-                legend.svg += fmt::format("<path class='line s{}' d='M{:.1f} {:.1f}h14'/>", i, x,
-                                          y - 4);
+                legend.svg +=
+                    fmt::format("<path class='line s{}' d='M{:.1f} {:.1f}h14'/>", i, x, y - 4);
                 break;
             case LegendEntry::Swatch::dot:
                 legend.svg += fmt::format("<circle class='s{}' cx='{:.1f}' cy='{:.1f}' r='3.5'/>",
@@ -126,8 +126,8 @@ Legend draw_legend(const std::vector<LegendEntry>& entries, double width) {
                                           i, x + 4, y);
                 break;
         }
-        legend.svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}</text>",
-                                  x + kSwatch, y, html_escape(entries[i].name));
+        legend.svg += fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}</text>", x + kSwatch,
+                                  y, html_escape(entries[i].name));
         x += wide;
     }
     legend.height = y - 34 + kLine;

@@ -43,9 +43,8 @@ std::string draw_bar(const BarPlot& plot, const BarPlot::Row& row, double y, con
         svg += fmt::format(
             "<path class='area s{}' d='M{:.1f} {:.1f}H{:.1f}v{}H{:.1f}z'><title>{}, {}: {:.4g}"
             "</title></path>",
-            p, place(at), y, place(at + row.parts[p]), kBarHeight, place(at),
-            html_escape(row.name), html_escape(p < plot.names.size() ? plot.names[p] : ""),
-            row.parts[p]);
+            p, place(at), y, place(at + row.parts[p]), kBarHeight, place(at), html_escape(row.name),
+            html_escape(p < plot.names.size() ? plot.names[p] : ""), row.parts[p]);
         at += row.parts[p];
     }
     if (row.high > row.low && row.high <= x.high)

@@ -120,8 +120,7 @@ std::string svg_stack(const StackPlot& plot) {
     x.from = kPlotLeft;
     x.to = kPlotWidth - kPlotRight;
     std::vector<LegendEntry> entries;
-    for (const std::string& name : plot.names)
-        entries.push_back({name, LegendEntry::Swatch::area});
+    for (const std::string& name : plot.names) entries.push_back({name, LegendEntry::Swatch::area});
     const Legend legend = draw_legend(entries);
     y.to = kPlotTop + legend.height;
     y.from = kPlotHeight + legend.height - kPlotBottom;

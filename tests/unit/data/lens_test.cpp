@@ -163,7 +163,7 @@ TEST(Undistort, only_a_fisheye_that_sees_more_than_sixty_degrees_to_a_side_is_to
     const auto fisheye = [](double focal) {
         return LensModel{"OPENCV_FISHEYE", {focal, focal, 320, 240, 0, 0, 0, 0}, 640, 480};
     };
-    const double limit = 319.5 / 1.0471975511965976;  // the border's pixel centre at 60 degrees
+    const double limit = 319.5 / 1.0471975511965976;   // the border's pixel centre at 60 degrees
     EXPECT_TRUE(too_wide_to_undistort(fisheye(150)));  // 122 degrees: no ray at all
     EXPECT_TRUE(too_wide_to_undistort(fisheye(limit * 0.99)));
     EXPECT_FALSE(too_wide_to_undistort(fisheye(limit * 1.01)));

@@ -28,8 +28,8 @@ struct Scene {
     SplatModel model;
     std::vector<View> views{1};
     Scene() {
-        const TestScene s = random_scene(
-            {.count = 20, .sh_degree = 3, .min_log_scale = -4, .max_log_scale = -2.5});
+        const TestScene s =
+            random_scene({.count = 20, .sh_degree = 3, .min_log_scale = -4, .max_log_scale = -2.5});
         model = s.model;
         for (float& p : model.position) p *= 0.4f;  // in the middle of the picture
         model.sh_rest.assign(model.sh_rest.size(), 0.0f);
@@ -233,8 +233,8 @@ TEST(EffectChoice, words_override_the_rules) {
     const auto plan = [&](const char* text) {
         return plan_rendering(s.model, s.views, {}, parse_effects(text));
     };
-    EXPECT_EQ(effects_on(plan("all")), (On{EFFECT_VIEW_COLOUR, EFFECT_OFF_CENTRE, EFFECT_LENS,
-                                           EFFECT_HUGE, EFFECT_NEAR}));
+    EXPECT_EQ(effects_on(plan("all")),
+              (On{EFFECT_VIEW_COLOUR, EFFECT_OFF_CENTRE, EFFECT_LENS, EFFECT_HUGE, EFFECT_NEAR}));
     EXPECT_EQ(effects_on(plan("all,-lens,-sh")), (On{EFFECT_OFF_CENTRE, EFFECT_HUGE, EFFECT_NEAR}));
     EXPECT_EQ(effects_on(plan("none,+near")), On{EFFECT_NEAR});
     EXPECT_EQ(effects_on(plan("auto,-sh,+off_centre")), On{EFFECT_OFF_CENTRE});
@@ -250,7 +250,8 @@ TEST(EffectChoice, words_override_the_rules) {
 }
 
 TEST(EffectChoice, what_is_no_effect_is_an_error_that_names_them) {
-    for (const char* text : {"", "sh", "+nothing", "+sh,auto", "all,none", "+sh,", "auto,", "+sh -lens"}) {
+    for (const char* text :
+         {"", "sh", "+nothing", "+sh,auto", "all,none", "+sh,", "auto,", "+sh -lens"}) {
         try {
             parse_effects(text);
             ADD_FAILURE() << text;
