@@ -243,7 +243,11 @@ TEST(EffectTraining, exposure_begins_as_an_identity) {
 }
 
 TEST(EffectTraining, near_plane_care_changes_no_bit_where_no_splat_is_beside_a_camera) {
-    const TinyTraining t = tiny_training();
+    TinyTraining t = tiny_training();
+    for (View& view : t.dataset.views) {  // wide enough for every splat to be in view
+        view.camera.fx *= 0.5;
+        view.camera.fy *= 0.5;
+    }
     TrainOptions off = plain_options();
     off.near_care = false;
     const EffectPlan plan = plan_rendering(t.start(), t.dataset.views, {});
@@ -253,11 +257,16 @@ TEST(EffectTraining, near_plane_care_changes_no_bit_where_no_splat_is_beside_a_c
 }
 
 TEST(EffectTraining, cooperation_and_segments_change_no_bit) {
-    TinyTraining t = tiny_training({.width = 400, .height = 300});
+    const TinyTraining t = tiny_training({.width = 640, .height = 480});
     TrainOptions always = plain_options(), never = always;
     always.crowds = Crowds::always;
     never.crowds = Crowds::never;
     EXPECT_EQ(trained(t, always, 3), trained(t, never, 3));
+    Device device;
+    Trainer trainer(device, t.dataset, t.photos, t.start(), plain_options());
+    trainer.step();
+    trainer.drain();
+    EXPECT_GT(trainer.counters().huge_splats, 0u) << "the scene is meant to have some";
 }
 
 TEST(EffectTraining, antialiasing_that_is_off_has_no_filter) {
