@@ -17,7 +17,7 @@ const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
 TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
     const fs::path out = scratch() / "compare";
     const std::string command =
-        "compare " + kScene + " --kernels gaussian,sinc --iterations 10,20 -r 8 -o " +
+        "compare " + kScene + " --kernels gaussian,sinc --iterations 10,20 -r 4 -o " +
         out.string() + " --effects=none --lpips " + (out / "missing.safetensors").string();
     const Outcome first = darb(command);
     ASSERT_EQ(first.code, 0) << first.err;
