@@ -201,10 +201,10 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
     }
     if (pairs > pair_capacity_ || pair_capacity_ == 0) {
         if (const std::uint32_t most = most_pairs(d, options_); pairs > most)
-            throw Error("splat-tile pairs",
-                        fmt::format("a frame needs {} pairs, this device's buffers hold {}", pairs,
-                                    most),
-                        "Lower the resolution (-r) or the number of splats (--cap_max).");
+            throw Error(
+                "splat-tile pairs",
+                fmt::format("a frame needs {} pairs, this device's buffers hold {}", pairs, most),
+                "Lower the resolution (-r) or the number of splats (--cap_max).");
         const std::uint64_t k = pair_capacity_ = std::max(pairs, kMinCapacity);
         pair_tile_ = Buffer(d, "pair tile", k * 4);
         pair_splat_ = Buffer(d, "pair splat", k * 4);
