@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Fuzzes every reader of files with libFuzzer (clang): splat scenes, COLMAP, transforms.json, checkpoints.
-#   tools/fuzz.sh [MINUTES]      of each reader (default 10; fractions are legal); 0.1 is what CI does
-# Seeds: the shipped scene and what darb writes. Findings stay in build-fuzz/corpus and build-fuzz/crashes.
+# Fuzzes every reader of files with libFuzzer (clang): splat scenes, COLMAP, transforms.json, checkpoints; and, where
+# the tests are built, the pipeline with random scenes that hold poison (tests/pipeline/scene_fuzz_test.cpp).
+#   tools/fuzz.sh [MINUTES]      of each (default 10; fractions are legal); 0.1 is what CI does
+# Seeds: the shipped scene and what darb writes. What is learned stays in build-fuzz/corpus, findings in
+# build-fuzz/crashes.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -57,4 +59,14 @@ for reader in $readers; do
         failed=1
     fi
 done
+scenes=build/tests/scene_fuzz_test
+if [[ -x $scenes ]]; then
+    if DARB_FUZZ_SEED=$((RANDOM * 32768 + RANDOM)) DARB_FUZZ_SECONDS=$seconds $scenes >$build/scenes.log 2>&1; then
+        echo "scenes: $seconds s, $(sed -nE 's/^([0-9]+) scenes, .*/\1/p' $build/scenes.log) executions, no finding"
+    else
+        tail -30 $build/scenes.log
+        echo "scenes: FAILED, see $build/scenes.log"
+        failed=1
+    fi
+fi
 exit $failed

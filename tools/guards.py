@@ -2,19 +2,20 @@
 """The guards of the hard cases: which line of the sources holds each, and which test watches it.
 
     tools/guards.py check               strings and tests exist, docs/hard_cases.md says the same
-    tools/guards.py docs [CHECK.json]   rewrites the tables of docs/hard_cases.md; CHECK.json is what
-                                        `darb check --every-kernel --json` wrote
+    tools/guards.py docs                rewrites the tables of docs/hard_cases.md, those of figures from
+                                        assets/results/truth_lavapipe.json (tools/truth_figures.py)
     tools/guards.py run [NAME...]       disables each guard in turn in a copy of the sources (build-guards)
                                         and fails unless the named test turns red; minutes
 """
 
 import filecmp
-import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+
+import truth_figures
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 DOCS = "docs/hard_cases.md"
@@ -61,6 +62,13 @@ GUARDS = [
     ("log-scale of 50, opacity logit of 1e4", "scale_limit_gradient", GRADIENT,
      "outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT)", "d_log_scale",
      "project_backward_test", "ProjectBackward.parameters_beyond_their_limits_have_no_gradient"),
+    ("log-scale of 50, opacity logit of 1e4", "opacity_limit_gradient", GRADIENT,
+     "abs(logit) <= OPACITY_LOGIT_LIMIT ? sums.d_opacity * kept * o * rest : 0.0",
+     "sums.d_opacity * kept * o * rest",
+     "project_backward_test", "ProjectBackward.parameters_beyond_their_limits_have_no_gradient"),
+    ("log-scale of 50, opacity logit of 1e4", "regulariser_limit", BACK,
+     "if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c]", "g.log_scale[c]",
+     "adam_update_test", "AdamUpdate.regularisers_leave_scales_beyond_their_limit"),
     ("splat centre exactly on a pixel centre", "distance_at_the_centre", "shaders/kernels/builtin.glsl",
      "sqrt(max(q, LEAST_DISTANCE * LEAST_DISTANCE))", "sqrt(q)",
      "blend_test", "*sinc_psi_builtin:*mean_on_a_pixel_centre*"),
@@ -82,9 +90,16 @@ GUARDS = [
     ("10,000 thin layers in one pixel", "gradient_ends_where_the_pixel_ended", BLEND_BACK,
      "raw >= ALPHA_CUTOFF && number <= px.last[k]", "raw >= ALPHA_CUTOFF",
      "blend_backward_test", "BlendBackwardCases.pairs_behind_the_stop_get_zero"),
+    ("10,000 thin layers in one pixel", "what_is_behind", BLEND_BACK,
+     "px.behind[k] += alpha * ahead;", "",
+     "blend_backward_test", "BlendBackwardCases.ten_thousand_thin_layers_match_double"),
     ("equal depths, shuffled order", "stable_sort", "shaders/sort/radix_scatter_columns.comp",
      "for (uint i = begin; i < end; ++i) {", "for (uint i = end; i-- > begin;) {",
      "frame_test", "Frame.equal_depths_keep_file_order"),
+    ("equal depths, shuffled order", "stable_sort_by_ballots", "shaders/sort/radix_scatter_ballot.comp",
+     "uint before = subgroupBallotExclusiveBitCount(peers);",
+     "uint before = subgroupBallotBitCount(peers) - 1u - subgroupBallotExclusiveBitCount(peers);",
+     "radix_sort_test", "*iota_values_are_the_stable_order*"),
     ("huge splats, a million splats in one tile", "long_lists", "shaders/forward/list_lengths.comp",
      "if (pairs > args.list_capacity)", "if (false)",
      "frame_passes_test", "ListLengths.*"),
@@ -106,12 +121,27 @@ GUARDS = [
     ("coordinates at 1e6 m", "recentring", "engine/scene/edit_splats.cpp",
      "> kRecentreBeyond)", "> 1e300)",
      "ply_test", "Ply.map_coordinates_keep_millimetres"),
+    ("coordinates at 1e6 m", "recentring_of_points", "trainer/initial_model.cpp",
+     "extent > kRecentreBeyond ?", "extent > 1e300 ?",
+     "initial_model_test", "InitialModel.map_coordinates_keep_millimetres"),
+    ("odd image sizes, more than 65,536 tiles", "pixels_within_the_image", "shaders/forward/blend.comp",
+     """        if (at.x >= args.width || at.y >= args.height) continue;
+        const uint o = at.y * args.width + at.x;
+        const float transmittance""", """        const uint o = at.y * args.width + at.x;
+        const float transmittance""",
+     "blend_test", "BlendCases.image_sizes_that_are_no_multiple_of_a_tile_match_double"),
     ("odd image sizes, more than 65,536 tiles", "wide_tile_keys", "engine/render/forward.cpp",
      "bits_for(tile_count),", "16,",
      "frame_test", "Frame.more_than_65536_tiles_are_told_apart"),
     ("NaN or infinity in a PLY, points or pose", "finite_splats", "engine/scene/ply.cpp",
      "if (!all_finite(values, columns)) return;", "",
      "ply_test", "Ply.splats_with_nan_or_infinity_are_dropped_and_counted"),
+    ("NaN or infinity in a PLY, points or pose", "finite_points", "engine/data/colmap_binary.cpp",
+     "if (!finite) {", "if (file.empty()) {",
+     "colmap_test", "ColmapBinary.nan_points_are_dropped_with_a_note"),
+    ("NaN or infinity in a PLY, points or pose", "finite_pose", "engine/data/pose.cpp",
+     "if (!std::isfinite(position.x + position.y + position.z))", "if (position.x > 1e300)",
+     "colmap_test", "ColmapBinary.bad_records_are_errors_with_reason"),
     ("NaN or infinity in a PLY, points or pose", "finite_scale", PROJECT,
      "any(isnan(raw_scale))", "false",
      "project_test", "Project.values_that_are_not_finite_are_culled_with_their_reason"),
@@ -127,6 +157,10 @@ GUARDS = [
     ("neighbours at distance 0, 1 point, no points", "least_distance", "engine/data/point_splats.cpp",
      "result[i] = std::max(kMinDistance2, sum", "result[i] = std::max(0.0, sum",
      "initial_model_test", "InitialModel.duplicate_points_have_a_finite_scale"),
+    ("neighbours at distance 0, 1 point, no points", "no_points", "trainer/initial_model.cpp",
+     "dataset.points.size() == 0 ? random_points(dataset, options) : PointCloud{};",
+     "dataset.points.size() == 1'000'000 ? random_points(dataset, options) : PointCloud{};",
+     "initial_model_test", "InitialModel.no_points_become_random_ones"),
     ("Adam with v = 0 after a reset", "adam_epsilon", "shaders/optim/adam.glsl",
      "+ ADAM_EPSILON);", "+ 0.0);",
      "adam_update_test", "AdamUpdate.zero_moments_and_zero_gradient_move_nothing"),
@@ -136,6 +170,12 @@ GUARDS = [
     ("degenerate camera", "orthonormal_rotation", "engine/data/pose.cpp",
      "<= kTolerance))", "<= 1e300))",
      "transforms_test", "Transforms.bad_files_are_errors_that_name_the_frame"),
+    ("degenerate camera", "photo_missing", "engine/data/colmap_source.cpp",
+     "if (!fs::is_regular_file(view.photo) && missing++ == 0)", "if (false && missing++ == 0)",
+     "colmap_test", "ColmapBinary.model_that_does_not_fit_together_is_an_error"),
+    ("degenerate camera", "frame_without_photo", "engine/data/transforms_source.cpp",
+     "if (view.photo.empty()) {", "if (root.empty()) {",
+     "transforms_test", "TransformsSource.nerfstudio_folder_with_masks_points_and_split"),
 ]
 
 
@@ -164,24 +204,6 @@ def case_table():
     return "\n".join(lines)
 
 
-def error_table(check):
-    kernels, rows = [], {}
-    for row in check["checks"]:
-        group = re.fullmatch(r"hard cases, (\S+) psi", row["group"])
-        if not group or row["allowed"] == 0:
-            continue
-        if group[1] not in kernels:
-            kernels.append(group[1])
-        match = re.match(r"(.*) (image|gradient)", row["name"])
-        band = "*" if row["outside"] else ""
-        rows.setdefault((match[1], match[2]), {})[group[1]] = f"{row['error']:.0e}{band}"
-    lines = ["| case | of | " + " | ".join(k.replace("_", " ") for k in kernels) + " |",
-             "|---|---|" + "---|" * len(kernels)]
-    for (name, of), errors in rows.items():
-        lines.append(f"| {name} | {of} | " + " | ".join(errors.get(k, "") for k in kernels) + " |")
-    return "\n".join(lines)
-
-
 def between(text, name, new=None):
     """The text between the markers of a table, or the whole with it replaced."""
     begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->"
@@ -205,20 +227,24 @@ def check():
         if full and not re.search(rf"TEST\w*\({full[1]},\s*{full[2]}\)", text):
             problems.append(f"guard {name}: {program} has no TEST({full[1]}, {full[2]})")
     docs = read(DOCS)
-    if between(docs, "cases") != case_table():
-        problems.append(f"{DOCS}: the table of cases is not that of tools/guards.py; run its docs command")
+    for name, table in all_tables().items():
+        if between(docs, name) != table:
+            problems.append(f"{DOCS}: the table of {name} is out of date; run tools/guards.py docs")
     for name in re.findall(r'add\(\s*"(\w+)"', read("engine/check/hard_cases.cpp")):
         if f"| {name}" not in between(docs, "errors"):
-            problems.append(f"{DOCS}: no errors of the case {name}; see tools/guards.py docs")
+            problems.append(f"{DOCS}: no errors of the case {name}; see tools/truth_figures.py")
     print("\n".join(problems) or f"guards: {len(GUARDS)}, all in place")
     return 1 if problems else 0
 
 
-def write_docs(check_file):
-    docs = between(read(DOCS), "cases", new=case_table())
-    if check_file:
-        with open(check_file, encoding="utf-8") as file:
-            docs = between(docs, "errors", new=error_table(json.load(file)))
+def all_tables():
+    return {"cases": case_table(), **truth_figures.tables()}
+
+
+def write_docs():
+    docs = read(DOCS)
+    for name, table in all_tables().items():
+        docs = between(docs, name, new=table)
     with open(os.path.join(ROOT, DOCS), "w", encoding="utf-8") as file:
         file.write(docs)
     return 0
@@ -236,7 +262,7 @@ def is_red(result, test):
 
 
 def run(names):
-    copy = os.path.join(ROOT, COPY, "source")
+    copy = os.path.join(ROOT, COPY)
     os.makedirs(copy, exist_ok=True)
     files = shell(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT).stdout
     for name in files.splitlines():
@@ -244,9 +270,10 @@ def run(names):
         if os.path.isfile(new) and not (os.path.exists(old) and filecmp.cmp(new, old, shallow=False)):
             os.makedirs(os.path.dirname(old), exist_ok=True)
             shutil.copyfile(new, old)
-    build = os.path.join(ROOT, COPY, "build")
-    made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release",
-                  "-DDARB_WERROR=OFF"])
+    build = os.path.join(copy, "build")
+    # So that ccache, where there is one, knows the objects of the project's own build.
+    os.environ.update(CCACHE_BASEDIR=copy, CCACHE_NOHASHDIR="1")
+    made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release"])
     if made.returncode:
         sys.exit(made.stdout)
     chosen = [g for g in GUARDS if not names or g[1] in names]
@@ -276,7 +303,7 @@ def main():
     if len(sys.argv) > 1 and sys.argv[1] == "check":
         return check()
     if len(sys.argv) > 1 and sys.argv[1] == "docs":
-        return write_docs(sys.argv[2] if len(sys.argv) > 2 else None)
+        return write_docs()
     if len(sys.argv) > 1 and sys.argv[1] == "run":
         return run(sys.argv[2:])
     sys.exit(__doc__)

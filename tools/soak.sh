@@ -5,10 +5,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+darb=${DARB:-build/darb} # the command under test
 iterations=${1:-10000}
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-build/darb train assets/scene -o "$out" -r 4 --iterations "$iterations" --densify-until-iter 0 \
+"$darb" train assets/scene -o "$out" -r 4 --iterations "$iterations" --densify-until-iter 0 \
     --test-iterations "$iterations" --save-iterations "$iterations" -q &
 run=$!
 while kill -0 $run 2>/dev/null; do

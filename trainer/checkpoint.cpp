@@ -218,7 +218,7 @@ std::string settings_text(const TrainOptions& o) {
         .dump();
 }
 
-std::string dataset_fingerprint(const Dataset& dataset) {
+std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU8>& photos) {
     std::uint64_t hash = 1469598103934665603ull;  // FNV-1a
     const auto add = [&](const void* data, size_t size) {
         const auto* bytes = static_cast<const unsigned char*>(data);
@@ -241,11 +241,16 @@ std::string dataset_fingerprint(const Dataset& dataset) {
         add(&c.rotation[0][0], 9 * sizeof(double));
     }
     add(dataset.points.position.data(), dataset.points.position.size() * sizeof(double));
+    for (const ImageU8& photo : photos) {
+        const std::uint32_t pixels = checksum(std::as_bytes(std::span(photo.data)));
+        add(&pixels, sizeof pixels);
+    }
     return fmt::format("{:016x}", hash);
 }
 
 void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
-                     const TrainOptions& options, const Dataset& dataset) {
+                     const TrainOptions& options, const Dataset& dataset,
+                     const std::string& fingerprint) {
     const Json before = Json::parse(checkpoint.settings, nullptr, false);
     const Json now = Json::parse(settings_text(options));
     std::string differences;
@@ -258,7 +263,7 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
     if (!differences.empty())
         throw Error(path.string(), "was written with other settings:" + differences,
                     "Repeat the options of that run, or start without --resume.");
-    if (checkpoint.dataset != dataset_fingerprint(dataset))
+    if (checkpoint.dataset != fingerprint)
         throw Error(path.string(),
                     "the data set " + dataset.root.string() + " is not the one it was trained on",
                     "Restore the photos and cameras of that run, or start without --resume.");

@@ -29,12 +29,14 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
 
 /// Every option that changes the result, as one JSON object in text.
 std::string settings_text(const TrainOptions& options);
-/// Names, sizes, cameras and points of a data set, hashed.
-std::string dataset_fingerprint(const Dataset& dataset);
+/// Names, sizes, cameras and points of a data set and the pixels of its photos, hashed; about a
+/// second for a gigabyte of pixels.
+std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU8>& photos);
 
 /// Throws Error naming each difference when the checkpoint is of other settings or another data
-/// set.
+/// set. fingerprint: that of the data set now.
 void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
-                     const TrainOptions& options, const Dataset& dataset);
+                     const TrainOptions& options, const Dataset& dataset,
+                     const std::string& fingerprint);
 
 }  // namespace darb

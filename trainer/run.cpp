@@ -34,6 +34,7 @@ class Run {
           run_(run),
           loaded_(run.photos.empty() ? load_photos(dataset.views) : std::vector<ImageU8>{}),
           photos_(run.photos.empty() ? loaded_ : run.photos),
+          fingerprint_(dataset_fingerprint(dataset, photos_)),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
           log_(run.output, !run.resume_from.empty()),
           progress_(1, options.iterations, run.quiet) {}
@@ -65,6 +66,7 @@ class Run {
     const RunOptions& run_;
     const std::vector<ImageU8> loaded_;  // empty where RunOptions brought the photos
     const std::vector<ImageU8>& photos_;
+    const std::string fingerprint_;
     Trainer trainer_;
     RunLog log_;
     Progress progress_;
@@ -78,7 +80,7 @@ class Run {
 
 void Run::resume() {
     const Checkpoint checkpoint = read_checkpoint(run_.resume_from);
-    check_resumable(checkpoint, run_.resume_from, options_, dataset_);
+    check_resumable(checkpoint, run_.resume_from, options_, dataset_, fingerprint_);
     trainer_.restore(checkpoint.state);
     seconds_ = checkpoint.seconds;
     log_.cut_after(checkpoint.state.iteration);
@@ -138,8 +140,7 @@ void Run::save_model(int iteration) {
 
 void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(false);
-    write_checkpoint(
-        path, {trainer_.state(), settings_text(options_), dataset_fingerprint(dataset_), seconds_});
+    write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_});
     stopwatch(true);
 }
 

@@ -61,14 +61,16 @@ std::vector<Row> run_checks(Device& device, const CheckOptions& options, const O
     checks.run([&] { return check_scan_and_sort(device); });
     checks.run([&] { return check_loss(device); });
     for (const Variant& v : variants(options.every_kernel))
-        checks.run([&] { return check_walk(device, v.kernel, v.footprint, v.evaluation); });
+        checks.run([&] {
+            return check_walk(device, v.kernel, v.footprint, v.evaluation, options.every_kernel);
+        });
     for (const Variant& v :
          options.every_kernel ? variants(true) : std::vector<Variant>{{KERNEL_RAISED_COSINE}}) {
         if (v.evaluation != EVALUATION_POLYNOMIAL) continue;
         const std::string group =
             fmt::format("hard cases, {} {}", kernel_name(v.kernel), footprint_name(v.footprint));
         for (const HardCase& c : hard_cases(v.kernel, v.footprint))
-            checks.run([&] { return check_hard_case(device, c, group); });
+            checks.run([&] { return check_hard_case(device, c, group, options.every_kernel); });
         if (v.footprint == Footprint::psi)
             checks.run([&] { return check_poison(device, v.kernel, group); });
     }

@@ -9,7 +9,9 @@
 namespace darb::check {
 
 struct CheckOptions {
-    bool every_kernel = false;  // walks and hard cases in all kernels and footprints; minutes
+    // Walks and hard cases in all kernels and footprints, and beside them the reference in float;
+    // minutes.
+    bool every_kernel = false;
 };
 
 /// All rows, in order; each also goes to on_row as it is ready.
@@ -19,6 +21,7 @@ std::vector<Row> run_checks(Device& device, const CheckOptions& options, const O
 std::vector<Row> check_kernels(Device& device);
 std::vector<Row> check_scan_and_sort(Device& device);
 std::vector<Row> check_loss(Device& device);
-std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int evaluation);
+std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int evaluation,
+                            bool float_alone = false);
 
 }  // namespace darb::check

@@ -72,9 +72,21 @@ SplatModel poisoned(const SplatModel& healthy, size_t n, std::uint64_t seed) {
     return m;
 }
 
+// Every gradient as a row.
+std::vector<Row> gradient_rows(const WalkTruth& truth, const auto& got, const HardCase& c,
+                               const std::string& group) {
+    std::vector<Row> rows;
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (!truth.d[a].empty())
+            rows.push_back(compare_row(group, attribute_name(a), truth.d[a], got.d[a],
+                                       c.gradient_tolerance, true));
+    return rows;
+}
+
 }  // namespace
 
-std::vector<Row> check_hard_case(Device& device, const HardCase& c, const std::string& group) {
+std::vector<Row> check_hard_case(Device& device, const HardCase& c, const std::string& group,
+                                 bool float_alone) {
     const Image<double> weights = c.gradient ? random_weights(c.scene.camera) : Image<double>{};
     const DeviceWalk walk =
         walk_on_device(device, c.scene.model, c.scene.camera, weights, c.settings);
@@ -82,6 +94,12 @@ std::vector<Row> check_hard_case(Device& device, const HardCase& c, const std::s
     std::vector<Row> rows;
     rows.push_back(
         compare_row(group, c.name + " image", truth.image, walk.image.data, c.image_tolerance));
+    WalkTruth in_float;
+    if (float_alone) {
+        in_float = walk_in_float(c.scene.model, c.scene.camera, weights, c.settings);
+        rows[0].float_alone =
+            compare_row(group, "", truth.image, in_float.image, c.image_tolerance).error;
+    }
     const bool seen = walk.status.visible > 0 && walk.status.pairs > 0;
     if (seen != c.expects_splats)
         rows.push_back(fact_row(group, c.name + " visible splats", false,
@@ -92,12 +110,9 @@ std::vector<Row> check_hard_case(Device& device, const HardCase& c, const std::s
     if (walk.status.bad_gradients > 0)
         rows.push_back(fact_row(group, c.name + " gradients", false,
                                 fmt::format("{} not finite", walk.status.bad_gradients)));
-    std::vector<Row> gradients;
-    for (int a = 0; a < kAttributeCount; ++a)
-        if (!truth.d[a].empty())
-            gradients.push_back(compare_row(group, attribute_name(a), truth.d[a], walk.d[a],
-                                            c.gradient_tolerance, true));
-    rows.push_back(worst_of(gradients, c.name + " gradient"));
+    rows.push_back(worst_of(gradient_rows(truth, walk, c, group), c.name + " gradient"));
+    if (float_alone)
+        rows.back().float_alone = worst_of(gradient_rows(truth, in_float, c, group), "").error;
     return rows;
 }
 

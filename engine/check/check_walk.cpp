@@ -28,7 +28,8 @@ reference::TestScene walk_scene(int kernel, Footprint footprint) {
 
 }  // namespace
 
-std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int evaluation) {
+std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int evaluation,
+                            bool float_alone) {
     const reference::TestScene scene = walk_scene(kernel, footprint);
     WalkSettings settings;
     settings.evaluation = evaluation;
@@ -42,13 +43,22 @@ std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int
     const bool steep = footprint == Footprint::exact && (kernel == KERNEL_INVERSE_QUADRATIC ||
                                                          kernel == KERNEL_INVERSE_MULTIQUADRIC);
     const char* allowed = steep ? "gradient_steep_float32" : "gradient_scaled_float32";
-    std::vector<Row> rows;
-    rows.push_back(compare_row(group, "image", truth.image, walk.image.data, "image_float32"));
-    for (int a = 0; a < kAttributeCount; ++a)
-        rows.push_back(compare_row(group, std::string("d_") + attribute_name(a), truth.d[a],
-                                   walk.d[a], allowed, true));
-    rows.push_back(compare_row(group, "mean gradient", truth.mean_gradient_ndc,
-                               walk.mean_gradient_ndc, allowed, true));
+    // Image, every gradient and the mean gradient of the device or of the reference in float.
+    const auto compared = [&](const auto& image, const auto& got) {
+        std::vector<Row> rows{compare_row(group, "image", truth.image, image, "image_float32")};
+        for (int a = 0; a < kAttributeCount; ++a)
+            rows.push_back(compare_row(group, std::string("d_") + attribute_name(a), truth.d[a],
+                                       got.d[a], allowed, true));
+        rows.push_back(compare_row(group, "mean gradient", truth.mean_gradient_ndc,
+                                   got.mean_gradient_ndc, allowed, true));
+        return rows;
+    };
+    std::vector<Row> rows = compared(walk.image.data, walk);
+    if (float_alone) {
+        const WalkTruth in_float = walk_in_float(scene.model, scene.camera, weights, settings);
+        const std::vector<Row> alone = compared(in_float.image, in_float);
+        for (size_t r = 0; r < rows.size(); ++r) rows[r].float_alone = alone[r].error;
+    }
     const bool whole = walk.status.visible > scene.model.size() / 2 &&
                        walk.status.bad_gradients == 0 && walk.status.visible >= truth.visible &&
                        walk.status.visible <= truth.visible + 3;

@@ -58,6 +58,8 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
     }
     walk.image =
         planes_to_image(forward.image().download<float>(floats), camera.width, camera.height);
+    if (splats.count() > 0)
+        walk.pair_count = forward.pair_count().download<std::uint32_t>(splats.count());
     if (d_image.data.empty()) return walk;
     for (int a = 0; a < kAttributeCount; ++a) {
         const size_t n = size_t{splats.count()} * splats.stride(a);

@@ -16,6 +16,7 @@ struct DeviceWalk {
     ImageF image;                                       // [H][W][3]
     std::array<std::vector<float>, kAttributeCount> d;  // dL/d(attribute), layout of SplatModel
     std::vector<float> mean_gradient_ndc;               // [N] |dL/dmean|
+    std::vector<std::uint32_t> pair_count;              // [N] tiles that list the splat; 0: culled
 };
 
 struct WalkSettings {

@@ -26,9 +26,9 @@ struct HardCase {
 std::vector<HardCase> hard_cases(int kernel, Footprint footprint);
 
 /// The case on the device against the reference in double: image, every gradient as one row (the
-/// worst attribute), and that all is finite.
+/// worst attribute), and that all is finite. float_alone: fill that field of the rows too.
 std::vector<Row> check_hard_case(Device& device, const HardCase& hard_case,
-                                 const std::string& group);
+                                 const std::string& group, bool float_alone = false);
 
 /// Splats with NaN, infinite, denormal and huge parameters among healthy ones change no bit of the
 /// image that the healthy ones alone give, and no bit of their gradients where they are culled.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ struct Row {
     bool pass = false;
     std::string detail;  // why it failed; empty where it passed
     double seconds = 0;
+    /// The error, by the same measure, of the reference's own code run in float; where it was run.
+    std::optional<double> float_alone;
 };
 
 /// Called with each row as it is ready.

@@ -5,8 +5,16 @@
 
 namespace darb::check {
 
-WalkTruth walk_in_double(const SplatModel& model, const Camera& camera,
-                         const Image<double>& d_image, const WalkSettings& settings) {
+namespace {
+
+template <class T>
+std::vector<double> widened(const std::vector<T>& values) {
+    return {values.begin(), values.end()};
+}
+
+template <class T>
+WalkTruth walk(const SplatModel& model, const Camera& camera, const Image<double>& d_image,
+               const WalkSettings& settings) {
     reference::RenderSettings raster;
     for (int c = 0; c < 3; ++c) raster.background[c] = settings.background[c];
     raster.near_z = static_cast<float>(NEAR_DEFAULT);
@@ -15,16 +23,31 @@ WalkTruth walk_in_double(const SplatModel& model, const Camera& camera,
     raster.transmittance_stop = settings.transmittance_stop;
     Camera local = camera;
     local.translation += camera.rotation * model.origin;
-    const reference::RenderResult result = reference::render(model, local, raster);
+    const reference::Splats<T> splats = reference::make_splats<T>(model);
+    const auto result = reference::render(splats, local, raster);
     WalkTruth truth;
-    truth.image = result.images.colour.data;
+    truth.image = widened(result.images.colour.data);
     truth.visible = result.visible_count();
     if (d_image.data.empty()) return truth;
-    const reference::Gradients g = reference::backward(model, local, raster, result, d_image);
-    truth.d = {g.splats.position, g.splats.log_scale, g.splats.rotation,
-               g.splats.opacity,  g.splats.sh_dc,     g.splats.sh_rest};
-    truth.mean_gradient_ndc = g.mean_gradient_ndc;
+    Image<T> d(d_image.width, d_image.height, d_image.channels);
+    d.data.assign(d_image.data.begin(), d_image.data.end());
+    const auto g = reference::backward(splats, local, raster, result, d);
+    truth.d = {widened(g.splats.position), widened(g.splats.log_scale), widened(g.splats.rotation),
+               widened(g.splats.opacity),  widened(g.splats.sh_dc),     widened(g.splats.sh_rest)};
+    truth.mean_gradient_ndc = widened(g.mean_gradient_ndc);
     return truth;
+}
+
+}  // namespace
+
+WalkTruth walk_in_double(const SplatModel& model, const Camera& camera,
+                         const Image<double>& d_image, const WalkSettings& settings) {
+    return walk<double>(model, camera, d_image, settings);
+}
+
+WalkTruth walk_in_float(const SplatModel& model, const Camera& camera, const Image<double>& d_image,
+                        const WalkSettings& settings) {
+    return walk<float>(model, camera, d_image, settings);
 }
 
 Image<double> random_weights(const Camera& camera) {

@@ -1,4 +1,5 @@
-// The walk in double with the settings of a device walk.
+// The walk of the reference with the settings of a device walk: in double, the truth; and the same
+// code in float, to show what float alone costs.
 #pragma once
 
 #include "engine/check/device_walk.h"
@@ -15,6 +16,8 @@ struct WalkTruth {
 /// The origin is taken out of the camera, as the device does.
 WalkTruth walk_in_double(const SplatModel& model, const Camera& camera,
                          const Image<double>& d_image, const WalkSettings& settings);
+WalkTruth walk_in_float(const SplatModel& model, const Camera& camera, const Image<double>& d_image,
+                        const WalkSettings& settings);
 
 /// [H][W][3] in [-1, 1], rounded to float.
 Image<double> random_weights(const Camera& camera);

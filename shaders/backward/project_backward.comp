@@ -134,7 +134,10 @@ void main() {
     if (UPDATE == 1) {  // the regularisers: weight / N of the sum of opacities, weight / 3N of that of scales
         const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
         g.opacity_logit += args.opacity_weight * o * (1.0 - o);
-        for (uint c = 0u; c < 3u; ++c) g.log_scale[c] += args.scale_weight * exp(log_scale[3u * i + c]);
+        for (uint c = 0u; c < 3u; ++c) {
+            const float raw = log_scale[3u * i + c];
+            if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c] += args.scale_weight * exp(raw);
+        }
     }
     update_splat(i, g);
 }

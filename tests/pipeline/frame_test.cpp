@@ -1,8 +1,10 @@
 // The forward walk as a whole: lists against the host, ties, invariances, empty and overfull
 // frames, and sizes at the limits.
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
+#include "engine/check/walk_truth.h"
 #include "engine/core/rng.h"
 #include "tests/support/device_walk.h"
 #include "tests/support/projected_frame.h"
@@ -269,6 +271,34 @@ TEST(Frame, a_list_of_20000_splats_is_shown_to_its_end) {
 }
 
 // 65,538 tiles: tile numbers take 17 bits. The splats lie in the last and in the first tiles.
+// A million equal layers in the one tile of an image. Their alpha is 2^-20, so that 1 - alpha is a
+// float; of the background 0.385 is left.
+TEST(Frame, a_million_splats_in_one_tile_are_all_shown_slow) {
+    constexpr size_t kCount = 1'000'000;
+    TestScene s = random_scene({.count = kCount, .width = 8, .height = 8, .sh_degree = 0});
+    s.camera.rotation = glm::dmat3(1.0);
+    std::fill(s.model.position.begin(), s.model.position.end(), 0.0f);
+    std::fill(s.model.log_scale.begin(), s.model.log_scale.end(), 8.0f);  // flat over the image
+    std::fill(s.model.opacity.begin(), s.model.opacity.end(), -20 * std::log(2.0f));
+    std::fill(s.model.sh_dc.begin(), s.model.sh_dc.end(), 0.0f);  // grey
+    WalkSettings settings;
+    settings.alpha_cutoff = 1e-7f;
+    settings.background = {1, 0, 0.5f};
+    const Image<double> weights = check::random_weights(s.camera);
+    const DeviceWalk walk = walk_on_device(s.model, s.camera, weights, settings);
+    EXPECT_EQ(walk.status.longest_list, kCount);
+    EXPECT_EQ(walk.status.bad_gradients, 0U);
+    const double left = std::pow(1 - 0x1p-20, double(kCount));
+    double sum = 0, expected = 0;
+    for (size_t i = 0; i < walk.image.data.size(); ++i) {
+        const double background = settings.background[int(i % 3)];
+        EXPECT_NEAR(walk.image.data[i], 0.5 * (1 - left) + background * left, 2e-3) << i;
+        expected += weights.data[i] * 0.28209479 * (1 - left);
+    }
+    for (size_t i = 0; i < walk.d[kShDc].size(); ++i) sum += walk.d[kShDc][i];
+    EXPECT_NEAR(sum, expected, 0.01 * std::abs(expected));
+}
+
 TEST(Frame, more_than_65536_tiles_are_told_apart) {
     TestScene s = random_scene({.count = 2, .width = 17, .height = 524'290, .sh_degree = 0});
     s.camera.rotation = glm::dmat3(1.0);

@@ -1,8 +1,10 @@
 // The whole walk on the device, splats to image and image gradient to every parameter, against the
-// double-precision reference, for every kernel, footprint and evaluation.
+// double-precision reference, for every kernel, footprint and evaluation, and each of them with
+// every degree of the harmonics.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <set>
 
 #include "engine/core/rng.h"
 #include "engine/reference/render.h"
@@ -15,9 +17,11 @@ struct Case {
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
     int evaluation = EVALUATION_POLYNOMIAL;
+    int sh_degree = 3;
     std::string name() const {
         return std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint)) +
-               (evaluation == EVALUATION_BUILTIN ? "_builtin" : "");
+               (evaluation == EVALUATION_BUILTIN ? "_builtin" : "") +
+               fmt::format("_sh{}", sh_degree);
     }
     /// Exact footprints of the kernels with a jump fall like a root at their edge: the slope there
     /// grows without bound, and a rounding of q is a percent of it.
@@ -77,6 +81,7 @@ TEST_P(Walk, random_scene_matches_double) {
                                           .height = 37,
                                           .kernel = c.kernel,
                                           .footprint = c.footprint,
+                                          .sh_degree = c.sh_degree,
                                           .seed = 7});
     WalkSettings settings;
     settings.evaluation = c.evaluation;
@@ -90,9 +95,22 @@ std::vector<Case> all_cases() {
     std::vector<Case> cases;
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
         for (const Footprint footprint : {Footprint::psi, Footprint::exact})
-            for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
-                cases.push_back({kernel, footprint, evaluation});
+            for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN}) {
+                const int degree = (kernel + 2 * static_cast<int>(footprint) + evaluation) % 4;
+                cases.push_back({kernel, footprint, evaluation, degree});
+            }
     return cases;
+}
+
+TEST(WalkCoverage, every_pair_of_choices_is_walked) {
+    std::set<std::array<int, 4>> pairs;  // which two of the choices, and their values
+    for (const Case& c : all_cases()) {
+        const int choice[] = {c.kernel, static_cast<int>(c.footprint), c.evaluation, c.sh_degree};
+        for (int a = 0; a < 4; ++a)
+            for (int b = a + 1; b < 4; ++b) pairs.insert({a, b, choice[a], choice[b]});
+    }
+    constexpr size_t k = KERNEL_COUNT, f = 2, e = 2, sh = 4;
+    EXPECT_EQ(pairs.size(), k * f + k * e + k * sh + f * e + f * sh + e * sh);
 }
 
 INSTANTIATE_TEST_SUITE_P(every_kernel, Walk, testing::ValuesIn(all_cases()),

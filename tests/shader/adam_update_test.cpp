@@ -140,6 +140,20 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     EXPECT_EQ(after.parameters[kPosition], state.parameters[kPosition]);
 }
 
+// exp(100) is no float: beyond the limit the regulariser has no gradient, as all that reads a
+// scale.
+TEST(AdamUpdate, regularisers_leave_scales_beyond_their_limit) {
+    Training training(20);
+    training.partials.count.assign(20, 0);
+    PassState state = start_state(training.scene.model);
+    state.parameters[kLogScale] = std::vector<float>(60, 100.0f);
+    AdamStep step = adam_step(kRates, 1);
+    step.scale_weight = 0.7f;
+    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
+                                              state, training.partials, step);
+    EXPECT_EQ(after.parameters[kLogScale], state.parameters[kLogScale]);
+}
+
 TEST(AdamUpdate, an_overflowed_frame_changes_nothing) {
     Training training;
     PassState state = training.update(start_state(training.scene.model), 1);

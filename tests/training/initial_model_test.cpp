@@ -45,6 +45,16 @@ TEST(InitialModel, one_point_and_two_points_are_models) {
     }
 }
 
+TEST(InitialModel, map_coordinates_keep_millimetres) {
+    Dataset d = looking_at(20, false);
+    const glm::dvec3 corner(431'000.25, 5'412'000.5, 812.125);
+    for (size_t i = 0; i < d.points.position.size(); ++i)
+        d.points.position[i] += corner[int(i % 3)];
+    const SplatModel model = initial_model(d, {});
+    for (size_t i = 0; i < d.points.position.size(); ++i)
+        EXPECT_NEAR(model.origin[int(i % 3)] + model.position[i], d.points.position[i], 1e-6);
+}
+
 TEST(InitialModel, no_points_become_random_ones) {
     TrainOptions options;
     options.random_points = 50;

@@ -64,10 +64,11 @@ TEST(Training, a_resumed_run_equals_one_that_never_stopped) {
             Trainer first = t.trainer();
             run_to(first, stop);
             write_checkpoint(path, {first.state(), settings_text(t.options),
-                                    dataset_fingerprint(t.dataset), 1.0});
+                                    dataset_fingerprint(t.dataset, t.photos), 1.0});
         }
         const Checkpoint checkpoint = read_checkpoint(path);
-        check_resumable(checkpoint, path, t.options, t.dataset);
+        check_resumable(checkpoint, path, t.options, t.dataset,
+                        dataset_fingerprint(t.dataset, t.photos));
         Trainer second = t.trainer();
         second.restore(checkpoint.state);
         EXPECT_EQ(second.iteration(), stop);
@@ -158,6 +159,58 @@ TEST(Training, held_out_picture_gets_closer_to_the_photo) {
     run_to(trainer, 300);
     const double after = evaluate_held_out(trainer, t.dataset, t.photos).views[0].psnr_db;
     EXPECT_GT(after, before + 3) << "from " << before << " dB";
+}
+
+// The same views and points in a map's coordinates, where a float has steps of half a metre.
+TEST(Training, map_coordinates_train_as_those_at_the_origin) {
+    TinyTraining t = tiny_training();
+    t.options.densify_until = 0;
+    std::vector<double> losses[2];
+    for (std::vector<double>& loss : losses) {
+        Trainer trainer = t.trainer();
+        trainer.on_result = [&](const IterationResult& r) { loss.push_back(r.loss); };
+        run_to(trainer, 40);
+        trainer.drain();
+        const glm::dvec3 corner(431'000.25, 5'412'000.5, 812.125);
+        for (View& v : t.dataset.views) v.camera.translation -= v.camera.rotation * corner;
+        for (size_t i = 0; i < t.dataset.points.position.size(); ++i)
+            t.dataset.points.position[i] += corner[int(i % 3)];
+    }
+    for (size_t i = 0; i < losses[0].size(); ++i)
+        EXPECT_NEAR(losses[1][i], losses[0][i], 1e-3 * losses[0][i]) << "iteration " << i + 1;
+}
+
+// A splat that is culled for a number that is none has no influence on those beside it.
+TEST(Training, poisoned_splats_leave_the_others_alone) {
+    TinyTraining t = tiny_training();
+    t.options.densify_until = 0;
+    t.options.opacity_weight = t.options.scale_weight = 0;  // they divide by the number of splats
+    const SplatModel start = t.start();
+    SplatModel sick = start;
+    sick.resize(start.size() + 5);
+    for (size_t i = start.size(); i < sick.size(); ++i)
+        for (int a = 0; a < kAttributeCount; ++a) {
+            std::vector<float>& values = attribute_values(sick, a);
+            const size_t stride = values.size() / sick.size();
+            for (size_t c = 0; c < stride; ++c) values[i * stride + c] = values[c];
+        }
+    size_t at = start.size();
+    sick.position[3 * at++] = std::nanf("");
+    sick.rotation[4 * at++] = std::numeric_limits<float>::infinity();
+    sick.log_scale[3 * at++] = std::nanf("");
+    sick.opacity[at++] = std::nanf("");
+    sick.sh_dc[3 * at++] = 1e38f;
+    Trainer clean(shared_device(), t.dataset, t.photos, start, t.options);
+    Trainer poisoned(shared_device(), t.dataset, t.photos, sick, t.options);
+    run_to(clean, 12);
+    run_to(poisoned, 12);
+    const SplatModel expected = clean.model(), got = poisoned.model();
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float>&x = attribute_values(expected, a), &y = attribute_values(got, a);
+        EXPECT_TRUE(std::equal(x.begin(), x.end(), y.begin())) << attribute_name(a);
+    }
+    EXPECT_EQ(poisoned.counters().bad_gradients, 0U);
+    EXPECT_GE(poisoned.counters().culled[CULL_ROTATION], 12U);
 }
 
 TEST(Training, a_model_that_lost_every_splat_trains_on) {

@@ -28,10 +28,13 @@ struct CheckFlags {
 };
 
 nlohmann::json row_json(const check::Row& row) {
-    return {{"group", row.group},     {"name", row.name},       {"error", row.error},
-            {"allowed", row.allowed}, {"values", row.count},    {"outside", row.outside},
-            {"band", row.band},       {"seconds", row.seconds}, {"pass", row.pass},
-            {"detail", row.detail}};
+    nlohmann::json json{{"group", row.group},  {"name", row.name},
+                        {"error", row.error},  {"allowed", row.allowed},
+                        {"values", row.count}, {"outside", row.outside},
+                        {"band", row.band},    {"seconds", row.seconds},
+                        {"pass", row.pass},    {"detail", row.detail}};
+    if (row.float_alone) json["float_alone"] = *row.float_alone;
+    return json;
 }
 
 void print_row(const check::Row& row, std::string& group) {

@@ -61,6 +61,14 @@ TEST(CameraList, bad_records_are_errors_that_name_them) {
               std::string::npos);
 }
 
+TEST(CameraList, truncated_anywhere_is_an_error) {
+    const std::string text(kOne);
+    const size_t end = text.find_last_not_of(" \n");
+    for (size_t length = 0; length < end; ++length)
+        EXPECT_FALSE(error_of([&] { parse_camera_list(text.substr(0, length), "c.json"); }).empty())
+            << length;
+}
+
 TEST(CameraList, original_list_of_3dgs_sees_its_points) {
     const auto folder = test_data() / "fixtures" / "inria_miku_output";
     DARB_NEED_DATA(folder);

@@ -1,6 +1,7 @@
 // COLMAP text models, and the real models in both forms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <unordered_map>
@@ -46,6 +47,32 @@ TEST(ColmapText, bad_lines_are_errors_that_name_them) {
                   parse_colmap_points_text("1 0 0 0 1 2 300 0\n", "p", dropped);
               }).find("300"),
               std::string::npos);
+}
+
+// A text cut at the end of a line is a shorter model; anywhere else it may be an error. Never a
+// crash.
+TEST(ColmapText, truncated_anywhere_is_a_shorter_model_or_an_error) {
+    const std::string cameras = "1 PINHOLE 8 6 50 50 4 3\n2 OPENCV 8 6 50 50 4 3 0.1 0 0 0\n",
+                      images = "1 1 0 0 0 1 2 3 1 a.jpg\n1 2 -1\n2 1 0 0 0 1 2 3 2 b.jpg\n\n",
+                      points = "1 0.5 0 0 1 2 3 0.1 1 2\n2 1 2 3 4 5 6 0 1 2\n";
+    size_t errors = 0;
+    const auto read = [&](const auto& parse) {
+        try {
+            EXPECT_LE(parse(), 2U);
+        } catch (const Error& error) {
+            EXPECT_EQ(error.where.find("cut.txt"), 0U) << error.where;
+            ++errors;
+        }
+    };
+    for (size_t length = 0; length < std::max({cameras.size(), images.size(), points.size()});
+         ++length) {
+        std::size_t dropped = 0;
+        const auto part = [&](const std::string& text) { return text.substr(0, length); };
+        read([&] { return parse_colmap_cameras_text(part(cameras), "cut.txt").size(); });
+        read([&] { return parse_colmap_images_text(part(images), "cut.txt").size(); });
+        read([&] { return parse_colmap_points_text(part(points), "cut.txt", dropped).size(); });
+    }
+    EXPECT_GT(errors, 50U);
 }
 
 TEST(ColmapText, nan_points_are_counted) {

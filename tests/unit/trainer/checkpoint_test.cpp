@@ -114,7 +114,7 @@ TEST_F(CheckpointFile, a_file_cut_at_any_byte_of_the_head_is_refused) {
 
 TEST_F(CheckpointFile, a_file_cut_or_grown_in_the_data_is_refused_as_truncated) {
     const Bytes file = written(checkpoint());
-    for (size_t less = 1; less < 3000; less += 97)
+    for (size_t less = 1; less < 3000; ++less)
         expect_refused(Bytes(file.begin(), file.end() - std::ptrdiff_t(less)),
                        fmt::format("{} bytes less", less), "truncated");
     Bytes longer = file;
@@ -150,6 +150,24 @@ TEST_F(CheckpointFile, a_header_that_promises_too_much_allocates_nothing) {
     const std::uint64_t huge = ~std::uint64_t{0};
     std::memcpy(file.data() + 16, &huge, 8);
     expect_refused(file, "a header of 2^64 bytes", "truncated");
+    for (const char* splats : {"2147483648", "9223372036854775808", "500000000", "8", "0", "-1"}) {
+        const Bytes whole = written(checkpoint());
+        std::uint64_t size = 0;
+        std::memcpy(&size, whole.data() + 16, 8);
+        std::string header(reinterpret_cast<const char*>(whole.data()) + 24, size);
+        const std::string count = "\"splats\":7";
+        ASSERT_NE(header.find(count), std::string::npos) << header;
+        header.replace(header.find(count), count.size(), std::string("\"splats\":") + splats);
+        Bytes changed(whole.begin(), whole.begin() + 24);
+        for (const char c : header) changed.push_back(static_cast<std::byte>(c));
+        changed.insert(changed.end(), whole.begin() + 24 + std::ptrdiff_t(size), whole.end());
+        size = header.size();
+        std::memcpy(changed.data() + 16, &size, 8);
+        const std::string message = error_of(changed);
+        EXPECT_TRUE(message.find("expected: truncated") != std::string::npos ||
+                    message.find("make no sense") != std::string::npos)
+            << splats << " splats: " << message;
+    }
 }
 
 TEST_F(CheckpointFile, a_failed_write_leaves_the_older_file) {
@@ -168,13 +186,13 @@ TEST_F(CheckpointFile, a_failed_write_leaves_the_older_file) {
 TEST_F(CheckpointFile, other_settings_are_named) {
     Dataset dataset;
     Checkpoint c = checkpoint();
-    c.dataset = dataset_fingerprint(dataset);
+    c.dataset = dataset_fingerprint(dataset, {});
     TrainOptions options;
-    check_resumable(c, path_, options, dataset);
+    check_resumable(c, path_, options, dataset, c.dataset);
     options.seed = 99;
     options.kernel = KERNEL_SINC;
     try {
-        check_resumable(c, path_, options, dataset);
+        check_resumable(c, path_, options, dataset, c.dataset);
         FAIL() << "accepted";
     } catch (const Error& error) {
         const std::string message = error.what();
@@ -190,26 +208,43 @@ TEST_F(CheckpointFile, another_data_set_is_refused) {
     dataset.views.resize(2);
     dataset.views[0].name = "one";
     dataset.views[0].camera.width = 10;
+    const std::vector<ImageU8> photos(2, ImageU8(10, 4, 4));
     Checkpoint c = checkpoint();
-    c.dataset = dataset_fingerprint(dataset);
-    check_resumable(c, path_, {}, dataset);
-    const auto refused = [&](const char* what, const auto& change) {
+    c.dataset = dataset_fingerprint(dataset, photos);
+    check_resumable(c, path_, {}, dataset, dataset_fingerprint(dataset, photos));
+    const auto refused = [&](const char* what, const auto& change,
+                             const std::vector<ImageU8>& now) {
         Dataset other = dataset;
         change(other);
         try {
-            check_resumable(c, path_, {}, other);
+            check_resumable(c, path_, {}, other, dataset_fingerprint(other, now));
             FAIL() << what << " is accepted";
         } catch (const Error& error) {
             EXPECT_NE(std::string(error.what()).find("garden"), std::string::npos) << error.what();
         }
     };
-    refused("another name", [](Dataset& d) { d.views[1].name = "two"; });
-    refused("another size", [](Dataset& d) { d.views[0].camera.width = 11; });
-    refused("another pose", [](Dataset& d) { d.views[1].camera.rotation[2][1] = 1e-9; });
-    refused("another focal length", [](Dataset& d) { d.views[1].camera.fx = 1e-9; });
-    refused("another split", [](Dataset& d) { d.views[1].is_test = true; });
-    refused("one view less", [](Dataset& d) { d.views.pop_back(); });
-    refused("a point", [](Dataset& d) { d.points.position = {1, 2, 3}; });
+    refused(
+        "another name", [](Dataset& d) { d.views[1].name = "two"; }, photos);
+    refused(
+        "another size", [](Dataset& d) { d.views[0].camera.width = 11; }, photos);
+    refused(
+        "another pose", [](Dataset& d) { d.views[1].camera.rotation[2][1] = 1e-9; }, photos);
+    refused(
+        "another focal length", [](Dataset& d) { d.views[1].camera.fx = 1e-9; }, photos);
+    refused(
+        "another split", [](Dataset& d) { d.views[1].is_test = true; }, photos);
+    refused(
+        "one view less", [](Dataset& d) { d.views.pop_back(); }, photos);
+    refused(
+        "a point",
+        [](Dataset& d) {
+            d.points.position = {1, 2, 3};
+        },
+        photos);
+    std::vector<ImageU8> painted = photos;
+    painted[1].data[5] = 1;
+    refused(
+        "one pixel of a photo", [](Dataset&) {}, painted);
 }
 
 }  // namespace
