@@ -10,7 +10,7 @@ namespace {
 constexpr int kSlowFrames = 2, kQuickFrames = 12;
 constexpr double kAim = 0.85, kRoom = 0.7;  // of the target: what a change aims at; room for more
 constexpr double kMostDown = 0.2, kMostUp = 2;  // factor of one change
-constexpr double kLeastPixels = 1.0 / 16, kLeastSplats = 1.0 / 64;
+constexpr double kLeastPixels = 1.0 / 16, kLeastSplats = 10'000;
 
 }  // namespace
 
@@ -32,10 +32,11 @@ MotionQuality MotionControl::quality() const {
     return {std::ceil(std::sqrt(pixels_) * 8 - 1e-9) / 8, splats_};
 }
 
-void MotionControl::start(double most) {
+void MotionControl::start(std::size_t splats, double most) {
     *this = MotionControl(target_ms_);
     most_ = most;
-    splats_ = std::min(splats_, most_);
+    least_ = std::min(kLeastSplats / std::max(static_cast<double>(splats), 1.0), most);
+    splats_ = std::clamp(splats_, least_, most_);
 }
 
 // `factor` for what costs more, less of a change for the other; up, where one is whole, all for the
@@ -45,7 +46,7 @@ void MotionControl::change(double factor) {
     const bool up = factor > 1;
     const double of_splats = up && pixels_ >= 1 ? 1 : best_.splats_ms / most;
     const double of_pixels = up && splats_ >= 1 ? 1 : best_.pixels_ms / most;
-    splats_ = std::clamp(splats_ * std::pow(factor, of_splats), kLeastSplats, 1.0);
+    splats_ = std::clamp(splats_ * std::pow(factor, of_splats), least_, 1.0);
     if (splats_ < 1) splats_ = std::min(splats_, most_);
     pixels_ = std::clamp(pixels_ * std::pow(factor, of_pixels), kLeastPixels, 1.0);
 }

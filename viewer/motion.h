@@ -2,6 +2,7 @@
 // takes a thirtieth of a second. Decided by the measured time of the frames before.
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "engine/gpu/commands.h"
@@ -36,13 +37,14 @@ class MotionControl {
     /// A frame drawn at quality() took this. Two slow frames in a row lower the quality, a dozen
     /// quick ones raise it; whichever of splats and pixels costs more changes more.
     void measured(const MotionCost& cost);
-    /// Another scene, of which nothing is known. most: the largest share of its splats below all.
-    void start(double most);
+    /// Another scene, of which nothing is known but how many splats it has and the largest share of
+    /// them below all. 10,000 splats cost little and are always drawn.
+    void start(std::size_t splats, double most);
 
   private:
     void change(double factor);
     double target_ms_;
-    double most_ = 0.5;
+    double most_ = 0.5, least_ = 1.0 / 64;  // shares of the splats; most_ below all
     double pixels_ = 0.25, splats_ = 0.25;  // shares
     int slow_ = 0, quick_ = 0;              // frames in a row
     MotionCost best_;                       // of the quickest of those

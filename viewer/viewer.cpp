@@ -110,7 +110,7 @@ void Viewer::poll_load() {
 void Viewer::adopt(Scene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded));
     picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
-    motion_.start(picture_.most_moving());
+    motion_.start(picture_.splat_count(), picture_.most_moving());
     const bool first = session_.scene == nullptr;
     session_.scene = std::move(scene);
     const Scene& s = *session_.scene;
@@ -150,7 +150,7 @@ void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
     session_.shown_sh_degree = splats.sh_degree();
     session_.own.sh_degree = splats.sh_degree();
     if (!first) return;
-    motion_.start(1);
+    motion_.start(splats.count(), 1);
     session_.display.kernel = splats.kernel();
     session_.display.footprint = splats.footprint();
     session_.display.antialias = splats.antialias();

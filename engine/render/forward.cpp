@@ -23,6 +23,14 @@ int bits_for(std::uint32_t count) {
     return std::max(1, static_cast<int>(std::bit_width(count > 0 ? count - 1 : 0)));
 }
 
+// A frame without a backward pass holds a word for a pair, not eight.
+std::uint32_t most_pairs(const Device& device, const ForwardOptions& options) {
+    const std::uint64_t words = device.info().max_storage_buffer_bytes / 4;
+    return options.store_for_backward
+               ? Forward::max_pairs(device)
+               : static_cast<std::uint32_t>(std::min<std::uint64_t>(words, 1u << 30));
+}
+
 }  // namespace
 
 SpecConstants kernel_constants(const ForwardOptions& options) {
@@ -151,7 +159,7 @@ void Forward::note_crowds(const gpu::FrameStatus& status) {
 bool Forward::make_room(const gpu::FrameStatus& status) {
     note_crowds(status);
     if (status.overflow == 0) return false;
-    const std::uint32_t most = max_pairs(*device_);
+    const std::uint32_t most = most_pairs(*device_, options_);
     const std::uint32_t wanted =
         (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.pairs;
     if (wanted > most)
@@ -216,11 +224,11 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         depth_sort_.emplace(d, splat_capacity_);
     }
     if (pairs > pair_capacity_ || pair_capacity_ == 0) {
-        if (pairs > max_pairs(d))
-            throw Error("splat-tile pairs",
-                        fmt::format("a frame needs {} pairs, this device's buffers hold {}", pairs,
-                                    max_pairs(d)),
-                        "Lower the resolution (-r) or the number of splats (--cap_max).");
+        if (const std::uint32_t most = most_pairs(d, options_); pairs > most)
+            throw Error(
+                "splat-tile pairs",
+                fmt::format("a frame needs {} pairs, this device's buffers hold {}", pairs, most),
+                "Lower the resolution (-r) or the number of splats (--cap_max).");
         const std::uint64_t k = pair_capacity_ = std::max(pairs, kMinCapacity);
         pair_tile_ = Buffer(d, "pair tile", k * 4);
         pair_splat_ = Buffer(d, "pair splat", k * 4);

@@ -27,7 +27,7 @@ TEST(MotionControl, Every_slow_device_ends_within_the_target) {
     for (const Modelled& device :
          {Modelled{5, 80, 10}, Modelled{5, 10, 300}, Modelled{10, 90, 90}, Modelled{2, 900, 60}}) {
         MotionControl control(33);
-        control.start(0.5);
+        control.start(1'000'000, 0.5);
         const double ms = device.cost(after(control, device, 300)).total_ms();
         EXPECT_LE(ms, 33) << device.splats_ms << ", " << device.pixels_ms;
         EXPECT_GE(ms, 15) << device.splats_ms << ", " << device.pixels_ms;
@@ -36,11 +36,11 @@ TEST(MotionControl, Every_slow_device_ends_within_the_target) {
 
 TEST(MotionControl, What_costs_more_is_what_is_given_up) {
     MotionControl control(33);
-    control.start(1);
+    control.start(1'000'000, 1);
     const MotionQuality many = after(control, {5, 200, 5}, 300);
     EXPECT_LT(many.splats, 0.25);
     EXPECT_GE(many.scale, 0.5);
-    control.start(1);
+    control.start(1'000'000, 1);
     const MotionQuality large = after(control, {5, 5, 200}, 300);
     EXPECT_GE(large.splats, 0.25);
     EXPECT_LT(large.scale, 0.5);
@@ -48,7 +48,7 @@ TEST(MotionControl, What_costs_more_is_what_is_given_up) {
 
 TEST(MotionControl, A_quick_device_gets_the_whole_picture_within_a_second) {
     MotionControl control(33);
-    control.start(0.5);
+    control.start(1'000'000, 0.5);
     EXPECT_EQ(after(control, {1, 2, 3}, 120), MotionQuality());
 }
 
@@ -56,7 +56,7 @@ TEST(MotionControl, A_quick_device_gets_the_whole_picture_within_a_second) {
 TEST(MotionControl, It_comes_to_rest) {
     for (const Modelled& device : {Modelled{2, 45, 2}, Modelled{5, 30, 30}, Modelled{20, 5, 5}}) {
         MotionControl control(33);
-        control.start(0.5);
+        control.start(1'000'000, 0.5);
         const MotionQuality settled = after(control, device, 300);
         for (int i = 0; i < 200; ++i) EXPECT_EQ(after(control, device, 1), settled) << i;
     }
@@ -64,7 +64,7 @@ TEST(MotionControl, It_comes_to_rest) {
 
 TEST(MotionControl, One_slow_frame_changes_nothing) {
     MotionControl control(33);
-    control.start(0.5);
+    control.start(1'000'000, 0.5);
     const Modelled device{5, 20, 20};
     const MotionQuality settled = after(control, device, 300);
     control.measured({500, 20, 20});
@@ -73,10 +73,18 @@ TEST(MotionControl, One_slow_frame_changes_nothing) {
 
 TEST(MotionControl, Where_nothing_helps_a_fifth_of_the_time_is_left_for_the_picture) {
     MotionControl control(33);
-    control.start(1);
+    control.start(1'000'000, 1);
     const Modelled device{80, 10, 10};
     const MotionCost cost = device.cost(after(control, device, 300));
     EXPECT_GT(cost.splats_ms + cost.pixels_ms, 3);
+}
+
+TEST(MotionControl, Ten_thousand_splats_are_always_drawn) {
+    MotionControl control(33);
+    control.start(20'000, 0.5);
+    EXPECT_EQ(after(control, {0, 5000, 5}, 300).splats, 0.5);
+    control.start(100'000, 0.5);
+    EXPECT_EQ(after(control, {0, 5000, 5}, 300).splats, 0.1);
 }
 
 TEST(MotionCost, Passes_are_told_apart) {
