@@ -62,6 +62,7 @@ inline TinyTraining tiny_training(const TinyOptions& tiny = {}) {
         if (v == 2) view.camera.fx *= tiny.close_up, view.camera.fy *= tiny.close_up;
         view.is_test = v == 0;
         t.photos.push_back(with_alpha(to_8bit(renderer.render(view.camera))));
+        view.lens.parameters = {view.camera.fx, view.camera.fy, view.camera.cx, view.camera.cy};
         t.dataset.views.push_back(view);
     }
     Pcg32 rng(92);

@@ -17,7 +17,10 @@ constexpr double kCharacterWidth = 6.3;  // of the ticks' font at 11 px, user un
 std::string tick_text(double v) {
     if (std::abs(v) >= 1e6) return fmt::format("{:g}M", v / 1e6);
     if (std::abs(v) >= 1e4) return fmt::format("{:g}k", v / 1e3);
-    return fmt::format("{:.6g}", std::abs(v) < 1e-12 ? 0.0 : v);
+    if (std::abs(v) < 1e-12) return "0";
+    if (std::abs(v) >= 1e-2) return fmt::format("{:.6g}", v);
+    const int power = static_cast<int>(std::floor(std::log10(std::abs(v)) + 1e-9));
+    return fmt::format("{:.3g}e{}", v / std::pow(10.0, power), power);  // 0.0001 is too wide
 }
 
 }  // namespace
