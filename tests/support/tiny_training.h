@@ -60,9 +60,9 @@ inline TinyTraining tiny_training(const TinyOptions& tiny = {}) {
         view.camera.rotation = rotation_of(std::cos(half_turn), 0, std::sin(half_turn), 0);
         view.camera.translation = {0, 0, 3.2};
         if (v == 2) view.camera.fx *= tiny.close_up, view.camera.fy *= tiny.close_up;
+        view.lens.parameters = {view.camera.fx, view.camera.fy, view.camera.cx, view.camera.cy};
         view.is_test = v == 0;
         t.photos.push_back(with_alpha(to_8bit(renderer.render(view.camera))));
-        view.lens.parameters = {view.camera.fx, view.camera.fy, view.camera.cx, view.camera.cy};
         t.dataset.views.push_back(view);
     }
     Pcg32 rng(92);
