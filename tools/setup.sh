@@ -8,6 +8,7 @@ usage() {
 usage: tools/setup.sh [options]
   --dry-run             only say what would be installed
   --no-tests            leave out what only the tests and the quality checks need
+  --with-torch          PyTorch too, for the test of LPIPS: 0.6 GB on disk
   --with-colmap         COLMAP too: training from photos without cameras runs it
   --with-mesa-backport  Debian 12: Mesa 25 from bookworm-backports; on the CPU it blends 1.5-1.7
                         times as fast as Mesa 22.3
@@ -32,6 +33,7 @@ build    zlib1g-dev           checksums and compression
 build    libzstd-dev          SPZ files
 build    libzip-dev           SOG files
 build    libwebp-dev          SOG files
+build    libeigen3-dev        matrix products of LPIPS
 build    libglfw3-dev         window of the viewer
 build    libimgui-dev         panels of the viewer
 run      mesa-vulkan-drivers  lavapipe, the CPU device, and the GPU drivers of Mesa
@@ -44,6 +46,7 @@ tests    xvfb                 a display for the tests of the window
 tests    xdotool              mouse and keys in them
 tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
 tests    python3              style script (standard library only)
+torch    python3-torch        the truth of the LPIPS test, which skips without it; optional
 colmap   colmap               cameras from photos; optional
 '
 
@@ -52,6 +55,7 @@ for option in "$@"; do
     case $option in
         --dry-run) dry_run=1 ;;
         --no-tests) groups=${groups/tests/} ;;
+        --with-torch) groups+=" torch" ;;
         --with-colmap) groups+=" colmap" ;;
         --with-mesa-backport) backport=1 ;;
         -h | --help) usage; exit 0 ;;

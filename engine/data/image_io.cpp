@@ -97,7 +97,7 @@ ImageU8 orient_image(const ImageU8& image, int orientation) {
     return turned;
 }
 
-void write_png(const std::filesystem::path& path, const ImageU8& image) {
+std::vector<std::byte> encode_png(const ImageU8& image) {
     DARB_CHECK(image.width > 0 && image.height > 0 && image.channels >= 1, "{}x{}x{}", image.width,
                image.height, image.channels);
     std::vector<std::byte> file;
@@ -108,8 +108,12 @@ void write_png(const std::filesystem::path& path, const ImageU8& image) {
     };
     if (!stbi_write_png_to_func(append, &file, image.width, image.height, image.channels,
                                 image.data.data(), image.width * image.channels))
-        throw Error(path.string(), "the PNG cannot be encoded", "Free memory.");
-    write_file_atomic(path, file);
+        throw Error("a picture", "the PNG cannot be encoded", "Free memory.");
+    return file;
+}
+
+void write_png(const std::filesystem::path& path, const ImageU8& image) {
+    write_file_atomic(path, encode_png(image));
 }
 
 std::string picture_name(const std::string& view_name, std::set<std::string>& used) {

@@ -6,6 +6,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "engine/core/image.h"
 
@@ -32,7 +33,10 @@ ImageU8 decode_image(std::span<const std::byte> file, const std::string& where,
 /// The image turned and mirrored as EXIF number 1 to 8 asks for; 5 to 8 swap width and height.
 ImageU8 orient_image(const ImageU8& image, int orientation);
 
-/// 1, 3 or 4 channels; through write_file_atomic, so makes missing folders.
+/// 1, 3 or 4 channels.
+std::vector<std::byte> encode_png(const ImageU8& image);
+
+/// encode_png through write_file_atomic, so makes missing folders.
 void write_png(const std::filesystem::path& path, const ImageU8& image);
 
 /// File name for a picture of a view: the view's name without extension, folders joined by "_",

@@ -20,6 +20,9 @@ void add_plan(CLI::App& app, Action& action);
 void add_info(CLI::App& app, Action& action);
 void add_convert(CLI::App& app, Action& action);
 void add_devices(CLI::App& app, Action& action);
+void add_psi(CLI::App& app, Action& action);
+void add_sim1d(CLI::App& app, Action& action);
+void add_compare(CLI::App& app, Action& action);
 void add_check(CLI::App& app, Action& action);
 
 }  // namespace darb

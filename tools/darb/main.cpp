@@ -44,6 +44,9 @@ int run(int argc, char** argv) {
     darb::add_info(app, action);
     darb::add_convert(app, action);
     darb::add_devices(app, action);
+    darb::add_compare(app, action);
+    darb::add_psi(app, action);
+    darb::add_sim1d(app, action);
     darb::add_check(app, action);
     if (!arguments.empty() && !arguments[0].starts_with('-') &&
         app.get_subcommands([&](CLI::App* one) { return one->check_name(arguments[0]); }).empty())

@@ -3,28 +3,21 @@
 #include <fmt/format.h>
 
 #include <atomic>
-#include <csignal>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tools/darb/commands.h"
-#include "tools/darb/effect_flags.h"
 #include "tools/darb/live_view.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
+#include "tools/darb/train_run.h"
 
 namespace darb {
 
 namespace {
-
-std::atomic<bool> g_stop{false};  // a signal handler can reach nothing else
-
-void on_interrupt(int) {
-    if (g_stop.exchange(true)) std::_Exit(130);  // the second Ctrl-C does not wait
-}
 
 // `darb train --resume -o OUT` alone: the arguments of the run that it goes on with.
 void recall_arguments(TrainFlags& flags) {
@@ -62,22 +55,6 @@ void print_summary(const RunSummary& summary, const TrainFlags& flags) {
                    flags.run.output.string());
 }
 
-EffectChoice training_choice(const TrainFlags& flags) {
-    EffectChoice choice = parse_effects(flags.effects);
-    if (flags.antialiasing) choice.changed[EFFECT_ANTIALIAS] = true;
-    return choice;
-}
-
-// The photos stay for the run where the plan had to look at them.
-void plan_effects(const Dataset& dataset, const EffectChoice& choice, TrainFlags& flags) {
-    if (!dataset.points.seen_begin.empty()) flags.run.photos = load_photos(dataset.views);
-    const EffectPlan plan = plan_training(dataset, flags.run.photos, flags.train.sh_degree, choice);
-    apply_plan(plan, flags.train);
-    flags.run.effects = plan_line(plan);
-    flags.run.effects_json =
-        plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 int train(TrainFlags flags, std::vector<std::string> arguments) {
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
     if (recalled) recall_arguments(flags);
@@ -89,17 +66,16 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
     device_options.select = flags.device;
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
-    const EffectChoice choice = training_choice(flags);
+    check_effects(flags);
     const Dataset dataset = load_training_data(flags);
-    plan_effects(dataset, choice, flags);
+    plan_effects(dataset, flags);
     if (!recalled)  // only now: a command that fails above leaves that of an earlier run
         write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
     print_plan(device, dataset, flags);
-    std::signal(SIGINT, on_interrupt);
-    std::signal(SIGTERM, on_interrupt);
-    const std::unique_ptr<LiveView> view = live.open(device, dataset, g_stop);
+    std::atomic<bool>& stop = stop_on_signals();
+    const std::unique_ptr<LiveView> view = live.open(device, dataset, stop);
     if (view) flags.run.on_step = [&](const LiveStep& step) { view->show(step); };
-    const RunSummary summary = run_training(device, dataset, flags.train, flags.run, &g_stop);
+    const RunSummary summary = run_training(device, dataset, flags.train, flags.run, &stop);
     print_summary(summary, flags);
     if (view) view->finish(summary.model);
     return 0;

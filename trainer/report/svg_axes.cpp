@@ -88,7 +88,9 @@ std::string open_plot(const std::string& title, double height) {
 }
 
 std::string draw_legend(const std::vector<std::string>& names, bool filled) {
-    if (names.size() < 2) return {};
+    const bool named = std::any_of(names.begin(), names.end(),
+                                   [](const std::string& name) { return !name.empty(); });
+    if (names.size() < 2 || !named) return {};
     std::string svg;
     double right = kPlotWidth - kPlotRight;
     for (std::size_t i = names.size(); i-- > 0;) {

@@ -28,7 +28,8 @@ std::string draw_axes(const std::string& x_label, const std::string& y_label, co
                       const Axis& y);
 /// The opening tag and the title.
 std::string open_plot(const std::string& title, double height = kPlotHeight);
-/// Names with a swatch each, right-aligned beside the title; empty for a single one.
+/// Names with a swatch each, right-aligned beside the title; empty for a single one, and
+/// where none has a name.
 std::string draw_legend(const std::vector<std::string>& names, bool filled = false);
 
 }  // namespace darb

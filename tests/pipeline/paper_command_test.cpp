@@ -1,0 +1,114 @@
+// darb compare, psi and sim1d as a user runs them.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_command.h"
+
+namespace darb::test {
+namespace {
+
+nlohmann::json read_json(const fs::path& path) {
+    return nlohmann::json::parse(read_text_file(path));
+}
+
+const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+
+TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
+    const fs::path out = scratch() / "compare";
+    const std::string command =
+        "compare " + kScene + " --kernels gaussian,sinc --iterations 10,20 -r 8 -o " +
+        out.string() + " --effects=none --lpips " + (out / "missing.safetensors").string();
+    const Outcome first = darb(command);
+    ASSERT_EQ(first.code, 0) << first.err;
+    EXPECT_NE(first.out.find("missing.safetensors does not exist"), std::string::npos) << first.out;
+    const nlohmann::json a = read_json(out / "compare.json");
+    const auto& medians = a["datasets"][0]["medians"];
+    ASSERT_EQ(medians.size(), 4u);
+    for (const auto& row : medians) {
+        EXPECT_GT(row["psnr_db"]["median"].get<double>(), 5);
+        EXPECT_GT(row["model_mb"]["median"].get<double>(), 0.1);
+        EXPECT_TRUE(row["lpips"].is_null());
+    }
+    for (const auto& run : a["datasets"][0]["runs"]) {
+        EXPECT_EQ(run["failure"], "");
+        EXPECT_GT(run["blending"]["blended_per_pixel"].get<double>(), 0.1);
+        EXPECT_GT(run["blending"]["pairs_per_splat"].get<double>(), 0.5);
+        EXPECT_GT(run["blending"]["ns_per_splat_pixel"].get<double>(), 0);
+    }
+    const std::string page = read_text_file(out / "compare.html");
+    EXPECT_NE(page.find("Where the errors differ most"), std::string::npos);
+    EXPECT_EQ(page.find("http"), page.find("http://www.w3.org"));  // nothing from outside
+
+    const fs::path metrics = out / "scene/sinc/seed0/metrics.json";
+    const auto written = fs::last_write_time(metrics);
+    fs::remove_all(out / "scene/gaussian");
+    const Outcome second = darb(command);
+    ASSERT_EQ(second.code, 0) << second.err;
+    EXPECT_NE(second.err.find("scene: sinc, seed 0: is there"), std::string::npos) << second.err;
+    EXPECT_EQ(fs::last_write_time(metrics), written);
+    // The same seed gives the same bits, trained before or now.
+    EXPECT_EQ(read_json(out / "compare.json")["datasets"][0]["medians"][2]["psnr_db"],
+              medians[2]["psnr_db"]);
+
+    const Outcome other = darb(command + " --train-options '--opacity-lr 0.01'");
+    EXPECT_EQ(other.code, 1);
+    EXPECT_NE(other.out.find("of a run with other settings: opacity_lr"), std::string::npos)
+        << other.out;
+}
+
+TEST(CompareCommand, RunOfDarbTrain_counts_slow) {
+    const fs::path out = scratch() / "compare_train";
+    const std::string options = " --iterations 12 -r 8 --effects=none ";
+    ASSERT_EQ(darb("train " + kScene + " --eval --kernel parabolic -q" + options + " -o " +
+                   (out / "scene/parabolic/seed0").string())
+                  .code,
+              0);
+    const Outcome compared =
+        darb("compare " + kScene + " --kernels parabolic" + options + " -o " + out.string());
+    EXPECT_EQ(compared.code, 0) << compared.err;
+    EXPECT_NE(compared.err.find("parabolic, seed 0: is there"), std::string::npos) << compared.err;
+}
+
+TEST(CompareCommand, BadInput_isNamedWithExitCode2) {
+    EXPECT_EQ(darb("compare").code, 2);
+    EXPECT_EQ(darb("compare /nowhere -o x").code, 2);
+    EXPECT_EQ(darb("compare " + kScene + " -o x --kernels triangle").code, 2);
+    const Outcome bad = darb("compare " + kScene + " -o x --train-options=--frobnicate");
+    EXPECT_EQ(bad.code, 2);
+    EXPECT_NE(bad.err.find("frobnicate"), std::string::npos) << bad.err;
+}
+
+TEST(CompareCommand, DataSetThatCannotBeLoaded_isAFailureInTheReport) {
+    const fs::path empty = scratch() / "empty_set", out = scratch() / "compare_empty";
+    fs::create_directories(empty);
+    const Outcome one = darb("compare " + empty.string() + " -o " + out.string());
+    EXPECT_EQ(one.code, 1) << one.err;
+    EXPECT_NE(read_text_file(out / "compare.html").find("every kernel"), std::string::npos);
+}
+
+TEST(PsiCommand, TableJsonAndPage_agree) {
+    const fs::path json = scratch() / "psi.json", page = scratch() / "psi.html";
+    const Outcome psi = darb("psi --kernel raised_cosine,sinc --samples 4 --cells 32 --json " +
+                             json.string() + " --html " + page.string());
+    ASSERT_EQ(psi.code, 0) << psi.err;
+    EXPECT_NE(psi.out.find("0.655153"), std::string::npos) << psi.out;
+    EXPECT_NEAR(read_json(json)["kernels"][1]["exact"].get<double>(), 1.176219, 5e-7);
+    EXPECT_NE(read_text_file(page).find("<svg"), std::string::npos);
+    EXPECT_EQ(darb("psi --kernel triangle").code, 2);
+}
+
+TEST(Sim1dCommand, TableJsonAndPage_areWritten) {
+    const fs::path json = scratch() / "sim1d.json", page = scratch() / "sim1d.html";
+    const Outcome sim = darb(
+        "sim1d --signals triangle --kernels gaussian,generalised_exponential "
+        "-N 1,2 --seeds 2 --steps 50 --samples 100 --json " +
+        json.string() + " --html " + page.string());
+    ASSERT_EQ(sim.code, 0) << sim.err;
+    EXPECT_EQ(read_json(json)["rows"].size(), 4u);
+    EXPECT_NE(read_text_file(page).find("N = 2"), std::string::npos);
+    EXPECT_EQ(darb("sim1d --signals noise").code, 2);
+}
+
+}  // namespace
+}  // namespace darb::test

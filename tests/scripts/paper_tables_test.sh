@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# tools/paper_tables.sh on a made-up ROOT: which scenes and sizes it hands to darb compare.
+set -uo pipefail
+script=$(cd "$(dirname "$0")/../../tools" && pwd)/paper_tables.sh
+fake=$(mktemp -d)
+trap 'rm -rf "$fake"' EXIT
+failed=0
+check() { # NAME PATTERN TEXT
+    if grep -qE -- "$2" <<<"$3"; then echo "ok      $1"; else
+        printf 'FAILED  %s: expected /%s/ in\n%s\n' "$1" "$2" "$3"
+        failed=1
+    fi
+}
+
+mkdir -p "$fake"/root/360_v2/{bicycle/images_4,room/images_2,garden/images} "$fake"/root/tandt/Truck/images
+printf '#!/bin/sh\necho "$@"\n' >"$fake/darb"
+chmod +x "$fake/darb"
+export DARB=$fake/darb
+output=$("$script" "$fake/root" "$fake/out" --seeds 2 2>&1)
+check "sizes of 3DGS" "bicycle@images_4 .*room@images_2 .*Truck@images " "$output"
+check "iterations and options" "--iterations 7000,30000 .*--seeds 2" "$output"
+check "missing scenes are named" "left out, not found: .*garden.*playroom" "$output"
+"$script" "$fake/nowhere" "$fake/out" 2>/dev/null
+check "no folder" '^2$' "$?"
+"$script" 2>/dev/null
+check "no arguments" '^2$' "$?"
+exit "$failed"

@@ -1,0 +1,118 @@
+// darb compare DATASET... -o OUT: kernels side by side, trained or found, as the paper's tables.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/gpu/device.h"
+#include "tools/darb/commands.h"
+#include "tools/darb/compare_flags.h"
+#include "tools/darb/kernel_flags.h"
+#include "tools/darb/train_run.h"
+
+namespace darb {
+
+namespace {
+
+void check_flags(CompareFlags& flags) {
+    if (flags.datasets.empty())
+        throw Error("darb compare", "no data set", "Name folders: darb compare DATASET... -o OUT.");
+    if (flags.output.empty())
+        throw Error("darb compare", "no output folder", "Name one with -o OUT.");
+    std::vector<std::string> names;
+    for (const std::string& dataset : flags.datasets) {
+        if (!std::filesystem::exists(dataset_path(dataset)))
+            throw Error(dataset, "no such file or folder", "Check the name.");
+        const std::string name = dataset_name(dataset);
+        if (std::find(names.begin(), names.end(), name) != names.end())
+            throw Error(dataset, "another data set is called " + name + " too",
+                        "Rename one folder: the name tells their runs apart.");
+        names.push_back(name);
+    }
+    std::sort(flags.iterations.begin(), flags.iterations.end());
+    flags.iterations.erase(std::unique(flags.iterations.begin(), flags.iterations.end()),
+                           flags.iterations.end());
+    if (flags.max_splats > 0)
+        flags.forwarded.push_back("--max-splats=" + std::to_string(flags.max_splats));
+    if (flags.html.empty()) flags.html = flags.output / "compare.html";
+    if (flags.json.empty()) flags.json = flags.output / "compare.json";
+}
+
+std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
+    note = "LPIPS was left out: no weights were given (--lpips FILE).";
+    for (const auto& file : flags.lpips)
+        if (!std::filesystem::exists(file)) {
+            note = "LPIPS was left out: " + file.string() + " does not exist.";
+            fmt::print(stderr, "warning: {}\n", note);
+            return std::nullopt;
+        }
+    if (flags.lpips.empty()) return std::nullopt;
+    std::optional<Lpips> lpips(std::in_place, flags.lpips, LpipsOptions{flags.lpips_as_3dgs, 0});
+    note = fmt::format("LPIPS: {}, colours from {} to 1{}.", lpips->net_name(),
+                       flags.lpips_as_3dgs ? "0" : "-1",
+                       flags.lpips_as_3dgs ? " as in the evaluation of 3DGS" : "");
+    return lpips;
+}
+
+std::string settings_of(const CompareFlags& flags) {
+    std::string words;
+    for (const std::string& word : flags.forwarded) words += " " + word;
+    return fmt::format(
+        "{}Options of training:{}{}{}.",
+        flags.max_splats > 0
+            ? fmt::format("Growth stops at {} splats. ", flags.max_splats)
+            : "Equal densification threshold, so each kernel has its own number of splats. ",
+        words, flags.train_options.empty() ? "" : " " + flags.train_options,
+        words.empty() && flags.train_options.empty() ? " the defaults" : "");
+}
+
+int compare(CompareFlags flags) {
+    check_flags(flags);
+    const std::vector<int> kernels = kernels_from_list("--kernels", flags.kernels);
+    Comparison comparison;
+    const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
+    for (const std::string& dataset : flags.datasets)  // bad options end it before it begins
+        train_flags_of(flags, dataset, kernels.front(), 0);
+    for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
+    comparison.iterations = flags.iterations;
+    comparison.seeds = flags.seeds;
+    comparison.settings = settings_of(flags);
+    DeviceOptions options;
+    options.select = flags.device;
+    {
+        const Device device(options);
+        comparison.device = device.info().name + ", " + device.info().driver;
+    }
+    const std::atomic<bool>& stop = stop_on_signals();
+    bool failed = false;
+    for (const std::string& dataset : flags.datasets) {
+        if (stop) break;
+        comparison.datasets.push_back(
+            compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, stop));
+        for (const ComparedRun& run : comparison.datasets.back().runs)
+            failed |= !run.failure.empty();
+        write_file_atomic(flags.json, comparison_json(comparison).dump(1) + "\n");
+        write_file_atomic(flags.html, comparison_html(comparison));
+    }
+    fmt::print("{}{}\nreport   {}\n", comparison_table(comparison), comparison.lpips_note,
+               flags.html.string());
+    if (stop) fmt::print("interrupted; the same command goes on\n");
+    return failed ? 1 : 0;
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<CompareFlags>();
+    CLI::App* command = app.add_subcommand(
+        "compare", "Kernels side by side on data sets: trains, measures, reports; resumes");
+    add_compare_flags(*command, *flags);
+    command->callback([flags, &action] { action = [flags] { return compare(*flags); }; });
+}
+
+}  // namespace darb

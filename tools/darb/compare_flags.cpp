@@ -1,0 +1,100 @@
+// The command line of `darb compare`, and that of each of its runs.
+#include "tools/darb/compare_flags.h"
+
+#include <fmt/format.h>
+
+#include "engine/core/error.h"
+#include "engine/kernels/kernel_family.h"
+
+namespace darb {
+
+namespace {
+
+/// An option that goes to `darb train` as it is.
+void forward(CLI::App& command, CompareFlags& flags, const std::string& names,
+             const std::string& word, const std::string& help) {
+    command.add_option_function<std::string>(
+        names,
+        [&flags, word](const std::string& value) { flags.forwarded.push_back(word + "=" + value); },
+        help);
+}
+
+}  // namespace
+
+void add_compare_flags(CLI::App& command, CompareFlags& flags) {
+    command.add_option("datasets", flags.datasets,
+                       "as darb train takes them; PATH@images_4 for its own photo folder");
+    command.add_option("-o,--output", flags.output,
+                       "folder of the runs, OUT/DATASET/KERNEL/seedN: finished ones are kept");
+    command.add_option("--kernels", flags.kernels, "paper (its five), all (nine), or names")
+        ->capture_default_str();
+    command.add_option("--iterations", flags.iterations, "evaluate after these, with commas")
+        ->delimiter(',')
+        ->capture_default_str()
+        ->check(CLI::Range(1, 10'000'000));
+    command.add_option("--seeds", flags.seeds, "runs of each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100));
+    command.add_option("--max-splats", flags.max_splats, "growth stops there: equal count")
+        ->check(CLI::PositiveNumber);
+    forward(command, flags, "-r,--resolution", "--resolution", "as in darb train");
+    forward(command, flags, "-i,--images", "--images", "as in darb train");
+    forward(command, flags, "--effects", "--effects", "as in darb train");
+    forward(command, flags, "--footprint", "--footprint", "psi or exact");
+    command.add_option("--train-options", flags.train_options,
+                       "more options of darb train, as one word in quotes");
+    command.add_option("--lpips", flags.lpips,
+                       "safetensors with the weights of AlexNet or VGG16 and of LPIPS's layers");
+    command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
+                     "colours from 0 to 1 into LPIPS, as published numbers of splats have it");
+    command.add_option("--blending-views", flags.blending_views, "to count and time; 0: none")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command.add_option("--html", flags.html, "default OUT/compare.html");
+    command.add_option("--json", flags.json, "default OUT/compare.json");
+    command.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
+    command.add_flag("-q,--quiet", flags.quiet, "no progress");
+}
+
+std::string dataset_path(const std::string& dataset) {
+    const bool whole = std::filesystem::exists(dataset);
+    return whole ? dataset : dataset.substr(0, dataset.rfind('@'));
+}
+
+std::string dataset_name(const std::string& dataset) {
+    return std::filesystem::weakly_canonical(dataset_path(dataset)).filename().string();
+}
+
+TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset, int kernel,
+                          std::uint64_t seed) {
+    const std::string name(kernel_name(kernel)), path = dataset_path(dataset);
+    const auto folder = flags.output / dataset_name(dataset) / name / fmt::format("seed{}", seed);
+    std::vector<std::string> words{"train", path, "-o", folder.string(), "--eval"};
+    words.push_back("--kernel=" + name);
+    words.push_back(fmt::format("--seed={}", seed));
+    words.push_back(fmt::format("--iterations={}", flags.iterations.back()));
+    for (const char* list : {"--test-iterations", "--save-iterations"}) {
+        words.push_back(list);
+        for (const int i : flags.iterations) words.push_back(std::to_string(i));
+    }
+    const bool own_images = path.size() < dataset.size();
+    if (own_images) words.push_back("--images=" + dataset.substr(path.size() + 1));
+    for (const std::string& word : flags.forwarded)
+        if (!own_images || !word.starts_with("--images=")) words.push_back(word);
+    for (const std::string& word : CLI::detail::split_up(flags.train_options))
+        words.push_back(word);
+    TrainFlags f;
+    CLI::App app;
+    add_train_flags(*app.add_subcommand("train"), f);
+    try {
+        app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    } catch (const CLI::ParseError& e) {
+        throw Error("darb compare", e.what(),
+                    "`darb train --help` lists what --train-options takes.");
+    }
+    finish_train_flags(f);
+    f.run.quiet = flags.quiet;
+    return f;
+}
+
+}  // namespace darb

@@ -1,0 +1,49 @@
+// What `darb compare` is asked for, and the training runs that follow from it.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tools/darb/train_flags.h"
+#include "tools/paper/compare.h"
+#include "tools/paper/lpips.h"
+
+namespace darb {
+
+struct CompareFlags {
+    std::vector<std::string> datasets;
+    std::filesystem::path output, html, json;
+    std::string kernels = "paper", device, train_options;
+    std::vector<int> iterations{7'000, 30'000};
+    int seeds = 1;
+    std::uint32_t max_splats = 0;        // 0: as many as the threshold makes
+    std::vector<std::string> forwarded;  // options of `darb train`, as words
+    std::vector<std::filesystem::path> lpips;
+    bool lpips_as_3dgs = false, quiet = false;
+    int blending_views = 4;
+};
+
+/// Adds every option to the subcommand; values land in flags, which must outlive the parse.
+void add_compare_flags(CLI::App& command, CompareFlags& flags);
+
+/// "PATH@IMAGES" names the photo folder of one data set; what has no such part keeps --images.
+std::string dataset_path(const std::string& dataset);
+
+/// The last folder of the path.
+std::string dataset_name(const std::string& dataset);
+
+/// The options that `darb train` would have for this run. Throws Error for --train-options that it
+/// does not know.
+TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset, int kernel,
+                          std::uint64_t seed);
+
+/// Trains what is not there yet and reads and measures everything, one data set; ends early, with
+/// what there is, when *stop is set. lpips may be null.
+ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,
+                           const std::vector<int>& kernels, const Lpips* lpips,
+                           const std::atomic<bool>& stop);
+
+}  // namespace darb

@@ -1,0 +1,121 @@
+// The training runs of a comparison, through the code of `darb train`.
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "engine/core/error.h"
+#include "engine/data/camera_list.h"
+#include "tools/darb/compare_flags.h"
+#include "tools/darb/train_data.h"
+#include "tools/darb/train_run.h"
+#include "tools/paper/compare_measure.h"
+#include "trainer/checkpoint.h"
+
+namespace darb {
+
+namespace {
+
+/// One data set with what its runs share.
+class Comparer {
+  public:
+    Comparer(const CompareFlags& flags, const std::string& name, int kernel, const Lpips* lpips)
+        : flags_(flags), name_(name), lpips_(lpips) {
+        TrainFlags first = train_flags_of(flags, name, kernel, 0);
+        dataset_ = load_training_data(first);
+        for (const View& v : dataset_.views)
+            if (v.is_test) cameras_.push_back(v.camera);
+        if (cameras_.empty())
+            throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
+        has_tracks_ = !dataset_.points.seen_begin.empty();
+        photos_ = load_photos(dataset_.views);
+    }
+
+    ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
+
+  private:
+    void train(TrainFlags& f, const std::atomic<bool>& stop);
+    void note(const std::string& line) const {
+        if (!flags_.quiet) fmt::print(stderr, "{}\n", line);
+    }
+
+    const CompareFlags& flags_;
+    std::string name_;
+    Dataset dataset_;
+    std::vector<Camera> cameras_;  // held out
+    bool has_tracks_ = false;
+    std::vector<ImageU8> photos_;
+    ViewLpips lpips_;
+};
+
+void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
+    if (has_tracks_) f.run.photos = photos_;  // else the plan of `darb train` has not seen them
+    plan_effects(dataset_, f);
+    f.run.photos = photos_;
+    const std::string settings = settings_text(f.train);
+    const RunState state = run_state(f.run.output, settings, format_camera_list(dataset_.views),
+                                     f.train.iterations, cameras_.size());
+    const std::string title =
+        fmt::format("{}: {}, seed {}", dataset_name(name_), f.kernel, f.train.seed);
+    if (state == RunState::finished) return note(title + ": is there");
+    if (state == RunState::partial) f.run.resume_from = f.run.output / "checkpoint.darb";
+    note(title);
+    DeviceOptions options;
+    options.select = flags_.device;
+    Device device(options);  // of its own, so that the peak of memory is this run's
+    run_training(device, dataset_, f.train, f.run, &stop);
+}
+
+ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
+    TrainFlags f = train_flags_of(flags_, name_, kernel, seed);
+    ComparedRun run;
+    run.kernel = f.kernel;
+    run.kernel_id = kernel;
+    run.seed = seed;
+    run.folder = f.run.output;
+    try {
+        train(f, stop);
+        if (stop) {
+            run.failure = "interrupted; the same command goes on with it";
+            return run;
+        }
+        read_run(run, flags_.iterations);
+        lpips_.measure(run);
+        if (seed == 0 && flags_.blending_views > 0) {
+            DeviceOptions options;
+            options.select = flags_.device;
+            Device device(options);
+            measure_blending_of(run, device, cameras_, flags_.blending_views);
+        }
+    } catch (const std::exception& e) {
+        run.failure = e.what();
+        note(fmt::format("failed: {}", e.what()));
+    }
+    return run;
+}
+
+}  // namespace
+
+ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,
+                           const std::vector<int>& kernels, const Lpips* lpips,
+                           const std::atomic<bool>& stop) {
+    ComparedDataset result{dataset_name(dataset), dataset, {}};
+    std::optional<Comparer> comparer;
+    try {
+        comparer.emplace(flags, dataset, kernels.front(), lpips);
+    } catch (const Error& e) {
+        ComparedRun failed;
+        failed.kernel = "every kernel";
+        failed.failure = e.what();
+        fmt::print(stderr, "failed: {}\n", e.what());
+        result.runs.push_back(std::move(failed));
+        return result;
+    }
+    for (int seed = 0; seed < flags.seeds; ++seed)
+        for (const int kernel : kernels) {
+            if (stop) return result;
+            result.runs.push_back(comparer->run(kernel, static_cast<std::uint64_t>(seed), stop));
+        }
+    return result;
+}
+
+}  // namespace darb

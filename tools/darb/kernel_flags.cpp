@@ -1,0 +1,35 @@
+#include "tools/darb/kernel_flags.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include "engine/core/error.h"
+#include "engine/kernels/kernel_family.h"
+
+namespace darb {
+
+std::vector<int> kernels_from_list(const std::string& option, const std::string& list) {
+    std::vector<int> kernels;
+    const auto add = [&](int kernel) {
+        if (std::find(kernels.begin(), kernels.end(), kernel) == kernels.end())
+            kernels.push_back(kernel);
+    };
+    if (list == "all" || list == "paper") {
+        const int count = list == "all" ? KERNEL_COUNT : KERNEL_INVERSE_QUADRATIC + 1;
+        for (int kernel = 0; kernel < count; ++kernel) add(kernel);
+        return kernels;
+    }
+    std::istringstream names(list);
+    for (std::string name; std::getline(names, name, ',');) {
+        const auto kernel = kernel_from_name(name);
+        std::string known;
+        for (int k = 0; k < KERNEL_COUNT; ++k)
+            known += (k == 0 ? "" : ", ") + std::string(kernel_name(k));
+        if (!kernel) throw Error(option + " " + name, "no such kernel", "There are " + known + ".");
+        add(*kernel);
+    }
+    if (kernels.empty()) throw Error(option, "names no kernel", "Write all, or names with commas.");
+    return kernels;
+}
+
+}  // namespace darb

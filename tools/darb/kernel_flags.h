@@ -1,0 +1,13 @@
+// Lists of kernels on the command line.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace darb {
+
+/// "all" (the nine of the family), "paper" (the five of the paper's tables) or names with commas,
+/// to KERNEL_* without repeats. Throws Error naming `option` for a name that is no kernel.
+std::vector<int> kernels_from_list(const std::string& option, const std::string& list);
+
+}  // namespace darb

@@ -1,0 +1,49 @@
+#include "tools/darb/train_run.h"
+
+#include <csignal>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "tools/darb/effect_flags.h"
+
+namespace darb {
+
+namespace {
+
+std::atomic<bool> g_stop{false};  // a signal handler can reach nothing else
+
+void on_interrupt(int) {
+    if (g_stop.exchange(true)) std::_Exit(130);  // the second Ctrl-C does not wait
+}
+
+EffectChoice training_choice(const TrainFlags& flags) {
+    EffectChoice choice = parse_effects(flags.effects);
+    if (flags.antialiasing) choice.changed[EFFECT_ANTIALIAS] = true;
+    return choice;
+}
+
+}  // namespace
+
+void check_effects(const TrainFlags& flags) {
+    training_choice(flags);
+}
+
+// The photos stay for the run where the plan had to look at them.
+void plan_effects(const Dataset& dataset, TrainFlags& flags) {
+    if (!dataset.points.seen_begin.empty() && flags.run.photos.empty())
+        flags.run.photos = load_photos(dataset.views);
+    const EffectPlan plan =
+        plan_training(dataset, flags.run.photos, flags.train.sh_degree, training_choice(flags));
+    apply_plan(plan, flags.train);
+    flags.run.effects = plan_line(plan);
+    flags.run.effects_json =
+        plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::atomic<bool>& stop_on_signals() {
+    std::signal(SIGINT, on_interrupt);
+    std::signal(SIGTERM, on_interrupt);
+    return g_stop;
+}
+
+}  // namespace darb

@@ -1,0 +1,21 @@
+// What the commands that train share: the effects of a run, and Ctrl-C.
+#pragma once
+
+#include <atomic>
+
+#include "engine/data/dataset.h"
+#include "tools/darb/train_flags.h"
+
+namespace darb {
+
+/// Throws Error where --effects cannot be read.
+void check_effects(const TrainFlags& flags);
+
+/// Plans the effects of the run and sets flags.train and flags.run as the plan wants them. Loads
+/// the photos into flags.run.photos where the plan has to look at them and they are not there yet.
+void plan_effects(const Dataset& dataset, TrainFlags& flags);
+
+/// Set by SIGINT and SIGTERM from now on; a second signal ends the process at once.
+std::atomic<bool>& stop_on_signals();
+
+}  // namespace darb

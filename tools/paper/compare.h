@@ -1,0 +1,91 @@
+// Training runs of several kernels on several data sets, side by side: what is read from their
+// output folders, what is measured on their scenes, and the page with all of it.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "tools/paper/blending.h"
+
+namespace darb {
+
+struct ComparedView {
+    std::string name;
+    double psnr_db = 0, ssim = 0;
+    std::optional<double> lpips;
+    std::filesystem::path picture;  // photo | render | error, equal widths
+};
+
+struct ComparedAt {  // an evaluation of one run
+    int iteration = 0;
+    double seconds = 0;  // of training
+    double psnr_db = 0, ssim = 0;
+    std::optional<double> lpips;
+    double splats = 0;
+    std::optional<double> model_mb;  // of its PLY file, 10^6 bytes; none where it was not saved
+    std::filesystem::path model;     // that file
+    std::vector<ComparedView> views;
+};
+
+struct CurvePoint {
+    int iteration = 0;
+    double seconds = 0, loss = 0, splats = 0;
+};
+
+struct ComparedRun {
+    std::string kernel;  // its name; with pulses "sinc, 2 pulses"
+    int kernel_id = 0;
+    std::uint64_t seed = 0;
+    std::filesystem::path folder;
+    std::string failure;  // what ended it; empty where it is finished
+    std::vector<ComparedAt> at;
+    std::vector<CurvePoint> curve;
+    double peak_mb = 0;  // of device memory, 10^6 bytes
+    std::optional<BlendStatistics> blending;
+};
+
+struct ComparedDataset {
+    std::string name;
+    std::filesystem::path path;
+    std::vector<ComparedRun> runs;  // by seed, then kernel
+};
+
+struct Comparison {
+    std::vector<ComparedDataset> datasets;
+    std::vector<std::string> kernels;  // names, in the order of the tables
+    std::vector<int> iterations;       // ascending
+    int seeds = 1;
+    std::string settings;    // what was asked for, in words
+    std::string device;      // name and driver
+    std::string lpips_note;  // which LPIPS, or why there is none
+};
+
+enum class RunState { none, partial, finished };
+
+/// What lies in the output folder of a training run that was to have these settings (settings_text)
+/// and this list of cameras. finished: metrics.json of a whole run. partial: a checkpoint alone.
+/// Throws Error where what is there has other settings, cameras or numbers of views.
+RunState run_state(const std::filesystem::path& folder, const std::string& settings,
+                   const std::string& cameras, int iterations, std::size_t held_out);
+
+/// Fills at, curve and peak_mb from metrics.json and run.jsonl in run.folder, for those of
+/// `iterations` that were evaluated. Throws Error naming the file.
+void read_run(ComparedRun& run, const std::vector<int>& iterations);
+
+/// The three parts of a held-out picture.
+struct HeldOutPicture {
+    ImageU8 photo, render;
+};
+HeldOutPicture read_held_out(const std::filesystem::path& picture);
+
+std::string comparison_table(const Comparison& comparison);
+nlohmann::json comparison_json(const Comparison& comparison);
+/// A whole page without outside resources. Reads the held-out pictures of the first seed.
+std::string comparison_html(const Comparison& comparison);
+
+}  // namespace darb

@@ -1,0 +1,130 @@
+// Output folders of training runs: what state they are in, and their numbers.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/data/image_io.h"
+#include "tools/paper/compare.h"
+
+namespace darb {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr const char* kRemedy = "Name another folder with -o, or remove this one.";
+
+Json read_json(const fs::path& path) {
+    Json json = Json::parse(read_text_file(path), nullptr, false);
+    if (!json.is_object())
+        throw Error(path.string(), "is no JSON object", "Remove the folder to train again.");
+    return json;
+}
+
+std::string differences(const Json& there, const Json& wanted) {
+    std::string text;
+    for (const auto& [name, value] : wanted.items())
+        if (!there.contains(name) || there[name] != value)
+            text +=
+                fmt::format("{}{} is {}, wanted {}", text.empty() ? "" : "; ", name,
+                            there.contains(name) ? there[name].dump() : "not set", value.dump());
+    return text;
+}
+
+fs::path picture_of(const fs::path& folder, int iteration, const std::string& view) {
+    std::string stem = fs::path(view).replace_extension().string();
+    std::replace_if(
+        stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
+    return folder / "held_out" / std::to_string(iteration) / (stem + ".png");
+}
+
+ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
+    ComparedAt at;
+    at.iteration = e.at("iteration");
+    at.seconds = e.at("seconds");
+    at.psnr_db = e.at("psnr_db");
+    at.ssim = e.at("ssim");
+    at.splats = e.at("splats");
+    for (const Json& v : e.at("views"))
+        at.views.push_back({v.at("name"), v.at("psnr_db"), v.at("ssim"), std::nullopt,
+                            picture_of(folder, at.iteration, v.at("name"))});
+    const fs::path model =
+        folder / "point_cloud" / fmt::format("iteration_{}", at.iteration) / "point_cloud.ply";
+    if (fs::exists(model)) {
+        at.model = model;
+        at.model_mb = 1e-6 * static_cast<double>(fs::file_size(model));
+    }
+    return at;
+}
+
+std::vector<CurvePoint> curve_of(const fs::path& log) {
+    std::vector<CurvePoint> curve;
+    std::istringstream lines(read_text_file(log));
+    for (std::string line; std::getline(lines, line);) {
+        const Json e = Json::parse(line, nullptr, false);
+        if (!e.is_object() || e.value("event", "") != "iteration") continue;
+        curve.push_back({e.value("iteration", 0), e.value("seconds", 0.0), e.value("loss", 0.0),
+                         e.value("splats", 0.0)});
+    }
+    return curve;
+}
+
+}  // namespace
+
+RunState run_state(const fs::path& folder, const std::string& settings, const std::string& cameras,
+                   int iterations, std::size_t held_out) {
+    const fs::path metrics_path = folder / "metrics.json";
+    if (fs::exists(metrics_path)) {
+        const Json metrics = read_json(metrics_path);
+        const Json start = metrics.value("start", Json::object());
+        const Json there = start.value("settings", Json::object());
+        if (const std::string other = differences(there, Json::parse(settings)); !other.empty())
+            throw Error(metrics_path.string(), "is of a run with other settings: " + other,
+                        kRemedy);
+        const fs::path list = folder / "cameras.json";
+        if (!fs::exists(list) || read_text_file(list) != cameras ||
+            start.value("held_out_views", std::size_t{0}) != held_out)
+            throw Error(list.string(),
+                        "the run there had other photos, another size or other held-out views",
+                        kRemedy);
+        if (!metrics.value("interrupted", true) && metrics.value("iteration", 0) == iterations)
+            return RunState::finished;
+    }
+    return fs::exists(folder / "checkpoint.darb") ? RunState::partial : RunState::none;
+}
+
+void read_run(ComparedRun& run, const std::vector<int>& iterations) {
+    const fs::path path = run.folder / "metrics.json";
+    const Json metrics = read_json(path);
+    try {
+        for (const Json& e : metrics.at("evaluations")) {
+            const int iteration = e.at("iteration");
+            if (std::find(iterations.begin(), iterations.end(), iteration) != iterations.end())
+                run.at.push_back(evaluation_of(e, run.folder));
+        }
+        run.peak_mb = 1e-6 * metrics.at("peak_device_bytes").get<double>();
+    } catch (const Json::exception& e) {
+        throw Error(path.string(), std::string("lacks what it should have: ") + e.what(),
+                    "Remove the folder to train again.");
+    }
+    run.curve = curve_of(run.folder / "run.jsonl");
+}
+
+HeldOutPicture read_held_out(const fs::path& picture) {
+    const ImageU8 all = read_image(picture);
+    const int width = all.width / 3;
+    HeldOutPicture parts{ImageU8(width, all.height, 3), ImageU8(width, all.height, 3)};
+    for (int y = 0; y < all.height; ++y)
+        for (int x = 0; x < width; ++x)
+            for (int c = 0; c < 3; ++c) {
+                parts.photo.at(x, y, c) = all.at(x, y, c);
+                parts.render.at(x, y, c) = all.at(width + x, y, c);
+            }
+    return parts;
+}
+
+}  // namespace darb

@@ -1,0 +1,133 @@
+// A comparison as text and as JSON.
+#include <fmt/format.h>
+
+#include "tools/paper/compare.h"
+#include "tools/paper/compare_stats.h"
+#include "tools/paper/paper_numbers.h"
+#include "trainer/report/html.h"
+
+namespace darb {
+
+namespace {
+
+using Json = nlohmann::json;
+
+Json optional_json(const std::optional<double>& v) {
+    return v ? Json(*v) : Json(nullptr);
+}
+
+Json at_json(const ComparedAt& at) {
+    Json views = Json::array();
+    for (const ComparedView& v : at.views)
+        views.push_back({{"name", v.name},
+                         {"psnr_db", v.psnr_db},
+                         {"ssim", v.ssim},
+                         {"lpips", optional_json(v.lpips)}});
+    return {{"iteration", at.iteration},
+            {"training_s", at.seconds},
+            {"psnr_db", at.psnr_db},
+            {"ssim", at.ssim},
+            {"lpips", optional_json(at.lpips)},
+            {"splats", at.splats},
+            {"model_mb", optional_json(at.model_mb)},
+            {"views", views}};
+}
+
+Json run_json(const ComparedRun& run) {
+    Json json{{"kernel", run.kernel},   {"seed", run.seed},       {"folder", run.folder.string()},
+              {"failure", run.failure}, {"peak_mb", run.peak_mb}, {"at", Json::array()},
+              {"curve", Json::array()}};
+    for (const ComparedAt& at : run.at) json["at"].push_back(at_json(at));
+    for (const CurvePoint& p : run.curve)
+        json["curve"].push_back({{"iteration", p.iteration},
+                                 {"seconds", p.seconds},
+                                 {"loss", p.loss},
+                                 {"splats", p.splats}});
+    if (const auto& b = run.blending)
+        json["blending"] = {{"blended_per_pixel", b->blended_per_pixel},
+                            {"pairs_per_splat", b->pairs_per_splat},
+                            {"ns_per_splat_pixel", b->ns_per_splat_pixel},
+                            {"blend_ms", b->blend_ms},
+                            {"frame_ms", b->frame_ms}};
+    return json;
+}
+
+Json summary_json(const Comparison& c, const ComparedDataset& dataset) {
+    Json rows = Json::array();
+    for (const int iteration : c.iterations)
+        for (const std::string& kernel : c.kernels) {
+            Json row{{"kernel", kernel}, {"iteration", iteration}};
+            for (const Column& column : quality_columns()) {
+                const OverSeeds v = over_seeds(dataset, kernel, iteration, column);
+                row[column.json] = v.median ? Json{{"median", *v.median},
+                                                   {"low", v.low},
+                                                   {"high", v.high},
+                                                   {"runs", v.count}}
+                                            : Json(nullptr);
+            }
+            rows.push_back(std::move(row));
+        }
+    return rows;
+}
+
+Json paper_json(const std::string& dataset) {
+    Json rows = Json::array();
+    for (const PaperNumbers& p : paper_numbers_of(dataset))
+        rows.push_back({{"kernel", kernel_name(p.kernel)},
+                        {"iteration", p.iteration},
+                        {"psnr_db", p.psnr_db},
+                        {"ssim", p.ssim},
+                        {"lpips", p.lpips},
+                        {"model_mb", p.model_mb},
+                        {"training_s", p.training_s}});
+    return rows;
+}
+
+}  // namespace
+
+std::string comparison_table(const Comparison& c) {
+    std::string text;
+    for (const ComparedDataset& dataset : c.datasets)
+        for (const int iteration : c.iterations) {
+            text += fmt::format("{}, {} iterations\n{:<26}", dataset.name, format_number(iteration),
+                                "");
+            for (const Column& column : quality_columns())
+                text += fmt::format(
+                    " {:>12}", column.unit.empty() ? column.name : column.name + " " + column.unit);
+            text += "\n";
+            for (const std::string& kernel : c.kernels) {
+                text += fmt::format("{:<26}", kernel);
+                for (const Column& column : quality_columns()) {
+                    const OverSeeds v = over_seeds(dataset, kernel, iteration, column);
+                    text += fmt::format(" {:>12}",
+                                        v.median ? format_number(*v.median, column.decimals) : "-");
+                }
+                text += "\n";
+            }
+            text += "\n";
+        }
+    for (const ComparedDataset& dataset : c.datasets)
+        for (const ComparedRun& run : dataset.runs)
+            if (!run.failure.empty())
+                text += fmt::format("failed: {}, {}, seed {}: {}\n", dataset.name, run.kernel,
+                                    run.seed, run.failure);
+    return text;
+}
+
+nlohmann::json comparison_json(const Comparison& c) {
+    Json datasets = Json::array();
+    for (const ComparedDataset& dataset : c.datasets) {
+        Json one{{"name", dataset.name},
+                 {"path", dataset.path.string()},
+                 {"medians", summary_json(c, dataset)},
+                 {"runs", Json::array()},
+                 {"paper", paper_json(dataset.name)}};
+        for (const ComparedRun& run : dataset.runs) one["runs"].push_back(run_json(run));
+        datasets.push_back(std::move(one));
+    }
+    return {{"version", DARB_VERSION}, {"device", c.device},    {"settings", c.settings},
+            {"seeds", c.seeds},        {"lpips", c.lpips_note}, {"iterations", c.iterations},
+            {"kernels", c.kernels},    {"datasets", datasets}};
+}
+
+}  // namespace darb

@@ -1,0 +1,99 @@
+#include "tools/paper/compare_stats.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "trainer/report/html.h"
+
+namespace darb {
+
+namespace {
+
+using Value = std::optional<double>;
+
+template <class F>
+auto of_blending(F member) {
+    return [member](const ComparedRun& run, const ComparedAt&) {
+        return run.blending ? Value((*run.blending).*member) : Value();
+    };
+}
+
+}  // namespace
+
+const std::vector<Column>& quality_columns() {
+    static const std::vector<Column> columns{
+        {"PSNR", "dB", "psnr_db", 2, true,
+         [](const ComparedRun&, const ComparedAt& at) { return Value(at.psnr_db); }},
+        {"SSIM", "", "ssim", 4, true,
+         [](const ComparedRun&, const ComparedAt& at) { return Value(at.ssim); }},
+        {"LPIPS", "", "lpips", 4, false,
+         [](const ComparedRun&, const ComparedAt& at) { return at.lpips; }},
+        {"model", "MB", "model_mb", 2, false,
+         [](const ComparedRun&, const ComparedAt& at) { return at.model_mb; }},
+        {"splats", "", "splats", 0, false,
+         [](const ComparedRun&, const ComparedAt& at) { return Value(at.splats); }},
+        {"peak", "MB", "peak_mb", 0, false,
+         [](const ComparedRun& run, const ComparedAt&) { return Value(run.peak_mb); }},
+        {"training", "s", "training_s", 1, false,
+         [](const ComparedRun&, const ComparedAt& at) { return Value(at.seconds); }},
+    };
+    return columns;
+}
+
+const std::vector<Column>& blending_columns() {
+    static const std::vector<Column> columns{
+        {"blended per pixel", "splats", "blended_per_pixel", 2, false,
+         of_blending(&BlendStatistics::blended_per_pixel)},
+        {"pairs per splat", "", "pairs_per_splat", 2, false,
+         of_blending(&BlendStatistics::pairs_per_splat)},
+        {"per splat and pixel", "ns", "ns_per_splat_pixel", 2, false,
+         of_blending(&BlendStatistics::ns_per_splat_pixel)},
+        {"blend pass", "ms", "blend_ms", 2, false, of_blending(&BlendStatistics::blend_ms)},
+        {"forward passes", "ms", "frame_ms", 2, false, of_blending(&BlendStatistics::frame_ms)},
+    };
+    return columns;
+}
+
+OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, int iteration,
+                     const Column& column) {
+    std::vector<double> values;
+    for (const ComparedRun& run : dataset.runs) {
+        if (run.kernel != kernel || !run.failure.empty()) continue;
+        for (const ComparedAt& at : run.at)
+            if (at.iteration == iteration)
+                if (const Value v = column.value(run, at); v && std::isfinite(*v))
+                    values.push_back(*v);
+    }
+    if (values.empty()) return {};
+    std::sort(values.begin(), values.end());
+    const std::size_t n = values.size();
+    return {0.5 * (values[(n - 1) / 2] + values[n / 2]), values.front(), values.back(),
+            static_cast<int>(n)};
+}
+
+Marks marks_of(const std::vector<Value>& values, bool more_is_better) {
+    std::vector<int> order;
+    for (std::size_t i = 0; i < values.size(); ++i)
+        if (values[i]) order.push_back(static_cast<int>(i));
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+        const double x = *values[static_cast<std::size_t>(a)];
+        const double y = *values[static_cast<std::size_t>(b)];
+        return more_is_better ? x > y : x < y;
+    });
+    Marks marks;
+    if (order.size() > 1) marks.best = order[0];
+    if (order.size() > 2) marks.third = order[2];
+    return marks;
+}
+
+std::string spread_text(const OverSeeds& value, int decimals) {
+    if (!value.median) return "-";
+    const std::string median = format_number(*value.median, decimals);
+    if (value.count < 2) return median;
+    return fmt::format("{} ({} to {})", median, format_number(value.low, decimals),
+                       format_number(value.high, decimals));
+}
+
+}  // namespace darb

@@ -1,0 +1,45 @@
+// Medians over the seeds of a comparison, and who is best.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/paper/compare.h"
+
+namespace darb {
+
+struct OverSeeds {
+    std::optional<double> median;  // none where no run has the value
+    double low = 0, high = 0;
+    int count = 0;
+};
+
+/// A column of the tables.
+struct Column {
+    std::string name;  // "PSNR"
+    std::string unit;  // "dB"; may be empty
+    std::string json;  // name in JSON
+    int decimals = 2;
+    bool more_is_better = true;
+    std::function<std::optional<double>(const ComparedRun&, const ComparedAt&)> value;
+};
+/// PSNR, SSIM, LPIPS, model MB, splats, peak MB, seconds.
+const std::vector<Column>& quality_columns();
+/// splats blended per pixel, pairs per splat, ns per splat-pixel, blend ms, frame ms.
+const std::vector<Column>& blending_columns();
+
+OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, int iteration,
+                     const Column& column);
+
+/// Of the medians: places in `values` of the best and the third best; -1 where there is none.
+struct Marks {
+    int best = -1, third = -1;
+};
+Marks marks_of(const std::vector<std::optional<double>>& values, bool more_is_better);
+
+/// "27.31" or, over several seeds, "27.31 (27.10 to 27.44)"; "-" without a value.
+std::string spread_text(const OverSeeds& value, int decimals);
+
+}  // namespace darb

@@ -1,0 +1,241 @@
+#include "tools/paper/lpips.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/reference/parallel.h"
+
+namespace darb {
+
+namespace {
+
+// Of the package's ScalingLayer, for colours in [-1, 1].
+constexpr float kShift[3] = {-0.030f, -0.088f, -0.188f}, kScale[3] = {0.458f, 0.448f, 0.450f};
+constexpr float kEpsilon = 1e-10f;
+constexpr std::size_t kColumnFloats = 1u << 20;  // of one block of unfolded patches: 4 MiB
+
+struct Plane {
+    int width = 0, height = 0;
+    std::size_t channels = 0;
+    std::vector<float> data;  // [channels][height][width]
+};
+
+struct Row {
+    int slice, index, pool, stride, padding;  // index: of features.N; slice: of the package
+    bool kept;
+};
+
+constexpr Row kAlexNet[] = {{1, 0, 0, 4, 2, true},
+                            {2, 3, 3, 1, 2, true},
+                            {3, 6, 3, 1, 1, true},
+                            {4, 8, 0, 1, 1, true},
+                            {5, 10, 0, 1, 1, true}};
+constexpr Row kVgg16[] = {{1, 0, 0, 1, 1, false}, {1, 2, 0, 1, 1, true},   {2, 5, 2, 1, 1, false},
+                          {2, 7, 0, 1, 1, true},  {3, 10, 2, 1, 1, false}, {3, 12, 0, 1, 1, false},
+                          {3, 14, 0, 1, 1, true}, {4, 17, 2, 1, 1, false}, {4, 19, 0, 1, 1, false},
+                          {4, 21, 0, 1, 1, true}, {5, 24, 2, 1, 1, false}, {5, 26, 0, 1, 1, false},
+                          {5, 28, 0, 1, 1, true}};
+
+constexpr const char* kRemedy =
+    "Save the state_dict of lpips.LPIPS, or that of torchvision's net together with the package's "
+    "lin layers, as safetensors.";
+
+const Tensor& tensor_of(const Tensors& tensors, const std::vector<std::string>& names,
+                        const std::string& where) {
+    for (const std::string& name : names)
+        if (const auto found = tensors.find(name); found != tensors.end()) return found->second;
+    throw Error(where, "has no tensor " + names.front(), kRemedy);
+}
+
+std::vector<std::string> trunk_names(const Row& row, const char* what) {
+    return {fmt::format("features.{}.{}", row.index, what),
+            fmt::format("net.slice{}.{}.{}", row.slice, row.index, what)};
+}
+
+Plane max_pool(const Plane& in, int side) {
+    Plane out{(in.width - side) / 2 + 1, (in.height - side) / 2 + 1, in.channels, {}};
+    out.data.resize(out.channels * out.width * out.height);
+    float* to = out.data.data();
+    for (std::size_t c = 0; c < in.channels; ++c) {
+        const float* plane = &in.data[c * in.width * in.height];
+        for (int y = 0; y < out.height; ++y)
+            for (int x = 0; x < out.width; ++x) {
+                float largest = -std::numeric_limits<float>::infinity();
+                for (int v = 0; v < side; ++v)
+                    for (int u = 0; u < side; ++u)
+                        largest = std::max(largest, plane[(2 * y + v) * in.width + 2 * x + u]);
+                *to++ = largest;
+            }
+    }
+    return out;
+}
+
+/// Patches of the output rows [first, last): column[(c k + v) k + u][pixel].
+void unfold(const Plane& in, int side, int stride, int padding, int width, int first, int last,
+            float* column) {
+    for (std::size_t c = 0; c < in.channels; ++c) {
+        const float* plane = &in.data[c * in.width * in.height];
+        for (int v = 0; v < side; ++v)
+            for (int u = 0; u < side; ++u)
+                for (int y = first; y < last; ++y) {
+                    const int from_y = y * stride + v - padding;
+                    const bool row_inside = from_y >= 0 && from_y < in.height;
+                    for (int x = 0; x < width; ++x) {
+                        const int from_x = x * stride + u - padding;
+                        *column++ = row_inside && from_x >= 0 && from_x < in.width
+                                        ? plane[from_y * in.width + from_x]
+                                        : 0.0f;
+                    }
+                }
+    }
+}
+
+/// max(0, weight * in + bias), by blocks of output rows: unfolded patches, then a matrix product.
+Plane convolve_relu(const Plane& in, const Tensor& weight, const std::vector<float>& bias,
+                    int stride, int padding, int threads) {
+    using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const int side = static_cast<int>(weight.shape[2]);
+    Plane out{(in.width + 2 * padding - side) / stride + 1,
+              (in.height + 2 * padding - side) / stride + 1,
+              weight.shape[0],
+              {}};
+    const std::size_t taps = weight.shape[1] * side * side;
+    const std::size_t pixels = std::size_t(out.width) * out.height;
+    out.data.resize(out.channels * pixels);
+    const Eigen::Map<const Matrix> filter(weight.data.data(), Eigen::Index(out.channels),
+                                          Eigen::Index(taps));
+    const Eigen::Map<const Eigen::VectorXf> offset(bias.data(), Eigen::Index(bias.size()));
+    const int rows = std::clamp(int(kColumnFloats / (taps * out.width)), 1, out.height);
+    const std::size_t blocks = (out.height + rows - 1) / rows;
+    reference::parallel_for(blocks, threads, [&](std::size_t b) {
+        const int first = static_cast<int>(b) * rows, last = std::min(first + rows, out.height);
+        const Eigen::Index count = Eigen::Index(last - first) * out.width;
+        Matrix column(Eigen::Index(taps), count);
+        unfold(in, side, stride, padding, out.width, first, last, column.data());
+        const Matrix product = ((filter * column).colwise() + offset).cwiseMax(0.0f);
+        for (std::size_t c = 0; c < out.channels; ++c)
+            std::copy_n(product.data() + Eigen::Index(c) * count, count,
+                        &out.data[c * pixels + std::size_t(first) * out.width]);
+    });
+    return out;
+}
+
+LpipsFeatures::Map normalised(const Plane& plane) {
+    LpipsFeatures::Map map{plane.channels, std::size_t(plane.width) * plane.height, plane.data};
+    std::vector<float> length(map.pixels, 0.0f);
+    for (std::size_t c = 0; c < map.channels; ++c)
+        for (std::size_t p = 0; p < map.pixels; ++p) {
+            const float v = map.data[c * map.pixels + p];
+            length[p] += v * v;
+        }
+    for (float& v : length) v = 1 / (std::sqrt(v) + kEpsilon);
+    for (std::size_t c = 0; c < map.channels; ++c)
+        for (std::size_t p = 0; p < map.pixels; ++p) map.data[c * map.pixels + p] *= length[p];
+    return map;
+}
+
+Plane scaled(const ImageF& image, bool as_3dgs) {
+    Plane plane{image.width, image.height, 3, {}};
+    const std::size_t pixels = std::size_t(image.width) * image.height;
+    plane.data.resize(3 * pixels);
+    for (std::size_t c = 0; c < 3; ++c)
+        for (std::size_t p = 0; p < pixels; ++p) {
+            const float v = std::clamp(image.data[p * image.channels + c], 0.0f, 1.0f);
+            plane.data[c * pixels + p] = ((as_3dgs ? v : 2 * v - 1) - kShift[c]) / kScale[c];
+        }
+    return plane;
+}
+
+Tensors read_all(const std::vector<std::filesystem::path>& files) {
+    Tensors all;
+    for (const std::filesystem::path& file : files) all.merge(read_safetensors(file));
+    return all;
+}
+
+std::string names_of(const std::vector<std::filesystem::path>& files) {
+    std::string names;
+    for (const auto& file : files) names += (names.empty() ? "" : ", ") + file.string();
+    return names;
+}
+
+}  // namespace
+
+Lpips::Lpips(const std::vector<std::filesystem::path>& files, const LpipsOptions& options)
+    : Lpips(read_all(files), names_of(files), options) {}
+
+Lpips::Lpips(const Tensors& tensors, const std::string& where, const LpipsOptions& options)
+    : options_(options) {
+    const Tensor& first = tensor_of(tensors, trunk_names(kAlexNet[0], "weight"), where);
+    net_ = first.shape.size() == 4 && first.shape[2] == 11 ? LpipsNet::alexnet : LpipsNet::vgg16;
+    const bool alexnet = net_ == LpipsNet::alexnet;
+    const std::span<const Row> rows = alexnet ? std::span<const Row>(kAlexNet) : kVgg16;
+    std::size_t channels = 3;
+    for (const Row& row : rows) {
+        const Tensor& weight = tensor_of(tensors, trunk_names(row, "weight"), where);
+        const Tensor& bias = tensor_of(tensors, trunk_names(row, "bias"), where);
+        const std::size_t side = !alexnet || row.index > 3 ? 3 : row.index == 0 ? 11 : 5;
+        if (weight.shape.size() != 4 || weight.shape[1] != channels || weight.shape[2] != side ||
+            weight.shape[3] != side || bias.data.size() != weight.shape[0])
+            throw Error(where + ", tensor " + trunk_names(row, "weight").front(),
+                        fmt::format("its shape is not [out][{}][{}][{}] of {}", channels, side,
+                                    side, net_name()),
+                        kRemedy);
+        layers_.push_back({row.pool, row.stride, row.padding, row.kept, weight, bias.data});
+        channels = weight.shape[0];
+        if (!row.kept) continue;
+        const std::string head = fmt::format("lin{}.model.1.weight", heads_.size());
+        const Tensor& lin =
+            tensor_of(tensors, {head, fmt::format("lins.{}.model.1.weight", heads_.size())}, where);
+        if (lin.data.size() != channels)
+            throw Error(where + ", tensor " + head,
+                        fmt::format("it has {} values for {} channels", lin.data.size(), channels),
+                        kRemedy);
+        heads_.push_back(lin.data);
+    }
+}
+
+std::string_view Lpips::net_name() const {
+    return net_ == LpipsNet::alexnet ? "AlexNet" : "VGG16";
+}
+
+LpipsFeatures Lpips::features(const ImageF& image) const {
+    DARB_CHECK(image.channels >= 3 && std::min(image.width, image.height) >= least_size(),
+               "{}x{}x{}", image.width, image.height, image.channels);
+    LpipsFeatures features;
+    Plane plane = scaled(image, options_.as_3dgs);
+    for (const Layer& layer : layers_) {
+        if (layer.pool > 0) plane = max_pool(plane, layer.pool);
+        plane = convolve_relu(plane, layer.weight, layer.bias, layer.stride, layer.padding,
+                              options_.threads);
+        if (layer.kept) features.maps.push_back(normalised(plane));
+    }
+    return features;
+}
+
+double Lpips::distance(const LpipsFeatures& a, const LpipsFeatures& b) const {
+    double total = 0;
+    for (std::size_t l = 0; l < heads_.size(); ++l) {
+        const LpipsFeatures::Map &x = a.maps[l], &y = b.maps[l];
+        DARB_CHECK(x.data.size() == y.data.size(), "pictures of {} and {} values", x.data.size(),
+                   y.data.size());
+        double sum = 0;
+        for (std::size_t c = 0; c < x.channels; ++c) {
+            double squares = 0;
+            for (std::size_t p = c * x.pixels; p < (c + 1) * x.pixels; ++p) {
+                const double d = double(x.data[p]) - y.data[p];
+                squares += d * d;
+            }
+            sum += heads_[l][c] * squares;
+        }
+        total += sum / static_cast<double>(x.pixels);
+    }
+    return total;
+}
+
+}  // namespace darb

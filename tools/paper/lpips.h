@@ -1,0 +1,69 @@
+// LPIPS, the learned perceptual distance of two pictures (Zhang et al. 2018, version 0.1), on the
+// CPU, with the weights of files that the user gives.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "tools/paper/safetensors.h"
+
+namespace darb {
+
+enum class LpipsNet { alexnet, vgg16 };
+
+struct LpipsOptions {
+    /// The package and its paper move colours from [0, 1] to [-1, 1] first. The evaluation code of
+    /// 3DGS does not, and published numbers of splat papers are without it.
+    bool as_3dgs = false;
+    int threads = 0;  // 0: one per core
+};
+
+/// The five feature maps of a picture, each normalised over its channels.
+struct LpipsFeatures {
+    struct Map {
+        std::size_t channels = 0, pixels = 0;
+        std::vector<float> data;  // [channels][pixels]
+    };
+    std::vector<Map> maps;
+};
+
+class Lpips {
+  public:
+    /// Tensors of all files together. Trunk: features.N.weight and .bias as torchvision names them
+    /// (AlexNet 0 3 6 8 10; VGG16 0 2 5 7 10 12 14 17 19 21 24 26 28), or net.sliceK.N.* as in the
+    /// lpips package. Heads: linK.model.1.weight, K = 0 to 4. The size of the first filter tells
+    /// the net. Throws Error naming the tensor that is missing or has another shape.
+    explicit Lpips(const std::vector<std::filesystem::path>& files,
+                   const LpipsOptions& options = {});
+    Lpips(const Tensors& tensors, const std::string& where, const LpipsOptions& options = {});
+
+    LpipsNet net() const { return net_; }
+    std::string_view net_name() const;  // "AlexNet", "VGG16"
+    /// Pictures need at least this many px each way.
+    int least_size() const { return net_ == LpipsNet::alexnet ? 31 : 16; }
+
+    /// image: RGB in [0, 1].
+    LpipsFeatures features(const ImageF& image) const;
+    double distance(const LpipsFeatures& a, const LpipsFeatures& b) const;
+    double distance(const ImageF& a, const ImageF& b) const {
+        return distance(features(a), features(b));
+    }
+
+  private:
+    struct Layer {
+        int pool = 0;  // side of the max pooling before it, stride 2; 0: none
+        int stride = 1, padding = 0;
+        bool kept = false;  // its output is one of the five maps
+        Tensor weight;      // [out][in][k][k]
+        std::vector<float> bias;
+    };
+
+    LpipsNet net_ = LpipsNet::alexnet;
+    LpipsOptions options_;
+    std::vector<Layer> layers_;
+    std::vector<std::vector<float>> heads_;  // [5][channels]
+};
+
+}  // namespace darb

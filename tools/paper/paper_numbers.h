@@ -1,0 +1,24 @@
+// What the paper prints per scene: DARB-Splatting, arXiv 2501.12369, supplementary Tables 1 and 2.
+// One RTX 4090, single runs.
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace darb {
+
+struct PaperNumbers {
+    std::string_view scene;  // lower case: bicycle, ..., truck, train, drjohnson, playroom
+    int kernel;              // KERNEL_*
+    int iteration;           // 7,000 or 30,000
+    double psnr_db, ssim, lpips, model_mb, training_s;
+};
+
+/// 13 scenes, 5 kernels, 2 numbers of iterations.
+std::span<const PaperNumbers> paper_numbers();
+
+/// Those of the scene whose name is the data set's, in any case; empty where there is none.
+std::vector<PaperNumbers> paper_numbers_of(std::string_view dataset);
+
+}  // namespace darb

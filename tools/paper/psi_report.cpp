@@ -1,0 +1,252 @@
+#include "tools/paper/psi_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/paper/pictures.h"
+#include "tools/paper/rings.h"
+#include "trainer/report/html.h"
+#include "trainer/report/page.h"
+#include "trainer/report/svg_plot.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kPoints = 241;    // of a curve
+constexpr int kFieldSize = 96;  // px of a picture of a field
+constexpr double kFieldHalf = 5.2;
+// The ellipsoid of the pictures, in units of its parameter: covariance of x, y, z.
+constexpr double kXX = 2.2, kXY = 0.9, kYY = 1.1, kXZ = 0.5, kYZ = -0.3, kZZ = 1.4;
+
+nlohmann::json spread_json(const PsiSpread& s) {
+    return {{"median", s.median}, {"low", s.low}, {"high", s.high}, {"deviation", s.deviation}};
+}
+
+nlohmann::json distance_json(const FootprintDistance& d) {
+    return {{"relative_l2", d.l2}, {"largest", d.linf}};
+}
+
+template <class F>
+PlotSeries curve(const std::string& name, double end, const F& f) {
+    PlotSeries series{name};
+    for (int i = 0; i < kPoints; ++i) {
+        const double d = end * i / (kPoints - 1);
+        series.points.emplace_back(d, f(d * d));
+    }
+    return series;
+}
+
+double shown_radius(const DerivedKernel& kernel) {
+    return 1.1 * std::sqrt(std::min(kernel.row().support, 12.25));
+}
+
+std::string profiles(const std::vector<const DerivedKernel*>& kernels) {
+    Plot w{"Kernels", "distance d (standard deviations)", "w", {}};
+    Plot a{"Their true projections, peak 1", "distance d (standard deviations)", "A / A(0)", {}};
+    Plot p{"The paper's splats: w(d / sqrt psi)", "distance d (standard deviations)", "w", {}};
+    for (const DerivedKernel* k : kernels) {
+        const std::string name(k->row().name);
+        w.series.push_back(curve(name, 4, [&](double q) { return k->value(Footprint::psi, q); }));
+        a.series.push_back(curve(name, 4, [&](double q) { return projected_profile(*k, q); }));
+        p.series.push_back(
+            curve(name, 4, [&](double q) { return k->value(Footprint::psi, q / k->psi()); }));
+    }
+    std::vector<std::string> names;
+    for (const PlotSeries& s : w.series) names.push_back(s.name);
+    for (Plot* plot : {&w, &a, &p})
+        if (plot->series.size() > 1)
+            for (PlotSeries& s : plot->series) s.name.clear();
+    return html_legend(names) + "<div class='plots'>" + svg_plot(w) + svg_plot(a) + svg_plot(p) +
+           "</div>\n";
+}
+
+std::string footprints(const PsiResult& r, const DerivedKernel& kernel) {
+    const auto truth = [&](double q) { return projected_profile(kernel, q); };
+    const auto splat = [&](double scale) {
+        return [&kernel, scale](double q) { return kernel.value(Footprint::psi, q / scale); };
+    };
+    const double end = shown_radius(kernel) * std::sqrt(std::max({1.0, r.exact, r.best}));
+    const std::string x = "distance d (standard deviations)";
+    Plot both{"Projection and splats", x, "", {}};
+    both.series = {curve("projection", end, truth), curve("psi", end, splat(r.exact)),
+                   curve("least squares", end, splat(r.best))};
+    Plot rest{"Splat less projection", x, "", {}};
+    const auto error = [&](double scale) {
+        return [&, scale](double q) { return splat(scale)(q) - truth(q); };
+    };
+    rest.series = {curve("psi", end, error(r.exact)), curve("least squares", end, error(r.best)),
+                   curve("as it is", end, error(1))};
+    return "<div class='plots'>" + svg_plot(both) + svg_plot(rest) + "</div>\n";
+}
+
+double coordinate(int pixel) {
+    return kFieldHalf * (2 * (pixel + 0.5) / kFieldSize - 1);
+}
+
+/// q of (x, y) under the 2x2 covariance, and of (x, y, 0) under the 3x3 one.
+double q_plane(double x, double y) {
+    return (kYY * x * x - 2 * kXY * x * y + kXX * y * y) / (kXX * kYY - kXY * kXY);
+}
+double q_cut(double x, double y) {
+    const double a = kYY * kZZ - kYZ * kYZ, b = kXZ * kYZ - kXY * kZZ, c = kXX * kZZ - kXZ * kXZ;
+    const double det = kXX * a + kXY * b + kXZ * (kXY * kYZ - kYY * kXZ);
+    return (a * x * x + 2 * b * x * y + c * y * y) / det;
+}
+
+std::string fields(const PsiResult& r, const DerivedKernel& kernel) {
+    const auto field = [&](const auto& f) {
+        return [&f](int i, int j) { return f(coordinate(i), coordinate(j)); };
+    };
+    const auto density = [&](double x, double y) {
+        return kernel.value(Footprint::psi, q_cut(x, y));
+    };
+    const auto projection = [&](double x, double y) {
+        return projected_profile(kernel, q_plane(x, y));
+    };
+    const auto splat = [&](double x, double y) {
+        return kernel.value(Footprint::psi, q_plane(x, y) / r.exact);
+    };
+    const auto best = [&](double x, double y) {
+        return kernel.value(Footprint::psi, q_plane(x, y) / r.best);
+    };
+    const auto residual = [&](double x, double y) { return splat(x, y) - projection(x, y); };
+    const auto best_residual = [&](double x, double y) { return best(x, y) - projection(x, y); };
+    const double limit = std::max(r.by_psi.linf, 1e-9);
+    return html_pictures(
+        {{grey_field(kFieldSize, 1, field(density)), "3D density, cut through the centre"},
+         {grey_field(kFieldSize, 1, field(projection)), "projection along z"},
+         {grey_field(kFieldSize, 1, field(splat)), fmt::format("splat, psi {:.4f}", r.exact)},
+         {signed_field(kFieldSize, limit, field(residual)),
+          fmt::format("residual of psi, full colour {:.3f}", limit)},
+         {signed_field(kFieldSize, limit, field(best_residual)),
+          fmt::format("residual of {:.4f}, same colours", r.best)}},
+        190);
+}
+
+std::string spread_text(const PsiSpread& s) {
+    return fmt::format("{:.5f} ± {:.5f}", s.median, s.deviation);
+}
+
+std::string rings_part() {
+    Plot plot{"Beyond the first pulse", "distance d (standard deviations)", "w", {}};
+    for (const bool sinc : {false, true}) {
+        PlotSeries series{sinc ? "|sinc|" : "raised cosine"};
+        const double end = ring_radius(sinc, 3);
+        for (int i = 0; i <= 2 * kPoints; ++i) {
+            const double d = end * i / (2 * kPoints);
+            series.points.emplace_back(d, ring_value(sinc, 3, d));
+        }
+        plot.series.push_back(std::move(series));
+    }
+    std::string html =
+        "<h2>Rings that the limit removes</h2><table><tr><th>kernel</th><th>pulses</th>"
+        "<th>radius</th><th>psi</th><th>of the mass beyond the first</th></tr>\n";
+    for (const Rings& r : all_rings())
+        html += fmt::format(
+            "<tr><td>{}</td><td>{}</td><td>{:.1f}</td><td>{:.6f}</td><td>{:.1f} %</td></tr>\n",
+            r.kernel, r.pulses, r.radius, r.psi, 100 * r.outside);
+    return html + "</table>\n<div class='plots'>" + svg_plot(plot) + "</div>\n";
+}
+
+std::string html_table(const std::vector<PsiResult>& results) {
+    std::string html =
+        "<div class='wide'><table><tr><th>kernel</th><th>grid xx</th><th>grid xy</th>"
+        "<th>grid yy</th><th>exact</th><th>least squares</th><th>psi: L2</th><th>max</th>"
+        "<th>as it is: L2</th><th>max</th><th>least squares: L2</th><th>max</th>"
+        "<th>exact footprint: L2</th><th>max</th></tr>\n";
+    for (const PsiResult& r : results) {
+        html += fmt::format(
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.6f}</td>"
+            "<td>{:.6f}</td>",
+            html_escape(r.kernel), spread_text(r.grid[0]), spread_text(r.grid[1]),
+            spread_text(r.grid[2]), r.exact, r.best);
+        for (const FootprintDistance& d : {r.by_psi, r.by_one, r.by_best})
+            html += fmt::format("<td>{:.4f}</td><td>{:.4f}</td>", d.l2, d.linf);
+        html += fmt::format("<td>{:.1e}</td><td>{:.1e}</td></tr>\n", r.by_exact_footprint.l2,
+                            r.by_exact_footprint.linf);
+    }
+    return html + "</table></div>\n";
+}
+
+}  // namespace
+
+std::string psi_table(const std::vector<PsiResult>& results) {
+    std::string text = fmt::format(
+        "{:<22} {:^27} {:>9} {:>9}  {:^13} {:^13} {:^15}\n{:<22} {:>8} {:>9} {:>8} {:>9} {:>9}  "
+        "{:>6} {:>6} {:>6} {:>6} {:>7} {:>7}\n",
+        "psi", "grid, median", "exact", "least", "psi footprint", "least squares",
+        "exact footprint", "", "xx", "xy", "yy", "moments", "squares", "L2", "max", "L2", "max",
+        "L2", "max");
+    for (const PsiResult& r : results)
+        text += fmt::format(
+            "{:<22} {:>8.5f} {:>9.5f} {:>8.5f} {:>9.6f} {:>9.6f}  {:>6.4f} {:>6.4f} {:>6.4f} "
+            "{:>6.4f} {:>7.1e} {:>7.1e}\n{:<22} {:>8.5f} {:>9.5f} {:>8.5f}\n",
+            r.kernel, r.grid[0].median, r.grid[1].median, r.grid[2].median, r.exact, r.best,
+            r.by_psi.l2, r.by_psi.linf, r.by_best.l2, r.by_best.linf, r.by_exact_footprint.l2,
+            r.by_exact_footprint.linf, "  standard deviation", r.grid[0].deviation,
+            r.grid[1].deviation, r.grid[2].deviation);
+    text += fmt::format("\n{:<22} {:>8} {:>9} {:>9} {:>16}\n", "with more pulses", "pulses",
+                        "radius", "psi", "mass beyond one");
+    for (const Rings& r : all_rings())
+        text += fmt::format("{:<22} {:>8} {:>9.1f} {:>9.6f} {:>14.1f} %\n", r.kernel, r.pulses,
+                            r.radius, r.psi, 100 * r.outside);
+    return text;
+}
+
+nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOptions& options) {
+    nlohmann::json kernels = nlohmann::json::array();
+    for (const PsiResult& r : results)
+        kernels.push_back(
+            {{"kernel", r.kernel},
+             {"support_q", std::isfinite(r.support) ? nlohmann::json(r.support) : nullptr},
+             {"grid",
+              {{"xx", spread_json(r.grid[0])},
+               {"xy", spread_json(r.grid[1])},
+               {"yy", spread_json(r.grid[2])}}},
+             {"exact", r.exact},
+             {"least_squares", r.best},
+             {"distance_from_projection",
+              {{"psi", distance_json(r.by_psi)},
+               {"least_squares", distance_json(r.by_best)},
+               {"covariance_as_it_is", distance_json(r.by_one)},
+               {"exact_footprint_float32", distance_json(r.by_exact_footprint)}}}});
+    nlohmann::json rings = nlohmann::json::array();
+    for (const Rings& r : all_rings())
+        rings.push_back({{"kernel", r.kernel},
+                         {"pulses", r.pulses},
+                         {"radius", r.radius},
+                         {"psi", r.psi},
+                         {"mass_beyond_first", r.outside}});
+    return {{"version", DARB_VERSION}, {"rings", rings},       {"samples", options.samples},
+            {"cells", options.cells},  {"seed", options.seed}, {"kernels", kernels}};
+}
+
+std::string psi_html(const std::vector<PsiResult>& results,
+                     const std::vector<const DerivedKernel*>& kernels,
+                     const PsiGridOptions& options) {
+    std::string body = "<h2>Every kernel</h2>" + html_table(results) + profiles(kernels);
+    for (std::size_t i = 0; i < results.size(); ++i)
+        body += "<h2>" + html_escape(results[i].kernel) + "</h2>" +
+                fields(results[i], *kernels[i]) + footprints(results[i], *kernels[i]);
+    body +=
+        rings_part() +
+        fmt::format(
+            "<h2>How to read it</h2><p>Grid: the paper's experiment, {} random covariances on {}^3 "
+            "cells: density within the support, summed along z, its weighted 2D covariance over "
+            "the "
+            "2x2 block of the 3D one; median and standard deviation, for xx, xy and yy apart. "
+            "Exact: a "
+            "third of the ratio of the fourth and the second radial moment. Least squares: the "
+            "scale "
+            "of the covariance that brings the splat nearest to the projection.</p><p>Distances: "
+            "between profiles with peak 1 over the image plane, relative L2 and largest. The exact "
+            "footprint is evaluated in float32, as the shaders have it.</p>\n",
+            options.samples, options.cells);
+    return html_page("The correction factor psi",
+                     "The kernel's splat beside the true projection of the same 3D kernel", body);
+}
+
+}  // namespace darb
