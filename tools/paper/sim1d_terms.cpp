@@ -53,7 +53,8 @@ struct Compact {
         const float x = Squared ? t * t : t;
         const float dx = Squared ? 2 * t * k.inverse_support : k.inverse_support;
         const float u = 1 - x;
-        float p = k.c[Degree], dp = 0, lower = 1;
+        float p = k.c[Degree], dp = 0;
+        float lower = u > 0 ? 1.0f : 0.0f;  // no slope beyond the edge, where u^0 would leave one
         for (int i = Degree - 1; i >= 0; --i) {
             dp = dp * x + p;
             p = p * x + k.c[i];
