@@ -66,9 +66,9 @@ std::vector<Crop> crops_of(const ComparedAt& first, const ComparedAt& second) {
             continue;
         const HeldOutPicture a = read_held_out(view.picture), b = read_held_out(other->picture);
         const int width = a.photo.width, height = a.photo.height;
-        const int side = std::max(std::min(width, height) / 4, kLeastSide);
-        if (b.photo.width != width || b.photo.height != height || side > std::min(width, height))
-            continue;
+        const int shorter = std::min(width, height);
+        const int side = std::min(shorter, std::max(shorter / 4, kLeastSide));
+        if (b.photo.width != width || b.photo.height != height) continue;
         SumTable table(width, height);
         for (int y = 0; y < height; ++y)
             for (int x = 0; x < width; ++x)

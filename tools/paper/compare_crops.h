@@ -16,8 +16,8 @@ struct Crop {
 };
 
 /// The square of the largest gain of the second and that of the largest loss, over all views that
-/// both have; in that order; empty where there are no pictures. side: a quarter of the shorter side
-/// of the picture, 24 px or more.
+/// both have; in that order; empty where there are no pictures. side: a quarter of the picture's
+/// shorter side, but at least 24 px where it has them.
 std::vector<Crop> crops_of(const ComparedAt& first, const ComparedAt& second);
 
 }  // namespace darb
