@@ -170,7 +170,8 @@ TEST(Command, effects_begin_with_a_minus_or_a_base) {
     }
     const Outcome o = darb("plan " + kScene + " --no-price --effects none,+lens --json");
     EXPECT_EQ(o.code, 0) << o.err;
-    for (const json& row : json::parse(o.out)["effects"])
+    const json plan = json::parse(o.out);
+    for (const json& row : plan["effects"])
         EXPECT_EQ(row["on"].get<bool>(), row["effect"] == "lens") << row.dump();
 }
 
