@@ -140,6 +140,17 @@ TEST(BlendBackwardCases, pairs_behind_the_stop_get_zero) {
     }
 }
 
+TEST(BlendBackwardCases, alpha_at_its_limit_moves_only_the_colour) {
+    BlendScene scene = kCosine.scene();
+    scene.add({8, 8}, {1e6, 0, 1e6}, 0.9999, {1, 0.5, 0.2});  // above 0.99 in every pixel
+    const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+    const PairSums& p = r.out.pairs[0];
+    EXPECT_EQ(glm::vec4(p.gx, p.gxx, p.gx_dy, p.g_dy), glm::vec4(0));
+    EXPECT_EQ(p.g_dy_dy, 0);
+    EXPECT_EQ(p.d_opacity, 0);
+    EXPECT_NE(p.d_colour, glm::vec3(0));
+}
+
 bool same_bits(const BlendOutput& a, const BlendOutput& b) {
     return a.pairs.size() == b.pairs.size() && a.image == b.image &&
            std::memcmp(a.pairs.data(), b.pairs.data(), a.pairs.size() * sizeof(PairSums)) == 0;
