@@ -157,12 +157,8 @@ TEST(WalkCases, needles_and_discs_match_double) {
 
 // Long on the screen: there the factor times the rows would lose what the product keeps.
 TEST(WalkCases, needles_across_the_picture_match_double) {
-    TestScene s = random_scene({.count = 40,
-                                .width = 121,
-                                .height = 83,
-                                .sh_degree = 0,
-                                .max_logit = 0,
-                                .seed = 57});
+    TestScene s = random_scene(
+        {.count = 40, .width = 121, .height = 83, .sh_degree = 0, .max_logit = 0, .seed = 57});
     for (size_t i = 0; i < s.model.size(); ++i)
         for (int c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = c == 0 ? 3.0f : -8.0f;
     expect_walk_matches(s, {}, tolerance("gradient_scaled_float32"));
