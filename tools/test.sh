@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs every check that a commit must pass; under 30 minutes on two cores.
-# Ends with "N passed, N failed" (ctest cases of all runs, plus one per other step).
+# Ends with the names of what failed, then "N passed, N failed" (ctest cases of all runs, plus one per other step).
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
@@ -32,7 +32,7 @@ for step in $steps; do
 done
 
 jobs=$(nproc)
-passed=0 failed=0 skipped=0 failures=()
+passed=0 failed=0 skipped=0 failures=() failed_cases=()
 logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 
@@ -44,6 +44,8 @@ run_ctest() {
     ctest --test-dir "$preset" --output-on-failure --no-tests=error -j2 "$@" 2>&1 | tee "$log"
     local status=${PIPESTATUS[0]} total bad left_out
     left_out=$(grep -cE '\((Skipped|Disabled)\)$' "$log")
+    mapfile -t -O "${#failed_cases[@]}" failed_cases < <( # ctest's own list at its end
+        sed -nE "/^The following tests FAILED:/,\$ s/^[[:space:]]+[0-9]+ - (.*)/$step: \1/p" "$log")
     read -r bad total < <(sed -nE 's/.* ([0-9]+) tests? failed out of ([0-9]+)$/\1 \2/p' "$log")
     if [[ -n ${total:-} ]]; then
         passed=$((passed + total - bad - left_out)) failed=$((failed + bad))
@@ -97,6 +99,7 @@ for step in $steps; do
 done
 
 [[ ${#failures[@]} == 0 ]] || echo "failed steps: ${failures[*]}"
+[[ ${#failed_cases[@]} == 0 ]] || printf 'failed case: %s\n' "${failed_cases[@]}"
 echo "$((SECONDS - started)) s, $skipped skipped (they name what they miss)"
 echo "$passed passed, $failed failed"
 [[ ${#failures[@]} == 0 && $failed == 0 ]]

@@ -78,16 +78,10 @@ void set_intrinsics(View& view, const UndistortedFrame& frame, int resolution, T
 
 /// The photo as it is, with its lens before the pinhole.
 UndistortedFrame original_frame(const LensModel& model) {
-    const Lens lens(model);
     UndistortedFrame frame;
-    Camera& camera = frame.camera;
-    camera.width = model.width;
-    camera.height = model.height;
-    camera.fx = lens.focal.x;
-    camera.fy = lens.focal.y;
-    camera.cx = lens.principal.x;
-    camera.cy = lens.principal.y;
-    if (model.distorted()) camera.lens = lens.terms(glm::dvec2(model.width, model.height));
+    frame.camera = pinhole_camera(model);
+    if (model.distorted())
+        frame.camera.lens = Lens(model).terms(glm::dvec2(model.width, model.height));
     return frame;
 }
 

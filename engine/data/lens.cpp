@@ -105,6 +105,18 @@ LensModel scale_lens(const LensModel& lens, int width, int height) {
     return scaled;
 }
 
+Camera pinhole_camera(const LensModel& model) {
+    const Lens lens(model);
+    Camera camera;
+    camera.width = model.width;
+    camera.height = model.height;
+    camera.fx = lens.focal.x;
+    camera.fy = lens.focal.y;
+    camera.cx = lens.principal.x;
+    camera.cy = lens.principal.y;
+    return camera;
+}
+
 Lens::Lens(const LensModel& model) {
     const ModelRow* row = find_model(model.model);
     DARB_CHECK(row && static_cast<int>(model.parameters.size()) == row->parameters, "{}",

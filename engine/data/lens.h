@@ -33,6 +33,9 @@ bool too_wide_to_undistort(const LensModel& lens);
 /// The lens of the same photo scaled to width x height.
 LensModel scale_lens(const LensModel& lens, int width, int height);
 
+/// Size, focal lengths and principal point of the photos, without pose and distortion.
+Camera pinhole_camera(const LensModel& lens);
+
 class Lens {
   public:
     explicit Lens(const LensModel& model);  // checked by check_lens

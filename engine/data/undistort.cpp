@@ -107,17 +107,12 @@ bool too_wide_to_undistort(const LensModel& model) {
 }
 
 UndistortedFrame undistorted_frame(const LensModel& model, const std::string& where) {
-    const Lens lens(model);
     UndistortedFrame frame;
     Camera& camera = frame.camera;
-    camera.width = model.width;
-    camera.height = model.height;
-    camera.fx = lens.focal.x;
-    camera.fy = lens.focal.y;
-    camera.cx = lens.principal.x;
-    camera.cy = lens.principal.y;
+    camera = pinhole_camera(model);
     if (!model.distorted()) return frame;
 
+    const Lens lens(model);
     const Bounds bounds = inner_bounds(lens, model);
     const double width = bounds.right - bounds.left, height = bounds.bottom - bounds.top;
     if (!(width > 0) || !(height > 0))
