@@ -24,6 +24,7 @@ struct OpenedPage {
     int plots = 0, drawn = 0;   // SVG elements; those with a visible curve, dot or area
     int pictures = 0;           // elements with a background picture of some size
     int cut = 0, overlaps = 0;  // texts of plots that reach over the plot's edge; over one another
+    std::string touching;       // the first of these texts
     std::string console;        // what was written to it; empty: nothing
 };
 
@@ -36,12 +37,15 @@ inline OpenedPage open_page(const std::string& html, const std::filesystem::path
         "'path.line,path.area,circle')].some(seen)).length+' '+[...document.querySelectorAll("
         "'.pane')].filter(e=>seen(e)&&getComputedStyle(e).backgroundImage.startsWith('url'))"
         ".length;"
-        "let cut=0,over=0;for(const s of all){const f=s.getBoundingClientRect();"
-        "const t=[...s.querySelectorAll('text')].map(e=>e.getBoundingClientRect());"
+        "let cut=0,over=0,first='';for(const s of all){const f=s.getBoundingClientRect();"
+        "const t=[...s.querySelectorAll('text')].map(e=>{const r=e.getBoundingClientRect();"
+        "r.said=e.firstChild?.data;return r});"
         "t.forEach((a,i)=>{if(a.left<f.left-1||a.right>f.right+1||a.top<f.top-1||"
-        "a.bottom>f.bottom+1)cut++;t.slice(i+1).forEach(b=>{if(Math.min(a.right,b.right)-"
+        "a.bottom>f.bottom+1){cut++;first||=a.said+' at the edge'}"
+        "t.slice(i+1).forEach(b=>{if(Math.min(a.right,b.right)-"
         "Math.max(a.left,b.left)>1&&Math.min(a.bottom,b.bottom)-Math.max(a.top,b.top)>"
-        "0.35*a.height)over++})})}document.title+=' '+cut+' '+over+' END'</script>";
+        "0.35*a.height){over++;first||=a.said+' on '+b.said}})})}"
+        "document.title+=' '+cut+' '+over+' END '+first+' STOP'</script>";
     const auto page = folder / fmt::format("page_{}.html", ::getpid());
     const auto dom = folder / fmt::format("dom_{}.html", ::getpid());
     const auto log = folder / fmt::format("log_{}.txt", ::getpid());
@@ -61,6 +65,8 @@ inline OpenedPage open_page(const std::string& html, const std::filesystem::path
     if (at != std::string::npos)
         std::sscanf(text.c_str() + at, "PLOTS %d %d %d %d %d END", &opened.plots, &opened.drawn,
                     &opened.pictures, &opened.cut, &opened.overlaps);
+    if (const size_t from = text.find(" END "), to = text.find(" STOP"); to != std::string::npos)
+        opened.touching = text.substr(from + 5, to - from - 5);
     if (const size_t line = said.find("CONSOLE"); line != std::string::npos)
         opened.console += said.substr(line, 400);
     for (const auto& file : {page, dom, log}) std::filesystem::remove(file);

@@ -112,8 +112,8 @@ void expect_all_drawn(const std::string& html, int plots) {
     EXPECT_EQ(page.console, "");
     EXPECT_EQ(page.plots, plots);
     EXPECT_EQ(page.drawn, plots);
-    EXPECT_EQ(page.cut, 0) << "texts that the plot's edge cuts";
-    EXPECT_EQ(page.overlaps, 0) << "texts over one another";
+    EXPECT_EQ(page.cut, 0) << page.touching;
+    EXPECT_EQ(page.overlaps, 0) << page.touching;
 }
 
 TEST(Cost, small_scene_is_measured_whole) {

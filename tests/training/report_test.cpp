@@ -1,11 +1,13 @@
 // trainer/report: the page is well-formed, whole in itself, and stands strange input.
 #include "trainer/report/report.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <random>
 #include <set>
 #include <string>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "engine/data/image_io.h"
 #include "tests/support/chromium.h"
 #include "trainer/report/html.h"
+#include "trainer/report/page.h"
 #include "trainer/report/svg_plot.h"
 
 namespace darb {
@@ -105,8 +108,8 @@ TEST(Report_inChromium, draws_every_plot_and_picture) {
     EXPECT_EQ(page.plots, 7);
     EXPECT_EQ(page.drawn, 7);
     EXPECT_EQ(page.pictures, 3);
-    EXPECT_EQ(page.cut, 0) << "texts that the plot's edge cuts";
-    EXPECT_EQ(page.overlaps, 0) << "texts over one another";
+    EXPECT_EQ(page.cut, 0) << page.touching;
+    EXPECT_EQ(page.overlaps, 0) << page.touching;
 }
 
 TEST(Report_emptyRun, leaves_parts_out) {
@@ -152,6 +155,39 @@ TEST(SvgBars_longNames, are_cut_and_whole_under_the_pointer) {
     EXPECT_NE(svg.find("n\u2026<title>" + name + "</title>"), std::string::npos);
     EXPECT_NE(svg.find("\u2192 50<"), std::string::npos) << "the bar that the axis cuts says so";
     EXPECT_EQ(svg.find("\u2192 1"), std::string::npos);
+}
+
+// Values of machines fast and slow, near one another and far apart: a page is made of what was
+// measured.
+TEST(Plots_anyRange, keep_their_texts_apart_and_inside) {
+    if (test::chromium().empty()) GTEST_SKIP() << "no Chromium to open the page with";
+    std::mt19937 random(1);
+    const auto power = [&](double low, double high) {
+        return std::pow(10.0, std::uniform_real_distribution<double>(low, high)(random));
+    };
+    std::string body;
+    for (int i = 0; i < 150; ++i) {
+        const double x = power(-5, 7), x_range = power(-2, 3);
+        const double y = power(-9, 9), y_range = power(-2, 12);
+        PlotSeries points{"a", {}};
+        BarPlot bars{"bars", "ms", {"one", "two"}, {}};
+        for (int k = 0; k < 12; ++k) {
+            const double at = x * (1 + x_range * power(-3, 0));
+            points.points.emplace_back(at, y * (1 + y_range * power(-3, 0)));
+            bars.rows.push_back({fmt::format("row {}", k), {0.7 * at, 0.3 * at}});
+        }
+        for (const bool log : {false, true}) {
+            Plot plot{"plot", "x", "y", {points}};
+            plot.log_x = plot.log_y = log;
+            plot.x_from_zero = i % 2 == 0;
+            body += svg_plot(plot);
+        }
+        body += svg_bars(bars);
+    }
+    const test::OpenedPage page = test::open_page(html_page("plots", "", body), testing::TempDir());
+    EXPECT_EQ(page.drawn, 450);
+    EXPECT_EQ(page.cut, 0) << page.touching;
+    EXPECT_EQ(page.overlaps, 0) << page.touching;
 }
 
 TEST(Report_missingPicture, is_an_error_with_its_name) {

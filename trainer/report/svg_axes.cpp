@@ -13,14 +13,34 @@ namespace darb {
 namespace {
 
 constexpr double kCharacterWidth = 6.3;  // of the ticks' font at 11 px, user units
+constexpr double kLineHeight = 13, kBetweenTicks = 6;
+constexpr double kMostDecades = 7;  // with a tick each
 
 std::string tick_text(double v) {
-    if (std::abs(v) >= 1e6) return fmt::format("{:g}M", v / 1e6);
-    if (std::abs(v) >= 1e4) return fmt::format("{:g}k", v / 1e3);
-    if (std::abs(v) < 1e-12) return "0";
-    if (std::abs(v) >= 1e-2) return fmt::format("{:.6g}", v);
-    const int power = static_cast<int>(std::floor(std::log10(std::abs(v)) + 1e-9));
-    return fmt::format("{:.3g}e{}", v / std::pow(10.0, power), power);  // 0.0001 is too wide
+    const double size = std::abs(v);
+    if (size < 1e-12) return "0";
+    if (size < 1e-2 || size >= 1e12) {  // 0.0001 is too wide
+        const int power = static_cast<int>(std::floor(std::log10(size) + 1e-9));
+        return fmt::format("{:.3g}e{}", v / std::pow(10.0, power), power);
+    }
+    if (size >= 1e9) return fmt::format("{:g}G", v / 1e9);
+    if (size >= 1e6) return fmt::format("{:g}M", v / 1e6);
+    if (size >= 1e4) return fmt::format("{:g}k", v / 1e3);
+    return fmt::format("{:.6g}", v);
+}
+
+// Those of a row or column of texts that keep clear of the one before.
+std::vector<double> apart(const std::vector<double>& ticks, const Axis& axis, bool upright) {
+    std::vector<double> kept;
+    double end = -1e9;  // of the last text, along the axis
+    for (const double v : ticks) {
+        const double at = std::abs(axis.place(v) - axis.from);
+        const double half = upright ? kLineHeight / 2 : text_width(tick_text(v)) / 2;
+        if (!kept.empty() && at - half < end + (upright ? 0 : kBetweenTicks)) continue;
+        kept.push_back(v);
+        end = at + half;
+    }
+    return kept;
 }
 
 }  // namespace
@@ -49,9 +69,13 @@ double Axis::place(double v) const {
 std::vector<double> ticks_of(const Axis& axis) {
     if (!axis.log) return round_ticks(axis.low, axis.high);
     std::vector<double> ticks;
-    for (int e = static_cast<int>(std::floor(axis.low)); e <= axis.high; ++e)
+    const double decades = axis.high - axis.low;
+    const int stride = std::max(1, static_cast<int>(std::ceil(decades / kMostDecades)));
+    for (int e = static_cast<int>(std::floor(axis.low / stride)) * stride; e <= axis.high;
+         e += stride)
         for (const double m : {1.0, 2.0, 5.0}) {
             const double log = std::log10(m) + e;
+            if (m > 1 && decades > 2.5) continue;
             if (log >= axis.low && log <= axis.high) ticks.push_back(m * std::pow(10, e));
         }
     if (ticks.size() >= 2) return ticks;
@@ -61,13 +85,13 @@ std::vector<double> ticks_of(const Axis& axis) {
 std::string draw_axes(const std::string& x_label, const std::string& y_label, const Axis& x,
                       const Axis& y) {
     std::string svg;
-    for (const double v : y.empty() ? std::vector<double>{} : ticks_of(y)) {
+    for (const double v : y.empty() ? std::vector<double>{} : apart(ticks_of(y), y, true)) {
         svg +=
             fmt::format("<path class='grid' d='M{:.1f} {:.1f}H{:.1f}'/>", x.from, y.place(v), x.to);
         svg += fmt::format("<text class='tick' text-anchor='end' x='{:.1f}' y='{:.1f}'>{}</text>",
                            x.from - 6, y.place(v) + 4, tick_text(v));
     }
-    for (const double v : ticks_of(x)) {
+    for (const double v : apart(ticks_of(x), x, false)) {
         svg +=
             fmt::format("<path class='grid' d='M{:.1f} {:.1f}V{:.1f}'/>", x.place(v), y.from, y.to);
         svg +=

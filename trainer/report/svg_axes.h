@@ -8,7 +8,7 @@ namespace darb {
 
 // Of every plot's view box, in user units; CSS scales the whole.
 constexpr double kPlotWidth = 480, kPlotHeight = 260;
-constexpr double kPlotLeft = 58, kPlotRight = 20, kPlotTop = 30, kPlotBottom = 44;
+constexpr double kPlotLeft = 70, kPlotRight = 28, kPlotTop = 30, kPlotBottom = 44;
 
 struct Axis {
     double low = 0, high = -1;  // low > high: nothing included yet; logarithms where log

@@ -12,7 +12,7 @@ namespace darb {
 namespace {
 
 // User units. Bars are drawn wider than other plots, as their names are long.
-constexpr double kRowHeight = 17, kBarHeight = 11, kBarsWidth = 720, kMostNames = 330, kValues = 52;
+constexpr double kRowHeight = 17, kBarHeight = 11, kBarsWidth = 720, kMostNames = 330, kValues = 78;
 constexpr double kMostOfMedian = 4;  // longer bars end at an arrow, or the others would be dots
 
 double total(const BarPlot::Row& row) {
@@ -52,7 +52,7 @@ std::string draw_bar(const BarPlot& plot, const BarPlot::Row& row, double y, con
             "<path class='whisker' d='M{:.1f} {:.1f}H{:.1f}'><title>{:.4g} to {:.4g}"
             "</title></path>",
             place(row.low), y + kBarHeight / 2, place(row.high), row.low, row.high);
-    return svg + fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}{:.4g}</text>", x.to + 6,
+    return svg + fmt::format("<text class='tick' x='{:.1f}' y='{:.1f}'>{}{:.3g}</text>", x.to + 6,
                              y + 9, at > x.high ? "\u2192 " : "", at);
 }
 
