@@ -18,6 +18,7 @@ namespace {
 // While a probe runs, times the rate of the view-dependent part: what it trains is thrown away, so
 // that it may look far ahead.
 constexpr float kProbeRestRate = 8;
+constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
 ForwardOptions forward_options(const TrainOptions& options) {
     ForwardOptions f;
@@ -157,11 +158,17 @@ AdamStep Trainer::rates(int iteration) const {
     return step;
 }
 
+// Density control opens the next iteration rather than closing its own, so that what is evaluated and
+// saved between them is what was trained, not what was just reset.
 void Trainer::step() {
+    if (iteration_ > 0) {
+        density_control(iteration_);
+        settle_effects(iteration_);
+    }
     launch(++iteration_);
     settle(flights_[(iteration_ + 1) & 1]);
-    density_control(iteration_);
-    settle_effects(iteration_);
+    smoothing_stale_ |= iteration_ % kFilterInterval == 0;
+    refresh_smoothing();
 }
 
 void Trainer::drain() {
@@ -301,7 +308,7 @@ void Trainer::density_control(int iteration) {
         const std::uint32_t within_memory = splats_within_memory();
         const std::uint32_t limit =
             std::min({options_.max_splats, within_memory,
-                      GpuSplats::max_count(*device_, options_.sh_degree, true)});
+                      GpuSplats::max_count(*device_, true)});
         args.gradient_threshold = options_.densify_grad_threshold;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * extent_);
         args.prune_opacity = options_.prune_opacity;

@@ -125,6 +125,7 @@ class Trainer {
     std::uint32_t photo_of(int view) const;  // its index among the training photos
     void settle_effects(int iteration);
     void update_smoothing();
+    void refresh_smoothing();  // where it is stale
     void probe_degree();
     double probe_arm(const State& start, int degree, const std::vector<int>& aside);
     double photo_psnr(int view);

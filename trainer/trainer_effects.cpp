@@ -11,7 +11,6 @@ namespace darb {
 
 namespace {
 
-constexpr int kFilterInterval = 100;     // iterations, as Mip-Splatting
 constexpr double kProbeGain_db = 0.05;   // that a degree must bring
 constexpr int kProbeIterations = 120;    // of each arm
 constexpr std::size_t kFewestViews = 8;  // fewer photos leave none to set aside: the schedule holds
@@ -29,11 +28,14 @@ void Trainer::update_smoothing() {
     smoothing_stale_ = false;
 }
 
+void Trainer::refresh_smoothing() {
+    if (!smoothing_ || !smoothing_stale_) return;
+    drain();
+    update_smoothing();
+}
+
 void Trainer::settle_effects(int iteration) {
-    if (smoothing_ && (smoothing_stale_ || iteration % kFilterInterval == 0)) {
-        drain();
-        update_smoothing();
-    }
+    refresh_smoothing();
     if (options_.probe_sh && iteration == next_probe_ && iteration < options_.iterations &&
         splats_.sh_degree() < options_.sh_degree)
         probe_degree();

@@ -50,13 +50,11 @@ SplatModel in_style(const SplatModel& own, SplatStyle style) {
     return model;
 }
 
-// The highest degree whose buffers the device can bind.
 int fitting_degree(const Device& device, const SplatModel& model) {
-    for (int degree = model.sh_degree; degree >= 0; --degree)
-        if (model.size() <= GpuSplats::max_count(device, degree, false)) return degree;
+    if (model.size() <= GpuSplats::max_count(device, false)) return model.sh_degree;
     throw Error("the scene",
                 fmt::format("has {} splats, {} can bind {}", model.size(), device.info().name,
-                            GpuSplats::max_count(device, 0, false)),
+                            GpuSplats::max_count(device, false)),
                 "Choose another device (darb devices), or prune the scene.");
 }
 

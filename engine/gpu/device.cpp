@@ -86,6 +86,7 @@ Device::State::State(const DeviceOptions& options, bool validation)
     const ListedDevice chosen = choose(instance, options.select);
     physical = chosen.handle;
     info = chosen.info;
+    if (faults.binding_bytes != 0) info.max_storage_buffer_bytes = faults.binding_bytes;
     lavapipe = info.driver.starts_with("llvmpipe");
     vkGetPhysicalDeviceMemoryProperties(physical, &memory);
     try {

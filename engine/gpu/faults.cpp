@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <utility>
 
 #include "engine/core/error.h"
 
@@ -10,20 +11,22 @@ namespace darb {
 namespace {
 
 void parse_one(std::string_view text, Faults& faults) {
-    constexpr std::string_view kOom = "oom:", kLost = "lost:";
+    constexpr std::string_view kOom = "oom:", kLost = "lost:", kBinding = "binding:";
     if (text.starts_with(kOom) && text.size() > kOom.size()) {
         faults.out_of_memory.emplace_back(text.substr(kOom.size()));
         return;
     }
-    if (text.starts_with(kLost)) {
-        const std::string_view number = text.substr(kLost.size());
+    for (const auto& [name, value] :
+         {std::pair{kLost, &faults.lost_at_submit}, std::pair{kBinding, &faults.binding_bytes}}) {
+        if (!text.starts_with(name)) continue;
+        const std::string_view number = text.substr(name.size());
         const auto [end, error] =
-            std::from_chars(number.data(), number.data() + number.size(), faults.lost_at_submit);
+            std::from_chars(number.data(), number.data() + number.size(), *value);
         const bool whole = end == number.data() + number.size();
-        if (error == std::errc() && whole && faults.lost_at_submit > 0) return;
+        if (error == std::errc() && whole && *value > 0) return;
     }
     throw Error("DARB_FAULT", "\"" + std::string(text) + "\" is no fault",
-                "Write oom:BUFFER or lost:N, separated by commas, or unset it.");
+                "Write oom:BUFFER, lost:N or binding:N, separated by commas, or unset it.");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Faults injected for tests through the environment variable DARB_FAULT, a comma-separated list:
 //   oom:NAME   creating the buffer NAME fails as if the device were out of memory
 //   lost:N     the N-th submit of the device (from 1) and all later ones report a lost device
+//   binding:N  the device says that a storage buffer binding holds at most N bytes
 // Unset in normal use. Read once per Device; a text that is neither is an Error.
 #pragma once
 
@@ -14,6 +15,7 @@ namespace darb {
 struct Faults {
     std::vector<std::string> out_of_memory;  // buffer names
     std::uint64_t lost_at_submit = 0;        // 0 = never
+    std::uint64_t binding_bytes = 0;         // 0 = what the device says
 
     bool fails_allocation(std::string_view buffer) const;
     bool fails_submit(std::uint64_t submit) const {

@@ -223,12 +223,8 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         scan_.emplace(d, splat_capacity_);
         depth_sort_.emplace(d, splat_capacity_);
     }
+    pairs = std::min(pairs, most_pairs(d, options_));
     if (pairs > pair_capacity_ || pair_capacity_ == 0) {
-        if (const std::uint32_t most = most_pairs(d, options_); pairs > most)
-            throw Error(
-                "splat-tile pairs",
-                fmt::format("a frame needs {} pairs, this device's buffers hold {}", pairs, most),
-                "Lower the resolution (-r) or the number of splats (--cap_max).");
         const std::uint64_t k = pair_capacity_ = std::max(pairs, kMinCapacity);
         pair_tile_ = Buffer(d, "pair tile", k * 4);
         pair_splat_ = Buffer(d, "pair splat", k * 4);
@@ -259,15 +255,16 @@ void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& 
     commands.pass("project");
     constexpr std::uint64_t of_frame = offsetof(gpu::FrameStatus, bad_gradients);
     commands.fill(BufferRange(status_, of_frame, sizeof(gpu::FrameStatus) - of_frame), 0);
-    if (n > 0) {
-        const gpu::ProjectArgs args{n, camera_index, static_cast<float>(LOW_PASS_DEFAULT)};
-        const Groups g = groups_for(n);
+    for (const SplatRange& range : splats.ranges()) {
+        const gpu::ProjectArgs args{range.first, range.first + range.count, camera_index,
+                                    static_cast<float>(LOW_PASS_DEFAULT)};
+        const Groups g = groups_for(range.count);
         commands.dispatch(
             project_pipeline(sh_degree), args,
             {cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
              splats.parameters(kRotation), splats.parameters(kOpacity), splats.parameters(kShDc),
-             splats.parameters(kShRest), splat_shape_, splat_light_, splat_bound_, cover_,
-             pair_count_, visible_, status_, splats.smoothing()},
+             splats.rows(splats.parameters(kShRest), range), splat_shape_, splat_light_,
+             splat_bound_, cover_, pair_count_, visible_, status_, splats.smoothing()},
             g.x, g.y);
     }
     record_depth_order(commands, n, data.near_plane);

@@ -38,7 +38,8 @@ const std::vector<float>& attribute_values(const SplatModel& model, int attribut
 }
 
 GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments)
-    : count_(static_cast<std::uint32_t>(model.size())) {
+    : count_(static_cast<std::uint32_t>(model.size())),
+      binding_bytes_(device.info().max_storage_buffer_bytes) {
     header_.sh_degree = model.sh_degree;
     header_.kernel = model.kernel;
     header_.footprint = model.footprint;
@@ -68,12 +69,22 @@ SplatModel GpuSplats::download() const {
     return model;
 }
 
-std::uint32_t GpuSplats::max_count(const Device& device, int sh_degree, bool with_moments) {
-    SplatModel header;
-    header.sh_degree = sh_degree;
-    const std::uint64_t floats = std::max(4, header.rest_count()) * (with_moments ? 2 : 1);
-    const std::uint64_t most = device.info().max_storage_buffer_bytes / (floats * sizeof(float));
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(most, 1u << 30));
+std::vector<SplatRange> GpuSplats::ranges() const {
+    return splat_ranges(count_, strides_[kShRest] * (has_moments() ? 2 : 1), binding_bytes_);
+}
+
+BufferRange GpuSplats::rows(const Buffer& of_rest, const SplatRange& range) const {
+    const std::uint32_t stride = strides_[kShRest];
+    if (stride == 0) return of_rest;
+    const std::uint64_t floats = &of_rest == &moments_[kShRest] ? stride * 2 : stride;
+    return {of_rest, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
+}
+
+// Rotations are the widest of what is bound whole, beside four words a splat of a frame.
+std::uint32_t GpuSplats::max_count(const Device& device, bool with_moments) {
+    const std::uint64_t row = (with_moments ? 8 : 4) * sizeof(float);
+    return static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(device.info().max_storage_buffer_bytes / row, 1u << 30));
 }
 
 }  // namespace darb

@@ -4,8 +4,10 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "engine/gpu/buffer.h"
+#include "engine/render/groups.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -44,12 +46,19 @@ class GpuSplats {
     /// After an attribute's buffers were replaced by ones of another count (density control).
     void set_count(std::uint32_t count) { count_ = count; }
 
-    /// The most splats that one buffer binding of this device allows.
-    static std::uint32_t max_count(const Device& device, int sh_degree, bool with_moments);
+    /// What passes over splats work off one dispatch at a time, as the harmonics and their moments
+    /// are bound by range where one binding of the device does not hold them all.
+    std::vector<SplatRange> ranges() const;
+    /// The rows of a range in one of the buffers of the harmonics.
+    BufferRange rows(const Buffer& of_rest, const SplatRange& range) const;
+
+    /// The most splats that this device's bindings allow.
+    static std::uint32_t max_count(const Device& device, bool with_moments);
 
   private:
     SplatModel header_;  // no splats, only what is not per splat
     std::uint32_t count_ = 0;
+    std::uint64_t binding_bytes_ = 0;  // the most that one binding holds
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> parameters_;
     std::array<Buffer, kAttributeCount> moments_;  // [N][stride][2]: first, second

@@ -25,7 +25,7 @@ layout(set = 0, binding = 2, scalar) buffer LogScale { float log_scale[]; };
 layout(set = 0, binding = 3, scalar) buffer Rotation { vec4 rotation[]; };
 layout(set = 0, binding = 4, scalar) buffer Opacity { float opacity_logit[]; };
 layout(set = 0, binding = 5, scalar) buffer ShDc { float sh_dc[]; };
-layout(set = 0, binding = 6, scalar) buffer ShRest { float sh_rest[]; };
+layout(set = 0, binding = 6, scalar) buffer ShRest { float sh_rest[]; };  // from first_splat on, as m_rest
 layout(set = 0, binding = 7, scalar) buffer MPosition { vec2 m_position[]; };
 layout(set = 0, binding = 8, scalar) buffer MScale { vec2 m_scale[]; };
 layout(set = 0, binding = 9, scalar) buffer MRotation { vec2 m_rotation[]; };
@@ -79,7 +79,7 @@ void update_rest(uint i, SplatGradient g) {
     sh_basis(g.direction, basis);
     for (int k = 0; k < SH_USED; ++k) {
         for (uint c = 0u; c < 3u; ++c) {
-            const uint at = i * SH_STRIDE + uint(k) * 3u + c;
+            const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u + c;
             vec2 m = m_rest[at];
             sh_rest[at] = adam_step(sh_rest[at], m, basis[k] * g.colour[c], args.rate_rest);
             m_rest[at] = m;
@@ -114,8 +114,8 @@ void update_splat(uint i, SplatGradient g) {
 }
 
 void main() {
-    const uint i = linear_id();
-    if (i >= args.splat_count || status.overflow != 0u) return;
+    const uint i = args.first_splat + linear_id();
+    if (i >= args.splat_end || status.overflow != 0u) return;
     SplatGradient g;
     g.position = g.log_scale = g.colour = g.direction = vec3(0.0);
     g.rotation = vec4(0.0);

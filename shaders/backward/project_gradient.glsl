@@ -101,13 +101,13 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     float basis[SH_REST_MAX], along[SH_REST_MAX];
     sh_basis(g.direction, basis);
     for (int k = 0; k < SH_USED; ++k) {
-        const uint at = i * SH_STRIDE + uint(k) * 3u;
+        const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u;
         colour += basis[k] * vec3(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]);
     }
     g.colour = mix(sums.d_colour, vec3(0.0), lessThan(colour, vec3(0.0)));
     if (SH_DEGREE > 0) {
         for (int k = 0; k < SH_USED; ++k) {
-            const uint at = i * SH_STRIDE + uint(k) * 3u;
+            const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u;
             along[k] = dot(g.colour, vec3(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]));
         }
         const vec3 d = sh_direction_gradient(g.direction, along);

@@ -1,5 +1,6 @@
 // Moves one attribute to the next generation's order; new splats copy their source, or start at zero (moments).
-// Place: after densify_sources, once an attribute. Work: one thread a float. Shared memory: none.
+// Place: after densify_sources, once an attribute and pair of ranges; every source lies in one range.
+// Work: one thread a float. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,8 +20,10 @@ layout(set = 0, binding = 2, scalar) writeonly buffer To { float to[]; };
 void main() {
     const uint at = linear_id();
     const uint splat = at / args.stride;
-    if (splat >= args.out_count) return;
-    const uvec2 source = sources[splat];
+    if (splat >= args.to_count) return;
+    const uvec2 source = sources[args.to_first + splat];
+    const uint row = source.x - args.from_first;  // beyond the range where it lies before it, too
+    if (row >= args.from_count) return;
     const bool zero = args.clear_new == 1u && source.y != DENSIFY_KEEP;
-    to[at] = zero ? 0.0 : from[source.x * args.stride + at % args.stride];
+    to[at] = zero ? 0.0 : from[row * args.stride + at % args.stride];
 }

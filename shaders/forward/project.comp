@@ -30,7 +30,7 @@ layout(set = 0, binding = 2, scalar) readonly buffer LogScale { vec3 log_scale[]
 layout(set = 0, binding = 3, scalar) readonly buffer Rotation { vec4 rotation[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Opacity { float opacity_logit[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer ShDc { vec3 sh_dc[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer ShRest { float sh_rest[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer ShRest { float sh_rest[]; };  // from first_splat on
 layout(set = 0, binding = 7, scalar) writeonly buffer SplatShape { vec4 splat_shape[]; };  // mean, l11, l21
 layout(set = 0, binding = 7, scalar) writeonly buffer SplatShapeHalf { uvec4 splat_shape_half[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer SplatLight { vec4 splat_light[]; };  // rgb, opacity
@@ -50,7 +50,7 @@ vec3 splat_colour(uint i, vec3 direction) {
         const int used = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
         const uint stride = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
         for (int k = 0; k < used; ++k) {
-            const uint o = i * stride + uint(k) * 3u;
+            const uint o = (i - args.first_splat) * stride + uint(k) * 3u;
             colour += basis[k] * vec3(sh_rest[o], sh_rest[o + 1u], sh_rest[o + 2u]);
         }
     }
@@ -167,8 +167,8 @@ uint project(uint i, out int reason) {
 }
 
 void main() {
-    const uint i = linear_id();
-    if (i >= args.splat_count) return;
+    const uint i = args.first_splat + linear_id();
+    if (i >= args.splat_end) return;
     int reason;
     const uint count = project(i, reason);
     pair_count[i] = count;

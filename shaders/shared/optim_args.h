@@ -9,7 +9,8 @@ namespace darb::gpu {
 #endif
 
 struct ProjectBackwardArgs {
-    uint splat_count;  // N
+    uint first_splat;  // of this dispatch, whose harmonics and their moments are bound from there on
+    uint splat_end;    // one past its last
     uint camera_index;
     float low_pass;  // px^2
     // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
@@ -35,8 +36,10 @@ struct DensifyArgs {
     uint seed;                 // of the split offsets, differs at each call
 };
 
+// One range of the splats after, from one range of the splats before: each is bound from its first on.
 struct GatherArgs {
-    uint out_count;  // splats after
+    uint to_first, to_count;
+    uint from_first, from_count;
     uint stride;     // floats per splat of this attribute
     uint clear_new;  // 1: zero for new splats (moments), 0: copy
 };
@@ -47,7 +50,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 48);
+static_assert(sizeof(ProjectBackwardArgs) == 52);
 }  // namespace darb::gpu
 #endif
 #endif

@@ -89,7 +89,8 @@ struct FrameGroups {
 };
 
 struct ProjectArgs {
-    uint splat_count;  // N
+    uint first_splat;  // of this dispatch, whose harmonics are bound from there on
+    uint splat_end;    // one past its last
     uint camera_index;
     float low_pass;  // px^2, added to the diagonal of the projected covariance
 };

@@ -99,7 +99,8 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
         begin(device, "pair begin", partials.begin), sum(device, "partials", sums),
         rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
         status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters);
-    const gpu::ProjectBackwardArgs args{n,
+    const gpu::ProjectBackwardArgs args{0,
+                                        n,
                                         0,
                                         static_cast<float>(LOW_PASS_DEFAULT),
                                         step.position,

@@ -46,7 +46,7 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);
-    commands.dispatch(pipeline, gpu::ProjectArgs{n, 0, static_cast<float>(LOW_PASS_DEFAULT)},
+    commands.dispatch(pipeline, gpu::ProjectArgs{0, n, 0, static_cast<float>(LOW_PASS_DEFAULT)},
                       {cameras, position, log_scale, rotation, opacity, sh_dc, sh_rest, shape,
                        light, bound, cover, pair_count, visible, status, smoothing},
                       g.x, g.y);

@@ -233,6 +233,42 @@ TEST(Training, one_splat_is_a_model) {
     for (const float value : trainer.model().position) EXPECT_TRUE(std::isfinite(value));
 }
 
+// What a binding does not hold is worked off range by range, density control included.
+TEST(Training, a_device_of_small_bindings_trains_the_same_bits) {
+    TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 700});
+    t.options.sh_degree = 3;
+    t.options.sh_interval = 5;
+    Trainer whole = t.trainer();
+    ::setenv("DARB_FAULT", "binding:163840", 1);
+    Device narrow;
+    ::unsetenv("DARB_FAULT");
+    Trainer parts(narrow, t.dataset, t.photos, t.start(), t.options);
+    ASSERT_GT(parts.splats().ranges().size(), 1U);
+    run_to(whole, 45);
+    run_to(parts, 45);
+    EXPECT_GT(parts.splats().ranges().size(), 1U);
+    EXPECT_GT(parts.counters().cloned_or_split, 10U);
+    EXPECT_TRUE(same_state(whole, parts));
+}
+
+// An evaluation at the iteration of a reset shows the scene that was trained.
+TEST(Training, opacities_are_reset_when_the_next_iteration_begins) {
+    TinyTraining t = tiny_training();
+    t.options.opacity_reset_interval = 25;
+    t.options.prune_opacity = 0.05f;
+    t.options.opacity_lr = 0.05f;
+    Trainer trainer = t.trainer();
+    const auto largest = [&] {
+        const SplatModel model = trainer.model();
+        return *std::max_element(model.opacity.begin(), model.opacity.end());
+    };
+    run_to(trainer, 25);
+    const float before = largest();
+    run_to(trainer, 26);
+    EXPECT_GT(before, -1);
+    EXPECT_LT(largest(), before - 1);
+}
+
 TEST(Training, splats_stop_growing_at_the_limit) {
     TinyTraining t = tiny_training();
     t.options.max_splats = 70;

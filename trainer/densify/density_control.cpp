@@ -115,12 +115,23 @@ void DensityControl::gather(const Buffer& sources, std::uint32_t count, std::uin
                             bool clear_new, Buffer& buffer) {
     const std::uint64_t floats = std::uint64_t(count) * stride;
     Buffer next(*device_, buffer.name(), floats * sizeof(float));
+    const auto row = std::uint64_t{stride} * sizeof(float);
+    const std::uint64_t most = device_->info().max_storage_buffer_bytes;
+    const auto before = static_cast<std::uint32_t>(buffer.bytes() / row);
     if (count > 0) {
-        const Groups g = groups_for(floats);
         commands_.begin();
         commands_.pass("gather");
-        commands_.dispatch(gather_, gpu::GatherArgs{count, stride, clear_new ? 1u : 0u},
-                           {sources, buffer, next}, g.x, g.y);
+        for (const SplatRange& to : splat_ranges(count, stride, most)) {
+            const Groups g = groups_for(std::uint64_t{to.count} * stride);
+            for (const SplatRange& from : splat_ranges(before, stride, most))
+                commands_.dispatch(
+                    gather_,
+                    gpu::GatherArgs{to.first, to.count, from.first, from.count, stride,
+                                    clear_new ? 1u : 0u},
+                    {sources, BufferRange(buffer, from.first * row, from.count * row),
+                     BufferRange(next, to.first * row, to.count * row)},
+                    g.x, g.y);
+        }
         commands_.submit_and_wait();
     }
     buffer = std::move(next);

@@ -141,6 +141,8 @@ TEST(Faults, text_that_is_no_fault_is_an_error) {
     EXPECT_NE(error_of([] { parse_faults("oops"); }), "no error");
     EXPECT_NE(error_of([] { parse_faults("lost:0"); }), "no error");
     EXPECT_NE(error_of([] { parse_faults("lost:2x"); }), "no error");
+    EXPECT_NE(error_of([] { parse_faults("binding:-1"); }), "no error");
+    EXPECT_EQ(parse_faults("binding:4096").binding_bytes, 4096U);
     const Faults faults = parse_faults("oom:a,lost:3,oom:b");
     EXPECT_TRUE(faults.fails_allocation("b"));
     EXPECT_FALSE(faults.fails_submit(2));
