@@ -179,8 +179,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     Forecast f;
     add_photos(dataset.views, options, f.demand);
     f.start_splats = static_cast<std::uint32_t>(start.size());
-    const std::uint32_t limit =
-        std::min(options.max_splats, GpuSplats::max_count(scratch, true));
+    const std::uint32_t limit = std::min(options.max_splats, GpuSplats::max_count(scratch, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);
     f.demand.splats = f.splats;
     f.demand.pairs = std::uint64_t{kMinPairsPerSplat} * f.splats;

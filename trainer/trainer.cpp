@@ -158,8 +158,8 @@ AdamStep Trainer::rates(int iteration) const {
     return step;
 }
 
-// Density control opens the next iteration rather than closing its own, so that what is evaluated and
-// saved between them is what was trained, not what was just reset.
+// Density control opens the next iteration rather than closing its own, so that what is evaluated
+// and saved between them is what was trained, not what was just reset.
 void Trainer::step() {
     if (iteration_ > 0) {
         density_control(iteration_);
@@ -307,8 +307,7 @@ void Trainer::density_control(int iteration) {
         gpu::DensifyArgs args{};
         const std::uint32_t within_memory = splats_within_memory();
         const std::uint32_t limit =
-            std::min({options_.max_splats, within_memory,
-                      GpuSplats::max_count(*device_, true)});
+            std::min({options_.max_splats, within_memory, GpuSplats::max_count(*device_, true)});
         args.gradient_threshold = options_.densify_grad_threshold;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * extent_);
         args.prune_opacity = options_.prune_opacity;

@@ -58,8 +58,8 @@ class Forward {
   public:
     Forward(Device& device, const ForwardOptions& options);
 
-    /// Makes the buffers fit: never shrinks. pairs: a guess, as a frame that needs more says so. The queue
-    /// must be idle.
+    /// Makes the buffers fit: never shrinks. pairs: a guess, as a frame that needs more says so.
+    /// The queue must be idle.
     void reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height);
     std::uint32_t pair_capacity() const { return pair_capacity_; }
     /// How many dispatches the blend passes take, LIST_SEGMENT pairs of every tile's list each.

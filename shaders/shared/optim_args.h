@@ -9,8 +9,9 @@ namespace darb::gpu {
 #endif
 
 struct ProjectBackwardArgs {
-    uint first_splat;  // of this dispatch, whose harmonics and their moments are bound from there on
-    uint splat_end;    // one past its last
+    uint
+        first_splat;  // of this dispatch, whose harmonics and their moments are bound from there on
+    uint splat_end;   // one past its last
     uint camera_index;
     float low_pass;  // px^2
     // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
@@ -36,7 +37,8 @@ struct DensifyArgs {
     uint seed;                 // of the split offsets, differs at each call
 };
 
-// One range of the splats after, from one range of the splats before: each is bound from its first on.
+// One range of the splats after, from one range of the splats before: each is bound from its first
+// on.
 struct GatherArgs {
     uint to_first, to_count;
     uint from_first, from_count;
