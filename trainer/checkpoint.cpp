@@ -61,7 +61,8 @@ Json header_of(const Checkpoint& c) {
                 {"culled", n.culled},
                 {"overflows", n.overflows},
                 {"longest_list", n.longest_list},
-                {"huge_splats", n.huge_splats}};
+                {"huge_splats", n.huge_splats},
+                {"most_pairs", n.most_pairs}};
 }
 
 void read_header(const Json& h, Checkpoint& c, const std::string& where) {
@@ -91,6 +92,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     n.overflows = h.value("overflows", std::uint64_t{0});  // absent in earlier files
     n.longest_list = h.value("longest_list", 0u);
     n.huge_splats = h.value("huge_splats", 0u);
+    n.most_pairs = h.value("most_pairs", 0u);
     n.culled = h.at("culled").get<decltype(n.culled)>();
 }
 

@@ -186,6 +186,12 @@ void Run::train(const std::atomic<bool>* stop) {
         trainer_.step();
         if (const std::uint32_t n = trainer_.stopped_by_memory(); n != 0 && stopped == 0)
             progress_.note(fmt::format("growth stops at {} splats: --max-memory", stopped = n));
+        if (const std::uint32_t n = trainer_.stopped_by_pairs(); n != 0 && stopped == 0)
+            progress_.note(
+                fmt::format("growth stops at {} splats: frames come near the pairs of "
+                            "splats and tiles that this device can bind; a smaller -r "
+                            "leaves room",
+                            stopped = n));
         const int i = trainer_.iteration();
         for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
             const Trainer::Probe& p = trainer_.probes()[told_probes_];

@@ -35,6 +35,8 @@ ForwardOptions forward_options(const TrainOptions& options) {
 
 // More splats than this share with a gradient that is not finite: something is broken.
 constexpr std::uint64_t kBadGradientShare = 1'000;
+constexpr double kMostPairs =
+    0.7;  // of what the device binds: beyond, splats do not grow in number
 
 SplatModel start_model(SplatModel start, const TrainOptions& options) {
     start.antialias = options.antialias;
@@ -231,6 +233,7 @@ gpu::FrameStatus Trainer::finish(Flight& flight) {
     counters_.bad_gradients += status.bad_gradients;
     counters_.longest_list = std::max(counters_.longest_list, status.longest_list);
     counters_.huge_splats = std::max(counters_.huge_splats, status.huge_splats);
+    counters_.most_pairs = std::max(counters_.most_pairs, status.pairs);
     forward_.note_crowds(status);
     check_gradients(iteration, status);
     for (const PassTime& pass : flight.commands.pass_times()) {
@@ -306,8 +309,12 @@ void Trainer::density_control(int iteration) {
     if (refine) {
         gpu::DensifyArgs args{};
         const std::uint32_t within_memory = splats_within_memory();
+        const bool pairs_are_near =
+            counters_.most_pairs > kMostPairs * Forward::max_pairs(*device_);
+        if (pairs_are_near && stopped_by_pairs_ == 0) stopped_by_pairs_ = splats_.count();
         const std::uint32_t limit =
-            std::min({options_.max_splats, within_memory, GpuSplats::max_count(*device_, true)});
+            std::min({options_.max_splats, within_memory, GpuSplats::max_count(*device_, true),
+                      pairs_are_near ? splats_.count() : 0xFFFFFFFFu});
         args.gradient_threshold = options_.densify_grad_threshold;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * extent_);
         args.prune_opacity = options_.prune_opacity;

@@ -38,6 +38,7 @@ struct TrainCounters {
     std::uint64_t redone_iterations = 0, overflows = 0;  // an overflow redoes one or two iterations
     std::uint32_t longest_list = 0;                      // pairs of one tile, most in any frame
     std::uint32_t huge_splats = 0;                       // most in any frame
+    std::uint32_t most_pairs = 0;                        // of splats and tiles, most in any frame
     std::uint64_t bad_gradients = 0;
     std::uint64_t cloned_or_split = 0, pruned = 0;
     std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason
@@ -94,6 +95,8 @@ class Trainer {
     double extent() const { return extent_; }
     /// The splats at which TrainOptions::max_memory_bytes stopped the growth; 0: it did not.
     std::uint32_t stopped_by_memory() const { return stopped_by_memory_; }
+    /// The same where frames came near the pairs that the device's bindings hold.
+    std::uint32_t stopped_by_pairs() const { return stopped_by_pairs_; }
 
     /// The state beside the model that a checkpoint holds. moments: [attribute][2 N stride].
     struct State {
@@ -166,7 +169,7 @@ class Trainer {
     std::array<Flight, 2> flights_;
     int iteration_ = 0;
     MemoryDemand demand_;  // its photos
-    std::uint32_t stopped_by_memory_ = 0;
+    std::uint32_t stopped_by_memory_ = 0, stopped_by_pairs_ = 0;
     TrainCounters counters_;
     std::vector<PassTotal> pass_totals_;
     std::uint64_t timed_iterations_ = 0;

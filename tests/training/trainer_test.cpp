@@ -308,6 +308,22 @@ TEST(Training, growth_stops_before_the_memory_budget) {
     device.set_memory_budget(0);
 }
 
+TEST(Training, growth_stops_before_the_pairs_that_a_binding_holds) {
+    TinyTraining t = tiny_training({.splats = 300});
+    t.options.prune_opacity = 0;
+    t.options.prune_extent = 100;
+    t.options.densify_grad_threshold = 1e-7f;
+    t.options.opacity_reset_interval = 1000;
+    ::setenv("DARB_FAULT", "binding:102400", 1);  // 3,200 pairs
+    Device narrow;
+    ::unsetenv("DARB_FAULT");
+    Trainer trainer(narrow, t.dataset, t.photos, t.start(), t.options);
+    run_to(trainer, 60);
+    EXPECT_GT(trainer.counters().most_pairs, 3200U * 7 / 10);
+    EXPECT_GT(trainer.stopped_by_pairs(), 300U);
+    EXPECT_EQ(trainer.splat_count(), trainer.stopped_by_pairs());
+}
+
 TEST(Training, a_budget_below_the_start_is_an_error_that_names_it) {
     TinyTraining t = tiny_training();
     t.options.max_memory_bytes = 100'000;
