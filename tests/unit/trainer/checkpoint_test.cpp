@@ -36,7 +36,7 @@ class CheckpointFile : public testing::Test {
             c.state.moments.push_back(moments);
         }
         c.state.gradient_sum.assign(splats * 2, 0.5f);
-        c.state.counters = {1, 8, 9, 10, 2, 3, 4, {5, 6, 7}};
+        c.state.counters = {1, 8, 9, 10, 11, 2, 3, 4, {5, 6, 7}};
         c.settings = settings_text({});
         c.dataset = "0123456789abcdef";
         c.seconds = 98.5;
@@ -83,6 +83,7 @@ TEST_F(CheckpointFile, what_is_written_comes_back) {
         EXPECT_EQ(back.state.model.footprint, Footprint::exact);
         EXPECT_EQ(back.state.counters.culled, c.state.counters.culled);
         EXPECT_EQ(back.state.counters.pruned, 4U);
+        EXPECT_EQ(back.state.counters.most_pairs, 11U);
         EXPECT_EQ(back.settings, c.settings);
         EXPECT_EQ(back.dataset, c.dataset);
         EXPECT_EQ(back.seconds, 98.5);
