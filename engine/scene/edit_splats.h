@@ -1,8 +1,9 @@
 // Changes to a whole scene: similarities with their effect on rotations and harmonics, and choices
-// of splats. All keep the order of the splats that stay.
+// of splats; those that drop some keep the order of the others.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
 #include <vector>
@@ -28,6 +29,8 @@ void set_positions(const std::vector<double>& positions, SplatModel& model);
 /// World position of a splat.
 glm::dvec3 position_of(const SplatModel& model, std::size_t splat);
 
+/// These splats in this order; kernel, footprint and all else that is not per splat stays.
+SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>& splats);
 /// Keeps the splats for which keep(i) is true; returns the count of those that went.
 std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model);
 /// Drops splats with a NaN or infinite parameter.
@@ -38,6 +41,8 @@ std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatMode
 std::size_t prune_opacity(double least, SplatModel& model);
 /// Leaves out the bands above `degree`.
 void limit_sh_degree(int degree, SplatModel& model);
+/// [N][C-1][3] of the bands up to `degree`, which is at most the model's.
+std::vector<float> sh_rest_up_to(int degree, const SplatModel& model);
 
 /// The turn that takes the axis named x, y, z, -x, -y or -z to -y, which is up in scenes as they
 /// are stored (y down): about x for z and -z, about z for the others. Throws Error for other names.

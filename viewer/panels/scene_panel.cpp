@@ -22,7 +22,6 @@ void kernel_choice(Session& s) {
     int footprint = d.footprint == Footprint::exact ? 1 : 0;
     if (ImGui::Combo("footprint", &footprint, "psi\0exact\0"))
         d.footprint = footprint == 1 ? Footprint::exact : Footprint::psi;
-    ImGui::Checkbox("anti-aliasing", &d.antialias);
     if (!s.scene) return;
     const SplatModel& m = s.scene->model;
     if (m.kernel == d.kernel && m.footprint == d.footprint) return;
@@ -72,10 +71,6 @@ void display_panel(Session& s) {
             d.style = static_cast<SplatStyle>(style);
     }
     kernel_choice(s);
-    if (s.shown_sh_degree > 0)
-        ImGui::SliderInt("SH degree", &d.sh_degree, 0, s.shown_sh_degree);
-    else
-        ImGui::TextDisabled("no view-dependent colour");
     ImGui::ColorEdit3("background", &d.background.x);
 }
 
