@@ -60,7 +60,13 @@ SplatPicture::SplatPicture(Device& device)
 void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
                              std::vector<std::uint32_t> important) {
     const int degree = fitting_degree(*device_, model);
-    own_ = GpuSplats(*device_, model, false, degree);
+    if (degree == model.sh_degree) {
+        own_ = GpuSplats(*device_, model, false);
+    } else {
+        SplatModel less = model;
+        limit_sh_degree(degree, less);
+        own_ = GpuSplats(*device_, less, false);
+    }
     styled_.reset();
     some_.reset();
     live_ = nullptr;
@@ -114,11 +120,12 @@ const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
     if (share >= 1 || important_.empty() || !own_) return styled(style);
     if (!some_ || some_as_ != style) {
         SplatModel model = in_style(pick_splats(*model_, important_), style);
+        limit_sh_degree(own_->sh_degree(), model);
         for (size_t i = 0; i < important_.size() && !removed_.empty(); ++i)
             if (removed_[important_[i]] != 0) model.opacity[i] = kRemovedLogit;
         compiled_ = true;
         some_.reset();
-        some_.emplace(*device_, model, false, own_->sh_degree());
+        some_.emplace(*device_, model, false);
         some_as_ = style;
     }
     const double count = share * static_cast<double>(model_->size());

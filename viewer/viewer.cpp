@@ -213,12 +213,11 @@ void Viewer::play_path(double seconds) {
     PathState& p = session_.path;
     if (!p.playing) return;
     p.at_s += seconds;
-    if (p.at_s > p.path.duration()) {
-        p.at_s = 0;
-        p.playing = false;
-    }
     leave_photo();
     apply(p.path.sample(p.at_s), session_.navigation);
+    if (p.at_s < p.path.duration()) return;
+    p.at_s = 0;
+    p.playing = false;
 }
 
 Camera Viewer::frame_camera(int width, int height) const {

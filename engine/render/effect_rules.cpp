@@ -95,10 +95,11 @@ EffectRow lens_rule(const std::vector<View>& views) {
     row.on = lenses > 0;
     row.measured = static_cast<double>(lenses);
     row.reason =
-        row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),
-                             too_wide)
-               : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
-                             distorted, views.size(), too_wide);
+        views.empty() ? "no cameras are named"
+        : row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),
+                               too_wide)
+                 : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
+                               distorted, views.size(), too_wide);
     return row;
 }
 

@@ -147,20 +147,13 @@ std::size_t prune_opacity(double least, SplatModel& model) {
 
 void limit_sh_degree(int degree, SplatModel& model) {
     if (degree >= model.sh_degree) return;
-    model.sh_rest = sh_rest_up_to(degree, model);
-    model.sh_degree = degree;
-}
-
-std::vector<float> sh_rest_up_to(int degree, const SplatModel& model) {
-    SplatModel header;
-    header.sh_degree = degree;
     const auto before = static_cast<std::size_t>(model.rest_count());
-    const auto after = static_cast<std::size_t>(header.rest_count());
-    std::vector<float> rest(model.size() * after);
+    model.sh_degree = degree;
+    const auto after = static_cast<std::size_t>(model.rest_count());
     for (std::size_t i = 0; i < model.size(); ++i)
         std::copy_n(model.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * before), after,
-                    rest.begin() + static_cast<std::ptrdiff_t>(i * after));
-    return rest;
+                    model.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * after));
+    model.sh_rest.resize(model.size() * after);
 }
 
 glm::dmat3 turn_of_up_axis(const std::string& axis) {

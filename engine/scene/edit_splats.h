@@ -41,8 +41,6 @@ std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatMode
 std::size_t prune_opacity(double least, SplatModel& model);
 /// Leaves out the bands above `degree`.
 void limit_sh_degree(int degree, SplatModel& model);
-/// [N][C-1][3] of the bands up to `degree`, which is at most the model's.
-std::vector<float> sh_rest_up_to(int degree, const SplatModel& model);
 
 /// The turn that takes the axis named x, y, z, -x, -y or -z to -y, which is up in scenes as they
 /// are stored (y down): about x for z and -z, about z for the others. Throws Error for other names.

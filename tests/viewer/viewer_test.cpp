@@ -146,6 +146,19 @@ TEST_F(ViewerTest, Load_reports_progress_and_is_cancelled_while_it_decodes) {
                  Stop);
 }
 
+TEST_F(ViewerTest, Picture_key_writes_the_scene_without_the_panels) {
+    load(file_);
+    const ImageU8 scene = shot();
+    viewer_->session().panels = true;
+    const fs::path before = fs::current_path();
+    fs::current_path(folder_);
+    Input input;
+    input.pressed = {Key::picture};
+    shot(true, input);
+    fs::current_path(before);
+    EXPECT_EQ(largest_difference(read_image(folder_ / "darb_001.png"), scene), 0);
+}
+
 TEST_F(ViewerTest, The_scene_is_shown_again_after_an_export) {
     load(file_);
     const ImageU8 before = shot();

@@ -71,7 +71,7 @@ void effects_panel(Session& s) {
         ImGui::TextUnformatted(row_name(row).c_str());
         if (s.plan) {
             const EffectRow& planned = s.plan->row(effect);
-            ImGui::SameLine(80 * s.gui_scale);
+            ImGui::SameLine(90 * s.gui_scale);
             ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
             ImGui::TextWrapped("%s: %s", planned.on ? "on" : "off", planned.reason.c_str());
             ImGui::PopStyleColor();
