@@ -104,7 +104,7 @@ struct Session {
     double export_share = -1;
     double measure_share = -1;
     std::vector<MeasuredChoice> measured;
-    int shown_sh_degree = 0;
+    int sh_degree = 0;  // highest of the scene or the run
     bool panels = true;
     float gui_scale = 1;
 };

@@ -41,14 +41,6 @@ SplatModel in_style(const SplatModel& own, SplatStyle style) {
     return model;
 }
 
-int fitting_degree(const Device& device, const SplatModel& model) {
-    if (model.size() <= GpuSplats::max_count(device, false)) return model.sh_degree;
-    throw Error("the scene",
-                fmt::format("has {} splats, {} can bind {}", model.size(), device.info().name,
-                            GpuSplats::max_count(device, false)),
-                "Choose another device (darb devices), or prune the scene.");
-}
-
 }  // namespace
 
 SplatPicture::SplatPicture(Device& device)
@@ -59,14 +51,12 @@ SplatPicture::SplatPicture(Device& device)
 
 void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
                              std::vector<std::uint32_t> important) {
-    const int degree = fitting_degree(*device_, model);
-    if (degree == model.sh_degree) {
-        own_ = GpuSplats(*device_, model, false);
-    } else {
-        SplatModel less = model;
-        limit_sh_degree(degree, less);
-        own_ = GpuSplats(*device_, less, false);
-    }
+    if (const std::uint32_t most = GpuSplats::max_count(*device_, false); model.size() > most)
+        throw Error(
+            "the scene",
+            fmt::format("has {} splats, {} can bind {}", model.size(), device_->info().name, most),
+            "Choose another device (darb devices), or prune the scene.");
+    own_ = GpuSplats(*device_, model, false);
     styled_.reset();
     some_.reset();
     live_ = nullptr;
@@ -120,7 +110,6 @@ const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
     if (share >= 1 || important_.empty() || !own_) return styled(style);
     if (!some_ || some_as_ != style) {
         SplatModel model = in_style(pick_splats(*model_, important_), style);
-        limit_sh_degree(own_->sh_degree(), model);
         for (size_t i = 0; i < important_.size() && !removed_.empty(); ++i)
             if (removed_[important_[i]] != 0) model.opacity[i] = kRemovedLogit;
         compiled_ = true;
@@ -158,7 +147,7 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
     key.kernel = display.kernel;
     key.footprint = display.footprint;
     const bool plain = display.style == SplatStyle::splats || !own_;
-    key.sh_stored = plain ? shown_sh_degree() : 0;
+    key.sh_stored = plain ? splats()->sh_degree() : 0;
     key.accuracy = moving ? preset_accuracy(kFast) : display.accuracy;
     key.accuracy.choice[kRenderScale] = 0;  // of the camera
     key.effects = display.effects;

@@ -27,9 +27,8 @@ class SplatPicture {
   public:
     explicit SplatPicture(Device& device);
 
-    /// Uploads a scene; the model must stay where it is as long as it is shown. Where a device's
-    /// buffers cannot hold all view-dependent colour, higher degrees are left out: see
-    /// shown_sh_degree. Throws Error and keeps the scene before.
+    /// Uploads a scene; the model must stay where it is as long as it is shown. Throws Error and
+    /// keeps the scene before.
     /// important: what to draw in motion, most important first; may be none.
     void set_scene(const SplatModel& model, const Bounds& bounds,
                    std::vector<std::uint32_t> important = {});
@@ -38,7 +37,6 @@ class SplatPicture {
     void set_live(const GpuSplats& splats, const Bounds& bounds);
     void clear();
     bool empty() const { return splats() == nullptr; }
-    int shown_sh_degree() const { return splats() ? splats()->sh_degree() : 0; }
     const Bounds& bounds() const { return bounds_; }
     std::uint32_t splat_count() const { return splats() ? splats()->count() : 0; }
 

@@ -70,7 +70,7 @@ void Viewer::adopt(Scene loaded) {
     const bool first = session_.scene == nullptr;
     session_.scene = std::move(scene);
     const Scene& s = *session_.scene;
-    session_.shown_sh_degree = picture_.shown_sh_degree();
+    session_.sh_degree = s.model.sh_degree;
     session_.edit = Edit(s.model.size());
     session_.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
     session_.save_file = s.file;
@@ -93,7 +93,7 @@ void Viewer::show_as_meant(const Scene& s, bool first) {
     DisplaySettings& d = session_.display;
     d.kernel = s.model.kernel;
     d.footprint = s.model.footprint;
-    d.sh_degree = session_.shown_sh_degree;
+    d.sh_degree = s.model.sh_degree;
     d.effects = {};
     d.effects.antialias = s.model.antialias;
     d.effects.lens = any_lens(session_.photos.views);
@@ -119,7 +119,7 @@ void Viewer::follow_plan() {
     DisplaySettings& d = session_.display;
     d.effects = plan.projection();
     d.crowds = plan.crowds();
-    d.sh_degree = std::min(plan.row(EFFECT_VIEW_COLOUR).degree, session_.shown_sh_degree);
+    d.sh_degree = plan.row(EFFECT_VIEW_COLOUR).degree;
 }
 
 void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
@@ -127,9 +127,9 @@ void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
     if (first) picture_.set_live(splats, bounds);
     session_.training.live = true;
     ++version_;
-    if (first || session_.display.sh_degree == session_.shown_sh_degree)
+    if (first || session_.display.sh_degree == session_.sh_degree)
         session_.display.sh_degree = splats.sh_degree();  // grows with the training
-    session_.shown_sh_degree = splats.sh_degree();
+    session_.sh_degree = splats.sh_degree();
     session_.own.sh_degree = splats.sh_degree();
     const bool smoothing = splats.smoothing().bytes() == std::uint64_t{splats.count()} * 4;
     session_.display.effects.smoothing = session_.own.effects.smoothing =

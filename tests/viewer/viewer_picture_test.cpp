@@ -204,7 +204,7 @@ TEST_F(ViewerTest, Degree_of_colour_follows_the_scene) {
         options.sh_degree = degree;
         write_ply(file_, random_scene(options).model);
         load(file_);
-        EXPECT_EQ(viewer_->session().shown_sh_degree, degree);
+        EXPECT_EQ(viewer_->session().sh_degree, degree);
         EXPECT_EQ(viewer_->session().display.sh_degree, degree);
     }
 }
@@ -218,7 +218,7 @@ TEST_F(ViewerTest, Accuracy_switch_changes_the_picture_and_its_measure_says_how_
     while (s.measure_share >= 0);
     size_t choices = 0;
     for (const int row : kAccuracyRows) choices += row_choices(row, 3).size();
-    for (const int row : kEffectRows) choices += row_choices(row, s.shown_sh_degree).size();
+    for (const int row : kEffectRows) choices += row_choices(row, s.sh_degree).size();
     ASSERT_EQ(s.measured.size(), choices);
     const DisplaySettings as_is = s.display;
     s.display = s.own;

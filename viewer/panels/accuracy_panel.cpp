@@ -28,7 +28,7 @@ std::string measured_text(const Session& s, int row, int choice) {
 void choices(Session& s, int row) {
     ImGui::PushID(row);
     int choice = 0;
-    for (const std::string& name : row_choices(row, s.shown_sh_degree)) {
+    for (const std::string& name : row_choices(row, s.sh_degree)) {
         if (ImGui::RadioButton(name.c_str(), chosen(row, s.display) == choice))
             choose(row, choice, s.display);
         const std::string text = measured_text(s, row, choice++);

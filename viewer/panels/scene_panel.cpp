@@ -43,8 +43,6 @@ void scene_panel(Session& s) {
     ImGui::Text("%zu splats, SH degree %d", scene.model.size() - s.edit.removed_count(),
                 scene.model.sh_degree);
     ImGui::Text("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);
-    if (s.shown_sh_degree < scene.model.sh_degree)
-        ImGui::TextWrapped("This device's buffers hold colour up to degree %d.", s.shown_sh_degree);
     for (const std::string& note : scene.notes) ImGui::TextWrapped("%s", note.c_str());
 }
 
