@@ -362,6 +362,8 @@ double Viewer::settle_panels(bool changed) {
 }
 
 void Viewer::settle(int width, int height) {
+    frame({}, width, height, true);
+    drawn_any_ = false;  // the times are those of a second picture: the first may have compiled
     do frame({}, width, height, true);
     while (unsettled_ > 0);
 }

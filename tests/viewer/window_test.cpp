@@ -67,6 +67,15 @@ TEST_F(WindowTest, Window_shows_the_headless_screenshot_and_closes_with_0_slow) 
     EXPECT_EQ(program_->wait(), 0) << log("view.log");
 }
 
+TEST_F(WindowTest, Accuracy_and_effects_of_the_command_line_show_in_the_screenshot) {
+    const fs::path scene = folder_ / "scene.ply";
+    const ImageU8 less = headless(scene, {"--accuracy", "fast", "--effects", "none"});
+    EXPECT_GT(largest_difference(less, headless()), 3);
+    Process wrong(command(scene, {"--effects", "fog"}), folder_ / "wrong.log");
+    EXPECT_EQ(wrong.wait(), 2);
+    EXPECT_NE(log("wrong.log").find("'fog' is no effect"), std::string::npos) << log("wrong.log");
+}
+
 TEST_F(WindowTest, Mouse_and_keys_move_the_camera_slow) {
     const ImageU8 wanted = headless();
     start();
