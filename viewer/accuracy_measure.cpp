@@ -5,16 +5,26 @@
 
 namespace darb {
 
-AccuracyMeasure::AccuracyMeasure(const DisplaySettings& display, const DisplaySettings& own)
-    : display_(display) {
-    display_.mode = VIEW_COLOUR;
-    display_.style = SplatStyle::splats;
-    reference_ = display_;
-    reference_.accuracy = preset_accuracy(kExact);
-    for (const int row : kEffectRows) choose(row, chosen(row, own), reference_);
+AccuracyMeasure::AccuracyMeasure(const DisplaySettings& display, const DisplaySettings& own) {
+    DisplaySettings now = display;
+    now.mode = VIEW_COLOUR;
+    now.style = SplatStyle::splats;
+    DisplaySettings exact = now;
+    choose(kPresetRow, kExact, exact);
+    exact.footprint = own.footprint;
+    exact.sh_degree = own.sh_degree;
+    exact.effects = own.effects;
+    exact.crowds = own.crowds;
+    pictures_ = {{exact, {}}, {now, {}}};
     const auto add = [&](int row) {
         const int count = static_cast<int>(row_choices(row, own.sh_degree).size());
-        for (int choice = 0; choice < count; ++choice) todo_.push_back({row, choice, 0, 0});
+        for (int choice = 0; choice < count; ++choice) {
+            DisplaySettings changed = now;
+            choose(row, choice, changed);
+            if (!(changed == now)) pictures_.push_back({changed, {}});
+            Picture& picture = changed == now ? pictures_[1] : pictures_.back();
+            picture.choices.push_back({row, choice, 0, 0});
+        }
     };
     for (const int row : kAccuracyRows) add(row);
     for (const int row : kEffectRows) add(row);
@@ -22,16 +32,14 @@ AccuracyMeasure::AccuracyMeasure(const DisplaySettings& display, const DisplaySe
 
 void AccuracyMeasure::step(const std::function<Frame(const DisplaySettings&)>& render) {
     if (done()) return;
-    if (next_ == 0) {
-        exact_ = to_float(render(reference_).picture);
-    } else {
-        MeasuredChoice m = todo_[next_ - 1];
-        DisplaySettings display = display_;
-        choose(m.row, m.choice, display);
-        const Frame frame = render(display);
-        m.ms = frame.ms;
-        m.psnr_db = psnr(to_float(frame.picture), exact_);
-        results_.push_back(m);
+    const Picture& picture = pictures_[next_];
+    const Frame frame = render(picture.display);
+    if (next_ == 0) exact_ = to_float(frame.picture);
+    const double psnr_db = psnr(to_float(frame.picture), exact_);
+    for (MeasuredChoice choice : picture.choices) {
+        choice.ms = frame.ms;
+        choice.psnr_db = psnr_db;
+        results_.push_back(choice);
     }
     ++next_;
 }

@@ -1,5 +1,5 @@
 // AccuracyMeasure: what each choice of each accuracy setting and effect costs and changes, at the
-// camera of the moment; one choice a call so that a window stays alive.
+// camera of the moment; one picture a call so that a window stays alive.
 #pragma once
 
 #include <functional>
@@ -20,16 +20,20 @@ class AccuracyMeasure {
     /// be shown; with the exact preset, what the error is against.
     AccuracyMeasure(const DisplaySettings& display, const DisplaySettings& own);
 
-    bool done() const { return next_ > todo_.size(); }
-    double share() const { return double(next_) / double(todo_.size() + 1); }
-    /// The exact picture first, then one choice a call.
+    bool done() const { return next_ >= pictures_.size(); }
+    double share() const { return double(next_) / double(pictures_.size()); }
     void step(const std::function<Frame(const DisplaySettings&)>& render);
     const std::vector<MeasuredChoice>& results() const { return results_; }
 
   private:
-    DisplaySettings display_, reference_;
-    std::vector<MeasuredChoice> todo_, results_;
-    size_t next_ = 0;  // 0: the exact picture; else the number of choices measured + 1
+    /// Choices that give the same picture, as all that are chosen now do.
+    struct Picture {
+        DisplaySettings display;
+        std::vector<MeasuredChoice> choices;
+    };
+    std::vector<Picture> pictures_;  // the exact one first, then as it is now
+    std::vector<MeasuredChoice> results_;
+    size_t next_ = 0;
     ImageF exact_;
 };
 

@@ -50,7 +50,7 @@ class Canvas {
     /// Makes it this large, in px; the picture before is lost when the size changes.
     void resize(int width, int height);
 
-    /// Records: the picture (B8G8R8A8 of buffer, scaled to the canvas where it is smaller; none
+    /// Records: the picture (B8G8R8A8 of buffer, scaled to the canvas where its size differs; none
     /// where the buffer is empty: `clear`), then `draw` inside the render pass.
     template <class Draw>
     void compose(VkCommandBuffer commands, const Buffer* pixels, int width, int height,

@@ -19,9 +19,10 @@ struct DisplaySettings {
     SplatStyle style = SplatStyle::splats;
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
-    bool antialias = false;  // opacity compensation of the low-pass
-    Accuracy accuracy;       // kernel evaluation, cut-offs, storage, depth order; the others unused
-    int sh_degree = 3;       // highest in use
+    Accuracy accuracy;  // all but footprint and SH degree, which stand here
+    int sh_degree = 3;  // highest in use
+    ProjectionEffects effects;
+    Crowds crowds = Crowds::by_counters;
     glm::vec3 background{0.0f};
     float near_plane = static_cast<float>(NEAR_DEFAULT);  // world units
     float error_max = 0.25f;   // mean absolute difference that is shown hottest

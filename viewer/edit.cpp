@@ -1,30 +1,11 @@
 #include "viewer/edit.h"
 
-#include <algorithm>
+#include <cmath>
 
 #include "engine/core/check.h"
+#include "engine/scene/edit_splats.h"
 
 namespace darb {
-
-namespace {
-
-glm::dvec3 position(const SplatModel& m, size_t i) {
-    return m.origin + glm::dvec3(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
-}
-
-// Keeps the entries of an array of `stride` values a splat whose splat is not removed.
-std::vector<float> kept(const std::vector<float>& values, size_t stride,
-                        const std::vector<std::uint8_t>& removed) {
-    std::vector<float> out;
-    out.reserve(values.size());
-    for (size_t i = 0; i < removed.size(); ++i)
-        if (removed[i] == 0)
-            out.insert(out.end(), values.begin() + static_cast<std::ptrdiff_t>(i * stride),
-                       values.begin() + static_cast<std::ptrdiff_t>((i + 1) * stride));
-    return out;
-}
-
-}  // namespace
 
 bool Region::contains(const glm::dvec3& p) const {
     const glm::dvec3 d = p - centre;
@@ -37,7 +18,7 @@ size_t Edit::remove(const SplatModel& model, const Region& region, bool inside) 
     DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
     std::vector<std::uint32_t> step;
     for (size_t i = 0; i < removed_.size(); ++i)
-        if (removed_[i] == 0 && region.contains(position(model, i)) == inside)
+        if (removed_[i] == 0 && region.contains(position_of(model, i)) == inside)
             step.push_back(static_cast<std::uint32_t>(i));
     const size_t count = step.size();
     if (count == 0) return 0;
@@ -61,22 +42,16 @@ void Edit::mark(const std::vector<std::uint32_t>& splats, std::uint8_t value) {
     removed_count_ += value != 0 ? splats.size() : -splats.size();
 }
 
-SplatModel Edit::apply(const SplatModel& m) const {
-    SplatModel out = m;
-    if (removed_count_ == 0) return out;
-    out.position = kept(m.position, 3, removed_);
-    out.log_scale = kept(m.log_scale, 3, removed_);
-    out.rotation = kept(m.rotation, 4, removed_);
-    out.opacity = kept(m.opacity, 1, removed_);
-    out.sh_dc = kept(m.sh_dc, 3, removed_);
-    out.sh_rest = kept(m.sh_rest, static_cast<size_t>(m.rest_count()), removed_);
+SplatModel Edit::apply(const SplatModel& model) const {
+    SplatModel out = model;
+    keep_splats([&](size_t i) { return removed_[i] == 0; }, out);
     return out;
 }
 
 size_t count_inside(const SplatModel& model, const Region& region, const Edit& edit) {
     size_t count = 0;
     for (size_t i = 0; i < model.size(); ++i)
-        if (edit.removed()[i] == 0 && region.contains(position(model, i))) ++count;
+        if (edit.removed()[i] == 0 && region.contains(position_of(model, i))) ++count;
     return count;
 }
 

@@ -24,14 +24,6 @@ std::vector<float> importance(const SplatModel& m, const Bounds& bounds) {
     return value;
 }
 
-void pick(const std::vector<float>& from, std::size_t stride,
-          const std::vector<std::uint32_t>& splats, std::vector<float>& to) {
-    to.resize(splats.size() * stride);
-    for (std::size_t i = 0; i < splats.size(); ++i)
-        std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(splats[i] * stride), stride,
-                    to.begin() + static_cast<std::ptrdiff_t>(i * stride));
-}
-
 }  // namespace
 
 std::vector<std::uint32_t> most_important(const SplatModel& model, const Bounds& bounds,
@@ -48,22 +40,6 @@ std::vector<std::uint32_t> most_important(const SplatModel& model, const Bounds&
     order.erase(end, order.end());
     order.shrink_to_fit();
     return order;
-}
-
-SplatModel picked(const SplatModel& m, const std::vector<std::uint32_t>& splats) {
-    SplatModel out;
-    out.sh_degree = m.sh_degree;
-    out.kernel = m.kernel;
-    out.footprint = m.footprint;
-    out.antialias = m.antialias;
-    out.origin = m.origin;
-    pick(m.position, 3, splats, out.position);
-    pick(m.log_scale, 3, splats, out.log_scale);
-    pick(m.rotation, 4, splats, out.rotation);
-    pick(m.opacity, 1, splats, out.opacity);
-    pick(m.sh_dc, 3, splats, out.sh_dc);
-    pick(m.sh_rest, static_cast<std::size_t>(m.rest_count()), splats, out.sh_rest);
-    return out;
 }
 
 }  // namespace darb

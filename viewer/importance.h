@@ -19,7 +19,4 @@ inline constexpr std::size_t kMostMoving = 400'000;
 std::vector<std::uint32_t> most_important(const SplatModel& model, const Bounds& bounds,
                                           std::size_t count);
 
-/// These splats of the model, in this order.
-SplatModel picked(const SplatModel& model, const std::vector<std::uint32_t>& splats);
-
 }  // namespace darb

@@ -75,8 +75,15 @@ void Navigation::set_pivot_depth(const glm::dvec3& point) {
 }
 
 void Navigation::set_up(const glm::dvec3& new_up) {
-    up = glm::normalize(new_up);
+    const glm::dvec3 to = glm::normalize(new_up), centre = pivot();
+    glm::dvec3 axis = glm::cross(up, to);
+    const double angle = std::atan2(glm::length(axis), glm::dot(up, to));
+    if (glm::length(axis) < 1e-9) axis = forward() - glm::dot(forward(), up) * up;  // a flip
+    if (glm::length(axis) < 1e-9) axis = right();
+    axes = rotation_about(glm::normalize(axis), angle) * axes;
+    up = to;
     level();
+    eye = centre - distance * forward();
 }
 
 void Navigation::level() {

@@ -37,7 +37,8 @@ struct Navigation {
     void frame(const glm::dvec3& centre, double radius, double aspect);
     /// A new pivot in the direction of `point`, without turning: only its distance changes.
     void set_pivot_depth(const glm::dvec3& point);
-    /// New world up, horizon levelled to it.
+    /// New world up: around the pivot the camera turns along with it, so that it goes on looking as
+    /// far above or below the horizon, which becomes level.
     void set_up(const glm::dvec3& new_up);
     /// Takes roll away: right becomes perpendicular to up.
     void level();

@@ -11,6 +11,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
+#include "engine/render/effect_plan.h"
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
 #include "viewer/edit.h"
@@ -76,7 +77,7 @@ struct Requests {
     bool frame_all = false, take_picture = false, save = false, quit = false;
     bool full_screen = false, leave_full_screen = false, cancel_load = false, load_path = false,
          save_path = false;
-    bool measure = false;
+    bool measure = false, follow_plan = false;
     bool export_path = false, cancel_export = false, opacity_changed = false;
 };
 
@@ -87,8 +88,9 @@ struct Session {
     bool show_region = false;
     std::filesystem::path save_file;
     Navigation navigation;
-    double fly_speed = 1;          // world units a second
-    DisplaySettings display, own;  // own: as the scene is meant to be shown
+    double fly_speed = 1;            // world units a second
+    DisplaySettings display, own;    // own: as the scene is meant to be shown
+    std::optional<EffectPlan> plan;  // of the scene
     Photos photos;
     PathState path;
     TrainingCurves training;
@@ -102,7 +104,7 @@ struct Session {
     double export_share = -1;
     double measure_share = -1;
     std::vector<MeasuredChoice> measured;
-    int shown_sh_degree = 0;
+    int sh_degree = 0;  // highest of the scene or the run
     bool panels = true;
     float gui_scale = 1;
 };

@@ -6,7 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/render/groups.h"
-#include "viewer/importance.h"
+#include "engine/scene/edit_splats.h"
 
 namespace darb {
 
@@ -21,41 +21,24 @@ constexpr float kEllipsoidCutoff = 0.9f;
 constexpr float kEllipsoidGrowth = 1.472f;  // ln(2 / 0.459)
 constexpr float kPointLogScale = -20;       // leaves the low-pass: a dot of about two pixels
 
-SplatModel with_sh_degree(const SplatModel& m, int degree) {
-    SplatModel out = m;
-    if (degree >= m.sh_degree) return out;
-    out.sh_degree = degree;
-    out.sh_rest.clear();
-    const size_t from = static_cast<size_t>(m.rest_count());
-    const size_t to = static_cast<size_t>(out.rest_count());
-    out.sh_rest.reserve(m.size() * to);
-    for (size_t i = 0; i < m.size(); ++i) {
-        const auto begin = m.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * from);
-        out.sh_rest.insert(out.sh_rest.end(), begin, begin + static_cast<std::ptrdiff_t>(to));
-    }
-    return out;
-}
-
+// Without harmonics where it is no copy.
 SplatModel in_style(const SplatModel& own, SplatStyle style) {
     if (style == SplatStyle::splats) return own;
-    SplatModel model = with_sh_degree(own, 0);
-    std::fill(model.opacity.begin(), model.opacity.end(), kOpaqueLogit);
+    SplatModel model = pick_splats(own, {});
+    limit_sh_degree(0, model);
+    model.position = own.position;
+    model.rotation = own.rotation;
+    model.sh_dc = own.sh_dc;
+    model.log_scale = own.log_scale;
     for (float& s : model.log_scale)
         s = style == SplatStyle::points ? kPointLogScale : s + kEllipsoidGrowth;
+    model.opacity.assign(own.size(), kOpaqueLogit);
     if (style == SplatStyle::ellipsoids) {  // what is nearly transparent would hide the rest
         for (size_t i = 0; i < model.size(); ++i)
             if (own.opacity[i] < kTransparentLogit) model.opacity[i] = kRemovedLogit;
         model.kernel = KERNEL_GAUSSIAN;
     }
     return model;
-}
-
-int fitting_degree(const Device& device, const SplatModel& model) {
-    if (model.size() <= GpuSplats::max_count(device, false)) return model.sh_degree;
-    throw Error("the scene",
-                fmt::format("has {} splats, {} can bind {}", model.size(), device.info().name,
-                            GpuSplats::max_count(device, false)),
-                "Choose another device (darb devices), or prune the scene.");
 }
 
 }  // namespace
@@ -68,13 +51,12 @@ SplatPicture::SplatPicture(Device& device)
 
 void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
                              std::vector<std::uint32_t> important) {
-    const int degree = fitting_degree(*device_, model);
-    std::optional<GpuSplats> next;
-    if (degree == model.sh_degree)
-        next.emplace(*device_, model, false);
-    else
-        next.emplace(*device_, with_sh_degree(model, degree), false);
-    own_ = std::move(next);
+    if (const std::uint32_t most = GpuSplats::max_count(*device_, false); model.size() > most)
+        throw Error(
+            "the scene",
+            fmt::format("has {} splats, {} can bind {}", model.size(), device_->info().name, most),
+            "Choose another device (darb devices), or prune the scene.");
+    own_ = GpuSplats(*device_, model, false);
     styled_.reset();
     some_.reset();
     live_ = nullptr;
@@ -127,8 +109,7 @@ const GpuSplats& SplatPicture::styled(SplatStyle style) {
 const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
     if (share >= 1 || important_.empty() || !own_) return styled(style);
     if (!some_ || some_as_ != style) {
-        SplatModel model =
-            in_style(with_sh_degree(picked(*model_, important_), own_->sh_degree()), style);
+        SplatModel model = in_style(pick_splats(*model_, important_), style);
         for (size_t i = 0; i < important_.size() && !removed_.empty(); ++i)
             if (removed_[important_[i]] != 0) model.opacity[i] = kRemovedLogit;
         compiled_ = true;
@@ -151,7 +132,8 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
     options.kernel = key.kernel;
     options.footprint = key.footprint;
     options.sh_stored = key.sh_stored;
-    options.effects.antialias = key.antialias;
+    options.effects = key.effects;
+    options.crowds = key.crowds;
     options.store_for_backward = key.store;
     if (key.ellipsoids) options.alpha_cutoff = kEllipsoidCutoff;
     // What the passes of these modes read and write is laid out like this.
@@ -165,9 +147,13 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
     key.kernel = display.kernel;
     key.footprint = display.footprint;
     const bool plain = display.style == SplatStyle::splats || !own_;
-    key.sh_stored = plain ? shown_sh_degree() : 0;
+    key.sh_stored = plain ? splats()->sh_degree() : 0;
     key.accuracy = moving ? preset_accuracy(kFast) : display.accuracy;
-    key.antialias = display.antialias && display.style == SplatStyle::splats;
+    key.accuracy.choice[kRenderScale] = 0;  // of the camera
+    key.effects = display.effects;
+    key.effects.off_centre |= display.effects.lens;
+    key.effects.antialias &= display.style == SplatStyle::splats;
+    key.crowds = display.crowds;
     key.store = display.mode == VIEW_COUNT;
     key.depth = display.mode == VIEW_DEPTH;
     key.ellipsoids = display.style == SplatStyle::ellipsoids && own_;
@@ -218,40 +204,39 @@ std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const Display
     return pass_times_;
 }
 
-void SplatPicture::render(const Camera& camera, const DisplaySettings& display,
+void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
                           const PhotoOverlay& photo, std::optional<double> moving) {
     compiled_ = false;
     const GpuSplats& shown = moving ? some_styled(display.style, *moving) : styled(display.style);
     Forward& forward = forward_for(shown, display, moving.has_value());
-    const gpu::CameraData data = camera_data(camera, shown.origin(), display.near_plane);
+    Camera camera = seen;
+    if (!display.effects.lens) camera.lens = {};
+    const bool is_halved =
+        display.accuracy.value(kRenderScale) < 1 && display.mode != VIEW_COUNT && !moving;
+    const Camera rendered = is_halved ? halved(camera) : camera;
+    compiled_ |= is_halved && !upsample_;
+    if (is_halved && !upsample_) upsample_.emplace(*device_);
+    const gpu::CameraData data = camera_data(rendered, shown.origin(), display.near_plane);
     const Buffer cameras = upload_cameras(*device_, {data});
     const int degree = std::min(display.sh_degree, shown.sh_degree());
     forward.before_blend = nullptr;
     glm::vec3 background = display.background;
     if (display.mode == VIEW_DEPTH) {
         background = glm::vec3(0.0f);
-        const double depth =
-            glm::dot(glm::transpose(camera.rotation)[2], bounds_.centre - camera.centre());
-        const gpu::DepthLightArgs args{
-            shown.count(), static_cast<float>(std::max(0.0, depth - 1.5 * bounds_.radius)),
-            static_cast<float>(std::max(depth, 0.0) + 1.5 * bounds_.radius)};
-        forward.before_blend = [this, args, &forward](Commands& commands) {
-            if (args.splat_count == 0) return;
-            commands.pass("depth colours");
-            const Groups g = groups_for(args.splat_count);
-            commands.dispatch(depth_light_, args, {forward.splat_bound(), forward.splat_light()},
-                              g.x, g.y);
-        };
+        forward.before_blend = depth_colours(forward, camera, shown.count());
     }
     const std::uint64_t bytes = std::uint64_t(camera.width) * camera.height * 4;
     if (pixels_.bytes() < bytes) pixels_ = Buffer(*device_, "pixels", bytes);
     const std::uint32_t pairs = std::max(forward.pair_capacity(),
                                          std::min(shown.count() * 2, Forward::max_pairs(*device_)));
-    forward.reserve(shown.count(), pairs, camera.width, camera.height);
+    forward.reserve(shown.count(), pairs, rendered.width, rendered.height);
     do {
         commands_.begin();
         forward.record(commands_, shown, cameras, 0, data, degree, background);
-        record_display(commands_, forward, data, display, photo);
+        const Buffer& image = is_halved
+                                  ? upsample_->record(commands_, forward.image(), rendered, camera)
+                                  : forward.image();
+        record_display(forward, image, camera, display, photo);
         commands_.submit_and_wait();
         status_ = forward.read_status();
     } while (forward.make_room(status_));
@@ -260,19 +245,35 @@ void SplatPicture::render(const Camera& camera, const DisplaySettings& display,
     height_ = camera.height;
 }
 
-void SplatPicture::record_display(Commands& commands, const Forward& forward,
-                                  const gpu::CameraData& data, const DisplaySettings& display,
-                                  const PhotoOverlay& photo) {
+std::function<void(Commands&)> SplatPicture::depth_colours(const Forward& forward,
+                                                           const Camera& camera,
+                                                           std::uint32_t splats) {
+    const double depth =
+        glm::dot(glm::transpose(camera.rotation)[2], bounds_.centre - camera.centre());
+    const gpu::DepthLightArgs args{splats,
+                                   static_cast<float>(std::max(0.0, depth - 1.5 * bounds_.radius)),
+                                   static_cast<float>(std::max(depth, 0.0) + 1.5 * bounds_.radius)};
+    return [this, args, &forward](Commands& commands) {
+        if (args.splat_count == 0) return;
+        commands.pass("depth colours");
+        const Groups g = groups_for(args.splat_count);
+        commands.dispatch(depth_light_, args, {forward.splat_bound(), forward.splat_light()}, g.x,
+                          g.y);
+    };
+}
+
+void SplatPicture::record_display(const Forward& forward, const Buffer& image, const Camera& camera,
+                                  const DisplaySettings& display, const PhotoOverlay& photo) {
     gpu::DisplayArgs args{};
-    args.width = data.width;
-    args.height = data.height;
-    args.tiles_x = data.tiles_x;
+    args.width = static_cast<std::uint32_t>(camera.width);
+    args.height = static_cast<std::uint32_t>(camera.height);
+    args.tiles_x = (args.width + TILE_SIZE - 1) / TILE_SIZE;
     args.heat_max = display.mode == VIEW_COUNT ? display.count_max : display.error_max;
     args.background_r = display.background.r;
     args.background_g = display.background.g;
     args.background_b = display.background.b;
     if (photo.photo != nullptr) {
-        args.split = static_cast<float>(photo.split * data.width);
+        args.split = static_cast<float>(photo.split * camera.width);
         args.photo_x = static_cast<float>(photo.x);
         args.photo_y = static_cast<float>(photo.y);
         args.photo_scale = static_cast<float>(photo.scale);
@@ -286,12 +287,12 @@ void SplatPicture::record_display(Commands& commands, const Forward& forward,
         pipeline = Pipeline(
             *device_, "display",
             {{"THREADS", VIEW_GROUP}, {"MODE", display.mode}, {"HAS_PHOTO", has_photo ? 1 : 0}});
-    commands.pass("display");
-    const Groups g = groups_for(std::uint64_t(data.width) * data.height, VIEW_GROUP);
-    commands.dispatch(pipeline, args,
-                      {forward.image(), has_photo ? *photo.photo : no_photo_, forward.tile_range(),
-                       forward.last_pair(), pixels_},
-                      g.x, g.y);
+    commands_.pass("display");
+    const Groups g = groups_for(std::uint64_t(args.width) * args.height, VIEW_GROUP);
+    commands_.dispatch(pipeline, args,
+                       {image, has_photo ? *photo.photo : no_photo_, forward.tile_range(),
+                        forward.last_pair(), pixels_},
+                       g.x, g.y);
 }
 
 }  // namespace darb

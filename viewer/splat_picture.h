@@ -9,6 +9,7 @@
 
 #include "engine/core/image.h"
 #include "engine/render/forward.h"
+#include "engine/render/upsample.h"
 #include "viewer/bounds.h"
 #include "viewer/display.h"
 
@@ -26,9 +27,8 @@ class SplatPicture {
   public:
     explicit SplatPicture(Device& device);
 
-    /// Uploads a scene; the model must stay where it is as long as it is shown. Where a device's
-    /// buffers cannot hold all view-dependent colour, higher degrees are left out: see
-    /// shown_sh_degree. Throws Error and keeps the scene before.
+    /// Uploads a scene; the model must stay where it is as long as it is shown. Throws Error and
+    /// keeps the scene before.
     /// important: what to draw in motion, most important first; may be none.
     void set_scene(const SplatModel& model, const Bounds& bounds,
                    std::vector<std::uint32_t> important = {});
@@ -37,7 +37,6 @@ class SplatPicture {
     void set_live(const GpuSplats& splats, const Bounds& bounds);
     void clear();
     bool empty() const { return splats() == nullptr; }
-    int shown_sh_degree() const { return splats() ? splats()->sh_degree() : 0; }
     const Bounds& bounds() const { return bounds_; }
     std::uint32_t splat_count() const { return splats() ? splats()->count() : 0; }
 
@@ -72,14 +71,18 @@ class SplatPicture {
     const GpuSplats& styled(SplatStyle style);
     const GpuSplats& some_styled(SplatStyle style, double share);
     Forward& forward_for(const GpuSplats& splats, const DisplaySettings& display, bool moving);
-    void record_display(Commands& commands, const Forward& forward, const gpu::CameraData& data,
+    std::function<void(Commands&)> depth_colours(const Forward& forward, const Camera& camera,
+                                                 std::uint32_t splats);
+    void record_display(const Forward& forward, const Buffer& image, const Camera& camera,
                         const DisplaySettings& display, const PhotoOverlay& photo);
 
     struct Key {  // what a Forward is built for
         int kernel = -1, sh_stored = 0;
         Footprint footprint = Footprint::psi;
         Accuracy accuracy;
-        bool antialias = false, ellipsoids = false, store = false, depth = false;
+        ProjectionEffects effects;
+        Crowds crowds = Crowds::by_counters;
+        bool ellipsoids = false, store = false, depth = false;
         bool operator==(const Key&) const = default;
     };
     Key key_for(const DisplaySettings& display, bool moving) const;
@@ -88,6 +91,7 @@ class SplatPicture {
     Device* device_;
     Commands commands_;
     Pipeline depth_light_;
+    std::optional<Upsample> upsample_;  // made where a picture is rendered at half the size
     std::map<int, Pipeline> display_pipelines_;  // by mode * 2 + whether there is a photo
     const SplatModel* model_ = nullptr;
     const GpuSplats* live_ = nullptr;

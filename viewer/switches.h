@@ -1,25 +1,34 @@
-// The switches whose time and error the viewer measures: accuracy settings and effects, as rows of
-// one table, each with its choices.
+// The switches whose time and error the viewer measures: presets, accuracy settings and effects, as
+// rows of one table, each with its choices.
 #pragma once
 
 #include <array>
 #include <string>
 #include <vector>
 
+#include "shaders/shared/effect_list.h"
 #include "viewer/display.h"
 
 namespace darb {
 
-/// A row is an AccuracySettingId, where footprint and SH degree are those of DisplaySettings, or:
-inline constexpr int kAntialiasRow = kAccuracyCount;
+/// A row is an AccuracySettingId, an effect of effect_row(), or all settings at once:
+inline constexpr int effect_row(int effect) {
+    return kAccuracyCount + effect;
+}
+inline constexpr int kPresetRow = kAccuracyCount + EFFECT_COUNT;
 
-inline constexpr std::array<int, 5> kAccuracyRows = {kEvaluation, kAlphaCutoff, kTransmittanceStop,
-                                                     kStorage, kDepthOrder};
-inline constexpr std::array<int, 3> kEffectRows = {kFootprint, kShDegree, kAntialiasRow};
+inline constexpr std::array kAccuracyRows = {
+    kPresetRow,    int{kEvaluation}, int{kFootprint},  int{kAlphaCutoff}, int{kTransmittanceStop},
+    int{kStorage}, int{kDepthOrder}, int{kRenderScale}};
+/// The effects of a view; of the others the plan has a reason alone.
+inline constexpr std::array kEffectRows = {
+    effect_row(EFFECT_VIEW_COLOUR), effect_row(EFFECT_ANTIALIAS), effect_row(EFFECT_OFF_CENTRE),
+    effect_row(EFFECT_LENS),        effect_row(EFFECT_HUGE),      effect_row(EFFECT_NEAR)};
 
 std::string row_name(int row);
 /// sh_degree: highest of the scene.
 std::vector<std::string> row_choices(int row, int sh_degree);
+/// -1: none of them, where single settings differ from every preset.
 int chosen(int row, const DisplaySettings& display);
 void choose(int row, int choice, DisplaySettings& display);
 

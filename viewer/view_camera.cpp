@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "engine/scene/edit_splats.h"
+
 namespace darb {
 
 namespace {
@@ -25,26 +27,13 @@ Camera fitted(const Camera& camera, int width, int height) {
     return c;
 }
 
-Camera resized(const Camera& camera, int width, int height) {
-    const double sx = double(width) / camera.width, sy = double(height) / camera.height;
-    Camera c = camera;
-    c.fx *= sx;
-    c.cx *= sx;
-    c.fy *= sy;
-    c.cy *= sy;
-    c.width = width;
-    c.height = height;
-    return c;
-}
-
 std::optional<glm::dvec3> pick(const SplatModel& m, const std::vector<std::uint8_t>& removed,
                                const Camera& camera, double x, double y) {
     std::optional<glm::dvec3> best;
     double best_depth = 0;
     for (size_t i = 0; i < m.size(); ++i) {
         if ((!removed.empty() && removed[i] != 0) || m.opacity[i] < kPickLogit) continue;
-        const glm::dvec3 world =
-            m.origin + glm::dvec3(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
+        const glm::dvec3 world = position_of(m, i);
         const glm::dvec3 p = camera.rotation * world + camera.translation;
         if (p.z <= 0 || (best && p.z >= best_depth)) continue;
         const double dx = camera.fx * p.x / p.z + camera.cx - x;

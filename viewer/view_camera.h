@@ -1,5 +1,4 @@
-// Cameras for a window: a photo's camera fitted into it, a camera at another resolution, and which
-// splat is under the pointer.
+// Cameras for a window: a photo's camera fitted into it, and which splat is under the pointer.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +14,6 @@ namespace darb {
 double fit_scale(const Camera& camera, int width, int height);
 /// The photo's camera with its frame centred in the window; what lies beyond it is shown too.
 Camera fitted(const Camera& camera, int width, int height);
-/// The same view at another size.
-Camera resized(const Camera& camera, int width, int height);
 
 /// The nearest of the splats whose mean projects within 8 px of the pointer and that are neither
 /// deleted nor nearly transparent; its mean in the world.

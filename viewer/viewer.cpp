@@ -14,6 +14,7 @@ namespace darb {
 namespace {
 
 constexpr double kRest_s = 0.12;  // without change, before the picture is refined
+constexpr double kLong_ms = 500;  // for a whole picture
 constexpr double kStep_s = 1.0 / 60;
 constexpr size_t kTimesKept = 60;  // frames in motion that the panel averages over
 constexpr int kRehearsals = 8;     // of motion, after the one that compiles
@@ -55,116 +56,16 @@ Viewer::Viewer(Device& device, ViewerOptions options, GLFWwindow* window)
       gui_(device, canvas_.render_pass(), options_.gui_scale > 0 ? options_.gui_scale : 1, window),
       picture_(device) {
     session_.photos.views = options_.views;
-    session_.navigation.up = start_up(options_);
+    session_.navigation.set_up(start_up(options_));
     session_.device_name = device.info().name;
+    session_.display.accuracy = options_.accuracy;
+    // Of each scene that is opened, see show_as_meant.
+    session_.display.accuracy.choice[kFootprint] = session_.display.accuracy.choice[kShDegree] = 0;
     session_.gui_scale = options_.gui_scale > 0 ? options_.gui_scale : 1;
     last_frame_ = changed_at_ = Clock::now();
 }
 
 Viewer::~Viewer() = default;
-
-void Viewer::open(const std::filesystem::path& path) {
-    try {
-        const std::filesystem::path file = options_.resolve ? options_.resolve(path) : path;
-        if (job_) {
-            job_->cancel();
-            cancelled_.push_back(std::move(job_));
-        }
-        session_.error.clear();
-        job_ = std::make_unique<LoadJob>(file, options_.wake);
-    } catch (const std::exception& e) {
-        report(e);
-    }
-}
-
-void Viewer::finish_loading() {
-    if (!job_) {
-        if (!session_.error.empty()) throw Error("darb view", session_.error);
-        return;
-    }
-    job_->wait();
-    std::optional<Scene> scene = std::exchange(job_, nullptr)->take();
-    if (scene) adopt(std::move(*scene));
-}
-
-void Viewer::report(const std::exception& error) {
-    session_.error = error.what();
-}
-
-void Viewer::poll_load() {
-    std::erase_if(cancelled_, [](const auto& job) { return job->done(); });
-    session_.load_share = job_ ? job_->share() : -1;
-    if (!job_) return;
-    session_.load_stage = fmt::format("{}: {}", job_->file().filename().string(), job_->stage());
-    if (!job_->done()) return;
-    session_.load_share = -1;
-    const std::unique_ptr<LoadJob> job = std::move(job_);
-    try {
-        if (std::optional<Scene> scene = job->take()) adopt(std::move(*scene));
-    } catch (const std::exception& e) {
-        report(e);
-    }
-}
-
-// The device's copy first: when that fails, the scene before is still there.
-void Viewer::adopt(Scene loaded) {
-    auto scene = std::make_unique<Scene>(std::move(loaded));
-    picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
-    motion_.start(picture_.splat_count(), picture_.most_moving());
-    const bool first = session_.scene == nullptr;
-    session_.scene = std::move(scene);
-    const Scene& s = *session_.scene;
-    session_.shown_sh_degree = picture_.shown_sh_degree();
-    session_.edit = Edit(s.model.size());
-    session_.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
-    session_.save_file = s.file;
-    session_.save_file.replace_filename(s.file.stem().string() + "_edited.ply");
-    session_.fly_speed = s.bounds.radius / 2;
-    DisplaySettings& d = session_.display;
-    d.kernel = s.model.kernel;
-    d.footprint = s.model.footprint;
-    d.antialias = s.model.antialias;
-    d.sh_degree = session_.shown_sh_degree;
-    session_.own = d;
-    session_.measured.clear();
-    d.near_plane =
-        std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(s.bounds.radius * 0.1));
-    session_.note = fmt::format("{}: {} splats in {:.2f} s", s.file.filename().string(),
-                                s.model.size(), s.load_s);
-    fmt::print("loaded {}: {} splats in {:.2f} s\n", s.file.string(), s.model.size(), s.load_s);
-    std::fflush(stdout);
-    ++version_;
-    if (first) session_.navigation.level();
-    if (session_.photos.current < 0) session_.requests.frame_all = true;
-    session_.navigation.distance =
-        std::max(glm::distance(session_.navigation.eye, s.bounds.centre), s.bounds.radius * 0.1);
-}
-
-void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
-    const bool first = !session_.training.live;
-    if (first) picture_.set_live(splats, bounds);
-    session_.training.live = true;
-    ++version_;
-    if (first || session_.display.sh_degree == session_.shown_sh_degree)
-        session_.display.sh_degree = splats.sh_degree();  // grows with the training
-    session_.shown_sh_degree = splats.sh_degree();
-    session_.own.sh_degree = splats.sh_degree();
-    if (!first) return;
-    motion_.start(splats.count(), 1);
-    session_.display.kernel = splats.kernel();
-    session_.display.footprint = splats.footprint();
-    session_.display.antialias = splats.antialias();
-    session_.own = session_.display;
-    session_.fly_speed = bounds.radius / 2;
-    session_.requests.frame_all = session_.photos.current < 0;
-    session_.navigation.distance =
-        std::max(glm::distance(session_.navigation.eye, bounds.centre), bounds.radius * 0.1);
-}
-
-void Viewer::end_live() {
-    picture_.clear();
-    session_.training.finished = true;
-}
 
 void Viewer::choose_camera(int n) {
     const int count = static_cast<int>(session_.photos.views.size());
@@ -312,12 +213,11 @@ void Viewer::play_path(double seconds) {
     PathState& p = session_.path;
     if (!p.playing) return;
     p.at_s += seconds;
-    if (p.at_s > p.path.duration()) {
-        p.at_s = 0;
-        p.playing = false;
-    }
     leave_photo();
     apply(p.path.sample(p.at_s), session_.navigation);
+    if (p.at_s < p.path.duration()) return;
+    p.at_s = 0;
+    p.playing = false;
 }
 
 Camera Viewer::frame_camera(int width, int height) const {
@@ -339,20 +239,21 @@ PhotoOverlay Viewer::overlay(const Camera& camera, int width, int height) const 
     o.width = p.width;
     o.height = p.height;
     o.split = p.compare ? p.split : 0;
-    (void)height;
     return o;
 }
 
-void Viewer::draw_picture(const PictureKey& key, bool moving) {
+// less: a picture that is replaced soon.
+void Viewer::draw_picture(const PictureKey& key, std::optional<MotionQuality> less) {
     const auto start = Clock::now();
-    const MotionQuality quality = moving ? motion_.quality() : MotionQuality();
+    const MotionQuality quality = less.value_or(MotionQuality());
     const Camera camera = scaled(key.camera, quality.scale);
     drawn_ = key;
     drawn_any_ = true;
-    drawn_moving_ = moving;
+    drawn_moving_ = less.has_value();
+    drawn_preview_ = less && quality.scale == 1;
     try {
         picture_.render(camera, key.display, overlay(camera, key.camera.width, key.camera.height),
-                        moving ? std::optional(quality.splats) : std::nullopt);
+                        less ? std::optional(quality.splats) : std::nullopt);
     } catch (const std::exception& e) {
         report(e);
         drawn_moving_ = false;  // not again before something changes
@@ -361,10 +262,12 @@ void Viewer::draw_picture(const PictureKey& key, bool moving) {
     FrameTimes& t = session_.times;
     t.passes = picture_.pass_times();
     t.picture_ms = milliseconds_since(start);
-    if (!moving) t.full_ms = t.picture_ms;
+    if (!less) t.full_ms = t.picture_ms;
     t.quality = quality;
     t.visible = picture_.status().visible;
     t.pairs = picture_.status().pairs;
+    if (session_.plan && !less)
+        session_.plan->note_frame(picture_.status().huge_splats, picture_.status().longest_list);
 }
 
 // Once after what a picture needs has changed: pipelines compile at their first use, and the first
@@ -384,6 +287,16 @@ void Viewer::rehearse_motion(const PictureKey& key) {
     } catch (const std::exception& e) {
         report(e);
     }
+}
+
+// Where the whole picture takes long.
+bool Viewer::preview_pays() const {
+    return session_.times.full_ms > kLong_ms && picture_.most_moving() < 1 &&
+           picture_.ready_to_move(session_.display);
+}
+
+bool Viewer::refined() const {
+    return drawn_any_ && last_ == drawn_ && (!drawn_moving_ || drawn_preview_);
 }
 
 bool Viewer::at_rest() const {
@@ -411,7 +324,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
 
     drew_moving_ = false;
     bool drew = false;
-    if (picture_.empty()) return export_ || session_.path.playing ? 0 : kForever;
+    if (picture_.empty()) return export_ || session_.path.playing ? 0 : settle_panels(false);
     PictureKey key{frame_camera(width, height), session_.display, session_.photos.current,
                    session_.photos.compare ? session_.photos.split : 0.0f, version_};
     last_.version = key.version;  // an edit or a training step is no motion
@@ -419,13 +332,19 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     last_ = key;
     const double rests = std::chrono::duration<double>(frame_start_ - changed_at_).count();
     const bool refine = full || rests >= kRest_s || !drawn_any_;
-    if (!(key == drawn_) && !refine) {
+    const bool whole = drawn_any_ && key == drawn_ && !drawn_moving_;
+    if (export_ || measure_) {
+        // Their pictures are shown as they come.
+    } else if (!(key == drawn_) && !refine) {
         drew_moving_ = true;
-        draw_picture(key, true);
-    } else if (full || (refine && (!(key == drawn_) || drawn_moving_))) {
-        draw_picture(key, false);
+        draw_picture(key, motion_.quality());
+    } else if (refine && !whole && !full && !refined() && preview_pays()) {
+        draw_picture(key, MotionQuality{1, picture_.most_moving()});
         drew = true;
-    } else if (!drawn_moving_ && session_.error.empty() &&
+    } else if (refine && !whole) {
+        draw_picture(key);
+        drew = true;
+    } else if (whole && !full && session_.error.empty() &&
                !picture_.ready_to_move(session_.display)) {
         rehearse_motion(key);
     }
@@ -434,7 +353,19 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     continuous_ = held || session_.path.playing || export_ || measure_;
     if (continuous_) return 0;
     if (drawn_moving_ && session_.error.empty()) return std::max(0.001, kRest_s - rests);
-    return drew ? 0 : kForever;  // once more, so that the panels show this picture's times
+    return settle_panels(drew);
+}
+
+double Viewer::settle_panels(bool changed) {
+    unsettled_ = changed ? kSettlingFrames : std::max(unsettled_ - 1, 0);
+    return unsettled_ > 0 ? 0 : kForever;
+}
+
+void Viewer::settle(int width, int height) {
+    frame({}, width, height, true);
+    drawn_any_ = false;  // the times are those of a second picture: the first may have compiled
+    do frame({}, width, height, true);
+    while (unsettled_ > 0);
 }
 
 void Viewer::presented() {
@@ -450,9 +381,7 @@ VkCommandBuffer Viewer::compose() {
     const VkCommandBuffer commands = canvas_.begin_commands();
     const glm::vec3& b = session_.display.background;
     const float clear[3] = {b.r, b.g, b.b};
-    const bool fits = picture_.width() <= canvas_.width() && picture_.height() <= canvas_.height();
-    const bool shown = !picture_.empty() && fits;
-    canvas_.compose(commands, shown ? &picture_.pixels() : nullptr, picture_.width(),
+    canvas_.compose(commands, picture_.empty() ? nullptr : &picture_.pixels(), picture_.width(),
                     picture_.height(), clear, [this](VkCommandBuffer c) { gui_.draw(c); });
     return commands;
 }

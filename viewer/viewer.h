@@ -22,6 +22,8 @@ struct ViewerOptions {
     std::vector<View> views;  // cameras of a data set, may be none
     std::string up;           // x, -x, ...; "" = from the cameras, else -y
     float gui_scale = 0;      // size of the panels; 0: as the display wants it
+    Accuracy accuracy;        // to start with
+    EffectChoice effects;     // on top of what a scene calls for
     /// The file that a path means (an output folder names its last scene). Throws Error.
     std::function<std::filesystem::path(const std::filesystem::path&)> resolve;
     /// Called from other threads when there is something to show.
@@ -49,9 +51,11 @@ class Viewer {
     void choose_camera(int n);
 
     /// One frame: input, panels, the picture where something changed, all of it into the canvas.
-    /// full: draws anew at full resolution in any case. Returns seconds until the next frame is
-    /// wanted: 0 at once, infinity when nothing happens by itself.
+    /// full: the whole picture at once, no coarse one in motion. Returns seconds until the next
+    /// frame is wanted: 0 at once, infinity when nothing happens by itself.
     double frame(const Input& input, int width, int height, bool full);
+    /// Full frames until the panels, too, have found their size and show the picture's times.
+    void settle(int width, int height);
     /// The canvas was shown: the whole frame's time is known.
     void presented();
 
@@ -65,9 +69,13 @@ class Viewer {
     void export_path_now();
     /// The picture is whole, and one in motion would have nothing to wait for.
     bool at_rest() const;
+    /// It has all pixels, and the most important splats at least.
+    bool refined() const;
 
   private:
     using Clock = std::chrono::steady_clock;
+    /// The panels show a picture's times in the next frame, and have their size in the one after.
+    static constexpr int kSettlingFrames = 2;
     struct PictureKey {  // what a picture depends on
         Camera camera;
         DisplaySettings display;
@@ -79,6 +87,8 @@ class Viewer {
 
     void poll_load();
     void adopt(Scene scene);
+    void show_as_meant(const Scene& scene, bool first);
+    void follow_plan();
     void handle_keys(const Input& input);
     void move(const Input& input, double seconds, int width, int height);
     void leave_photo();
@@ -87,8 +97,10 @@ class Viewer {
     void play_path(double seconds);
     Camera frame_camera(int width, int height) const;
     PhotoOverlay overlay(const Camera& camera, int width, int height) const;
-    void draw_picture(const PictureKey& key, bool moving);
+    void draw_picture(const PictureKey& key, std::optional<MotionQuality> less = {});
+    bool preview_pays() const;
     void rehearse_motion(const PictureKey& key);
+    double settle_panels(bool changed);
     void step_export();
     void step_measure(int width, int height);
     void report(const std::exception& error);
@@ -105,10 +117,12 @@ class Viewer {
     std::optional<PathExport> export_;
     std::optional<AccuracyMeasure> measure_;
     PictureKey drawn_, last_;
-    bool drawn_any_ = false, drawn_moving_ = false;  // what the picture now is
-    int version_ = 0;                                // of the scene and its edits
-    bool drew_moving_ = false;                       // in this frame
-    bool continuous_ = false;                        // the last frame wanted this one at once
+    // What the picture now is; a preview has all pixels and the most important splats.
+    bool drawn_any_ = false, drawn_moving_ = false, drawn_preview_ = false;
+    int version_ = 0;                  // of the scene and its edits
+    bool drew_moving_ = false;         // in this frame
+    bool continuous_ = false;          // the last frame wanted this one at once
+    int unsettled_ = kSettlingFrames;  // frames until the panels have settled
     Clock::time_point frame_start_, changed_at_, last_frame_;
 };
 

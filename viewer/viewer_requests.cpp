@@ -90,6 +90,7 @@ void Viewer::act_on_requests(int width, int height) {
         if (r.export_path) export_.emplace(s.path.path, s.path.folder, s.path.fps);
         if (r.cancel_export) export_.reset();
         if (export_) step_export();
+        if (r.follow_plan && s.plan) follow_plan();
         if (r.measure && !picture_.empty()) measure_.emplace(s.display, s.own);
         if (r.cancel_export) measure_.reset();
         if (measure_) step_measure(width, height);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/core/error.h"
+#include "engine/scene/edit_splats.h"
 #include "shaders/shared/render_args.h"
 
 namespace darb {
@@ -76,18 +77,8 @@ void EffectPlan::note_frame(std::uint32_t huge_splats, std::uint32_t longest_lis
 }
 
 void apply_plan(const EffectPlan& plan, SplatModel& model) {
-    if (!plan.on(EFFECT_ANTIALIAS)) model.antialias = false;
-    const int degree = plan.row(EFFECT_VIEW_COLOUR).degree;
-    if (degree >= model.sh_degree) return;
-    SplatModel low = model;
-    low.sh_degree = degree;
-    const auto stride = static_cast<std::size_t>(low.rest_count());
-    const auto stored = static_cast<std::size_t>(model.rest_count());
-    low.sh_rest.assign(model.size() * stride, 0.0f);
-    for (std::size_t i = 0; i < model.size(); ++i)
-        std::copy_n(model.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * stored), stride,
-                    low.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * stride));
-    model = std::move(low);
+    model.antialias = plan.on(EFFECT_ANTIALIAS);
+    limit_sh_degree(plan.row(EFFECT_VIEW_COLOUR).degree, model);
 }
 
 void apply_plan(const EffectPlan& plan, std::vector<View>& views) {

@@ -65,6 +65,7 @@ EffectChoice parse_effects(std::string_view text);
 struct RenderOutputs {
     bool depth = false;
     float near_plane = static_cast<float>(NEAR_DEFAULT);
+    bool free_camera = false;  // a viewer's, beside the views: near-plane care is called for
 };
 
 /// For pictures of a scene through these cameras (none: only what the file decides, and care for
@@ -79,7 +80,7 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
 EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& photos, int sh_degree,
                          const EffectChoice& choice = {});
 
-/// The model as the plan wants it: higher bands and the render mode dropped.
+/// The model as the plan wants it: higher bands dropped, the render mode as planned.
 void apply_plan(const EffectPlan& plan, SplatModel& model);
 /// The cameras as the plan wants them: pinholes where lenses are off.
 void apply_plan(const EffectPlan& plan, std::vector<View>& views);

@@ -95,10 +95,11 @@ EffectRow lens_rule(const std::vector<View>& views) {
     row.on = lenses > 0;
     row.measured = static_cast<double>(lenses);
     row.reason =
-        row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),
-                             too_wide)
-               : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
-                             distorted, views.size(), too_wide);
+        views.empty() ? "no cameras are named"
+        : row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),
+                               too_wide)
+                 : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
+                               distorted, views.size(), too_wide);
     return row;
 }
 
@@ -294,7 +295,10 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
     plan.row(EFFECT_DEPTH) = {outputs.depth, false, 0, outputs.depth ? 1.0 : 0.0,
                               outputs.depth ? "depth was asked for" : "no output asks for it"};
     plan.row(EFFECT_HUGE) = huge_rule();
-    plan.row(EFFECT_NEAR) = near_rule(model, views, outputs.near_plane);
+    if (outputs.free_camera)
+        plan.row(EFFECT_NEAR) = {true, false, 0, 0, "the camera moves, a splat may lie beside it"};
+    else
+        plan.row(EFFECT_NEAR) = near_rule(model, views, outputs.near_plane);
     override_rows(choice, plan, model.sh_degree,
                   {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH});
     return plan;

@@ -22,6 +22,8 @@ struct ProjectionEffects {
     bool smoothing = false;  // the 3D filter of GpuSplats::smoothing()
     bool lens = false;       // Camera::lens; needs off_centre
     bool near_care = true;   // false: no splat beside a picture reaches into it
+
+    bool operator==(const ProjectionEffects&) const = default;
 };
 
 inline void add_constants(const ProjectionEffects& effects, SpecConstants& constants) {

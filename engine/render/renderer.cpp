@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "engine/core/check.h"
-#include "engine/render/groups.h"
 
 namespace darb {
 
@@ -30,18 +29,6 @@ FrameAccuracy frame_of(const SplatModel& model, ForwardOptions options) {
 
 }  // namespace
 
-Camera halved(const Camera& camera) {
-    Camera small = camera;
-    small.width = (camera.width + 1) / 2;
-    small.height = (camera.height + 1) / 2;
-    const double x = double(small.width) / camera.width, y = double(small.height) / camera.height;
-    small.fx *= x;
-    small.cx *= x;
-    small.fy *= y;
-    small.cy *= y;
-    return small;
-}
-
 ImageF planes_to_image(const std::vector<float>& planes, int width, int height) {
     ImageF image(width, height, 3);
     const size_t plane = size_t(width) * height;
@@ -63,20 +50,7 @@ Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy&
       splats_(device, model, false),
       forward_(device, accuracy_.options),
       commands_(device) {
-    if (accuracy_.halved) upsample_ = Pipeline(device, "upsample", {{"THREADS", SPLAT_GROUP}});
-}
-
-const Buffer& Renderer::record_upsample(const Camera& rendered, const Camera& shown) {
-    const std::uint64_t pixels = std::uint64_t(shown.width) * shown.height;
-    if (!upsampled_ || upsampled_.bytes() < pixels * 12)
-        upsampled_ = Buffer(*device_, "upsampled image", pixels * 12);
-    const gpu::UpsampleArgs args{
-        static_cast<std::uint32_t>(rendered.width), static_cast<std::uint32_t>(rendered.height),
-        static_cast<std::uint32_t>(shown.width), static_cast<std::uint32_t>(shown.height)};
-    const Groups g = groups_for(pixels);
-    commands_.pass("upsample");
-    commands_.dispatch(upsample_, args, {forward_.image(), upsampled_}, g.x, g.y);
-    return upsampled_;
+    if (accuracy_.halved) upsample_.emplace(device);
 }
 
 ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int sh_degree,
@@ -94,7 +68,8 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
     for (;;) {
         commands_.begin();
         forward_.record(commands_, splats_, cameras, 0, data, degree, background);
-        image = accuracy_.halved ? &record_upsample(rendered, camera) : &forward_.image();
+        image = upsample_ ? &upsample_->record(commands_, forward_.image(), rendered, camera)
+                          : &forward_.image();
         commands_.submit_and_wait();
         status_ = forward_.read_status();
         if (!forward_.make_room(status_)) break;

@@ -1,9 +1,12 @@
 // Renderer: one model on one device, pictures of it for any camera, at a chosen accuracy.
 #pragma once
 
+#include <optional>
+
 #include "engine/core/image.h"
 #include "engine/render/accuracy.h"
 #include "engine/render/forward.h"
+#include "engine/render/upsample.h"
 
 namespace darb {
 
@@ -33,22 +36,17 @@ class Renderer {
 
   private:
     Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy);
-    const Buffer& record_upsample(const Camera& rendered, const Camera& shown);
 
     Device* device_;
     FrameAccuracy accuracy_;
     GpuSplats splats_;
     Forward forward_;
-    Pipeline upsample_;  // where the resolution is halved
-    Buffer upsampled_;   // float [3][H][W]
+    std::optional<Upsample> upsample_;  // where the resolution is halved
     Commands commands_;
     gpu::FrameStatus status_{};
     gpu::CameraData camera_{};  // of the last render
     std::vector<PassTime> pass_times_;
 };
-
-/// The same view with half the pixels each way, rounded up.
-Camera halved(const Camera& camera);
 
 /// float [3][H][W] planes to an interleaved image.
 ImageF planes_to_image(const std::vector<float>& planes, int width, int height);

@@ -32,9 +32,22 @@ void turn_rotations(const glm::dmat3& turn, std::vector<float>& rotation) {
     }
 }
 
-void move_row(std::vector<float>& values, std::size_t from, std::size_t to, std::size_t width) {
-    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(from * width), width,
-                values.begin() + static_cast<std::ptrdiff_t>(to * width));
+// Row i of `to` becomes row splats[i] of `from`; the same array where splats ascend.
+void gather_rows(const std::vector<float>& from, const std::vector<std::uint32_t>& splats,
+                 std::size_t width, std::vector<float>& to) {
+    for (std::size_t i = 0; i < splats.size(); ++i)
+        if (&from != &to || splats[i] != i)
+            std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(splats[i] * width), width,
+                        to.begin() + static_cast<std::ptrdiff_t>(i * width));
+}
+
+void gather(const SplatModel& from, const std::vector<std::uint32_t>& splats, SplatModel& to) {
+    gather_rows(from.position, splats, 3, to.position);
+    gather_rows(from.log_scale, splats, 3, to.log_scale);
+    gather_rows(from.rotation, splats, 4, to.rotation);
+    gather_rows(from.opacity, splats, 1, to.opacity);
+    gather_rows(from.sh_dc, splats, 3, to.sh_dc);
+    gather_rows(from.sh_rest, splats, static_cast<std::size_t>(from.rest_count()), to.sh_rest);
 }
 
 bool row_is_finite(const std::vector<float>& values, std::size_t row, std::size_t width) {
@@ -83,23 +96,26 @@ glm::dvec3 position_of(const SplatModel& model, std::size_t splat) {
     return model.origin + glm::dvec3(p[0], p[1], p[2]);
 }
 
+SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>& splats) {
+    SplatModel out;
+    out.sh_degree = model.sh_degree;
+    out.kernel = model.kernel;
+    out.footprint = model.footprint;
+    out.antialias = model.antialias;
+    out.origin = model.origin;
+    out.resize(splats.size());
+    gather(model, splats, out);
+    return out;
+}
+
 std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model) {
-    const auto rest = static_cast<std::size_t>(model.rest_count());
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < model.size(); ++i) {
-        if (!keep(i)) continue;
-        if (kept != i) {
-            move_row(model.position, i, kept, 3);
-            move_row(model.log_scale, i, kept, 3);
-            move_row(model.rotation, i, kept, 4);
-            move_row(model.opacity, i, kept, 1);
-            move_row(model.sh_dc, i, kept, 3);
-            move_row(model.sh_rest, i, kept, rest);
-        }
-        ++kept;
-    }
-    const std::size_t gone = model.size() - kept;
-    model.resize(kept);
+    std::vector<std::uint32_t> kept;
+    for (std::size_t i = 0; i < model.size(); ++i)
+        if (keep(i)) kept.push_back(static_cast<std::uint32_t>(i));
+    const std::size_t gone = model.size() - kept.size();
+    if (gone == 0) return 0;
+    gather(model, kept, model);
+    model.resize(kept.size());
     return gone;
 }
 

@@ -1,8 +1,9 @@
 // Changes to a whole scene: similarities with their effect on rotations and harmonics, and choices
-// of splats. All keep the order of the splats that stay.
+// of splats; those that drop some keep the order of the others.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
 #include <vector>
@@ -28,6 +29,8 @@ void set_positions(const std::vector<double>& positions, SplatModel& model);
 /// World position of a splat.
 glm::dvec3 position_of(const SplatModel& model, std::size_t splat);
 
+/// These splats in this order; kernel, footprint and all else that is not per splat stays.
+SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>& splats);
 /// Keeps the splats for which keep(i) is true; returns the count of those that went.
 std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model);
 /// Drops splats with a NaN or infinite parameter.

@@ -67,13 +67,28 @@ TEST_F(WindowTest, Window_shows_the_headless_screenshot_and_closes_with_0_slow) 
     EXPECT_EQ(program_->wait(), 0) << log("view.log");
 }
 
+TEST_F(WindowTest, Accuracy_and_effects_of_the_command_line_show_in_the_screenshot) {
+    const fs::path scene = folder_ / "scene.ply";
+    const ImageU8 less = headless(scene, {"--accuracy", "fast", "--effects", "none"});
+    EXPECT_GT(largest_difference(less, headless()), 3);
+    Process wrong(command(scene, {"--effects", "fog"}), folder_ / "wrong.log");
+    EXPECT_EQ(wrong.wait(), 2);
+    EXPECT_NE(log("wrong.log").find("'fog' is no effect"), std::string::npos) << log("wrong.log");
+}
+
 TEST_F(WindowTest, Mouse_and_keys_move_the_camera_slow) {
     const ImageU8 wanted = headless();
     start();
     ASSERT_TRUE(shows(wanted));
     xdo({"mousemove", "300", "200", "mousedown", "1", "mousemove", "360", "220", "mouseup", "1"});
     EXPECT_TRUE(changes_from(wanted, 20)) << "orbit";
+    const ImageU8 orbited = settled();
+    xdo({"key", "k", "mousedown", "2", "mousemove", "310", "200", "mouseup", "2"});
+    EXPECT_TRUE(changes_from(orbited, 20)) << "pan";
     const ImageU8 turned = settled();
+    xdo({"key", "k", "key", "space"});
+    EXPECT_TRUE(changes_from(turned, 20)) << "path";
+    EXPECT_TRUE(shows(turned)) << "the end of the path";
     xdo({"keydown", "w", "sleep", "0.3", "keyup", "w"});
     EXPECT_TRUE(changes_from(turned, 20)) << "fly";
     const ImageU8 flown = settled();
@@ -135,8 +150,9 @@ TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_slow) {
                                    "property float y\nproperty float z\nproperty uchar red\n"
                                    "property uchar green\nproperty uchar blue\nend_header\n"
                                    "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0.5 0 0 255\n";
-    if (const auto data = test_data_folder())
-        files.push_back(*data / "splats" / "Unicorn_Stuffy_cleaned.sog");
+    if (const auto data = test_data_folder())  // a zip and a folder
+        for (const char* name : {"Unicorn_Stuffy_cleaned.sog", "playbot_sog"})
+            files.push_back(*data / "splats" / name);
     const fs::path bad = folder_ / "bad name.ply";
     std::ofstream(bad) << "ply\nformat binary_little_endian 1.0\nelement vertex 5\nend_header\n";
     start();

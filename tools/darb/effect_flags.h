@@ -1,4 +1,4 @@
-// --effects and what goes with it, for train, render, eval and plan.
+// --effects and what goes with it, for train, render, view, eval and plan.
 #pragma once
 
 #include <CLI/CLI.hpp>

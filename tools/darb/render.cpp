@@ -43,13 +43,7 @@ void scale_camera(Camera& camera, int resolution) {
     const double scale = resolution <= 8 ? 1.0 / resolution : double(resolution) / camera.width;
     const int width = std::max(1, static_cast<int>(std::lround(camera.width * scale)));
     const int height = std::max(1, static_cast<int>(std::lround(camera.height * scale)));
-    const double sx = double(width) / camera.width, sy = double(height) / camera.height;
-    camera.fx *= sx;
-    camera.fy *= sy;
-    camera.cx *= sx;
-    camera.cy *= sy;
-    camera.width = width;
-    camera.height = height;
+    camera = resized(camera, width, height);
 }
 
 double median(std::vector<double> values) {

@@ -22,14 +22,11 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     device_options.select = flags.device;
     Device device(device_options);
     Viewer viewer(device, options);
+    apply_flags(viewer, flags, size);
     if (!flags.scene.empty()) viewer.open(flags.scene);
     viewer.finish_loading();
-    apply_flags(viewer, flags, size);
-    const auto draw = [&] {
-        viewer.frame({}, size.width, size.height, true);
-        if (!viewer.session().error.empty()) throw Error("darb view", viewer.session().error);
-    };
-    for (int i = 0; i < 3; ++i) draw();  // panels find their size in the first, times in the second
+    viewer.settle(size.width, size.height);
+    if (!viewer.session().error.empty()) throw Error("darb view", viewer.session().error);
     if (!flags.screenshot.empty()) {
         viewer.compose();
         viewer.canvas().submit_and_wait();
@@ -48,6 +45,8 @@ int view(const ViewFlags& flags) {
     ViewerOptions options;
     options.up = flags.up;
     options.gui_scale = flags.gui_scale;
+    options.accuracy = chosen_accuracy(flags.accuracy);
+    options.effects = parse_effects(flags.effects);
     if (!flags.up.empty()) up_from_name(flags.up);
     options.views = find_views(flags);
     options.resolve = find_scene;

@@ -5,6 +5,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
+#include "tools/darb/effect_flags.h"
 
 namespace darb {
 
@@ -23,7 +24,7 @@ PixelSize parse_size(const std::string& text) {
 }
 
 std::vector<View> find_views(const ViewFlags& flags) {
-    DatasetOptions options;
+    DatasetOptions options = flags.data;
     options.require_photos = false;
     if (!flags.cameras.empty()) return load_cameras(flags.cameras, options);
     if (flags.scene.empty()) return {};
@@ -94,6 +95,9 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     c.add_option("--gui-scale", flags.gui_scale, "size of the panels (default: the display's)")
         ->check(CLI::Range(0.5, 4.0));
     c.add_flag("-w,--white-background", flags.white_background, "white, not black");
+    add_accuracy_flags(c, flags.accuracy);
+    add_effects_flag(c, flags.effects);
+    add_lens_flag(c, flags.data);
     c.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
 }
 

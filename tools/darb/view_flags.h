@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/darb/accuracy_flags.h"
 #include "viewer/viewer.h"
 
 namespace darb {
@@ -16,6 +17,9 @@ struct ViewFlags {
     int camera = -1, fps = 30;
     float gui_scale = 0;  // of the panels; 0: the display's
     bool white_background = false, compare = false, no_panels = false;
+    AccuracyFlags accuracy;
+    std::string effects = "auto";
+    DatasetOptions data;
 };
 
 struct PixelSize {

@@ -38,12 +38,21 @@ void pump(ViewerWindow& window, double patience_s) {
     if (!error.empty()) throw Error("darb view", error);
 }
 
-// Until the picture is whole; seconds that this took.
-double rest(ViewerWindow& window) {
+struct Rest {
+    double refined_s = 0, whole_s = 0;  // until all pixels; until all splats, too
+};
+
+// Until the picture is whole.
+Rest rest(ViewerWindow& window) {
     const auto start = Clock::now();
-    do pump(window, 0.01);
-    while (!window.viewer().at_rest());
-    return seconds_since(start);
+    Rest times;
+    do {
+        pump(window, 0.01);
+        if (times.refined_s == 0 && window.viewer().refined())
+            times.refined_s = seconds_since(start);
+    } while (!window.viewer().at_rest());
+    times.whole_s = seconds_since(start);
+    return times;
 }
 
 void turn(ViewerWindow& window, double seconds) {
@@ -77,10 +86,12 @@ void write_view_times(ViewerWindow& window, const Device& device,
     }
     const double frames_per_s = double(moving_ms.size()) / seconds_since(motion);
     const MotionQuality quality = s.times.quality;
-    std::vector<double> refined_s, rest_ms;
+    std::vector<double> refined_s, whole_s, rest_ms;
     for (int i = 0; i < kRests; ++i) {
         if (i > 0) turn(window, 0.05);
-        refined_s.push_back(rest(window));
+        const Rest times = rest(window);
+        refined_s.push_back(times.refined_s);
+        whole_s.push_back(times.whole_s);
         rest_ms.push_back(s.times.full_ms);
     }
     const Canvas& canvas = window.viewer().canvas();
@@ -105,7 +116,9 @@ void write_view_times(ViewerWindow& window, const Device& device,
                                           {{"median_ms", quantile(rest_ms, 0.5)},
                                            {"worst_ms", quantile(rest_ms, 1)},
                                            {"refined_after_s", quantile(refined_s, 0.5)},
-                                           {"refined_after_worst_s", quantile(refined_s, 1)}}},
+                                           {"refined_after_worst_s", quantile(refined_s, 1)},
+                                           {"whole_after_s", quantile(whole_s, 0.5)},
+                                           {"whole_after_worst_s", quantile(whole_s, 1)}}},
                                          {"peak_memory_bytes", peak_memory_bytes()},
                                          {"device_memory_bytes", device.allocated_bytes()}};
     write_file_atomic(file, json.dump(2) + "\n");

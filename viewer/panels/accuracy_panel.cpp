@@ -1,5 +1,5 @@
 // Accuracy settings and effects as switches, each choice with its measured time and error beside
-// it.
+// it, each effect with the reason that the plan gives.
 #include <imgui.h>
 
 #include <cmath>
@@ -11,17 +11,6 @@
 namespace darb {
 
 namespace {
-
-void presets(Accuracy& accuracy) {
-    for (int preset = 0; preset < kPresetCount; ++preset) {
-        if (preset > 0) ImGui::SameLine();
-        const Accuracy wanted = preset_accuracy(preset);
-        bool is_chosen = true;
-        for (const int row : kAccuracyRows) is_chosen &= wanted.choice[row] == accuracy.choice[row];
-        if (ImGui::RadioButton(std::string(preset_name(preset)).c_str(), is_chosen))
-            for (const int row : kAccuracyRows) accuracy.choice[row] = wanted.choice[row];
-    }
-}
 
 std::string measured_text(const Session& s, int row, int choice) {
     for (const MeasuredChoice& m : s.measured) {
@@ -36,11 +25,10 @@ std::string measured_text(const Session& s, int row, int choice) {
     return "";
 }
 
-void switch_row(Session& s, int row) {
-    ImGui::TextDisabled("%s", row_name(row).c_str());
+void choices(Session& s, int row) {
     ImGui::PushID(row);
     int choice = 0;
-    for (const std::string& name : row_choices(row, s.shown_sh_degree)) {
+    for (const std::string& name : row_choices(row, s.sh_degree)) {
         if (ImGui::RadioButton(name.c_str(), chosen(row, s.display) == choice))
             choose(row, choice, s.display);
         const std::string text = measured_text(s, row, choice++);
@@ -51,16 +39,46 @@ void switch_row(Session& s, int row) {
     ImGui::PopID();
 }
 
+void measure_button(Session& s) {
+    if (ImGui::Button("Measure here")) s.requests.measure = true;
+    ImGui::TextWrapped("Time on the device, error of the 8-bit picture against the exact one.");
+}
+
 }  // namespace
 
 void accuracy_panel(Session& s) {
-    if (!ImGui::CollapsingHeader("Accuracy and effects")) return;
-    if (ImGui::Button("Measure here")) s.requests.measure = true;
-    ImGui::TextWrapped("Time on the device, error of the 8-bit picture against the exact one.");
-    presets(s.display.accuracy);
-    for (const int row : kAccuracyRows) switch_row(s, row);
-    ImGui::Separator();
-    for (const int row : kEffectRows) switch_row(s, row);
+    if (!ImGui::CollapsingHeader("Accuracy")) return;
+    ImGui::PushID("accuracy");
+    measure_button(s);
+    for (const int row : kAccuracyRows) {
+        ImGui::TextDisabled("%s", row_name(row).c_str());
+        choices(s, row);
+    }
+    ImGui::PopID();
+}
+
+void effects_panel(Session& s) {
+    if (!ImGui::CollapsingHeader("Effects")) return;
+    ImGui::PushID("effects");
+    measure_button(s);
+    if (s.plan && ImGui::Button("As planned")) s.requests.follow_plan = true;
+    for (int effect = 0; effect < EFFECT_COUNT; ++effect) {
+        const int row = effect_row(effect);
+        bool has_switch = false;
+        for (const int other : kEffectRows) has_switch |= other == row;
+        if (!has_switch && !s.plan) continue;
+        ImGui::Separator();
+        ImGui::TextUnformatted(row_name(row).c_str());
+        if (s.plan) {
+            const EffectRow& planned = s.plan->row(effect);
+            ImGui::SameLine(90 * s.gui_scale);
+            ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+            ImGui::TextWrapped("%s: %s", planned.on ? "on" : "off", planned.reason.c_str());
+            ImGui::PopStyleColor();
+        }
+        if (has_switch) choices(s, row);
+    }
+    ImGui::PopID();
 }
 
 }  // namespace darb

@@ -20,7 +20,7 @@ void progress_window(Session& s, float width, float height) {
     const bool exports = s.export_share >= 0;
     ImGui::TextUnformatted(loads     ? s.load_stage.c_str()
                            : exports ? "exporting frames"
-                                     : "measuring accuracy settings");
+                                     : "measuring settings and effects");
     ImGui::ProgressBar(static_cast<float>(loads     ? s.load_share
                                           : exports ? s.export_share
                                                     : s.measure_share),
@@ -86,6 +86,7 @@ void side_panel(Session& s, float height) {
     camera_panel(s);
     performance_panel(s);
     accuracy_panel(s);
+    effects_panel(s);
     edit_panel(s);
     path_panel(s);
     help(s);

@@ -10,6 +10,7 @@ void display_panel(Session& session);
 void camera_panel(Session& session);
 void performance_panel(Session& session);
 void accuracy_panel(Session& session);
+void effects_panel(Session& session);
 void edit_panel(Session& session);
 void path_panel(Session& session);
 void training_panel(Session& session);

@@ -22,7 +22,6 @@ void kernel_choice(Session& s) {
     int footprint = d.footprint == Footprint::exact ? 1 : 0;
     if (ImGui::Combo("footprint", &footprint, "psi\0exact\0"))
         d.footprint = footprint == 1 ? Footprint::exact : Footprint::psi;
-    ImGui::Checkbox("anti-aliasing", &d.antialias);
     if (!s.scene) return;
     const SplatModel& m = s.scene->model;
     if (m.kernel == d.kernel && m.footprint == d.footprint) return;
@@ -44,8 +43,6 @@ void scene_panel(Session& s) {
     ImGui::Text("%zu splats, SH degree %d", scene.model.size() - s.edit.removed_count(),
                 scene.model.sh_degree);
     ImGui::Text("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);
-    if (s.shown_sh_degree < scene.model.sh_degree)
-        ImGui::TextWrapped("This device's buffers hold colour up to degree %d.", s.shown_sh_degree);
     for (const std::string& note : scene.notes) ImGui::TextWrapped("%s", note.c_str());
 }
 
@@ -72,10 +69,6 @@ void display_panel(Session& s) {
             d.style = static_cast<SplatStyle>(style);
     }
     kernel_choice(s);
-    if (s.shown_sh_degree > 0)
-        ImGui::SliderInt("SH degree", &d.sh_degree, 0, s.shown_sh_degree);
-    else
-        ImGui::TextDisabled("no view-dependent colour");
     ImGui::ColorEdit3("background", &d.background.x);
 }
 

@@ -127,6 +127,27 @@ TEST(EditSplats, chosen_splats_keep_their_order_and_values) {
     EXPECT_EQ(model.rotation[4], before.rotation[16]);
 }
 
+TEST(EditSplats, picked_splats_come_in_the_order_asked_for) {
+    SplatModel model = sample_model(2, 5);
+    model.kernel = KERNEL_RAISED_COSINE;
+    model.antialias = true;
+    model.origin = {1, 2, 3};
+    const SplatModel two = pick_splats(model, {4, 1});
+    ASSERT_EQ(two.size(), 2u);
+    EXPECT_EQ(two.kernel, model.kernel);
+    EXPECT_TRUE(two.antialias);
+    EXPECT_EQ(two.origin, model.origin);
+    for (size_t k = 0; k < 2; ++k) {
+        const size_t from = k == 0 ? 4 : 1;
+        EXPECT_EQ(two.opacity[k], model.opacity[from]);
+        EXPECT_EQ(two.position[3 * k + 2], model.position[3 * from + 2]);
+        EXPECT_EQ(two.log_scale[3 * k], model.log_scale[3 * from]);
+        EXPECT_EQ(two.rotation[4 * k + 3], model.rotation[4 * from + 3]);
+        EXPECT_EQ(two.sh_dc[3 * k + 1], model.sh_dc[3 * from + 1]);
+        EXPECT_EQ(two.sh_rest[24 * k + 23], model.sh_rest[24 * from + 23]);
+    }
+}
+
 TEST(EditSplats, crop_prune_and_degree) {
     SplatModel model = sample_model(3, 200);
     const SplatModel before = model;

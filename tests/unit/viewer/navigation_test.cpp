@@ -127,6 +127,19 @@ TEST(Navigation, Set_up_levels_the_horizon) {
     EXPECT_NEAR(glm::determinant(n.axes), 1, kTight);
 }
 
+TEST(Navigation, A_new_up_keeps_the_pivot_and_the_height_above_the_horizon) {
+    for (const char* name : {"y", "z", "-z", "x"}) {  // y: a flip
+        Navigation n = oblique();
+        const glm::dvec3 pivot = n.pivot();
+        const double height = glm::dot(n.forward(), n.up);
+        n.set_up(up_from_name(name));
+        expect_near(n.pivot(), pivot);
+        EXPECT_NEAR(glm::dot(n.forward(), n.up), height, kTight) << name;
+        EXPECT_NEAR(glm::dot(n.right(), n.up), 0, kTight) << name;
+        EXPECT_GT(glm::dot(-n.down(), n.up), 0) << name;
+    }
+}
+
 TEST(Navigation, Take_gives_the_camera_back) {
     const Navigation n = oblique();
     const Camera c = n.camera(640, 480);

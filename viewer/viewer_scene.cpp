@@ -1,0 +1,155 @@
+// What the viewer shows: a file that was loaded, or a training run; and how each is meant to be
+// shown.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "engine/core/error.h"
+#include "viewer/viewer.h"
+
+namespace darb {
+
+namespace {
+
+bool any_lens(const std::vector<View>& views) {
+    return std::any_of(views.begin(), views.end(),
+                       [](const View& v) { return v.camera.lens.active; });
+}
+
+}  // namespace
+
+void Viewer::open(const std::filesystem::path& path) {
+    try {
+        const std::filesystem::path file = options_.resolve ? options_.resolve(path) : path;
+        if (job_) {
+            job_->cancel();
+            cancelled_.push_back(std::move(job_));
+        }
+        session_.error.clear();
+        job_ = std::make_unique<LoadJob>(file, options_.wake);
+    } catch (const std::exception& e) {
+        report(e);
+    }
+}
+
+void Viewer::finish_loading() {
+    if (!job_) {
+        if (!session_.error.empty()) throw Error("darb view", session_.error);
+        return;
+    }
+    job_->wait();
+    std::optional<Scene> scene = std::exchange(job_, nullptr)->take();
+    if (scene) adopt(std::move(*scene));
+}
+
+void Viewer::report(const std::exception& error) {
+    session_.error = error.what();
+}
+
+void Viewer::poll_load() {
+    std::erase_if(cancelled_, [](const auto& job) { return job->done(); });
+    session_.load_share = job_ ? job_->share() : -1;
+    if (!job_) return;
+    session_.load_stage = fmt::format("{}: {}", job_->file().filename().string(), job_->stage());
+    if (!job_->done()) return;
+    session_.load_share = -1;
+    const std::unique_ptr<LoadJob> job = std::move(job_);
+    try {
+        if (std::optional<Scene> scene = job->take()) adopt(std::move(*scene));
+    } catch (const std::exception& e) {
+        report(e);
+    }
+}
+
+// The device's copy first: when that fails, the scene before is still there.
+void Viewer::adopt(Scene loaded) {
+    auto scene = std::make_unique<Scene>(std::move(loaded));
+    picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
+    motion_.start(picture_.splat_count(), picture_.most_moving());
+    const bool first = session_.scene == nullptr;
+    session_.scene = std::move(scene);
+    const Scene& s = *session_.scene;
+    session_.sh_degree = s.model.sh_degree;
+    session_.edit = Edit(s.model.size());
+    session_.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
+    session_.save_file = s.file;
+    session_.save_file.replace_filename(s.file.stem().string() + "_edited.ply");
+    session_.fly_speed = s.bounds.radius / 2;
+    show_as_meant(s, first);
+    session_.note.clear();
+    fmt::print("loaded {}: {} splats in {:.2f} s\neffects: {}\n", s.file.string(), s.model.size(),
+               s.load_s, plan_line(*session_.plan));
+    std::fflush(stdout);
+    ++version_;
+    if (first) session_.navigation.level();
+    if (session_.photos.current < 0) session_.requests.frame_all = true;
+    session_.navigation.distance =
+        std::max(glm::distance(session_.navigation.eye, s.bounds.centre), s.bounds.radius * 0.1);
+}
+
+// As the file says, but for what the command line wants otherwise.
+void Viewer::show_as_meant(const Scene& s, bool first) {
+    DisplaySettings& d = session_.display;
+    d.kernel = s.model.kernel;
+    d.footprint = s.model.footprint;
+    d.sh_degree = s.model.sh_degree;
+    d.effects = {};
+    d.effects.antialias = s.model.antialias;
+    d.effects.lens = any_lens(session_.photos.views);
+    d.crowds = Crowds::by_counters;
+    d.near_plane =
+        std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(s.bounds.radius * 0.1));
+    session_.own = d;
+    session_.measured.clear();
+    session_.plan = plan_rendering(
+        s.model, session_.photos.views,
+        {.depth = d.mode == VIEW_DEPTH, .near_plane = d.near_plane, .free_camera = true},
+        options_.effects);
+    follow_plan();
+    const FrameAccuracy wanted = frame_accuracy(options_.accuracy, s.model);
+    d.footprint = wanted.footprint;
+    d.sh_degree = std::min(d.sh_degree, wanted.sh_degree);
+    const bool depth = session_.plan->on(EFFECT_DEPTH);
+    if (first && depth != (d.mode == VIEW_DEPTH)) d.mode = depth ? VIEW_DEPTH : VIEW_COLOUR;
+}
+
+void Viewer::follow_plan() {
+    const EffectPlan& plan = *session_.plan;
+    DisplaySettings& d = session_.display;
+    d.effects = plan.projection();
+    d.crowds = plan.crowds();
+    d.sh_degree = plan.row(EFFECT_VIEW_COLOUR).degree;
+}
+
+void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
+    const bool first = !session_.training.live;
+    if (first) picture_.set_live(splats, bounds);
+    session_.training.live = true;
+    ++version_;
+    if (first || session_.display.sh_degree == session_.sh_degree)
+        session_.display.sh_degree = splats.sh_degree();  // grows with the training
+    session_.sh_degree = splats.sh_degree();
+    session_.own.sh_degree = splats.sh_degree();
+    const bool smoothing = splats.smoothing().bytes() == std::uint64_t{splats.count()} * 4;
+    session_.display.effects.smoothing = session_.own.effects.smoothing =
+        splats.antialias() && smoothing;
+    if (!first) return;
+    motion_.start(splats.count(), 1);
+    session_.display.kernel = splats.kernel();
+    session_.display.footprint = splats.footprint();
+    session_.display.effects.antialias = splats.antialias();
+    session_.display.effects.lens = any_lens(session_.photos.views);
+    session_.own = session_.display;
+    session_.fly_speed = bounds.radius / 2;
+    session_.requests.frame_all = session_.photos.current < 0;
+    session_.navigation.distance =
+        std::max(glm::distance(session_.navigation.eye, bounds.centre), bounds.radius * 0.1);
+}
+
+void Viewer::end_live() {
+    picture_.clear();
+    session_.training.finished = true;
+}
+
+}  // namespace darb
