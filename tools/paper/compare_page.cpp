@@ -109,6 +109,7 @@ std::string plot(const Comparison& c, const ComparedDataset& dataset, Plot frame
         series.dots = dots;
         if (const ComparedRun* run = first_run(c, dataset, k)) {
             series.points = points(*run);
+            series.dots |= series.points.size() == 1;  // a line of one point is not seen
             for (const auto& [x, y] : series.points)
                 series.titles.push_back(fmt::format("{}: {:.5g}, {:.5g}", c.kernels[k], x, y));
         }
@@ -174,8 +175,10 @@ std::string paper_table(const ComparedDataset& dataset) {
 
 std::string crop_rows(const Comparison& c, const ComparedDataset& dataset) {
     const ComparedRun* base = nullptr;
-    for (std::size_t k = 0; k < c.kernels.size() && base == nullptr; ++k)
-        if (c.kernels[k] == kernel_name(KERNEL_GAUSSIAN)) base = first_run(c, dataset, k);
+    for (std::size_t k = 0; k < c.kernels.size(); ++k)
+        if (const ComparedRun* run = first_run(c, dataset, k);
+            run != nullptr && (base == nullptr || run->kernel == kernel_name(KERNEL_GAUSSIAN)))
+            base = run;
     if (base == nullptr || base->at.empty()) return {};
     std::string html;
     for (std::size_t k = 0; k < c.kernels.size(); ++k) {
@@ -186,16 +189,18 @@ std::string crop_rows(const Comparison& c, const ComparedDataset& dataset) {
                 fmt::format("{}: {}", run->kernel, format_number(-1e3 * crop.gain, 2));
             html +=
                 html_pictures({{crop.photo, fmt::format("{} at {}, {}", crop.view, crop.x, crop.y)},
-                               {crop.first, "gaussian"},
+                               {crop.first, base->kernel},
                                {crop.second, gain}},
                               kCropWidth);
         }
     }
     return html.empty()
                ? ""
-               : "<h3>Where the errors differ most</h3><p class='soft'>Photo, gaussian, kernel: "
-                 "first where the kernel gains most on the gaussian, then where it loses most; the "
-                 "number is its squared error less the gaussian's, times 1,000.</p>" +
+               : fmt::format(
+                     "<h3>Where the errors differ most</h3><p class='soft'>Photo, {0}, kernel: "
+                     "first where the kernel gains most on {0}, then where it loses most; the "
+                     "number is its squared error less that of {0}, times 1,000.</p>",
+                     html_escape(base->kernel)) +
                      html;
 }
 

@@ -19,7 +19,8 @@ struct PulseChange {
     std::optional<double> splats, model, peak, seconds;  // ratios
 
     bool less_memory() const { return model && *model < 1; }
-    bool less_quality() const { return psnr_db && *psnr_db < 0; }
+    bool less_psnr() const { return psnr_db && *psnr_db < 0; }
+    bool less_ssim() const { return ssim && *ssim < 0; }
 };
 
 /// Every kernel of the comparison that was run with one pulse and with more.

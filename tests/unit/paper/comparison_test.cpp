@@ -162,12 +162,13 @@ TEST(ComparePulses, MoreAgainstOne_isJudgedByModelAndPsnr) {
     EXPECT_EQ(changes[0].pulses, 2);
     EXPECT_DOUBLE_EQ(*changes[0].psnr_db, -1);
     EXPECT_DOUBLE_EQ(*changes[0].model, 0.75);
-    EXPECT_TRUE(changes[0].less_memory() && changes[0].less_quality());
+    EXPECT_TRUE(changes[0].less_memory() && changes[0].less_psnr());
     EXPECT_FALSE(changes[1].model);  // three pulses were not run
-    EXPECT_FALSE(changes[1].less_memory() || changes[1].less_quality());
+    EXPECT_FALSE(changes[1].less_memory() || changes[1].less_psnr());
     EXPECT_NE(comparison_table(c).find("sinc with 2 pulses against one: PSNR -1.00 dB"),
               std::string::npos)
         << comparison_table(c);
+    EXPECT_FALSE(changes[0].less_ssim());  // both 0
     EXPECT_NE(comparison_html(c).find("More pulses against one"), std::string::npos);
 }
 
