@@ -74,7 +74,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     const auto footprint = footprint_from_name(h.at("footprint").get<std::string>());
     const auto splats = h.at("splats").get<std::uint64_t>();
     if (!kernel || !footprint || m.sh_degree < 0 || m.sh_degree > 3 || splats > kMaxSplats ||
-        c.state.iteration < 0)
+        c.state.iteration < 0 || (*footprint == Footprint::exact && !has_exact_footprint(*kernel)))
         throw Error(where, "the header's values make no sense",
                     "Start again from another checkpoint.");
     m.kernel = *kernel;

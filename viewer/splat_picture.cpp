@@ -145,7 +145,7 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
 SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool moving) const {
     Key key;
     key.kernel = display.kernel;
-    key.footprint = display.footprint;
+    key.footprint = has_exact_footprint(key.kernel) ? display.footprint : Footprint::psi;
     const bool plain = display.style == SplatStyle::splats || !own_;
     key.sh_stored = plain ? splats()->sh_degree() : 0;
     key.accuracy = moving ? preset_accuracy(kFast) : display.accuracy;

@@ -70,12 +70,19 @@ void ChebyshevSeries::evaluate(double u, double& value, double& derivative) cons
 
 DerivedKernel::DerivedKernel(const KernelProfile& row) : row_(row) {
     DARB_CHECK(row.edge_order >= 0 && row.support > 0, "kernel {}", row.name);
+    DARB_CHECK((row.form == KERNEL_FORM_RINGS) == (row.pulses.count > 1), "kernel {}", row.name);
     const bool compact = std::isfinite(row.support);
     DARB_CHECK(compact == (row.form != KERNEL_FORM_GAUSSIAN), "kernel {}", row.name);
-    radius_ = compact ? std::sqrt(row.support) : kGaussRadius;
+    find_pulses();
+    radius_ = compact ? std::sqrt(pulses_.front().end) : kGaussRadius;
     radial_mass_ = radial_moment(radius_, 2);
     if (!compact) return;  // a Gaussian is its own footprint
-    psi_ = radial_moment(radius_, 4) / radial_mass_ / 3;
+    psi_ = scale_ = radial_moment(radius_, 4) / radial_mass_ / 3;
+    if (row.form == KERNEL_FORM_RINGS) {
+        const double whole = std::sqrt(row.support);
+        psi_ = radial_moment(whole, 4) / radial_moment(whole, 2) / 3;
+        return;
+    }
     const double centre = footprint_integral(row, 1);
     std::vector<double> samples(kNodes);
     for (int j = 0; j < kNodes; ++j)
@@ -85,16 +92,42 @@ DerivedKernel::DerivedKernel(const KernelProfile& row) : row_(row) {
     footprint_ = ChebyshevSeries(samples);
 }
 
-double DerivedKernel::radial_moment(double radius, int power) const {
-    double sum = 0;
-    for (const auto [x, weight] : even_quadrature()) {
-        const double r = radius * x;
-        sum += weight * std::pow(r, power) * profile_value(row_, r * r);
+void DerivedKernel::find_pulses() {
+    if (row_.pulses.count == 1) pulses_ = {{0, row_.support}};
+    double from = 0, to = row_.pulses.first_end;
+    for (int pulse = 0; pulse < row_.pulses.count && row_.pulses.count > 1; ++pulse) {
+        double low = from * from, high = to * to;  // of the peak: w rises before it
+        for (int step = 0; step < 80 && pulse > 0; ++step) {
+            const double middle = (low + high) / 2;
+            (slope(Footprint::psi, middle) > 0 ? low : high) = middle;
+        }
+        pulses_.push_back({low, to * to});
+        from = to;
+        to += row_.pulses.period;
     }
-    return sum * radius;
+}
+
+double DerivedKernel::radial_moment(double radius, int power) const {
+    double total = 0, from = 0;
+    for (const Pulse& pulse : pulses_) {  // smooth within each
+        const double to = std::min(radius, std::sqrt(pulse.end));
+        if (to <= from) break;
+        const auto f = [&](double weight, double r) {
+            return weight * std::pow(r, power) * profile_value(row_, r * r);
+        };
+        double sum = 0;
+        if (from == 0)
+            for (const auto [x, weight] : even_quadrature()) sum += f(weight, to * x);
+        else
+            sum = integrate_unit([&](double x) { return f(1, from + (to - from) * x); });
+        total += sum * (to - from);
+        from = to;
+    }
+    return total;
 }
 
 void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) const {
+    DARB_CHECK(row_.form != KERNEL_FORM_RINGS, "{} has no exact footprint", row_.name);
     u = (row_.support - q) / row_.support;
     footprint_.evaluate(u, p, dp);
 }
@@ -122,6 +155,9 @@ double DerivedKernel::slope(Footprint footprint, double q) const {
 double DerivedKernel::reach(Footprint footprint, double opacity, double cutoff) const {
     if (!(opacity >= cutoff)) return 0;
     double low = 0, high = 1;
+    for (const Pulse& pulse : pulses_)  // the outermost that shows, and there its falling side
+        if (pulse.peak > 0 && opacity * value(footprint, pulse.peak) >= cutoff) low = pulse.peak;
+    high = std::max(high, low);
     while (high < row_.support && opacity * value(footprint, high) >= cutoff) high *= 2;
     high = std::min(high, row_.support);
     // The answer keeps opacity * value(high) < cutoff; 80 halvings reach neighbouring doubles.
@@ -133,7 +169,7 @@ double DerivedKernel::reach(Footprint footprint, double opacity, double cutoff) 
 }
 
 double DerivedKernel::covariance_scale(Footprint footprint) const {
-    return footprint == Footprint::psi ? psi_ : 1;
+    return footprint == Footprint::psi ? scale_ : 1;
 }
 
 double DerivedKernel::radius_quantile(double u) const {

@@ -130,6 +130,13 @@ KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint,
         fit_compact(kernel, footprint, k);
     } else if (row.form == KERNEL_FORM_GAUSSIAN) {
         fit_gaussian(k);
+    } else if (row.form == KERNEL_FORM_RINGS) {
+        k.degree = 0;
+        k.modulus_of_sinc = row.kernel == KERNEL_SINC;
+        for (std::size_t i = 0; i < kernel.pulses().size(); ++i) {
+            k.c[2 * i] = kernel.pulses()[i].peak;
+            k.c[2 * i + 1] = kernel.pulses()[i].end;
+        }
     } else {
         // w(3) = 4^-e
         k.half_power = static_cast<int>(std::lround(-std::log2(kernel.value(Footprint::psi, 3))));

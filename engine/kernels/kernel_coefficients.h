@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "engine/kernels/kernel_profile.h"
 
@@ -17,19 +18,22 @@ constexpr int kFullDegree = 5, kLeastDegree = 2;
 struct KernelCoefficients {
     int form = KERNEL_FORM_COMPACT;
     int degree = 0;
-    int half_power = 0;          // compact: 2a of u^a; quadric: 2e of (1+q)^-e, 1 or 2
-    bool squared = false;        // x = t^2 rather than t; compact only
-    bool line_integral = false;  // the exact footprint; quadric only
-    double support = 0;          // R^2
-    double inverse_support = 0;  // 1/R^2 as the shaders have it: rounded up to float, so that the
-                                 // edge q = R^2 gives u <= 0 with fused and unfused arithmetic
-    std::array<double, KERNEL_MAX_DEGREE + 1> c{};  // of the polynomial, rising powers
-    double least_value = 0;                         // smallest w, or 0: the shaders do not clamp it
+    bool modulus_of_sinc = false;  // rings; else raised cosine
+    int half_power = 0;            // compact: 2a of u^a; quadric: 2e of (1+q)^-e, 1 or 2
+    bool squared = false;          // x = t^2 rather than t; compact only
+    bool line_integral = false;    // the exact footprint; quadric only
+    double support = 0;            // R^2
+    double inverse_support = 0;    // 1/R^2 as the shaders have it: rounded up to float, so that the
+                                   // edge q = R^2 gives u <= 0 with fused and unfused arithmetic
+    // of the polynomial, rising powers; rings: q of the peak and of the end of each pulse
+    std::array<double, KERNEL_MAX_DEGREE + 1> c{};
+    double least_value = 0;  // smallest w, or 0: the shaders do not clamp it
     double value_error = 0;  // largest, of the fit in double; gaussian: relative
     double slope_error = 0;  // largest error of dw/dt (gaussian: dw/dq), t = q/R^2
 };
 
-/// degree: kLeastDegree..kFullDegree. value(0) is 1 and the edge of the kernels that fall to zero
+/// degree: kLeastDegree..kFullDegree; without meaning for rings, which are no polynomial. value(0)
+/// is 1 and the edge of the kernels that fall to zero
 /// is exactly zero at every degree. Costs milliseconds; kernel_coefficients keeps its results.
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree);
 const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, int degree);
@@ -111,12 +115,44 @@ void evaluate_quadric(const KernelCoefficients& k, Real q, Real& w, Real& slope)
     slope = inside ? slope : Real(0);
 }
 
+/// More than one pulse of 1/2 + 1/2 cos x or |sin x / x|, x = pi sqrt(q / c1), c1 the first zero.
+template <class Real>
+void evaluate_rings(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
+    const bool inside = q < static_cast<Real>(k.support);
+    const Real factor = static_cast<Real>(std::numbers::pi * std::numbers::pi / k.c[1]);  // x^2 / q
+    const Real s = std::max(inside ? q * factor : Real(0), Real(1e-24)), x = std::sqrt(s);
+    if (!k.modulus_of_sinc) {
+        w = Real(0.5) + Real(0.5) * std::cos(x);
+        slope = Real(-0.25) * std::sin(x) / x * factor;
+    } else {
+        w = std::sin(x) / x;
+        slope = (std::cos(x) - w) / (2 * s);  // of w by s
+        if (s < Real(1)) {                    // where that cancels, its series
+            slope = 0;
+            Real term = Real(-1) / 6;
+            for (int n = 1; n <= 9; ++n) {
+                slope += static_cast<Real>(n) * term;
+                term *= -s / static_cast<Real>((2 * n + 2) * (2 * n + 3));
+            }
+        }
+        if (w < 0) {
+            w = -w;
+            slope = -slope;
+        }
+        slope *= factor;
+    }
+    w = inside ? w : Real(0);
+    slope = inside ? slope : Real(0);
+}
+
 template <class Real>
 void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
     if (k.form == KERNEL_FORM_COMPACT) {
         evaluate_compact(k, q, w, slope);
     } else if (k.form == KERNEL_FORM_GAUSSIAN) {
         evaluate_gaussian(k, q, w, slope);
+    } else if (k.form == KERNEL_FORM_RINGS) {
+        evaluate_rings(k, q, w, slope);
     } else {
         evaluate_quadric(k, q, w, slope);
     }

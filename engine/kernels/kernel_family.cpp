@@ -11,10 +11,10 @@ namespace darb {
 const DerivedKernel& derived_kernel(int kernel) {
     static const auto kernels = [] {
         std::vector<DerivedKernel> all;
-        for (int k = 0; k < KERNEL_COUNT; ++k) all.emplace_back(kernel_profile(k));
+        for (int k = 0; k < KERNEL_ROWS; ++k) all.emplace_back(kernel_profile(k));
         return all;
     }();
-    DARB_CHECK(kernel >= 0 && kernel < KERNEL_COUNT, "kernel = {}", kernel);
+    DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
     return kernels[static_cast<std::size_t>(kernel)];
 }
 
@@ -23,9 +23,25 @@ std::string_view kernel_name(int kernel) {
 }
 
 std::optional<int> kernel_from_name(std::string_view name) {
-    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+    for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel)
         if (kernel_name(kernel) == name) return kernel;
     return std::nullopt;
+}
+
+std::optional<int> kernel_with_pulses(int kernel, int pulses) {
+    const int base = kernel < KERNEL_COUNT ? kernel : kernel_profile(kernel).kernel;
+    if (pulses == 1) return base;
+    for (int row = KERNEL_COUNT; row < KERNEL_ROWS; ++row)
+        if (kernel_profile(row).kernel == base && kernel_pulses(row) == pulses) return row;
+    return std::nullopt;
+}
+
+int kernel_pulses(int kernel) {
+    return kernel_profile(kernel).pulses.count;
+}
+
+bool has_exact_footprint(int kernel) {
+    return kernel_profile(kernel).form != KERNEL_FORM_RINGS;
 }
 
 std::string_view footprint_name(Footprint footprint) {

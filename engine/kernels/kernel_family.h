@@ -15,9 +15,16 @@ namespace darb {
 enum class Footprint { psi = FOOTPRINT_PSI, exact = FOOTPRINT_EXACT };
 
 /// Names as in files and on the command line: gaussian, raised_cosine, half_cosine_squared, sinc,
-/// inverse_quadratic, cosine, squared_raised_cosine, inverse_multiquadric, parabolic.
+/// inverse_quadratic, cosine, squared_raised_cosine, inverse_multiquadric, parabolic; and the rows
+/// of more than one pulse, see kernel_with_pulses.
 std::string_view kernel_name(int kernel);
 std::optional<int> kernel_from_name(std::string_view name);
+/// The row of the same kernel with this many of its pulses: 1 is the kernel of the list, others
+/// have names that say so ("sinc_2_pulses"). Nothing where the kernel has no such row.
+std::optional<int> kernel_with_pulses(int kernel, int pulses);
+int kernel_pulses(int kernel);
+/// Whether Footprint::exact may be asked for: not with more than one pulse.
+bool has_exact_footprint(int kernel);
 std::string_view footprint_name(Footprint footprint);  // psi, exact
 std::optional<Footprint> footprint_from_name(std::string_view name);
 
@@ -33,13 +40,16 @@ double kernel_slope(int kernel, Footprint footprint, double q);
 /// R^2.
 double kernel_reach(int kernel, Footprint footprint, double opacity, double cutoff);
 
-/// Ratio of the projected second moment to the 2x2 block of the 3D covariance (paper's psi).
+/// Ratio of the projected second moment to the 2x2 block of the 3D covariance (paper's psi), rings
+/// included.
 double kernel_psi(int kernel);
-/// What multiplies the 2x2 covariance: kernel_psi for Footprint::psi, 1 for exact.
+/// What multiplies the 2x2 covariance: kernel_psi of the first pulse for Footprint::psi, 1 for
+/// exact. Rings leave it, so that the limit is all that they change.
 double covariance_scale(int kernel, Footprint footprint);
 
 /// Inverse of the cumulative radial density r^2 w(r^2) of the 3D kernel: u in [0,1) -> r (in units
-/// of the standard deviation parameter). Splits draw children's offsets from it; gaussian: chi_3.
+/// of the standard deviation parameter). Splits draw children's offsets from it; gaussian: chi_3;
+/// with rings: of the first pulse.
 double kernel_radius_quantile(int kernel, double u);
 
 }  // namespace darb

@@ -40,14 +40,33 @@ Complex square(Complex z) {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-const std::array<KernelProfile, KERNEL_COUNT> kRows{{
+Complex raised_cosine(Complex q) {  // = 1/2 + 1/2 cos(pi d/2.5)
+    return square(cos_root(q / 6.25));
+}
+
+Complex sinc(Complex q) {  // = sin x/x, x = pi d/3
+    return cos_root(q / 9.0) * sinc_root(q / 9.0);
+}
+
+Complex modulus_of_sinc(Complex q) {
+    const Complex w = sinc(q);
+    return w.real() < 0 ? -w : w;
+}
+
+constexpr Pulses cosine_pulses(int count) {
+    return {count, 2.5, 5};
+}
+
+constexpr Pulses sinc_pulses(int count) {
+    return {count, 3, 3};
+}
+
+const std::array<KernelProfile, KERNEL_ROWS> kRows{{
     {"gaussian", kInfinity, 0, KERNEL_FORM_GAUSSIAN, [](Complex q) { return std::exp(-q / 2.0); }},
-    {"raised_cosine", 6.25, 2, KERNEL_FORM_COMPACT,
-     [](Complex q) { return square(cos_root(q / 6.25)); }},  // = 1/2 + 1/2 cos(pi d/2.5)
+    {"raised_cosine", 6.25, 2, KERNEL_FORM_COMPACT, raised_cosine},
     {"half_cosine_squared", 9, 1, KERNEL_FORM_COMPACT,
      [](Complex q) { return cos_root(square(q / 9.0)); }},  // = cos(pi q/18)
-    {"sinc", 9, 1, KERNEL_FORM_COMPACT,
-     [](Complex q) { return cos_root(q / 9.0) * sinc_root(q / 9.0); }},  // = sin x/x, x = pi d/3
+    {"sinc", 9, 1, KERNEL_FORM_COMPACT, sinc},
     {"inverse_quadratic", 9, 0, KERNEL_FORM_QUADRIC, [](Complex q) { return 1.0 / (1.0 + q); }},
     {"cosine", 9, 1, KERNEL_FORM_COMPACT, [](Complex q) { return cos_root(q / 9.0); }},
     {"squared_raised_cosine", 9, 4, KERNEL_FORM_COMPACT,
@@ -55,12 +74,18 @@ const std::array<KernelProfile, KERNEL_COUNT> kRows{{
     {"inverse_multiquadric", 9, 0, KERNEL_FORM_QUADRIC,
      [](Complex q) { return 1.0 / std::sqrt(1.0 + q); }},
     {"parabolic", 9, 1, KERNEL_FORM_COMPACT, [](Complex q) { return 1.0 - q / 9.0; }},
+    {"raised_cosine_2_pulses", 56.25, 2, KERNEL_FORM_RINGS, raised_cosine, KERNEL_RAISED_COSINE,
+     cosine_pulses(2)},
+    {"raised_cosine_3_pulses", 156.25, 2, KERNEL_FORM_RINGS, raised_cosine, KERNEL_RAISED_COSINE,
+     cosine_pulses(3)},
+    {"sinc_2_pulses", 36, 1, KERNEL_FORM_RINGS, modulus_of_sinc, KERNEL_SINC, sinc_pulses(2)},
+    {"sinc_3_pulses", 81, 1, KERNEL_FORM_RINGS, modulus_of_sinc, KERNEL_SINC, sinc_pulses(3)},
 }};
 
 }  // namespace
 
 const KernelProfile& kernel_profile(int kernel) {
-    DARB_CHECK(kernel >= 0 && kernel < KERNEL_COUNT, "kernel = {}", kernel);
+    DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
     return kRows[static_cast<std::size_t>(kernel)];
 }
 

@@ -18,15 +18,24 @@ namespace darb {
 /// support.
 using Profile = std::complex<double> (*)(std::complex<double> q);
 
+/// Kernels that oscillate on beyond their first zero may keep some of their rings. w is then smooth
+/// and falls from its peak to 0 within each pulse.
+struct Pulses {
+    int count = 1;
+    double first_end = 0, period = 0;  // of the zeros, in d; unused with one pulse
+};
+
 struct KernelProfile {
     std::string_view name;
     double support;  // R^2 in q; infinity only with KERNEL_FORM_GAUSSIAN
     int edge_order;  // of the zero at the edge in u = 1 - q/R^2: 0 jump, 1 kink, 2 double zero, ...
     int form;  // KERNEL_FORM_*: the arithmetic of the shaders; COMPACT unless w has poles near
     Profile profile;
+    int kernel = -1;  // KERNEL_* of the shaders, where it is not the row's own number
+    Pulses pulses{};
 };
 
-/// The rows, indexed by KERNEL_*.
+/// The rows, indexed by KERNEL_*, below KERNEL_ROWS.
 const KernelProfile& kernel_profile(int kernel);
 
 /// A polynomial on [0, 1] in the Chebyshev basis.
@@ -49,7 +58,15 @@ class DerivedKernel {
     explicit DerivedKernel(const KernelProfile& row);
 
     const KernelProfile& row() const { return row_; }
+    /// The ratio of moments over the whole support.
     double psi() const { return psi_; }
+    /// Where a pulse (1 to row().pulses.count) is highest and where it ends, in q.
+    struct Pulse {
+        double peak = 0, end = 0;
+    };
+    const std::vector<Pulse>& pulses() const { return pulses_; }
+    /// Integral of r^power w(r^2) from 0 to radius.
+    double radial_moment(double radius, int power) const;
     /// See kernel_family.h for the five below.
     double value(Footprint footprint, double q) const;
     double slope(Footprint footprint, double q) const;
@@ -58,13 +75,14 @@ class DerivedKernel {
     double radius_quantile(double u) const;
 
   private:
+    void find_pulses();
     void footprint_parts(double q, double& u, double& p, double& dp) const;
-    double radial_moment(double radius, int power) const;
 
     KernelProfile row_;
-    double radius_ = 0;  // R, or where the Gaussian is below rounding
-    double psi_ = 1;
-    double radial_mass_ = 1;     // integral of r^2 w(r^2) over the ball
+    std::vector<Pulse> pulses_;
+    double radius_ = 0;  // of the first pulse, or where the Gaussian is below rounding
+    double psi_ = 1, scale_ = 1;
+    double radial_mass_ = 1;     // integral of r^2 w(r^2) over the ball of the first pulse
     ChebyshevSeries footprint_;  // A(q) / (A(0) u^(edge_order + 1/2)), in u
 };
 

@@ -59,13 +59,16 @@ std::vector<double> fit(const Function& f) {
 }  // namespace
 
 KernelTable::KernelTable(int kernel, Footprint footprint, int polynomial_degree)
-    : polynomial_(polynomial_degree == 0
-                      ? nullptr
-                      : &kernel_coefficients(kernel, footprint, polynomial_degree)),
+    : kernel_(kernel),
+      footprint_(footprint),
+      in_place_(
+          polynomial_degree == 0 && has_exact_footprint(kernel)
+              ? nullptr
+              : &kernel_coefficients(kernel, footprint, std::max(polynomial_degree, kLeastDegree))),
       exact_(footprint == Footprint::exact),
       support_(kernel_support(kernel)),
       covariance_scale_(darb::covariance_scale(kernel, footprint)) {
-    if (!std::isfinite(support_) || polynomial_ != nullptr) {
+    if (!std::isfinite(support_) || in_place_ != nullptr) {
         return;
     }
     const auto q_of = [this](double x) {
@@ -89,9 +92,9 @@ double KernelTable::evaluate(const std::vector<double>& table, double x) const {
 }
 
 double KernelTable::value(double q) const {
-    if (polynomial_ != nullptr) {
+    if (in_place_ != nullptr) {
         double w, slope;
-        darb::evaluate(*polynomial_, q, w, slope);
+        darb::evaluate(*in_place_, q, w, slope);
         return w;
     }
     if (value_table_.empty()) {
@@ -102,9 +105,9 @@ double KernelTable::value(double q) const {
 }
 
 double KernelTable::slope(double q) const {
-    if (polynomial_ != nullptr) {
+    if (in_place_ != nullptr) {
         double w, slope;
-        darb::evaluate(*polynomial_, q, w, slope);
+        darb::evaluate(*in_place_, q, w, slope);
         return slope;
     }
     if (slope_table_.empty()) {
@@ -124,8 +127,9 @@ double KernelTable::reach(double opacity, double cutoff) const {
     }
     if (!std::isfinite(support_)) {
         // A short polynomial is up to a percent off; blending tests every sample again.
-        return -2 * std::log(cutoff / opacity) + (polynomial_ != nullptr ? 0.05 : 0.0);
+        return -2 * std::log(cutoff / opacity) + (in_place_ != nullptr ? 0.05 : 0.0);
     }
+    if (!has_exact_footprint(kernel_)) return kernel_reach(kernel_, footprint_, opacity, cutoff);
     double low = 0, high = support_;
     while (high - low > 1e-14 * support_) {
         const double middle = 0.5 * (low + high);
@@ -135,7 +139,7 @@ double KernelTable::reach(double opacity, double cutoff) const {
 }
 
 const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_degree) {
-    DARB_CHECK(kernel >= 0 && kernel < KERNEL_COUNT, "kernel = {}", kernel);
+    DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
     DARB_CHECK(polynomial_degree >= 0 && polynomial_degree <= kFullDegree, "degree = {}",
                polynomial_degree);
     struct Slot {
@@ -143,7 +147,7 @@ const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_
         std::unique_ptr<const KernelTable> table;
     };
     // A cache of constants, so no state: each entry is built once and never changes.
-    static std::array<Slot, KERNEL_COUNT * 2 * (kFullDegree + 1)> slots;
+    static std::array<Slot, KERNEL_ROWS * 2 * (kFullDegree + 1)> slots;
     const int row = kernel * 2 + (footprint == Footprint::exact ? 1 : 0);
     Slot& slot = slots[row * (kFullDegree + 1) + polynomial_degree];
     std::call_once(slot.once, [&] {

@@ -1,7 +1,7 @@
 // KernelTable: value and slope of one kernel and footprint, fast enough for the inner loop. The
 // Gaussian is called as it is; the others are tabled once from engine/kernels as piecewise
 // Chebyshev interpolants: in q for the kernels themselves, and in s = sqrt(1 - q / R^2) for the
-// exact footprints, which are analytic in it up to their edge.
+// exact footprints, which are analytic in it up to their edge. Kernels with rings are called too.
 #pragma once
 
 #include <vector>
@@ -27,9 +27,11 @@ class KernelTable {
   private:
     double evaluate(const std::vector<double>& table, double x) const;
 
-    const KernelCoefficients* polynomial_ = nullptr;  // takes the place of the tables
-    bool exact_;                                      // tabled in s, else in q / R^2
-    double support_;                                  // R^2
+    int kernel_;
+    Footprint footprint_;
+    const KernelCoefficients* in_place_ = nullptr;  // of the tables: a polynomial, or rings
+    bool exact_;                                    // tabled in s, else in q / R^2
+    double support_;                                // R^2
     double covariance_scale_;
     std::vector<double> value_table_;  // [kPieces][kTerms] monomials in [-1, 1]; empty: gaussian
     std::vector<double> slope_table_;  // of the slope; of slope * s, finite at the edge, if exact_

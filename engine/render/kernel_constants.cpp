@@ -4,6 +4,7 @@
 #include <string>
 
 #include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 namespace {
@@ -21,12 +22,17 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     DARB_CHECK(evaluation == EVALUATION_POLYNOMIAL || evaluation == EVALUATION_BUILTIN,
                "evaluation = {}", evaluation);
     DARB_CHECK(alpha_cutoff > 0 && alpha_cutoff < 1, "alpha_cutoff = {}", alpha_cutoff);
+    if (footprint == Footprint::exact && !has_exact_footprint(kernel))
+        throw Error(std::string(kernel_name(kernel)), "has no exact footprint",
+                    "Use the footprint psi, or one pulse.");
     const KernelCoefficients& k = kernel_coefficients(kernel, footprint, degree);
+    if (k.form == KERNEL_FORM_RINGS) evaluation = EVALUATION_BUILTIN;
     double margin = evaluation == EVALUATION_BUILTIN ? kBuiltinMargin : kRoundingMargin;
     if (k.form == KERNEL_FORM_GAUSSIAN) margin += 1.5 * k.value_error;
     DARB_CHECK(k.half_power <= 9, "half_power = {}", k.half_power);  // shaders/kernels/compact.glsl
     SpecConstants constants{
-        {"KERNEL", kernel},
+        {"KERNEL", *kernel_with_pulses(kernel, 1)},
+        {"KERNEL_PULSES", kernel_pulses(kernel)},
         {"FOOTPRINT", static_cast<int>(footprint)},
         {"EVALUATION", evaluation},
         {"KERNEL_FORM", k.form},

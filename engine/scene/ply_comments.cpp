@@ -38,6 +38,9 @@ void read_ply_comments(const PlyHeader& header, const std::string& where, SplatM
             throw Error(where, fmt::format("names the unknown SplatFootprint '{}'", name));
         model.footprint = *footprint;
     }
+    if (model.footprint == Footprint::exact && !has_exact_footprint(model.kernel))
+        throw Error(where, fmt::format("names SplatFootprint exact, which {} has not",
+                                       kernel_name(model.kernel)));
     model.antialias = comment_value(header, "SplatRenderMode") == "mip";
 }
 

@@ -1,6 +1,7 @@
 // The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected at
 // d = 0. For comparison of cost and accuracy; Vulkan leaves sin and cos 2^-11 of error. Only kernels that have
-// such a formula: others, and the exact footprints of the compact ones, keep their polynomial.
+// such a formula: others, and the exact footprints of the compact ones, keep their polynomial. KERNEL_SUPPORT ends
+// the pulses; there is no polynomial for more than one.
 bool builtin_exists() {
     return KERNEL == KERNEL_GAUSSIAN ||
            (FOOTPRINT == FOOTPRINT_PSI &&
@@ -39,6 +40,10 @@ void builtin_value_slope(float q, out float w, out float slope) {
         const float k = PI / 3.0;
         sinc_slope(k * d, w, slope);
         slope *= k * k;
+        if (KERNEL_PULSES > 1 && w < 0.0) {  // |sinc|: the alpha of a negative ring would be below any cut-off
+            w = -w;
+            slope = -slope;
+        }
     } else if (KERNEL == KERNEL_COSINE) {
         const float k = PI / 6.0;
         w = cos(k * d);

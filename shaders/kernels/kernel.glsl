@@ -22,7 +22,8 @@ layout(constant_id = 108) const float KERNEL_INVERSE_SUPPORT = 0.0;  // rounded 
 layout(constant_id = 109) const float COVARIANCE_SCALE = 1.0;        // psi, or 1
 layout(constant_id = 110) const float ALPHA_CUTOFF = ALPHA_CUTOFF_DEFAULT;
 layout(constant_id = 111) const float KERNEL_REACH_MARGIN = 1e-5;  // relative, of w in kernel_reach
-layout(constant_id = 120) const float KERNEL_C0 = 1.0;  // of P, rising powers
+layout(constant_id = 112) const int KERNEL_PULSES = 1;  // more: form RINGS, built-in only
+layout(constant_id = 120) const float KERNEL_C0 = 1.0;  // of P, rising powers; of RINGS: see its form
 layout(constant_id = 121) const float KERNEL_C1 = 0.0;
 layout(constant_id = 122) const float KERNEL_C2 = 0.0;
 layout(constant_id = 123) const float KERNEL_C3 = 0.0;
@@ -59,8 +60,23 @@ float kernel_value(float q) {
     return w;
 }
 
+// Where w falls for the last time through `least`, which is at most 1: outside the peak of that pulse.
+void last_flank(float least, out float low, out float high) {
+    low = KERNEL_C0;
+    high = KERNEL_C1;
+    if (KERNEL_PULSES > 1 && kernel_value(KERNEL_C2) >= least) {
+        low = KERNEL_C2;
+        high = KERNEL_C3;
+    }
+    if (KERNEL_PULSES > 2 && kernel_value(KERNEL_C4) >= least) {
+        low = KERNEL_C4;
+        high = KERNEL_C5;
+    }
+}
+
 // The q beyond which opacity * w < ALPHA_CUTOFF, rounded outwards, at most R^2; 0 below the cut-off. Once per
-// splat: closed forms where there are, else halvings of [0, R^2] on the falling w that is computed.
+// splat: closed forms where there are, else halvings of [0, R^2], or of a pulse's outer flank, on the falling w that
+// is computed.
 float kernel_reach(float opacity) {
     if (!(opacity >= ALPHA_CUTOFF)) return 0.0;
     const float least = ALPHA_CUTOFF * (1.0 - KERNEL_REACH_MARGIN) / opacity;
@@ -71,6 +87,7 @@ float kernel_reach(float opacity) {
         q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
     } else {
         float low = 0.0, high = KERNEL_SUPPORT;
+        if (KERNEL_FORM == KERNEL_FORM_RINGS) last_flank(least, low, high);
         for (int step = 0; step < 24; ++step) {
             const float middle = 0.5 * (low + high);
             const bool inside = kernel_value(middle) >= least;

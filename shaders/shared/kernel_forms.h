@@ -9,6 +9,10 @@
 // w = (1+q)^-1 or (1+q)^-1/2 cut at R^2, and the exact footprints of these two
 #define KERNEL_FORM_QUADRIC 2
 
+// 1/2 + 1/2 cos x or |sin x / x| with rings, x proportional to d: the built-in functions, and in
+// place of the coefficients the q of the peak and of the end of each pulse
+#define KERNEL_FORM_RINGS 3
+
 #define KERNEL_MAX_DEGREE 8
 
 #endif

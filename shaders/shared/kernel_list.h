@@ -14,6 +14,15 @@
 #define KERNEL_PARABOLIC 8
 #define KERNEL_COUNT 9
 
+// Rows beyond the list: a kernel of it with more than one pulse. To the shaders they are that
+// kernel and KERNEL_PULSES.
+#define KERNEL_RAISED_COSINE_2_PULSES 9
+#define KERNEL_RAISED_COSINE_3_PULSES 10
+#define KERNEL_SINC_2_PULSES 11
+#define KERNEL_SINC_3_PULSES 12
+#define KERNEL_ROWS 13
+#define KERNEL_MAX_PULSES 3
+
 #define FOOTPRINT_PSI 0
 #define FOOTPRINT_EXACT 1
 

@@ -70,6 +70,40 @@ TEST(CompareCommand, RunOfDarbTrain_counts_slow) {
     EXPECT_NE(compared.err.find("parabolic, seed 0: is there"), std::string::npos) << compared.err;
 }
 
+TEST(CompareCommand, MorePulses_areTrainedStoredAndSetAgainstOne_slow) {
+    const fs::path out = scratch() / "compare_pulses";
+    const Outcome compared = darb("compare " + kScene +
+                                  " --kernels gaussian,sinc --pulses 1,3 -r 8 "
+                                  "--iterations 6 --effects=none --blending-views 1 -o " +
+                                  out.string());
+    ASSERT_EQ(compared.code, 0) << compared.err;
+    const nlohmann::json set = read_json(out / "compare.json")["datasets"][0];
+    EXPECT_EQ(set["medians"].size(), 3u);
+    ASSERT_EQ(set["pulses"].size(), 1u);
+    for (const auto& row : set["pulses"]) {
+        EXPECT_TRUE(row["psnr_db_difference"].is_number());
+        EXPECT_GT(row["peak_ratio"].get<double>(), 0.5);
+    }
+    const fs::path scene =
+        out / "scene/sinc_3_pulses/seed0/point_cloud/iteration_6/point_cloud.ply";
+    EXPECT_NE(read_text_file(scene).find("SplatKernel: sinc_3_pulses"), std::string::npos);
+    const std::string render = "render " + scene.string() + " -r 8 --cameras " + kScene + " -o " +
+                               (out / "frames").string();
+    EXPECT_EQ(darb(render).code, 0);
+    const Outcome exact = darb(render + " --footprint exact");
+    EXPECT_EQ(exact.code, 2);
+    EXPECT_NE(exact.err.find("sinc_3_pulses"), std::string::npos) << exact.err;
+}
+
+TEST(TrainCommand, PulsesThatAKernelHasNot_areNamedWithExitCode2) {
+    for (const char* flags : {"--kernel gaussian --pulses 2", "--kernel sinc --pulses 4",
+                              "--kernel sinc --pulses 2 --footprint exact"}) {
+        const Outcome bad = darb("train " + kScene + " -o x " + flags);
+        EXPECT_EQ(bad.code, 2) << flags;
+        EXPECT_NE(bad.err.find("--pulses"), std::string::npos) << bad.err;
+    }
+}
+
 TEST(CompareCommand, BadInput_isNamedWithExitCode2) {
     EXPECT_EQ(darb("compare").code, 2);
     EXPECT_EQ(darb("compare /nowhere -o x").code, 2);

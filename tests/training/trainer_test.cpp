@@ -353,8 +353,9 @@ TEST(Training, more_bad_gradients_than_one_in_a_thousand_stop_the_run) {
 }
 
 TEST(Training, every_kernel_and_footprint_brings_the_loss_down) {
-    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+    for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel)
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
+            if (footprint == Footprint::exact && !has_exact_footprint(kernel)) continue;
             SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
                          std::string(footprint_name(footprint)));
             TinyTraining t = tiny_training();

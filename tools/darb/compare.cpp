@@ -12,7 +12,6 @@
 #include "engine/gpu/device.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/compare_flags.h"
-#include "tools/darb/kernel_flags.h"
 #include "tools/darb/train_run.h"
 
 namespace darb {
@@ -73,7 +72,7 @@ std::string settings_of(const CompareFlags& flags) {
 
 int compare(CompareFlags flags) {
     check_flags(flags);
-    const std::vector<int> kernels = kernels_from_list("--kernels", flags.kernels);
+    const std::vector<int> kernels = kernels_of(flags);
     Comparison comparison;
     const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
     for (const std::string& dataset : flags.datasets)  // bad options end it before it begins

@@ -3,8 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
+#include "tools/darb/kernel_flags.h"
 
 namespace darb {
 
@@ -28,6 +31,12 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
                        "folder of the runs, OUT/DATASET/KERNEL/seedN: finished ones are kept");
     command.add_option("--kernels", flags.kernels, "paper (its five), all (nine), or names")
         ->capture_default_str();
+    command
+        .add_option("--pulses", flags.pulses,
+                    "of raised_cosine and sinc, with commas: 1,2,3 tests what rings cost and gain")
+        ->delimiter(',')
+        ->capture_default_str()
+        ->check(CLI::Range(1, KERNEL_MAX_PULSES));
     command.add_option("--iterations", flags.iterations, "evaluate after these, with commas")
         ->delimiter(',')
         ->capture_default_str()
@@ -56,6 +65,19 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     command.add_flag("-q,--quiet", flags.quiet, "no progress");
 }
 
+std::vector<int> kernels_of(const CompareFlags& flags) {
+    std::vector<int> rows;
+    for (const int kernel : kernels_from_list("--kernels", flags.kernels))
+        for (const int pulses : flags.pulses)
+            if (const auto row = kernel_with_pulses(kernel, pulses);
+                row && std::find(rows.begin(), rows.end(), *row) == rows.end())
+                rows.push_back(*row);
+    if (rows.empty())
+        throw Error("--pulses", "none of the kernels has so many",
+                    "raised_cosine and sinc have 1 to 3 pulses, the others one.");
+    return rows;
+}
+
 std::string dataset_path(const std::string& dataset) {
     const bool whole = std::filesystem::exists(dataset);
     return whole ? dataset : dataset.substr(0, dataset.rfind('@'));
@@ -70,7 +92,8 @@ TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset,
     const std::string name(kernel_name(kernel)), path = dataset_path(dataset);
     const auto folder = flags.output / dataset_name(dataset) / name / fmt::format("seed{}", seed);
     std::vector<std::string> words{"train", path, "-o", folder.string(), "--eval"};
-    words.push_back("--kernel=" + name);
+    words.push_back("--kernel=" + std::string(kernel_name(*kernel_with_pulses(kernel, 1))));
+    words.push_back(fmt::format("--pulses={}", kernel_pulses(kernel)));
     words.push_back(fmt::format("--seed={}", seed));
     words.push_back(fmt::format("--iterations={}", flags.iterations.back()));
     for (const char* list : {"--test-iterations", "--save-iterations"}) {

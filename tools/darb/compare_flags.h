@@ -18,6 +18,7 @@ struct CompareFlags {
     std::filesystem::path output, html, json;
     std::string kernels = "paper", device, train_options;
     std::vector<int> iterations{7'000, 30'000};
+    std::vector<int> pulses{1};
     int seeds = 1;
     std::uint32_t max_splats = 0;        // 0: as many as the threshold makes
     std::vector<std::string> forwarded;  // options of `darb train`, as words
@@ -25,6 +26,10 @@ struct CompareFlags {
     bool lpips_as_3dgs = false, quiet = false;
     int blending_views = 4;
 };
+
+/// The kernels of --kernels, each with those of --pulses that it has; in that order. Throws Error
+/// where that leaves none.
+std::vector<int> kernels_of(const CompareFlags& flags);
 
 /// Adds every option to the subcommand; values land in flags, which must outlive the parse.
 void add_compare_flags(CLI::App& command, CompareFlags& flags);

@@ -55,8 +55,8 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     const std::string settings = settings_text(f.train);
     const RunState state = run_state(f.run.output, settings, format_camera_list(dataset_.views),
                                      f.train.iterations, cameras_.size());
-    const std::string title =
-        fmt::format("{}: {}, seed {}", dataset_name(name_), f.kernel, f.train.seed);
+    const std::string title = fmt::format("{}: {}, seed {}", dataset_name(name_),
+                                          kernel_name(f.train.kernel), f.train.seed);
     if (state == RunState::finished) return note(title + ": is there");
     if (state == RunState::partial) f.run.resume_from = f.run.output / "checkpoint.darb";
     note(title);
@@ -69,8 +69,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
 ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
     TrainFlags f = train_flags_of(flags_, name_, kernel, seed);
     ComparedRun run;
-    run.kernel = f.kernel;
-    run.kernel_id = kernel;
+    run.kernel = kernel_name(kernel);
     run.seed = seed;
     run.folder = f.run.output;
     try {

@@ -101,6 +101,11 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
             "gaussian, raised_cosine, half_cosine_squared, sinc, inverse_quadratic, cosine, "
             "squared_raised_cosine, inverse_multiquadric, parabolic")
         ->capture_default_str();
+    command
+        .add_option("--pulses", f.pulses,
+                    "of raised_cosine and sinc: 2 or 3 keep rings that the paper's limit removes")
+        ->capture_default_str()
+        ->check(CLI::Range(1, KERNEL_MAX_PULSES));
     add_accuracy_flags(command, f.accuracy, true);
     command.add_option("--strategy", f.strategy, "how the splats grow: adc, as 3DGS")
         ->capture_default_str();

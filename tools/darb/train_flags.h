@@ -23,6 +23,7 @@ struct TrainFlags {
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
     std::string kernel = "gaussian", strategy = "adc";
+    int pulses = 1;
     AccuracyFlags accuracy;
     DatasetOptions data;
     TrainOptions train;

@@ -1,4 +1,6 @@
 // Command line to options: what the parser leaves as words.
+#include <fmt/format.h>
+
 #include "engine/core/error.h"
 #include "tools/darb/train_flags.h"
 
@@ -23,11 +25,19 @@ void finish_train_flags(TrainFlags& f) {
     if (!kernel)
         throw Error("--kernel " + f.kernel, "no such kernel",
                     "See `darb train --help` for the nine names.");
+    const auto row = kernel_with_pulses(*kernel, f.pulses);
+    if (*kernel >= KERNEL_COUNT || !row)
+        throw Error(fmt::format("--kernel {} --pulses {}", f.kernel, f.pulses),
+                    "there is no such kernel",
+                    "Only raised_cosine and sinc have --pulses 2 or 3; others have one.");
     check_strategy(f.strategy);
-    f.train.kernel = *kernel;
+    f.train.kernel = *row;
     f.train.accuracy = chosen_accuracy(f.accuracy, true);
     f.train.footprint =
         f.train.accuracy.value(kFootprint) == FOOTPRINT_EXACT ? Footprint::exact : Footprint::psi;
+    if (f.train.footprint == Footprint::exact && !has_exact_footprint(f.train.kernel))
+        throw Error(fmt::format("--pulses {}", f.pulses), "goes with the footprint psi only",
+                    "Leave --footprint out, or use one pulse.");
     f.train.sh_rest_lr = f.train.sh_dc_lr / 20.0f;
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -38,8 +37,7 @@ struct CurvePoint {
 };
 
 struct ComparedRun {
-    std::string kernel;  // its name; with pulses "sinc, 2 pulses"
-    int kernel_id = 0;
+    std::string kernel;  // its name
     std::uint64_t seed = 0;
     std::filesystem::path folder;
     std::string failure;  // what ended it; empty where it is finished
@@ -77,7 +75,7 @@ RunState run_state(const std::filesystem::path& folder, const std::string& setti
 /// `iterations` that were evaluated. Throws Error naming the file.
 void read_run(ComparedRun& run, const std::vector<int>& iterations);
 
-/// The three parts of a held-out picture.
+/// Of the three parts of a held-out picture.
 struct HeldOutPicture {
     ImageU8 photo, render;
 };

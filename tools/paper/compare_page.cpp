@@ -8,6 +8,7 @@
 #include "engine/kernels/kernel_family.h"
 #include "tools/paper/compare.h"
 #include "tools/paper/compare_crops.h"
+#include "tools/paper/compare_pulses.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 #include "tools/paper/pictures.h"
@@ -20,12 +21,12 @@ namespace darb {
 namespace {
 
 constexpr int kSplatPicture = 110;    // px
-constexpr double kSplatExtent = 4.2;  // standard deviations
+constexpr double kSplatExtent = 4.2;  // standard deviations; times the pulses
 constexpr int kCropWidth = 200;       // px on the page
 
 std::string marked(const std::string& text, std::size_t row, const Marks& marks) {
-    if (static_cast<int>(row) == marks.best) return "<b>" + text + "</b>";
-    if (static_cast<int>(row) == marks.third) return "<u>" + text + "</u>";
+    if (marks[row] == Mark::best) return "<b>" + text + "</b>";
+    if (marks[row] == Mark::third) return "<u>" + text + "</u>";
     return text;
 }
 
@@ -46,7 +47,7 @@ std::string table_of(const Comparison& c, const ComparedDataset& dataset, int it
             values[k].push_back(over_seeds(dataset, kernel, iteration, columns[k]));
             medians.push_back(values[k].back().median);
         }
-        marks.push_back(marks_of(medians, columns[k].more_is_better));
+        marks.push_back(marks_of(medians, columns[k]));
     }
     std::string html = head_of("kernel", columns);
     for (std::size_t row = 0; row < c.kernels.size(); ++row) {
@@ -77,7 +78,7 @@ std::string means_table(const Comparison& c, int iteration) {
             means[k].push_back(all ? std::optional(sum / static_cast<double>(c.datasets.size()))
                                    : std::nullopt);
         }
-        marks.push_back(marks_of(means[k], columns[k].more_is_better));
+        marks.push_back(marks_of(means[k], columns[k]));
     }
     std::string html = head_of("kernel", columns);
     for (std::size_t row = 0; row < c.kernels.size(); ++row) {
@@ -108,6 +109,7 @@ std::string plot(const Comparison& c, const ComparedDataset& dataset, Plot frame
         series.dots = dots;
         if (const ComparedRun* run = first_run(c, dataset, k)) {
             series.points = points(*run);
+            series.dots |= series.points.size() == 1;  // a line of one point is not seen
             for (const auto& [x, y] : series.points)
                 series.titles.push_back(fmt::format("{}: {:.5g}, {:.5g}", c.kernels[k], x, y));
         }
@@ -173,8 +175,10 @@ std::string paper_table(const ComparedDataset& dataset) {
 
 std::string crop_rows(const Comparison& c, const ComparedDataset& dataset) {
     const ComparedRun* base = nullptr;
-    for (std::size_t k = 0; k < c.kernels.size() && base == nullptr; ++k)
-        if (c.kernels[k] == kernel_name(KERNEL_GAUSSIAN)) base = first_run(c, dataset, k);
+    for (std::size_t k = 0; k < c.kernels.size(); ++k)
+        if (const ComparedRun* run = first_run(c, dataset, k);
+            run != nullptr && (base == nullptr || run->kernel == kernel_name(KERNEL_GAUSSIAN)))
+            base = run;
     if (base == nullptr || base->at.empty()) return {};
     std::string html;
     for (std::size_t k = 0; k < c.kernels.size(); ++k) {
@@ -182,19 +186,21 @@ std::string crop_rows(const Comparison& c, const ComparedDataset& dataset) {
         if (run == nullptr || run == base || run->at.empty()) continue;
         for (const Crop& crop : crops_of(base->at.back(), run->at.back())) {
             const std::string gain =
-                fmt::format("{}: {} 1e3 MSE", run->kernel, format_number(-1e3 * crop.gain, 2));
+                fmt::format("{}: {}", run->kernel, format_number(-1e3 * crop.gain, 2));
             html +=
                 html_pictures({{crop.photo, fmt::format("{} at {}, {}", crop.view, crop.x, crop.y)},
-                               {crop.first, "gaussian"},
+                               {crop.first, base->kernel},
                                {crop.second, gain}},
                               kCropWidth);
         }
     }
     return html.empty()
                ? ""
-               : "<h3>Where the errors differ most</h3><p class='soft'>Photo, gaussian, kernel: "
-                 "first where the kernel gains most on the gaussian, then where it loses most; the "
-                 "number is its squared error less the gaussian's, times 1,000.</p>" +
+               : fmt::format(
+                     "<h3>Where the errors differ most</h3><p class='soft'>Photo, {0}, kernel: "
+                     "first where the kernel gains most on {0}, then where it loses most; the "
+                     "number is its squared error less that of {0}, times 1,000.</p>",
+                     html_escape(base->kernel)) +
                      html;
 }
 
@@ -203,19 +209,23 @@ std::string splat_figure(const Comparison& c) {
     std::vector<Captioned> pictures;
     Plot profile{"Splats of one covariance", "distance (standard deviations)", "weight", {}};
     std::vector<std::string> names;
-    for (int k = 0; k < KERNEL_COUNT; ++k) {
-        const std::string name(kernel_name(k));
-        if (std::find(c.kernels.begin(), c.kernels.end(), name) == c.kernels.end()) continue;
-        const auto w = [&](double q) { return kernel_value(k, Footprint::psi, q / kernel_psi(k)); };
+    int pulses = 1;
+    for (const std::string& name : c.kernels)
+        pulses = std::max(pulses, kernel_pulses(kernel_from_name(name).value()));
+    const double extent = kSplatExtent * pulses;
+    for (const std::string& name : c.kernels) {
+        const int k = kernel_from_name(name).value();
+        const double scale = covariance_scale(k, Footprint::psi);
+        const auto w = [&](double q) { return kernel_value(k, Footprint::psi, q / scale); };
         const auto at = [&](int x, int y) {
-            const double u = kSplatExtent * (2 * (x + 0.5) / kSplatPicture - 1);
-            const double v = kSplatExtent * (2 * (y + 0.5) / kSplatPicture - 1);
+            const double u = extent * (2 * (x + 0.5) / kSplatPicture - 1);
+            const double v = extent * (2 * (y + 0.5) / kSplatPicture - 1);
             const double a = 0.8 * u + 0.6 * v, b = -0.6 * u + 0.8 * v;  // a turned ellipse, 2 to 1
             return w(a * a / 2 + b * b * 2);
         };
         pictures.push_back({grey_field(kSplatPicture, 1, at), name});
         PlotSeries series;
-        for (int i = 0; i <= 200; ++i)
+        for (int i = 0; i <= 200 * pulses; ++i)
             series.points.emplace_back(0.022 * i, w(0.022 * i * 0.022 * i));
         profile.series.push_back(std::move(series));
         names.push_back(name);
@@ -231,7 +241,7 @@ std::string dataset_part(const Comparison& c, const ComparedDataset& dataset) {
     for (const int iteration : c.iterations)
         html += fmt::format("<h3>{} iterations</h3>", format_number(iteration)) +
                 table_of(c, dataset, iteration, quality_columns());
-    html += paper_table(dataset) + curves(c, dataset);
+    html += paper_table(dataset) + pulse_html(c, dataset) + curves(c, dataset);
     if (std::any_of(dataset.runs.begin(), dataset.runs.end(),
                     [](const ComparedRun& run) { return run.blending.has_value(); }))
         html += "<h3>What blending takes</h3>" +
@@ -255,7 +265,8 @@ std::string comparison_html(const Comparison& c) {
     for (const ComparedDataset& dataset : c.datasets) body += dataset_part(c, dataset);
     body += splat_figure(c);
     body += fmt::format(
-        "<h2>How to read it</h2><p>Bold: best; underlined: third best, of the medians of a column. "
+        "<h2>How to read it</h2><p>Bold: best; underlined: third best, of the medians of a column "
+        "as they are printed; all that tie are marked. "
         "Held-out views. Medians over {} seed{}, range in brackets; curves and crops are of the "
         "first. {}</p><p>{}</p><p>Model: the PLY file. Peak: device memory. Training: without "
         "evaluation. Splats blended per pixel are those with alpha at or over the cut-off before "

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "tools/paper/compare.h"
+#include "tools/paper/compare_pulses.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 #include "trainer/report/html.h"
@@ -106,6 +107,7 @@ std::string comparison_table(const Comparison& c) {
             }
             text += "\n";
         }
+    for (const ComparedDataset& dataset : c.datasets) text += pulse_lines(c, dataset);
     for (const ComparedDataset& dataset : c.datasets)
         for (const ComparedRun& run : dataset.runs)
             if (!run.failure.empty())
@@ -121,6 +123,7 @@ nlohmann::json comparison_json(const Comparison& c) {
                  {"path", dataset.path.string()},
                  {"medians", summary_json(c, dataset)},
                  {"runs", Json::array()},
+                 {"pulses", pulse_json(c, dataset)},
                  {"paper", paper_json(dataset.name)}};
         for (const ComparedRun& run : dataset.runs) one["runs"].push_back(run_json(run));
         datasets.push_back(std::move(one));

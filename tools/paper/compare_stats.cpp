@@ -73,19 +73,22 @@ OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, 
             static_cast<int>(n)};
 }
 
-Marks marks_of(const std::vector<Value>& values, bool more_is_better) {
-    std::vector<int> order;
-    for (std::size_t i = 0; i < values.size(); ++i)
-        if (values[i]) order.push_back(static_cast<int>(i));
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-        const double x = *values[static_cast<std::size_t>(a)];
-        const double y = *values[static_cast<std::size_t>(b)];
-        return more_is_better ? x > y : x < y;
-    });
-    Marks marks;
-    if (order.size() > 1) marks.best = order[0];
-    if (order.size() > 2) marks.third = order[2];
-    return marks;
+Marks marks_of(const std::vector<Value>& values, const Column& column) {
+    const double unit = std::pow(10, column.decimals);
+    const auto printed = [&](const Value& v) {
+        return std::round(*v * unit) * (column.more_is_better ? 1 : -1);
+    };
+    Marks marks(values.size(), Mark::none);
+    bool differ = false;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        int better = 0;
+        for (const Value& other : values)
+            if (values[i] && other && printed(other) > printed(values[i])) ++better;
+        differ |= better > 0;
+        if (values[i] && better == 0) marks[i] = Mark::best;
+        if (values[i] && better == 2) marks[i] = Mark::third;
+    }
+    return differ ? marks : Marks(values.size(), Mark::none);
 }
 
 std::string spread_text(const OverSeeds& value, int decimals) {

@@ -33,11 +33,12 @@ const std::vector<Column>& blending_columns();
 OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, int iteration,
                      const Column& column);
 
-/// Of the medians: places in `values` of the best and the third best; -1 where there is none.
-struct Marks {
-    int best = -1, third = -1;
-};
-Marks marks_of(const std::vector<std::optional<double>>& values, bool more_is_better);
+/// best: none is better; third: two are. Of values as they are printed, so all that look the same
+/// are marked the same.
+enum class Mark { none, best, third };
+using Marks = std::vector<Mark>;
+/// One mark a value; none at all where there is one value or where all are the same.
+Marks marks_of(const std::vector<std::optional<double>>& values, const Column& column);
 
 /// "27.31" or, over several seeds, "27.31 (27.10 to 27.44)"; "-" without a value.
 std::string spread_text(const OverSeeds& value, int decimals);

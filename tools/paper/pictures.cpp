@@ -43,7 +43,7 @@ std::string html_pictures(const std::vector<Captioned>& pictures, int width_px) 
         html += fmt::format(
             "<figure style='margin:0;width:{0}px'><img alt='{1}' style='width:100%;"
             "image-rendering:pixelated;border-radius:4px' src='data:image/png;base64,{2}'/>"
-            "<figcaption>{1}</figcaption></figure>",
+            "<figcaption style='overflow-wrap:anywhere'>{1}</figcaption></figure>",
             width_px, html_escape(one.caption), base64(encode_png(one.picture)));
     return html + "</div>\n";
 }

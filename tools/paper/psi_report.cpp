@@ -132,12 +132,12 @@ std::string spread_text(const PsiSpread& s) {
 
 std::string rings_part() {
     Plot plot{"Beyond the first pulse", "distance d (standard deviations)", "w", {}};
-    for (const bool sinc : {false, true}) {
-        PlotSeries series{sinc ? "|sinc|" : "raised cosine"};
-        const double end = ring_radius(sinc, 3);
+    for (const int kernel : {KERNEL_RAISED_COSINE_3_PULSES, KERNEL_SINC_3_PULSES}) {
+        PlotSeries series{kernel == KERNEL_SINC_3_PULSES ? "|sinc|" : "raised cosine"};
+        const double end = std::sqrt(kernel_support(kernel));
         for (int i = 0; i <= 2 * kPoints; ++i) {
             const double d = end * i / (2 * kPoints);
-            series.points.emplace_back(d, ring_value(sinc, 3, d));
+            series.points.emplace_back(d, kernel_value(kernel, Footprint::psi, d * d));
         }
         plot.series.push_back(std::move(series));
     }
@@ -147,7 +147,7 @@ std::string rings_part() {
     for (const Rings& r : all_rings())
         html += fmt::format(
             "<tr><td>{}</td><td>{}</td><td>{:.1f}</td><td>{:.6f}</td><td>{:.1f} %</td></tr>\n",
-            r.kernel, r.pulses, r.radius, r.psi, 100 * r.outside);
+            kernel_name(r.kernel), r.pulses, r.radius, r.psi, 100 * r.outside);
     return html + "</table>\n<div class='plots'>" + svg_plot(plot) + "</div>\n";
 }
 
@@ -191,8 +191,8 @@ std::string psi_table(const std::vector<PsiResult>& results) {
     text += fmt::format("\n{:<22} {:>8} {:>9} {:>9} {:>16}\n", "with more pulses", "pulses",
                         "radius", "psi", "mass beyond one");
     for (const Rings& r : all_rings())
-        text += fmt::format("{:<22} {:>8} {:>9.1f} {:>9.6f} {:>14.1f} %\n", r.kernel, r.pulses,
-                            r.radius, r.psi, 100 * r.outside);
+        text += fmt::format("{:<22} {:>8} {:>9.1f} {:>9.6f} {:>14.1f} %\n", kernel_name(r.kernel),
+                            r.pulses, r.radius, r.psi, 100 * r.outside);
     return text;
 }
 
@@ -215,7 +215,7 @@ nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOpti
                {"exact_footprint_float32", distance_json(r.by_exact_footprint)}}}});
     nlohmann::json rings = nlohmann::json::array();
     for (const Rings& r : all_rings())
-        rings.push_back({{"kernel", r.kernel},
+        rings.push_back({{"kernel", kernel_name(r.kernel)},
                          {"pulses", r.pulses},
                          {"radius", r.radius},
                          {"psi", r.psi},

@@ -31,7 +31,7 @@ class Terms1d {
     void add_term(const Primitive1d& p, std::size_t i, const Reach& reach);
 
     int kernel_;
-    const KernelCoefficients* coefficients_;  // none for the generalised exponential
+    const KernelCoefficients* coefficients_;  // for the generalised exponential the Gaussian's
     double radius_;                           // of the support, in widths
     std::span<const float> target_;
     std::vector<float> x_, residual_;

@@ -104,17 +104,17 @@ std::string curves(const Study1dResult& result, std::size_t signal) {
     return "<div class='plots'>" + html + "</div>\n";
 }
 
-/// Kernels by their place in a row of medians: 0 the best.
+/// How many kernels have a lesser median: 0 for the best, and for all that tie with it.
 std::vector<std::size_t> ranks(const Study1dResult& result, std::size_t signal, std::size_t n) {
-    std::vector<std::size_t> order(result.options.kernels.size()), rank(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    const std::size_t kernels = result.options.kernels.size();
     const auto loss = [&](std::size_t k) {
         const double v = result.row(signal, k, n).median;
         return std::isfinite(v) ? v : 1e30;
     };
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return loss(a) < loss(b); });
-    for (std::size_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
+    std::vector<std::size_t> rank(kernels, 0);
+    for (std::size_t k = 0; k < kernels; ++k)
+        for (std::size_t other = 0; other < kernels; ++other)
+            if (loss(other) < loss(k)) ++rank[k];
     return rank;
 }
 
@@ -153,14 +153,14 @@ std::string ratio_text(const Standing& s) {
     return s.compared > 0 ? fmt::format("{:.2f}", std::exp(s.log_ratio / s.compared)) : "-";
 }
 
-std::string html_tables(const Study1dResult& result) {
+std::string html_standings(const Study1dResult& result) {
     const Study1dOptions& o = result.options;
-    std::string html = "<h2>Over all signals</h2><table><tr><th>kernel</th>";
+    std::string html =
+        "<p class='soft'>Ratio: geometric mean over the signals of the median loss over the "
+        "gaussian's. Won: signals with the least median loss.</p><div class='wide'><table><tr>"
+        "<th>kernel</th>";
     for (const int n : o.primitives)
-        html += fmt::format(
-            "<th>N = {0}: loss over the gaussian's</th><th>signals won</th>"
-            "<th>failed</th>",
-            n);
+        html += fmt::format("<th>N = {}: ratio</th><th>won</th><th>failed</th>", n);
     html += "</tr>\n";
     const auto all = standings(result);
     for (std::size_t k = 0; k < o.kernels.size(); ++k) {
@@ -170,14 +170,18 @@ std::string html_tables(const Study1dResult& result) {
                 fmt::format("<td>{}</td><td>{}</td><td>{}</td>", ratio_text(s), s.wins, s.failed);
         html += "</tr>\n";
     }
-    html +=
-        "</table>\n<h2>Every row</h2><div class='wide'><table><tr><th>signal</th><th>kernel"
+    return html + "</table></div>\n";
+}
+
+std::string html_rows(const Study1dResult& result) {
+    std::string html =
+        "<div class='wide'><table><tr><th>signal</th><th class='left'>kernel"
         "</th><th>N</th><th>final loss, median</th><th>quartiles</th><th>range</th>"
         "<th>failed</th><th>reached the target</th><th>steps to it</th><th>ms to it</th>"
         "<th>ms a run</th></tr>\n";
     for (const Study1dRow& r : result.rows)
         html += fmt::format(
-            "<tr><td>{}</td><td class='text'>{}</td><td>{}</td><td>{}</td><td>{} to {}</td>"
+            "<tr><td>{}</td><td class='left'>{}</td><td>{}</td><td>{}</td><td>{} to {}</td>"
             "<td>{} to {}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0f}</td></tr>\n",
             signal_name(r.signal), kernel_1d_name(r.kernel), r.primitives, loss_text(r.median),
             loss_text(r.quartile1), loss_text(r.quartile3), loss_text(r.low), loss_text(r.high),
@@ -256,12 +260,13 @@ std::string study_1d_html(const Study1dResult& result) {
     const Study1dOptions& o = result.options;
     std::vector<std::string> names;
     for (const int k : o.kernels) names.emplace_back(kernel_1d_name(k));
-    std::string body = html_tables(result) +
+    std::string body = "<h2>Over all signals</h2>" + html_standings(result) +
                        "<h2>Signals and fits</h2><p class='soft'>Grey: the signal; orange: the run "
                        "with the median loss, which stands in the cell.</p><div class='plots'>";
     for (std::size_t s = 0; s < o.signals.size(); ++s) body += grid_figure(result, s);
     body += "</div>\n<h2>Loss</h2>" + html_legend(names);
     for (std::size_t s = 0; s < o.signals.size(); ++s) body += curves(result, s);
+    body += "<h2>Every row</h2>" + html_rows(result);
     body += fmt::format(
         "<h2>How it was done</h2><p>{} samples on [-10, 10]; {} steps of Adam at rate {} on the "
         "mean squared error; {} seeds, which give every kernel the same start. Widths are fitted "

@@ -45,7 +45,7 @@ svg .tick,svg .label{fill:var(--soft);font-size:11px}
 tr.mark td{font-weight:600}ul{margin:.4rem 0;padding-left:1.2rem}
 .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
 th,td{text-align:right;padding:.22rem .9rem .22rem 0;border-bottom:1px solid var(--line);white-space:nowrap}
-th{color:var(--soft);font-weight:500}th:first-child,td:first-child,td.text{text-align:left}
+th{color:var(--soft);font-weight:500}th:first-child,td:first-child,th.left,td.left,td.text{text-align:left}
 td.text{white-space:normal;overflow-wrap:anywhere}
 td.bar{width:14rem;padding-right:0}td.bar i{display:block;height:.7em;border-radius:3px;
 -webkit-print-color-adjust:exact;print-color-adjust:exact}

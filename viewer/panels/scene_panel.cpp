@@ -20,8 +20,10 @@ void kernel_choice(Session& s) {
         ImGui::EndCombo();
     }
     int footprint = d.footprint == Footprint::exact ? 1 : 0;
+    ImGui::BeginDisabled(!has_exact_footprint(d.kernel));
     if (ImGui::Combo("footprint", &footprint, "psi\0exact\0"))
         d.footprint = footprint == 1 ? Footprint::exact : Footprint::psi;
+    ImGui::EndDisabled();
     if (!s.scene) return;
     const SplatModel& m = s.scene->model;
     if (m.kernel == d.kernel && m.footprint == d.footprint) return;

@@ -63,5 +63,12 @@ INSTANTIATE_TEST_SUITE_P(Reference, EveryTable,
                                     std::string(footprint_name(std::get<1>(i.param)));
                          });
 
+INSTANTIATE_TEST_SUITE_P(ReferenceRings, EveryTable,
+                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_ROWS),
+                                          testing::Values(Footprint::psi)),
+                         [](const auto& i) {
+                             return std::string(kernel_name(std::get<0>(i.param)));
+                         });
+
 }  // namespace
 }  // namespace darb::reference

@@ -154,6 +154,24 @@ INSTANTIATE_TEST_SUITE_P(Reference, EveryKernel,
                                     std::string(footprint_name(std::get<1>(i.param)));
                          });
 
+class EveryRing : public EveryKernel {};
+
+TEST_P(EveryRing, Parameters_MatchDifferences) {
+    GradientCase c = base();
+    c.scene.count = 6;
+    c.scene.sh_degree = 0;
+    Differences differences = differences_of(c);
+    ASSERT_GT(differences.result().visible_count(), 3U);
+    differences.check_all(case_name(c.scene), tolerance("difference"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Reference, EveryRing,
+                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_ROWS),
+                                          testing::Values(Footprint::psi)),
+                         [](const auto& i) {
+                             return std::string(kernel_name(std::get<0>(i.param)));
+                         });
+
 TEST(ReferenceGradient, OpaqueLayers_MatchDifferencesThroughClampAndStop) {
     GradientCase c;
     c.scene = {.count = 20, .kernel = KERNEL_HALF_COSINE_SQUARED, .sh_degree = 1, .seed = 5};
