@@ -1,25 +1,29 @@
 #!/usr/bin/env python3
-"""The tables of docs/accuracy.md: what accuracy costs on some scenes, and what effects each data set calls for.
+"""The tables of docs/accuracy.md and docs/effects.md: what accuracy costs on some scenes, and what effects each data set calls for.
 
-    tools/show_costs.py --darb build/tools/darb --scene NAME=SCENE[,DATASET] ... [--quick]
+    tools/show_costs.py --darb build/darb --scene NAME=SCENE[,DATASET] ... [--quick]
         runs `darb cost` on each scene; writes OUT/accuracy_cost.json
-    tools/show_costs.py --darb build/tools/darb --plan NAME=PATH ... [--compare NAME=PATH[,CAMERAS] ...]
+    tools/show_costs.py --darb build/darb --plan NAME=PATH ... [--compare NAME=PATH[,CAMERAS] ...]
         runs `darb plan` on each data set or scene, with time and memory of none, auto and all for those of
         --compare; writes OUT/effect_plans.json
 
 --out OUT: default assets/results. --prefix "chrt -r 4": put before each measuring command. --note TEXT: about the
-machine, kept in the files. --print: only prints the tables of the files that are there. Results of scenes that are
-not named this time are kept. The tables are printed as Markdown.
+machine, kept in the files. Results of scenes that are not named this time are kept. Every call, one without scenes
+too, rewrites the tables of docs/accuracy.md and docs/effects.md.
 """
 
 import argparse
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
 import tempfile
 
+import guards  # beside this file: the tables of a page
+
+SETTINGS_FIRST = ["balanced", "fast", "exact"]
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
@@ -80,43 +84,75 @@ def plan_of(options, paths, compare):
     return plan
 
 
-def cost_table(name, scene):
-    photos = "photos" in scene["rows"][0]
-    print(f"\n**{name}**: {scene['splats']:,} splats, {scene['views']} views, {scene['device']}. {scene['note']}\n")
-    print("| setting | ms | PSNR to the truth (dB) | largest error |" + (" photos (dB) |" if photos else ""))
-    print("|---|---|---|---|" + ("---|" if photos else ""))
-    for row in scene["rows"]:
-        mark = "**" if row["on_front"] else ""
-        cells = [f"{mark}{row['name']}{mark}", f"{row['ms']['median']:.1f}", f"{row['error']['psnr_db']:.1f}",
-                 f"{row['error']['max']:.4f}"]
-        if photos:
-            cells.append(f"{row['photos']['psnr_db']:.2f}")
-        print("| " + " | ".join(cells) + " |")
-    for answer in scene["answers"]:
-        print(f"- {answer}")
+def cost_cell(row):
+    photos = f", {row['photos']['psnr_db']:.2f} dB" if "photos" in row else ""
+    text = f"{row['ms']['median']:.1f} ms, {row['error']['psnr_db']:.1f} dB{photos}"
+    return f"**{text}**" if row["on_front"] else text
 
 
-def plan_tables(plans):
-    print("\n| what | on | of these by measured numbers |\n|---|---|---|")
-    for name, plan in plans.items():
-        on = [row for row in plan["effects"] if row["on"]]
-        reasons = "; ".join(f"{row['effect']}: {row['reason']}" for row in on)
-        print(f"| {name} | {', '.join(row['effect'] for row in on) or 'none'} | {reasons} |")
-    print("\n| what | none | auto | all |\n|---|---|---|---|")
-    for name, plan in plans.items():
+def cost_tables(costs):
+    """Settings alone and presets, a column a scene; then the answers and the front of each."""
+    single = [s for s in SETTINGS_FIRST if any(s == r["name"] for scene in costs.values() for r in scene["rows"])]
+    single += [r["name"] for scene in costs.values() for r in scene["rows"]
+               if re.fullmatch(r"[a-z_]+ \S+", r["name"]) and r["name"] not in single]
+    lines = ["| setting | " + " | ".join(f"{n}: a frame, from the truth" + (", from photos" if "photos" in s["rows"][0]
+                                         else "") for n, s in costs.items()) + " |", "|---|" + "---|" * len(costs)]
+    for name in dict.fromkeys(single):
+        cells = [next((cost_cell(r) for r in s["rows"] if r["name"] == name), "") for s in costs.values()]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    for name, scene in costs.items():
+        lines += ["", f"**{name}**: {scene['splats']:,} splats ({scene['kernel']}), {scene['views']} views, "
+                  f"{scene['pixels']:,} px, {scene['repeats']} repeats or more, {scene['driver']}. {scene['note']} "
+                  "The front, fastest first:", "", "| settings | ms | from the truth |" +
+                  (" photos |" if "photos" in scene["rows"][0] else ""),
+                  "|---|---|---|" + ("---|" if "photos" in scene["rows"][0] else "")]
+        for row in sorted((r for r in scene["rows"] if r["on_front"]), key=lambda r: r["ms"]["median"]):
+            photos = f" {row['photos']['psnr_db']:.2f} dB |" if "photos" in row else ""
+            lines.append(f"| {row['name']} | {row['ms']['median']:.1f} | {row['error']['psnr_db']:.1f} dB |{photos}")
+        lines += [""] + [f"- {answer}" for answer in scene["answers"]]
+    return "\n".join(lines)
+
+
+def what_is_on(plan):
+    on = [e for e in plan["effects"] if e["on"]]
+    off = [e for e in plan["effects"] if not e["on"] and e["measured"] > 0]
+    return "; ".join(f"**{e['effect']}**: {e['reason']}" for e in on) + \
+        "".join(f"; {e['effect']} off: {e['reason']}" for e in off)
+
+
+def plan_table(plans):
+    rows = [f"| {name} | {what_is_on(plan)} |" for name, plan in sorted(plans.items())]
+    return "\n".join(["| of | effects that are on, and why; those that are off by a measured number |", "|---|---|"] + rows)
+
+
+def compared_table(plans):
+    lines = ["| what | none | auto | all |", "|---|---|---|---|"]
+    for name, plan in sorted(plans.items()):
         if "compared" in plan:
-            cells = [f"{c['ms']:.1f} ms, {c['peak_bytes'] / 1e6:.1f} MB" for c in plan["compared"]]
-            print(f"| {name} | " + " | ".join(cells) + " |")
+            cells = [f"{c['ms']:.1f} ms (± {c['spread_ms']:.1f}), {c['peak_bytes'] / 1e6:.1f} MB" for c in plan["compared"]]
+            lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def write_docs(costs, plans):
+    for page, tables in (("docs/accuracy.md", {"costs": cost_tables(costs)}),
+                         ("docs/effects.md", {"compared": compared_table(plans), "plans": plan_table(plans)})):
+        path = os.path.join(ROOT, page)
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        for name, table in tables.items():
+            text = guards.between(text, name, new=table)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--darb", default=os.path.join(ROOT, "build/tools/darb"))
+    parser.add_argument("--darb", default=os.path.join(ROOT, "build/darb"))
     parser.add_argument("--out", default=os.path.join(ROOT, "assets/results"))
     parser.add_argument("--prefix", default="")
     parser.add_argument("--note", default="")
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--print", action="store_true")
     for kind in ("scene", "plan", "compare"):
         parser.add_argument("--" + kind, action="append", default=[], metavar="NAME=PATH")
     options = parser.parse_args()
@@ -132,11 +168,7 @@ def main():
             name, paths = named(text)
             plans[name] = plan_of(options, paths, kind == "compare")
             write(plans_file, plans)
-    if options.scene or options.print:
-        for name, scene in costs.items():
-            cost_table(name, scene)
-    if options.plan or options.compare or options.print:
-        plan_tables(plans)
+    write_docs(costs, plans)
 
 
 if __name__ == "__main__":

@@ -39,6 +39,18 @@ bool parse_info(std::span<const std::byte> head, const std::string& where, Image
                                  &info.channels) != 0;
 }
 
+void check_picture(const ImageU8& image) {
+    DARB_CHECK(image.width > 0 && image.height > 0 && image.channels >= 1, "{}x{}x{}", image.width,
+               image.height, image.channels);
+}
+
+/// What stb_image_write calls with each piece of a file.
+void append_bytes(void* context, void* data, int size) {
+    auto* out = static_cast<std::vector<std::byte>*>(context);
+    const auto* bytes = static_cast<const std::byte*>(data);
+    out->insert(out->end(), bytes, bytes + size);
+}
+
 }  // namespace
 
 ImageInfo read_image_info(const std::filesystem::path& path) {
@@ -98,17 +110,20 @@ ImageU8 orient_image(const ImageU8& image, int orientation) {
 }
 
 std::vector<std::byte> encode_png(const ImageU8& image) {
-    DARB_CHECK(image.width > 0 && image.height > 0 && image.channels >= 1, "{}x{}x{}", image.width,
-               image.height, image.channels);
+    check_picture(image);
     std::vector<std::byte> file;
-    const auto append = [](void* context, void* data, int size) {
-        auto* out = static_cast<std::vector<std::byte>*>(context);
-        const auto* bytes = static_cast<const std::byte*>(data);
-        out->insert(out->end(), bytes, bytes + size);
-    };
-    if (!stbi_write_png_to_func(append, &file, image.width, image.height, image.channels,
+    if (!stbi_write_png_to_func(append_bytes, &file, image.width, image.height, image.channels,
                                 image.data.data(), image.width * image.channels))
         throw Error("a picture", "the PNG cannot be encoded", "Free memory.");
+    return file;
+}
+
+std::vector<std::byte> encode_jpeg(const ImageU8& image, int quality) {
+    check_picture(image);
+    std::vector<std::byte> file;
+    if (!stbi_write_jpg_to_func(append_bytes, &file, image.width, image.height, image.channels,
+                                image.data.data(), quality))
+        throw Error("a picture", "the JPEG cannot be encoded", "Free memory.");
     return file;
 }
 

@@ -1,4 +1,4 @@
-// PNG and JPEG files: size and orientation without decoding, whole images, PNG out.
+// PNG and JPEG files: size and orientation without decoding, whole images, PNG and JPEG out.
 #pragma once
 
 #include <cstddef>
@@ -35,6 +35,8 @@ ImageU8 orient_image(const ImageU8& image, int orientation);
 
 /// 1, 3 or 4 channels.
 std::vector<std::byte> encode_png(const ImageU8& image);
+/// quality: 1 to 100. An alpha channel is left out.
+std::vector<std::byte> encode_jpeg(const ImageU8& image, int quality);
 
 /// encode_png through write_file_atomic, so makes missing folders.
 void write_png(const std::filesystem::path& path, const ImageU8& image);

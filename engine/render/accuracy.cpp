@@ -48,7 +48,7 @@ constexpr AccuracySetting kSettings[kAccuracyCount] = {
     {"transmittance_stop",
      "a pixel ends before its transmittance falls below it",
      kStops,
-     {2, 0, 1},
+     {0, 0, 1},
      ""},
     {"storage", "of the projected splats' colour, opacity and shape", kStorages, {1, 0, 0}, ""},
     {"sh_degree", "highest degree of view-dependent colour", kDegrees, {0, 0, 0}, ""},

@@ -94,6 +94,8 @@ EffectRow lens_rule(const std::vector<View>& views) {
         wide > 0 ? fmt::format("; {} see more than 60 degrees to a side", wide) : "";
     row.on = lenses > 0;
     row.measured = static_cast<double>(lenses);
+    row.reason = "no cameras are named";
+    if (views.empty()) return row;
     row.reason =
         views.empty() ? "no cameras are named"
         : row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),

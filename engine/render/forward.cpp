@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/render/groups.h"
 #include "engine/render/kernel_constants.h"
+#include "shaders/shared/lens.h"
 
 namespace darb {
 
@@ -57,7 +58,7 @@ gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, floa
                     (camera.height - camera.cy) / camera.fy);
     glm::dvec2 margin =
         JACOBIAN_MARGIN * 0.5 * glm::dvec2(camera.width / camera.fx, camera.height / camera.fy);
-    d.lens_fold = 1e18f;  // a lens without terms is the pinhole
+    d.lens_fold = static_cast<float>(LENS_FOLD_NONE);
     if (const LensTerms& lens = camera.lens; lens.active) {
         low = lens.ray_min;
         high = lens.ray_max;

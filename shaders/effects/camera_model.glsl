@@ -1,6 +1,7 @@
 // From a point in the camera to its pixel, the rows of the Jacobian there, and their gradients. The camera is a
 // pinhole; OFF_CENTRE and LENS of effects/constants.glsl say what else it is. Needs covariance.glsl.
 
+#include "shared/lens.h"
 #include "effects/lens.glsl"
 
 vec2 principal_point(CameraData camera) {
@@ -14,9 +15,12 @@ vec2 clamped_ratio(CameraData camera, vec2 ratio) {
     return clamp(ratio, OFF_CENTRE == 1 ? camera.ratio_min : -camera.ratio_max, camera.ratio_max);
 }
 
+// A camera without lens terms is a pinhole, by the same arithmetic whether lenses are compiled in or not.
+bool distorts(CameraData camera) { return LENS == 1 && camera.lens_fold < LENS_FOLD_NONE; }
+
 // False where no pixel sees the point.
 bool pixel_of(CameraData camera, vec3 p, out vec2 pixel) {
-    if (LENS == 1) {
+    if (distorts(camera)) {
         const LensPoint at = lens_point(camera, p.xy / p.z);
         pixel = camera.focal * at.value + principal_point(camera);
         return lens_sees(camera, at);
@@ -30,7 +34,7 @@ void jacobian_rows(CameraData camera, vec3 p, out vec3 j0, out vec3 j1) {
     const vec2 ratio = clamped_ratio(camera, p.xy / p.z);
     j0 = vec3(camera.focal.x / p.z, 0.0, -camera.focal.x * ratio.x / p.z);
     j1 = vec3(0.0, camera.focal.y / p.z, -camera.focal.y * ratio.y / p.z);
-    if (LENS == 1) {
+    if (distorts(camera)) {
         const mat2 d = lens_jacobian(lens_point(camera, ratio));
         const vec3 k0 = vec3(1.0, 0.0, -ratio.x) / p.z, k1 = vec3(0.0, 1.0, -ratio.y) / p.z;
         j0 = camera.focal.x * (d[0][0] * k0 + d[1][0] * k1);
@@ -72,7 +76,7 @@ vec3 lens_point_gradient(CameraData camera, vec3 p, vec3 d_j0, vec3 d_j1, vec2 d
 
 // dL/dp from the gradients of the Jacobian's rows and of the pixel.
 vec3 camera_point_gradient(CameraData camera, vec3 p, vec3 d_j0, vec3 d_j1, vec2 d_pixel) {
-    if (LENS == 1) return lens_point_gradient(camera, p, d_j0, d_j1, d_pixel);
+    if (distorts(camera)) return lens_point_gradient(camera, p, d_j0, d_j1, d_pixel);
     const vec2 ratio = clamped_ratio(camera, p.xy / p.z);
     const vec2 low = OFF_CENTRE == 1 ? camera.ratio_min : -camera.ratio_max;
     const vec2 from_x = jacobian_row_gradient(camera.focal.x, p.x, p.z, ratio.x,

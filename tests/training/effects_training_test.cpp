@@ -171,8 +171,7 @@ TEST(EffectsRendering, auto_equals_all_in_the_picture) {
             pictures.push_back(renderer.render(view.camera));
         }
         EXPECT_EQ(pictures[0].data, pictures[1].data) << "identities, bit by bit";
-        // With the lens's arithmetic compiled in, an identity up to rounding.
-        EXPECT_TRUE(compare("all", pictures[0].data, pictures[2].data, tolerance("image_float32")));
+        EXPECT_EQ(pictures[0].data, pictures[2].data) << "identities, bit by bit";
     }
 }
 

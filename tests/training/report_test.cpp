@@ -14,6 +14,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/rng.h"
 #include "engine/data/image_io.h"
 #include "tests/support/chromium.h"
 #include "trainer/report/html.h"
@@ -94,7 +95,7 @@ TEST(Report_example, is_well_formed_and_without_outside_resources) {
         EXPECT_EQ(html.find(outside), std::string::npos) << outside;
     for (const char* part : {"still life &lt;1&gt; &amp; &quot;friends&quot;", "PSNR (dB)",
                              "iterations", "training time (s)", "view_03.png", "28.31 dB",
-                             "data:image/png;base64,iVBORw0KGgo", "of the roofline", "type='range'",
+                             "data:image/jpeg;base64,/9j/", "of the roofline", "type='range'",
                              "Time an iteration, by pass", "&#39;&lt;&amp;&gt;&#39;", "13,000"})
         EXPECT_NE(html.find(part), std::string::npos) << part;
     EXPECT_EQ(html.find("nan"), std::string::npos);
@@ -110,6 +111,19 @@ TEST(Report_inChromium, draws_every_plot_and_picture) {
     EXPECT_EQ(page.pictures, 3);
     EXPECT_EQ(page.cut, 0) << page.touching;
     EXPECT_EQ(page.overlaps, 0) << page.touching;
+}
+
+TEST(Report_largePictures, are_shown) {
+    if (test::chromium().empty()) GTEST_SKIP() << "no Chromium to open the page with";
+    ImageU8 noise(2400, 800, 3);  // 3 MB as a JPEG
+    Pcg32 rng(4);
+    for (std::uint8_t& value : noise.data) value = static_cast<std::uint8_t>(rng.below(256));
+    write_png(scratch("report_noise.png"), noise);
+    ReportData data;
+    data.pictures = {{"noise", scratch("report_noise.png"), 5, 0}};
+    const std::string html = report_html(data);
+    EXPECT_GT(html.size(), size_t{1} << 21) << "meant to be beyond what a CSS variable holds";
+    EXPECT_EQ(test::open_page(html, testing::TempDir()).pictures, 3);
 }
 
 TEST(Report_emptyRun, leaves_parts_out) {
@@ -136,6 +150,8 @@ TEST(Report_oneSample, has_axes) {
     const std::string html = report_html(data);
     EXPECT_EQ(first_fault(html), "");
     EXPECT_NE(html.find("<svg"), std::string::npos);
+    data.evaluations = {{1, 0.1, 20, 0.86, 100}};
+    EXPECT_EQ(report_html(data).find(">1.2<"), std::string::npos) << "no SSIM beyond 1";
 }
 
 TEST(SvgPlot_legend, stands_below_the_title_in_lines_that_fit) {

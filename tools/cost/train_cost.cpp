@@ -6,10 +6,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "engine/check/device_walk.h"
+#include "engine/check/walk_truth.h"
 #include "engine/core/error.h"
 #include "engine/reference/loss.h"
-#include "engine/reference/render.h"
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
 #include "trainer/trainer.h"
@@ -92,42 +91,33 @@ double gradient_error(Device& device, SplatModel model, const View& view, const 
                       const Accuracy& accuracy, const TrainOptions& options) {
     const FrameAccuracy frame = frame_accuracy(accuracy, model);
     model.footprint = frame.footprint;
-    const Accuracy exact = preset_accuracy(kExact);
-    reference::RenderSettings settings;
-    settings.alpha_cutoff = exact.value(kAlphaCutoff);
-    settings.transmittance_stop = exact.value(kTransmittanceStop);
-    const glm::vec3 background(options.white_background ? 1.0f : 0.0f);
-    for (int c = 0; c < 3; ++c) settings.background[c] = background[c];
-    Camera relative = view.camera;
-    relative.translation += relative.rotation * model.origin;
-    const auto splats = reference::make_splats<double>(model);
-    const auto truth = reference::render(splats, relative, settings);
-    const ImageF target = composite(photo, background);
-    Image<double> wanted(target.width, target.height, 3);
-    std::copy(target.data.begin(), target.data.end(), wanted.data.begin());
-    const auto loss = reference::loss(truth.images.colour, wanted, {options.lambda_dssim});
-    const auto g = reference::backward(splats, relative, settings, truth, loss.d_image);
-
-    check::WalkSettings walk;
+    check::WalkSettings walk, exact;
+    exact.background = walk.background = glm::vec3(options.white_background ? 1.0f : 0.0f);
+    exact.alpha_cutoff = static_cast<float>(preset_accuracy(kExact).value(kAlphaCutoff));
+    exact.transmittance_stop =
+        static_cast<float>(preset_accuracy(kExact).value(kTransmittanceStop));
     walk.evaluation = frame.options.evaluation;
     walk.polynomial_degree = frame.options.polynomial_degree;
     walk.storage = frame.options.storage;
     walk.depth_order = frame.options.depth_order;
     walk.alpha_cutoff = frame.options.alpha_cutoff;
     walk.transmittance_stop = frame.options.transmittance_stop;
-    walk.background = background;
+
+    const ImageF target = composite(photo, exact.background);
+    Image<double> wanted(target.width, target.height, 3), shown = wanted;
+    std::copy(target.data.begin(), target.data.end(), wanted.data.begin());
+    shown.data = check::walk_in_double(model, view.camera, {}, exact).image;
+    const auto loss = reference::loss(shown, wanted, {options.lambda_dssim});
+    const auto truth = check::walk_in_double(model, view.camera, loss.d_image, exact);
     const auto got = check::walk_on_device(device, model, view.camera, loss.d_image, walk);
-    const std::vector<double>* expected[kAttributeCount] = {&g.splats.position, &g.splats.log_scale,
-                                                            &g.splats.rotation, &g.splats.opacity,
-                                                            &g.splats.sh_dc,    &g.splats.sh_rest};
     double off = 0;
     int attributes = 0;
     for (int a = 0; a < kAttributeCount; ++a) {
         double difference = 0, size = 0;
-        for (size_t i = 0; i < expected[a]->size(); ++i) {
-            const double e = (*expected[a])[i] - got.d[a][i];
+        for (size_t i = 0; i < truth.d[a].size(); ++i) {
+            const double e = truth.d[a][i] - got.d[a][i];
             difference += e * e;
-            size += (*expected[a])[i] * (*expected[a])[i];
+            size += truth.d[a][i] * truth.d[a][i];
         }
         if (!(size > 0)) continue;
         off += std::sqrt(difference / size);

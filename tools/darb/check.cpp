@@ -83,8 +83,9 @@ int dump_view(const CheckFlags& flags) {
     if (flags.scene.empty() || flags.cameras.empty() || flags.dump.empty())
         throw Error("darb check", "--scene, --cameras and --dump belong together",
                     "darb check --scene S.ply --cameras cameras.json --view 0 --dump DIR");
-    if (!flags.json.empty())
-        throw Error("darb check --json", "has nothing to say of --dump", "Leave one of them out.");
+    if (!flags.json.empty() || flags.checks.every_kernel)
+        throw Error(flags.json.empty() ? "darb check --every-kernel" : "darb check --json",
+                    "has nothing to say of --dump", "Leave one of them out.");
     const SplatModel model = load_scene(flags.scene);
     const std::vector<View> views = load_cameras(flags.cameras, flags.data);
     if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())

@@ -48,8 +48,6 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
 }
 
 int cost(const CostFlags& flags) {
-    if (flags.quick && flags.full)
-        throw Error("--quick --full", "contradict each other", "Use one of them.");
     if (!flags.train.empty()) return train_cost(flags);
     if (flags.scene.empty())
         throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
@@ -87,20 +85,25 @@ void add_cost(CLI::App& app, Action& action) {
     CLI::App* command =
         app.add_subcommand("cost", "Measure what each accuracy setting costs in time");
     command->add_option("scene", flags->scene, "PLY file, or the output folder of darb train");
-    command->add_option("--train", flags->train,
-                        "price the settings in training on this data set instead");
+    auto* dataset = command->add_option(
+        "dataset", flags->dataset, "photos with cameras; without: eight views around the splats");
+    auto* train = command->add_option("--train", flags->train,
+                                      "price the settings in training on this data set instead");
     command->add_option("--seeds", flags->seeds, "runs a setting with --train (default 3)")
-        ->check(CLI::Range(1, 100));
+        ->check(CLI::Range(1, 100))
+        ->needs(train);
     command->add_option("--iterations", flags->iterations, "of a run with --train (default 1,500)")
-        ->check(CLI::Range(20, 1'000'000));
-    command->add_option("dataset", flags->dataset,
-                        "photos with cameras; without: eight views around the splats");
+        ->check(CLI::Range(20, 1'000'000))
+        ->needs(train);
     command->add_option("--json", flags->json, "write every number to this file");
     command->add_option("--html", flags->html, "write a page with plots to this file");
-    command->add_flag("--quick", flags->quick, "seconds: fewer views, repeats and combinations");
-    command->add_flag("--full", flags->full, "minutes: more of all three");
+    auto* quick = command->add_flag("--quick", flags->quick,
+                                    "seconds: fewer views, repeats and combinations");
+    command->add_flag("--full", flags->full, "minutes: more of all three")->excludes(quick);
     command->add_option("--size", flags->size, "of the views around the splats, px")
-        ->capture_default_str();
+        ->capture_default_str()
+        ->excludes(train)
+        ->excludes(dataset);
     command
         ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
         ->capture_default_str();

@@ -4,9 +4,11 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
-#include "engine/core/files.h"
+#include "engine/core/error.h"
 #include "engine/data/camera_list.h"
+#include "tools/cost/views.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/plan_price.h"
@@ -22,7 +24,7 @@ struct PlanFlags {
     std::filesystem::path what, cameras;
     std::string device, effects = "auto";
     bool as_json = false, no_price = false, compare = false, depth = false;
-    int sh_degree = 3;
+    std::optional<int> sh_degree;
     DatasetOptions data;
 };
 
@@ -37,19 +39,33 @@ struct Subject {
 Subject open(const PlanFlags& flags) {
     Subject s;
     s.training = !is_scene(flags.what);
+    const auto refuse = [&](bool given, const char* flag) {
+        if (given)
+            throw Error(fmt::format("darb plan {} {}", flags.what.string(), flag),
+                        s.training ? "is for a scene, and this is a data set"
+                                   : "is for a data set, and this is a scene",
+                        "Leave it out.");
+    };
     if (s.training) {
+        refuse(flags.depth, "--depth");
+        refuse(!flags.cameras.empty(), "--cameras");
         s.dataset = load_dataset(flags.what, flags.data);
         if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
             s.photos = load_photos(s.dataset.views);
         return s;
     }
+    refuse(flags.sh_degree.has_value(), "--sh-degree");
     s.model = load_scene(flags.what);
     if (!flags.cameras.empty()) s.views = load_cameras(flags.cameras, flags.data);
     return s;
 }
 
+int degree_of(const Subject& s, const PlanFlags& flags) {
+    return s.training ? flags.sh_degree.value_or(TrainOptions{}.sh_degree) : s.model.sh_degree;
+}
+
 EffectPlan plan_of(const Subject& s, const PlanFlags& flags, const EffectChoice& choice) {
-    return s.training ? plan_training(s.dataset, s.photos, flags.sh_degree, choice)
+    return s.training ? plan_training(s.dataset, s.photos, degree_of(s, flags), choice)
                       : plan_rendering(s.model, s.views, {.depth = flags.depth}, choice);
 }
 
@@ -57,30 +73,11 @@ Measured measure(const Subject& s, const PlanFlags& flags, const EffectPlan& pla
     DeviceOptions device;
     device.select = flags.device;
     if (s.training) return measure_training(device, s.dataset, TrainOptions{}, plan);
-    const std::vector<View> views = s.views.empty() ? framing_views(s.model) : s.views;
+    std::vector<View> views = s.views;
+    if (views.empty())
+        for (const Camera& camera : orbit_views(s.model, 4, 640, 480).cameras)
+            views.emplace_back().camera = camera;
     return measure_rendering(device, s.model, views, plan);
-}
-
-json rows_json(const EffectPlan& plan, const EffectPrices& prices) {
-    json rows = plan_json(plan);
-    for (std::size_t e = 0; e < prices.size(); ++e)
-        if (prices[e]) rows[e]["price"] = {{"ms", prices[e]->ms}, {"bytes", prices[e]->bytes}};
-    return rows;
-}
-
-void print_rows(const EffectPlan& plan, const EffectPrices& prices, bool training) {
-    const char* ms_of = training ? "ms/iter" : "ms/frame";
-    fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  reason\n", "effect", "", ms_of, "MB");
-    for (int e = 0; e < EFFECT_COUNT; ++e) {
-        const EffectRow& row = plan.row(e);
-        std::string ms = "-", mb = "-";
-        if (const auto at = static_cast<std::size_t>(e); at < prices.size() && prices[at]) {
-            ms = fmt::format("{:+.2f}", prices[at]->ms);
-            mb = fmt::format("{:+.2f}", static_cast<double>(prices[at]->bytes) / 1e6);
-        }
-        const char* state = row.on ? "on" : "off";
-        fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), state, ms, mb, row.reason);
-    }
 }
 
 // none, auto and all as wholes.
@@ -106,15 +103,14 @@ int run_plan(const PlanFlags& flags) {
     if (!empty && (!flags.no_price || flags.compare)) {
         const Measured base = measure(s, flags, plan);
         plan.note_frame(base.huge_splats, base.longest_list);
-        const int most_degree = s.training ? flags.sh_degree : s.model.sh_degree;
         if (!flags.no_price)
-            prices = price_effects(plan, base, s.training, most_degree,
+            prices = price_effects(plan, base, s.training, degree_of(s, flags),
                                    [&](const EffectPlan& p) { return measure(s, flags, p); });
     }
-    if (!flags.as_json) print_rows(plan, prices, s.training);
+    if (!flags.as_json) print_priced(plan, prices, s.training);
     const char* kind = s.training ? "data set" : "scene";
     json result{
-        {"path", flags.what.string()}, {"kind", kind}, {"effects", rows_json(plan, prices)}};
+        {"path", flags.what.string()}, {"kind", kind}, {"effects", priced_json(plan, prices)}};
     if (flags.compare && !empty) result["compared"] = compare_choices(s, flags);
     if (flags.as_json)
         fmt::print("{}\n", result.dump(2, ' ', false, json::error_handler_t::replace));
@@ -132,8 +128,9 @@ void add_plan(CLI::App& app, Action& action) {
     command->add_option("--cameras", flags->cameras,
                         "of a scene: the cameras that it will be rendered through");
     command->add_option("-r,--resolution", flags->data.resolution, "as in training");
-    command->add_option("--sh-degree", flags->sh_degree, "of a data set: the highest degree")
-        ->capture_default_str()
+    command
+        ->add_option("--sh-degree", flags->sh_degree,
+                     "of a data set: the highest degree (default 3)")
         ->check(CLI::Range(0, 3));
     command->add_flag("--depth", flags->depth, "of a scene: depth images are wanted too");
     add_effects_flag(*command, flags->effects);

@@ -1,8 +1,9 @@
 #include "tools/darb/plan_price.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
 #include "engine/render/renderer.h"
 #include "tools/darb/effect_flags.h"
@@ -30,39 +31,6 @@ double sum_of(const std::vector<PassTime>& passes) {
 }
 
 }  // namespace
-
-std::vector<View> framing_views(const SplatModel& model) {
-    constexpr int kWidth = 640, kHeight = 480;
-    std::vector<View> views;
-    if (model.size() == 0) return views;
-    glm::dvec3 centre(0.0);
-    double radius2 = 0;
-    const auto at = [&](std::size_t i) {
-        return glm::dvec3(model.position[3 * i], model.position[3 * i + 1],
-                          model.position[3 * i + 2]);
-    };
-    for (std::size_t i = 0; i < model.size(); ++i) centre += at(i) / double(model.size());
-    for (std::size_t i = 0; i < model.size(); ++i) {
-        const glm::dvec3 d = at(i) - centre;
-        radius2 += glm::dot(d, d) / double(model.size());
-    }
-    for (std::size_t v = 0; v < kViews; ++v) {
-        const double angle = 1.5707963267948966 * static_cast<double>(v);
-        View view;
-        Camera& c = view.camera;
-        c.width = kWidth;
-        c.height = kHeight;
-        c.fx = c.fy = kWidth;
-        c.cx = 0.5 * kWidth;
-        c.cy = 0.5 * kHeight;
-        const glm::dvec3 right(std::cos(angle), 0, -std::sin(angle)), down(0, 1, 0);
-        c.rotation = glm::transpose(glm::dmat3(right, down, glm::cross(right, down)));
-        c.translation =
-            glm::dvec3(0, 0, 3 * std::sqrt(radius2)) - c.rotation * (centre + model.origin);
-        views.push_back(view);
-    }
-    return views;
-}
 
 Measured measure_rendering(const DeviceOptions& device_options, const SplatModel& model,
                            const std::vector<View>& views, const EffectPlan& plan) {
@@ -143,6 +111,28 @@ EffectPrices price_effects(const EffectPlan& plan, const Measured& base, bool tr
                 (static_cast<std::int64_t>(base.bytes) - static_cast<std::int64_t>(changed.bytes))};
     }
     return prices;
+}
+
+nlohmann::json priced_json(const EffectPlan& plan, const EffectPrices& prices) {
+    nlohmann::json rows = plan_json(plan);
+    for (std::size_t e = 0; e < prices.size(); ++e)
+        if (prices[e]) rows[e]["price"] = {{"ms", prices[e]->ms}, {"bytes", prices[e]->bytes}};
+    return rows;
+}
+
+void print_priced(const EffectPlan& plan, const EffectPrices& prices, bool training) {
+    const char* ms_of = training ? "ms/iter" : "ms/frame";
+    fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  reason\n", "effect", "", ms_of, "MB");
+    for (int e = 0; e < EFFECT_COUNT; ++e) {
+        const EffectRow& row = plan.row(e);
+        std::string ms = "-", mb = "-";
+        if (const auto at = static_cast<std::size_t>(e); at < prices.size() && prices[at]) {
+            ms = fmt::format("{:+.2f}", prices[at]->ms);
+            mb = fmt::format("{:+.2f}", static_cast<double>(prices[at]->bytes) / 1e6);
+        }
+        const char* state = row.on ? "on" : "off";
+        fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), state, ms, mb, row.reason);
+    }
 }
 
 }  // namespace darb

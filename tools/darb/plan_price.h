@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
@@ -35,7 +36,8 @@ Measured measure_training(const DeviceOptions& device, const Dataset& dataset,
 EffectPrices price_effects(const EffectPlan& plan, const Measured& base, bool training,
                            int most_degree, const std::function<Measured(const EffectPlan&)>& with);
 
-/// Views that frame the splats from four sides, where no cameras are named.
-std::vector<View> framing_views(const SplatModel& model);
+/// A row an effect, with its price where there is one.
+void print_priced(const EffectPlan& plan, const EffectPrices& prices, bool training);
+nlohmann::json priced_json(const EffectPlan& plan, const EffectPrices& prices);
 
 }  // namespace darb

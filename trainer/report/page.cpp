@@ -46,18 +46,18 @@ tr.mark td{font-weight:600}ul{margin:.4rem 0;padding-left:1.2rem}
 .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
 th,td{text-align:right;padding:.22rem .9rem .22rem 0;border-bottom:1px solid var(--line);white-space:nowrap}
 th{color:var(--soft);font-weight:500}th:first-child,td:first-child,th.left,td.left,td.text{text-align:left}
-td.text{white-space:normal;overflow-wrap:anywhere}
+td.text{white-space:normal;overflow-wrap:anywhere;min-width:11rem}
 td.bar{width:14rem;padding-right:0}td.bar i{display:block;height:.7em;border-radius:3px;
 -webkit-print-color-adjust:exact;print-color-adjust:exact}
 figure{margin:0 0 1.2rem;break-inside:avoid}
 .pair{display:grid;grid-template-columns:1fr 1fr;gap:.5rem}
-.pane{aspect-ratio:var(--r);background:var(--p) 0 0/300% 100%;border-radius:6px;position:relative;
+.pane{aspect-ratio:var(--r);background:0 0/300% 100%;border-radius:6px;position:relative;
 -webkit-print-color-adjust:exact;print-color-adjust:exact}
 .render{position:absolute;inset:0;background-position:50% 0;clip-path:inset(0 calc(100% - var(--x)) 0 0)}
 .error{background-position:100% 0}
 figcaption{display:flex;justify-content:space-between;color:var(--soft);margin-bottom:.25rem;gap:1rem}
 @media print{body{max-width:none;padding:0;font-size:11px}h2{break-after:avoid}.wide{overflow:visible}
-th,td{padding-right:.5rem}.area,circle,.line,.cards div{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
+th,td{padding-right:.5rem}.plots{grid-template-columns:1fr 1fr}.area,circle,.line,.cards div{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 .parts{display:grid;grid-template-columns:1fr 1fr;gap:.5rem;color:var(--soft);font-size:.85rem}
 )css";
 

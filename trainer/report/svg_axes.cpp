@@ -57,7 +57,7 @@ void Axis::include(double v) {
 
 void Axis::widen() {
     if (high - low >= 1e-9 * std::max(1.0, std::abs(low))) return;
-    const double half = std::max(0.5, 0.05 * std::abs(low));
+    const double half = log || low == 0 ? 0.5 : 0.05 * std::abs(low);
     low -= half;
     high += half;
 }
