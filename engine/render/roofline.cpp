@@ -63,7 +63,7 @@ DeviceRates measure_rates(Device& device) {
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     const double rest = 3.0 * ((c.sh_degree + 1) * (c.sh_degree + 1) - 1);
     const double floats = 14 + rest;  // parameters of a splat
-    const double samples = c.pairs * kTilePixels * kTouchedShare;
+    const double samples = c.evaluated > 0 ? c.evaluated : c.pairs * kTilePixels * kTouchedShare;
     if (pass == "project")
         return PassWork{c.splats * 8 + c.visible * (4 * floats + kProjectedBytes),
                         c.visible * (kProjectFma + kShFma * rest)};
@@ -71,6 +71,7 @@ std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     if (pass == "depth sort") return PassWork{c.visible * 4 * kSortBytes, 0};
     if (pass == "emit") return PassWork{c.visible * (16 + 32 + 5 * 4) + c.pairs * 8, 0};
     if (pass == "tile sort") return PassWork{c.pairs * 2 * kSortBytes, 0};
+    if (pass == "scan") return PassWork{c.splats * 3 * 4, 0};  // read twice, written once
     if (pass == "tile ranges") return PassWork{c.pairs * 4, 0};
     if (pass == "blend") return PassWork{c.pairs * kPairBytes + c.pixels * 20, samples * kBlendFma};
     if (pass == "loss") return PassWork{c.pixels * (12 + 4 + 12), c.pixels * kLossFma};

@@ -20,7 +20,8 @@ DeviceRates measure_rates(Device& device);
 /// Means of the frames or iterations that a time belongs to.
 struct FrameCounts {
     double splats = 0, visible = 0, pairs = 0, pixels = 0;
-    int sh_degree = 0;  // of the buffers
+    int sh_degree = 0;     // of the buffers
+    double evaluated = 0;  // splat-pixels of blending; 0: estimated from the pairs
 };
 
 struct PassWork {

@@ -16,6 +16,7 @@ void add_eval(CLI::App& app, Action& action);
 void add_render(CLI::App& app, Action& action);
 void add_view(CLI::App& app, Action& action);
 void add_cost(CLI::App& app, Action& action);
+void add_bench(CLI::App& app, Action& action);
 void add_plan(CLI::App& app, Action& action);
 void add_info(CLI::App& app, Action& action);
 void add_convert(CLI::App& app, Action& action);

@@ -52,6 +52,7 @@ int run(int argc, char** argv) {
     darb::add_view(app, action);
 #endif
     darb::add_cost(app, action);
+    darb::add_bench(app, action);
     darb::add_plan(app, action);
     darb::add_info(app, action);
     darb::add_convert(app, action);

@@ -1,0 +1,47 @@
+// How frame and iteration time grow with splats, pixels and splat-tile pairs on the random scene of
+// `darb bench`: curves with fitted exponents, as a table, JSON and a page of plots.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tools/bench/measure.h"
+
+namespace darb {
+
+struct GrowthPoint {
+    double splats = 0, pixels = 0, pairs = 0;
+    Spread ms;
+    std::vector<PassFigure> passes;
+};
+
+struct GrowthCurve {
+    std::string name;                 // "frame" or "iteration"
+    std::string by;                   // "splats" or "pixels": what varies
+    std::vector<GrowthPoint> points;  // ascending
+};
+
+struct GrowthPlan {
+    std::uint32_t most_splats = 1'000'000;
+    int most_width = 2560;  // px, of pictures of 16 to 9
+    Sampling sampling;
+};
+
+/// Sizes that the device or its memory cannot take are left out with a line to progress.
+std::vector<GrowthCurve> measure_growth(Device& device, const GrowthPlan& plan,
+                                        const std::function<void(const std::string&)>& progress);
+
+/// The value of a point that a name stands for: splats, pixels or pairs.
+double growth_value(const GrowthPoint& point, const std::string& by);
+/// b of ms = a x^b, least squares of the logarithms over the points whose x is at least a tenth of
+/// the largest: below that fixed costs rule. NaN with fewer than two such points.
+double growth_exponent(const std::vector<GrowthPoint>& points, const std::string& by);
+
+std::string growth_table(const std::vector<GrowthCurve>& curves);
+nlohmann::json growth_json(const std::vector<GrowthCurve>& curves);
+/// A whole page without outside resources. context: context_json().
+std::string growth_html(const std::vector<GrowthCurve>& curves, const nlohmann::json& context);
+
+}  // namespace darb

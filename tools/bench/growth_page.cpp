@@ -1,0 +1,152 @@
+// The curves of growth.h as text, JSON and a page.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/bench/growth.h"
+#include "trainer/report/html.h"
+#include "trainer/report/page.h"
+#include "trainer/report/svg_plot.h"
+
+namespace darb {
+
+namespace {
+
+using Json = nlohmann::json;
+
+// Of the curve on which the splats, and with them the pairs, vary.
+std::vector<GrowthPoint> points_by_splats(const std::vector<GrowthCurve>& curves,
+                                          const std::string& name) {
+    std::vector<GrowthPoint> points;
+    for (const GrowthCurve& curve : curves)
+        if (curve.name == name && curve.by == "splats")
+            points.insert(points.end(), curve.points.begin(), curve.points.end());
+    return points;
+}
+
+std::string exponent_text(double exponent) {
+    return std::isfinite(exponent) ? fmt::format("{:.2f}", exponent) : "-";
+}
+
+PlotSeries series(const std::string& name, const std::vector<GrowthPoint>& points,
+                  const std::string& by) {
+    PlotSeries s;
+    s.name = fmt::format("{}, exponent {}", name, exponent_text(growth_exponent(points, by)));
+    s.dots = true;
+    for (const GrowthPoint& p : points) {
+        s.points.emplace_back(growth_value(p, by), p.ms.median);
+        s.titles.push_back(fmt::format("{}: {} splats, {} pixels, {} pairs, {:.2f} ms", name,
+                                       format_number(p.splats), format_number(p.pixels),
+                                       format_number(p.pairs), p.ms.median));
+    }
+    return s;
+}
+
+Plot log_plot(const std::string& title, const std::string& x_label) {
+    Plot plot{title, x_label, "ms", {}};
+    plot.log_x = plot.log_y = true;
+    return plot;
+}
+
+// The passes of one curve against what varies.
+Plot pass_plot(const GrowthCurve& curve) {
+    Plot plot = log_plot(fmt::format("Passes of a {} by {}", curve.name, curve.by), curve.by);
+    if (curve.points.empty()) return plot;
+    for (const PassFigure& pass : curve.points.back().passes) {
+        PlotSeries s;
+        s.name = pass.name;
+        for (const GrowthPoint& p : curve.points)
+            for (const PassFigure& one : p.passes)
+                if (one.name == pass.name)
+                    s.points.emplace_back(growth_value(p, curve.by), one.ms.median);
+        plot.series.push_back(std::move(s));
+    }
+    return plot;
+}
+
+std::string page_table(const GrowthCurve& curve) {
+    std::string html = fmt::format(
+        "<h2>{} by {}</h2><div class='wide'><table><tr><th>splats</th><th>pixels</th>"
+        "<th>pairs</th><th>ms</th><th>quartiles</th></tr>\n",
+        curve.name, curve.by);
+    for (const GrowthPoint& p : curve.points)
+        html += fmt::format(
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f} to {:.3f}</td></tr>\n",
+            format_number(p.splats), format_number(p.pixels), format_number(p.pairs), p.ms.median,
+            p.ms.low, p.ms.high);
+    return html + "</table></div>\n";
+}
+
+}  // namespace
+
+std::string growth_table(const std::vector<GrowthCurve>& curves) {
+    std::string text;
+    for (const GrowthCurve& curve : curves) {
+        text += fmt::format("{} by {}: exponent {}, by pairs {}\n", curve.name, curve.by,
+                            exponent_text(growth_exponent(curve.points, curve.by)),
+                            exponent_text(growth_exponent(curve.points, "pairs")));
+        text += fmt::format("{:>12} {:>12} {:>12} {:>12} {:>8}\n", "splats", "pixels", "pairs",
+                            "ms", "+- %");
+        for (const GrowthPoint& p : curve.points)
+            text +=
+                fmt::format("{:>12} {:>12} {:>12} {:>12.3f} {:>8.1f}\n", format_number(p.splats),
+                            format_number(p.pixels), format_number(p.pairs), p.ms.median,
+                            p.ms.median > 0 ? 50 * (p.ms.high - p.ms.low) / p.ms.median : 0.0);
+    }
+    return text;
+}
+
+Json growth_json(const std::vector<GrowthCurve>& curves) {
+    Json all = Json::array();
+    const auto number = [](double v) { return std::isfinite(v) ? Json(v) : Json(); };
+    for (const GrowthCurve& curve : curves) {
+        Json points = Json::array();
+        for (const GrowthPoint& p : curve.points) {
+            Json passes = Json::object();
+            for (const PassFigure& pass : p.passes) passes[pass.name] = pass.ms.median;
+            points.push_back({{"splats", p.splats},
+                              {"pixels", p.pixels},
+                              {"pairs", p.pairs},
+                              {"ms", p.ms.median},
+                              {"quartile_low", p.ms.low},
+                              {"quartile_high", p.ms.high},
+                              {"passes_ms", passes}});
+        }
+        all.push_back({{"name", curve.name},
+                       {"by", curve.by},
+                       {"exponent", number(growth_exponent(curve.points, curve.by))},
+                       {"exponent_by_pairs", number(growth_exponent(curve.points, "pairs"))},
+                       {"points", points}});
+    }
+    return all;
+}
+
+std::string growth_html(const std::vector<GrowthCurve>& curves, const Json& context) {
+    Plot splats = log_plot("By splats", "splats"), pixels = log_plot("By pixels", "pixels"),
+         pairs = log_plot("By splat-tile pairs", "pairs");
+    std::string passes, tables;
+    for (const GrowthCurve& curve : curves) {
+        (curve.by == "splats" ? splats : pixels)
+            .series.push_back(series(curve.name, curve.points, curve.by));
+        passes += svg_plot(pass_plot(curve));
+        tables += page_table(curve);
+    }
+    for (const char* name : {"frame", "iteration"})
+        pairs.series.push_back(series(name, points_by_splats(curves, name), "pairs"));
+    return html_page(
+        "Growth",
+        fmt::format("{}, {}; {} x {}; {}; darb {}", context["device"].get<std::string>(),
+                    context["driver"].get<std::string>(), context["num_cpus"].get<unsigned>(),
+                    context["processor"].get<std::string>(), context["date"].get<std::string>(),
+                    context["commit"].get<std::string>()),
+        "<div class='plots'>" + svg_plot(splats) + svg_plot(pixels) + svg_plot(pairs) + passes +
+            "</div>\n" + tables +
+            "<h2>How to read it</h2><p>Random splats in the unit sphere, seen from outside, degree "
+            "0. A frame is drawn at 1280x720 where splats vary and of 100,000 splats where pixels "
+            "do; an iteration (forward, loss, backward, Adam) at 640x360 and of 30,000. Time is "
+            "that of the wall clock, the median; exponents b of ms = a x^b are fitted over the "
+            "largest decade, where fixed costs no longer rule.</p>\n");
+}
+
+}  // namespace darb

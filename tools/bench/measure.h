@@ -1,0 +1,79 @@
+// How `darb bench` takes a time: warm, many samples, the wall clock and the passes' timestamps side
+// by side, and what else the machine did meanwhile.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "engine/gpu/commands.h"
+#include "engine/render/roofline.h"
+#include "tools/cost/cost.h"
+
+namespace darb {
+
+struct Sampling {
+    double seconds = 2;  // of a case, after the least number of samples
+    int least = 10, most = 200;
+    int warm_up = 2;  // runs before the first sample
+};
+
+struct PassFigure {
+    std::string name;
+    Spread ms;
+    PassWork work{};   // 0 for passes that pass_work does not know
+    double share = 0;  // of the roofline
+};
+
+/// A native loop beside the device's pass that does the same work, in the same samples.
+struct Yardstick {
+    std::string name;  // of the pass
+    Spread device_ms, native_ms;
+    std::string agreement_name;  // psnr_db of the pictures, or relative_error of the sums
+    double agreement = 0;        // between the two results
+};
+
+struct BenchResult {
+    std::string name;
+    Spread ms;                    // wall clock of one frame, step, sort or start
+    std::vector<double> samples;  // ms, in the order taken
+    double cpu_ms = 0;            // median processor time, all threads and child processes
+    std::vector<PassFigure> passes;
+    FrameCounts counts;       // means; 0 where a case has no such thing
+    double contributing = 0;  // splat-pixels
+    double per_sample = 1;    // frames or steps that a sample is the mean of
+    std::vector<Yardstick> yardsticks;
+    double beside_cores = 0;  // that other processes kept busy meanwhile
+    std::string note;
+};
+
+/// Fills ms, samples, cpu_ms, per_sample, passes without work, and beside_cores. once: a sample, of
+/// which it returns the passes. prepare: before each, not timed.
+void take_samples(
+    const Sampling& sampling, int per_sample, const std::function<std::vector<PassTime>()>& once,
+    BenchResult& result, const std::function<void()>& prepare = [] {});
+
+/// work and share of the passes, from result.counts.
+void rate_passes(const DeviceRates& rates, BenchResult& result);
+/// Over all passes: what the roofline needs over what they take; 0 where no pass has work.
+double roofline_share(const BenchResult& result, const DeviceRates& rates);
+PassWork total_work(const BenchResult& result);
+
+/// Processor time of other processes since construction, in cores; 0 where the system does not say.
+class Beside {
+  public:
+    Beside();
+    double cores() const;
+
+  private:
+    double wall_ = 0, own_ = 0, all_ = 0;  // seconds
+};
+
+/// Date, processors, load, scheduling class, build: what a result must say of its circumstances.
+nlohmann::json machine_json();
+
+/// Runs a Vulkan frame or a native loop and returns its milliseconds.
+double milliseconds(const std::function<void()>& work);
+
+}  // namespace darb

@@ -1,0 +1,64 @@
+// Forward and backward blending as plain C++ loops over vectors of floats, on as many threads as
+// the machine has cores: the yardstick of `darb bench` for what the blend passes could take on a
+// CPU. They walk the same tile lists, evaluate the same splat-pixels and give the same results as
+// shaders/forward/blend.comp and shaders/backward/blend_backward.comp.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "engine/render/forward.h"
+
+namespace darb {
+
+/// What the blend passes of one frame read, on the host. Gaussian splats in float32.
+struct BlendFrame {
+    std::uint32_t width = 0, height = 0;         // px
+    std::uint32_t tiles_x = 0, tiles_y = 0;      // tiles
+    std::vector<glm::uvec2> tile_range;          // [T] begin and end in pair_order
+    std::vector<std::uint32_t> pair_order;       // [K] slots, tile after tile, front to back
+    std::vector<std::uint32_t> pair_splat;       // [K] by slot, with block bits
+    std::vector<glm::vec4> shape, light, bound;  // [N] as project.comp leaves them
+    glm::vec3 background{0.0f};
+    std::array<float, 6> polynomial{};  // of 2^f, rising powers
+    float alpha_cutoff = 0, transmittance_stop = 0;
+};
+
+/// Of the last frame that forward recorded; the queue must be idle. Throws Error where the frame
+/// is of another kernel, evaluation or storage than the loops know.
+BlendFrame download_frame(const Forward& forward, const gpu::CameraData& data, std::uint32_t splats,
+                          std::uint32_t pairs, const glm::vec3& background);
+
+/// What the forward loop writes and the backward loop reads.
+struct BlendedImage {
+    std::vector<float> image;                // [3][H][W]
+    std::vector<float> final_transmittance;  // [H][W]
+    std::vector<std::uint32_t> last_pair;    // [H][W] 1 + the last pair looked at; 0: none
+};
+
+struct BlendCounts {
+    std::uint64_t evaluated = 0;     // splat-pixels whose kernel is evaluated, 64 a block of 8 x 8
+    std::uint64_t contributing = 0;  // of these, the ones that change a pixel
+};
+
+/// Partial sums of a pair, in its slot, as blend_backward.comp writes them.
+struct BlendPartials {
+    std::vector<float> first;  // [K][8]
+    std::vector<float> rest;   // [K]
+};
+
+/// The instructions that the loops use on this machine: "AVX-512", "AVX2" or "baseline".
+std::string native_instructions();
+
+/// threads: 0 = all cores. Vectors of the results are sized at the first call and used again.
+void native_blend(const BlendFrame& frame, BlendedImage& result, int threads = 0);
+/// d_image: [3][H][W].
+void native_blend_backward(const BlendFrame& frame, const BlendedImage& image,
+                           const std::vector<float>& d_image, BlendPartials& result,
+                           int threads = 0);
+/// Not timed: slower than native_blend.
+BlendCounts count_blend(const BlendFrame& frame);
+
+}  // namespace darb

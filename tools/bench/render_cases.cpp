@@ -1,0 +1,114 @@
+#include <fmt/format.h>
+
+#include "engine/render/effect_plan.h"
+#include "engine/render/gpu_splats.h"
+#include "engine/scene/splat_file.h"
+#include "tools/bench/cases.h"
+#include "tools/bench/scenes.h"
+#include "tools/bench/yardstick.h"
+#include "tools/cost/views.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::size_t kRandomSplats = 100'000;
+const glm::dvec3 kRandomCentre(0, 0, 4), kBikerCentre(-0.06, -1.6, 4);
+
+struct Planned {
+    SplatModel model;
+    Camera camera;
+    EffectPlan plan;
+};
+
+// As darb render draws it.
+Planned planned(const SplatModel& model, const Camera& camera) {
+    View view;
+    view.camera = camera;
+    Planned p{model, camera, plan_rendering(model, {view}, {})};
+    apply_plan(p.plan, p.model);
+    return p;
+}
+
+BenchResult measure(Device& device, const SplatModel& model, const Camera& camera,
+                    const DeviceRates& rates, const BenchOptions& options) {
+    BenchResult result = measure_frames(device, model, camera, rates, options.sampling);
+    const Planned p = planned(model, camera);
+    const BlendFigures blend =
+        measure_blend(device, p.model, {camera}, p.plan.projection(), options.sampling);
+    result.counts = blend.counts;
+    result.contributing = blend.contributing;
+    result.yardsticks = blend.yardsticks;
+    rate_passes(rates, result);
+    return result;
+}
+
+}  // namespace
+
+BenchResult measure_frames(Device& device, const SplatModel& model, const Camera& camera,
+                           const DeviceRates& rates, const Sampling& sampling) {
+    const Planned p = planned(model, camera);
+    ForwardOptions options = frame_accuracy({}, p.model).options;
+    options.effects = p.plan.projection();
+    options.effects.antialias = p.model.antialias;
+    options.crowds = p.plan.crowds();
+    const GpuSplats splats(device, p.model, false);
+    Forward forward(device, options);
+    Commands commands(device);
+    const gpu::CameraData data = camera_data(camera, splats.origin());
+    const Buffer cameras = upload_cameras(device, {data});
+    forward.reserve(splats.count(), splats.count() * 4, camera.width, camera.height);
+    gpu::FrameStatus status{};
+    BenchResult result;
+    take_samples(
+        sampling, 1,
+        [&] {
+            do {
+                commands.begin();
+                forward.record(commands, splats, cameras, 0, data, p.model.sh_degree,
+                               glm::vec3(0.0f));
+                commands.submit_and_wait();
+                status = forward.read_status();
+            } while (forward.make_room(status));
+            return commands.pass_times();
+        },
+        result);
+    result.counts = {static_cast<double>(splats.count()),
+                     static_cast<double>(status.visible),
+                     static_cast<double>(status.pairs),
+                     static_cast<double>(camera.width) * camera.height,
+                     p.model.sh_degree,
+                     0};
+    rate_passes(rates, result);
+    return result;
+}
+
+std::vector<BenchCase> render_cases() {
+    std::vector<BenchCase> cases;
+    constexpr int sizes[][2] = {{1280, 720}, {1920, 1080}};
+    const auto add = [&](const std::string& scene, const std::filesystem::path& file, int width,
+                         int height, auto camera_of) {
+        cases.push_back(
+            {fmt::format("render/{}/{}x{}", scene, width, height), file,
+             [=](Device& device, const DeviceRates& rates, const BenchOptions& options) {
+                 const SplatModel model =
+                     file.empty() ? random_scene(kRandomSplats) : load_splats(*options.data / file);
+                 return measure(device, model, camera_of(model, width, height), rates, options);
+             }});
+    };
+    const auto random = [](const SplatModel&, int width, int height) {
+        return bench_camera(kRandomCentre, true, width, height);
+    };
+    const auto biker = [](const SplatModel&, int width, int height) {
+        return bench_camera(kBikerCentre, false, width, height);
+    };
+    const auto framed = [](const SplatModel& model, int width, int height) {
+        return orbit_views(model, 1, width, height).cameras[0];
+    };
+    for (const auto& [w, h] : sizes) add("random_100k", "", w, h, random);
+    for (const auto& [w, h] : sizes) add("biker", "splats/biker.compressed.ply", w, h, biker);
+    for (const auto& [w, h] : sizes) add("toy_cat", "splats/toy-cat.compressed.ply", w, h, framed);
+    return cases;
+}
+
+}  // namespace darb

@@ -1,0 +1,25 @@
+// The scenes that `darb bench` measures on.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "engine/scene/camera.h"
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+/// Splats uniform in the unit sphere, log-scales N(log 0.01, 0.4), opacity logits N(0, 1.5), higher
+/// coefficients N(0, 0.05), the colour that of the position; the same at every call.
+SplatModel random_scene(std::size_t splats, int sh_degree = 3);
+
+/// At centre, looking along -z with y up, where upright; else turned 180 degrees about z, as scenes
+/// with y down want it. Horizontal field of view of 45 degrees.
+Camera bench_camera(const glm::dvec3& centre, bool upright, int width, int height);
+
+/// The folder of photos and trained scenes: named, else $DARB_TEST_DATA, else ../shared/data beside
+/// the working folder; nothing where there is none. Throws Error where the named one is missing.
+std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::path& named);
+
+}  // namespace darb

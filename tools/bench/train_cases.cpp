@@ -1,0 +1,118 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "tools/bench/cases.h"
+#include "tools/bench/yardstick.h"
+#include "trainer/initial_model.h"
+#include "trainer/trainer.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kScheduled = 7'000;  // iterations of the run that the steps are taken from
+constexpr int kYardstickViews = 2;
+
+struct TrainCase {
+    const char* dataset;
+    int after;  // iterations with density control before the steps that are timed
+};
+
+std::vector<Camera> some_cameras(const Dataset& dataset, std::size_t most) {
+    std::vector<Camera> cameras;
+    const std::size_t count = std::min(most, dataset.views.size());
+    for (std::size_t i = 0; i < count; ++i)
+        cameras.push_back(dataset.views[i * dataset.views.size() / count].camera);
+    return cameras;
+}
+
+BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rates,
+                    const BenchOptions& options) {
+    Dataset dataset = load_dataset(*options.data / one.dataset);
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    TrainOptions train;
+    train.iterations = kScheduled;
+    if (options.plan_training) options.plan_training(dataset, photos, train);
+    train.densify_until = std::min(one.after, train.densify_end());
+    Trainer trainer(device, dataset, photos, initial_model(dataset, train), train);
+    const auto start = std::chrono::steady_clock::now();
+    while (trainer.iteration() < one.after) {
+        trainer.step();
+        if (options.progress && trainer.iteration() % 500 == 0)
+            options.progress(fmt::format("{}: set-up, {} of {} iterations, {} splats", one.dataset,
+                                         trainer.iteration(), one.after, trainer.splat_count()));
+    }
+    trainer.drain();
+    const std::chrono::duration<double> set_up = std::chrono::steady_clock::now() - start;
+    const int views = static_cast<int>(dataset.views.size());
+    BenchResult result = measure_steps(trainer, std::min(views, 10), options.sampling);
+    const SplatModel model = trainer.model();
+    const ProjectionEffects effects{train.off_centre || train.lens, train.antialias, false,
+                                    train.lens, train.near_care};
+    const BlendFigures blend = measure_blend(device, model, some_cameras(dataset, kYardstickViews),
+                                             effects, options.sampling);
+    // The steps' own means; evaluated splat-pixels follow the pairs.
+    const double scale = result.counts.pairs / std::max(blend.counts.pairs, 1.0);
+    result.counts.evaluated = scale * blend.counts.evaluated;
+    result.contributing = scale * blend.contributing;
+    result.counts.sh_degree = model.sh_degree;
+    result.counts.pixels = blend.counts.pixels;
+    result.yardsticks = blend.yardsticks;
+    rate_passes(rates, result);
+    result.note = fmt::format("{} photos, after {} iterations ({:.1f} s of set-up)", views,
+                              one.after, set_up.count());
+    return result;
+}
+
+}  // namespace
+
+BenchResult measure_steps(Trainer& trainer, int steps_a_sample, const Sampling& sampling) {
+    BenchResult result;
+    double visible = 0, pairs = 0, finished = 0;
+    trainer.on_result = [&](const IterationResult& one) {
+        visible += one.visible;
+        pairs += one.pairs;
+        finished += 1;
+    };
+    take_samples(
+        sampling, steps_a_sample,
+        [&] {
+            const std::vector<PassTotal> before = trainer.pass_totals();
+            for (int step = 0; step < steps_a_sample; ++step) trainer.step();
+            trainer.drain();
+            std::vector<PassTime> passes;
+            for (const PassTotal& pass : trainer.pass_totals()) {
+                const auto known =
+                    std::find_if(before.begin(), before.end(),
+                                 [&](const PassTotal& p) { return p.name == pass.name; });
+                passes.push_back({pass.name, pass.ms - (known == before.end() ? 0 : known->ms)});
+            }
+            return passes;
+        },
+        result);
+    trainer.on_result = {};
+    result.counts.splats = trainer.splat_count();
+    result.counts.visible = visible / std::max(finished, 1.0);
+    result.counts.pairs = pairs / std::max(finished, 1.0);
+    return result;
+}
+
+std::vector<BenchCase> train_cases(bool full) {
+    std::vector<BenchCase> cases;
+    for (const TrainCase& one :
+         {TrainCase{"sceaux_castle_200_tiny", 0}, TrainCase{"sceaux_castle_800", 0},
+          TrainCase{"fox_800", full ? kScheduled : 1'000}}) {
+        std::string name = fmt::format("train/{}", one.dataset);
+        if (one.after > 0) name += fmt::format("/after_{}", one.after);
+        cases.push_back(
+            {name, one.dataset,
+             [one](Device& device, const DeviceRates& rates, const BenchOptions& options) {
+                 return measure(device, one, rates, options);
+             }});
+    }
+    return cases;
+}
+
+}  // namespace darb

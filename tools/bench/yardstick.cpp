@@ -1,0 +1,209 @@
+#include "tools/bench/yardstick.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/rng.h"
+#include "engine/gpu/pipeline.h"
+#include "engine/render/accuracy.h"
+#include "engine/render/forward.h"
+#include "tools/bench/native_blend.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kMost = 20;  // samples
+
+ForwardOptions options_of(const SplatModel& model, const ProjectionEffects& effects) {
+    ForwardOptions options = frame_accuracy({}, model).options;
+    options.effects = effects;
+    options.effects.antialias = model.antialias;
+    options.store_for_backward = true;
+    return options;
+}
+
+double psnr(const std::vector<float>& a, const std::vector<float>& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += std::pow(double(a[i]) - b[i], 2);
+    return -10 * std::log10(std::max(sum / static_cast<double>(a.size()), 1e-20));
+}
+
+void add_error(const std::vector<float>& a, const std::vector<float>& b, double& error,
+               double& norm) {
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        error += std::pow(double(a[i]) - b[i], 2);
+        norm += std::pow(double(b[i]), 2);
+    }
+}
+
+// One camera: its frame on the device, and the same natively. The backward blend is recorded as
+// Backward does it, but with pair sums that can be read, and without the passes after it.
+class Side {
+  public:
+    Side(Device& device, const SplatModel& model, const Camera& camera,
+         const ProjectionEffects& effects)
+        : splats_(device, model, false),
+          forward_(device, options_of(model, effects)),
+          commands_(device),
+          data_(camera_data(camera, splats_.origin())),
+          cameras_(upload_cameras(device, {data_})),
+          degree_(model.sh_degree) {
+        const std::size_t floats = std::size_t{data_.width} * data_.height * 3;
+        Pcg32 random(7, 1);
+        for (std::size_t i = 0; i < floats; ++i)
+            d_image_.push_back(static_cast<float>(random.uniform(-1, 1)));
+        d_image_on_device_ = Buffer(device, "d_image", floats * 4);
+        d_image_on_device_.upload(d_image_);
+        forward_.reserve(splats_.count(), splats_.count() * 4, camera.width, camera.height);
+        do {
+            commands_.begin();
+            record_forward();
+            commands_.submit_and_wait();
+            status_ = forward_.read_status();
+        } while (forward_.make_room(status_));
+        make_backward(device);
+        draw();
+        if (forward_.options().kernel == KERNEL_GAUSSIAN)
+            frame_ = download_frame(forward_, data_, splats_.count(), status_.pairs, background_);
+    }
+
+    /// Milliseconds of the passes "blend" and "blend backward".
+    std::pair<double, double> draw() {
+        commands_.begin();
+        record_forward();
+        commands_.pass("blend backward");
+        commands_.fill(partials_on_device_, 0);
+        commands_.fill(rest_on_device_, 0);
+        const std::uint32_t segments = forward_.list_segments();
+        for (std::uint32_t segment = segments; segment-- > 0;) {
+            const gpu::BlendArgs args{data_.width,   data_.height,  data_.tiles_x, background_.r,
+                                      background_.g, background_.b, segment,       segments};
+            commands_.dispatch(
+                backward_, args,
+                {forward_.tile_range(), forward_.pair_order(), forward_.pair_splat(),
+                 forward_.splat_shape(), forward_.splat_light(), forward_.splat_bound(),
+                 d_image_on_device_, forward_.final_transmittance(), forward_.last_pair(),
+                 partials_on_device_, rest_on_device_, behind_},
+                data_.tiles_x, data_.tiles_y);
+        }
+        commands_.submit_and_wait();
+        std::pair<double, double> ms;
+        for (const PassTime& pass : commands_.pass_times()) {
+            if (pass.name == "blend") ms.first += pass.ms;
+            if (pass.name == "blend backward") ms.second += pass.ms;
+        }
+        return ms;
+    }
+
+    std::pair<double, double> draw_natively(int threads = 0) {
+        const double forward = milliseconds([&] { native_blend(frame_, image_, threads); });
+        return {forward, milliseconds([&] {
+                    native_blend_backward(frame_, image_, d_image_, partials_, threads);
+                })};
+    }
+
+    double picture_psnr() const {
+        return psnr(image_.image, forward_.image().download<float>(image_.image.size()));
+    }
+    double sums_error() const {
+        double error = 0, norm = 0;
+        add_error(partials_.first, partials_on_device_.download<float>(partials_.first.size()),
+                  error, norm);
+        add_error(partials_.rest, rest_on_device_.download<float>(partials_.rest.size()), error,
+                  norm);
+        return std::sqrt(error / std::max(norm, 1e-300));
+    }
+
+    const BlendFrame& frame() const { return frame_; }
+    const gpu::FrameStatus& status() const { return status_; }
+
+  private:
+    void record_forward() {
+        forward_.record(commands_, splats_, cameras_, 0, data_, degree_, background_);
+    }
+    void make_backward(Device& device) {
+        SpecConstants constants = kernel_constants(forward_.options());
+        const std::uint32_t subgroup = add_block_constants(device, constants);
+        const bool segmented = forward_.list_segments() > 1;
+        constants["THREADS"] = static_cast<std::int32_t>(subgroup);
+        constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
+        backward_ = Pipeline(device, "blend_backward", constants, true, subgroup);
+        behind_ =
+            Buffer(device, "behind", segmented ? std::uint64_t{data_.width} * data_.height * 4 : 4);
+        partials_on_device_ =
+            Buffer(device, "pair partials", std::uint64_t{forward_.pair_capacity()} * 32);
+        rest_on_device_ =
+            Buffer(device, "pair partials, rest", std::uint64_t{forward_.pair_capacity()} * 4);
+    }
+
+    GpuSplats splats_;
+    Forward forward_;
+    Pipeline backward_;
+    Buffer behind_, partials_on_device_, rest_on_device_;
+    Commands commands_;
+    gpu::CameraData data_;
+    Buffer cameras_, d_image_on_device_;
+    int degree_;
+    glm::vec3 background_{0.0f};
+    gpu::FrameStatus status_{};
+    std::vector<float> d_image_;
+    BlendFrame frame_;
+    BlendedImage image_;
+    BlendPartials partials_;
+};
+
+std::vector<Yardstick> yardsticks(const std::vector<double> (&ms)[4], double picture_psnr,
+                                  double sums_error) {
+    return {{"blend", spread_of(ms[0]), spread_of(ms[2]), "psnr_db", picture_psnr},
+            {"blend backward", spread_of(ms[1]), spread_of(ms[3]), "relative_error", sums_error}};
+}
+
+}  // namespace
+
+BlendFigures measure_blend(Device& device, const SplatModel& model,
+                           const std::vector<Camera>& cameras, const ProjectionEffects& effects,
+                           const Sampling& sampling) {
+    BlendFigures figures;
+    const double share = 1.0 / static_cast<double>(cameras.size());
+    std::vector<double> mean_ms[4];  // device forward, backward; native forward, backward
+    double worst_psnr = 1e9, worst_error = 0;
+    for (const Camera& camera : cameras) {
+        Side side(device, model, camera, effects);
+        figures.counts.visible += share * side.status().visible;
+        figures.counts.pairs += share * side.status().pairs;
+        figures.counts.pixels += share * camera.width * camera.height;
+        if (side.frame().width == 0) continue;  // a kernel without native loops
+        const BlendCounts counts = count_blend(side.frame());
+        figures.counts.evaluated += share * static_cast<double>(counts.evaluated);
+        figures.contributing += share * static_cast<double>(counts.contributing);
+        side.draw_natively();
+        worst_psnr = std::min(worst_psnr, side.picture_psnr());
+        worst_error = std::max(worst_error, side.sums_error());
+        const std::size_t wanted = static_cast<std::size_t>(std::clamp(sampling.least, 1, kMost));
+        for (std::size_t taken = 0; taken < wanted; ++taken) {
+            const auto device_ms = side.draw();
+            const auto native_ms = side.draw_natively();
+            const double one[4] = {device_ms.first, device_ms.second, native_ms.first,
+                                   native_ms.second};
+            for (int i = 0; i < 4; ++i) {
+                if (mean_ms[i].size() <= taken) mean_ms[i].push_back(0);
+                mean_ms[i][taken] += share * one[i];
+            }
+        }
+    }
+    figures.counts.splats = static_cast<double>(model.size());
+    figures.counts.sh_degree = model.sh_degree;
+    if (!mean_ms[0].empty()) figures.yardsticks = yardsticks(mean_ms, worst_psnr, worst_error);
+    return figures;
+}
+
+std::vector<Yardstick> compare_blend(Device& device, const SplatModel& model, const Camera& camera,
+                                     int threads) {
+    Side side(device, model, camera, {});
+    std::vector<double> ms[4] = {{0}, {0}, {0}, {0}};
+    side.draw_natively(threads);
+    return yardsticks(ms, side.picture_psnr(), side.sums_error());
+}
+
+}  // namespace darb

@@ -1,0 +1,149 @@
+// darb bench [FILTER]: how long frames, training steps, sorts and starts take on this device, what
+// they work on, and how near that is to what the device can do.
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <regex>
+
+#include "engine/core/error.h"
+#include "tools/bench/cases.h"
+#include "tools/bench/report.h"
+#include "tools/bench/scenes.h"
+#include "tools/darb/bench_growth.h"
+#include "tools/darb/commands.h"
+#include "tools/darb/cost_flags.h"
+#include "tools/darb/effect_flags.h"
+
+namespace darb {
+
+namespace {
+
+struct BenchFlags {
+    std::string filter, device, note;
+    std::filesystem::path data, json;
+    BenchOptions options;
+    GrowthFlags growth;
+    bool list = false, quiet = false, brief = false;
+};
+
+std::vector<BenchCase> chosen_cases(const BenchFlags& flags) {
+    std::vector<BenchCase> cases = bench_cases(flags.options.full);
+    try {
+        const std::regex filter(flags.filter);
+        std::erase_if(cases,
+                      [&](const BenchCase& one) { return !std::regex_search(one.name, filter); });
+    } catch (const std::regex_error& e) {
+        throw Error("darb bench " + flags.filter,
+                    fmt::format("is no regular expression: {}", e.what()),
+                    "Use part of a name; darb bench --list shows them.");
+    }
+    if (cases.empty())
+        throw Error("darb bench " + flags.filter, "fits no case", "darb bench --list shows them.");
+    return cases;
+}
+
+// Those whose scenes are there; a line on stderr for each of the others.
+std::vector<BenchCase> possible_cases(std::vector<BenchCase> cases, const BenchOptions& options) {
+    std::error_code error;
+    std::erase_if(cases, [&](const BenchCase& one) {
+        if (one.file.empty()) return false;
+        if (options.data && std::filesystem::exists(*options.data / one.file, error)) return false;
+        fmt::print(stderr, "{} is left out: no {}; name its folder with --data or DARB_TEST_DATA\n",
+                   one.name, ((options.data ? *options.data : "DATA") / one.file).string());
+        return true;
+    });
+    return cases;
+}
+
+void run_cases(Device& device, const DeviceRates& rates, const std::vector<BenchCase>& cases,
+               const BenchFlags& flags, const nlohmann::json& context) {
+    nlohmann::json json{{"context", context}, {"benchmarks", nlohmann::json::array()}};
+    for (const BenchCase& one : cases) {
+        BenchResult result = one.run(device, rates, flags.options);
+        result.name = one.name;
+        fmt::print("{}", result_text(result, rates, !flags.brief));
+        std::fflush(stdout);
+        json["benchmarks"].push_back(result_json(result, rates));
+        write_json(flags.json, json);  // what is there, should a later case end the run
+    }
+}
+
+int bench(BenchFlags flags) {
+    if (flags.growth.on && !flags.filter.empty())
+        throw Error("darb bench --growth " + flags.filter, "--growth measures no cases",
+                    "Leave one of them out.");
+    if (!flags.growth.on && !flags.growth.html.empty())
+        throw Error("darb bench --html", "the page is that of --growth", "Add --growth.");
+    std::vector<BenchCase> cases = chosen_cases(flags);
+    if (flags.list) {
+        for (const BenchCase& one : cases) fmt::print("{}\n", one.name);
+        return 0;
+    }
+    BenchOptions& options = flags.options;
+    options.data = bench_data_folder(flags.data);
+    options.device = flags.device;
+    flags.growth.plan.sampling = options.sampling;
+    options.program = std::filesystem::read_symlink("/proc/self/exe");
+    options.plan_training = [](Dataset& dataset, const std::vector<ImageU8>& photos,
+                               TrainOptions& train) {
+        const EffectPlan plan = plan_training(dataset, photos, train.sh_degree);
+        apply_plan(plan, train);
+        apply_plan(plan, dataset.views);
+    };
+    options.progress = [&](const std::string& line) {
+        if (!flags.quiet) fmt::print(stderr, "{}\n", line);
+    };
+    if (!flags.growth.on) cases = possible_cases(std::move(cases), options);
+    DeviceOptions device_options;
+    device_options.select = flags.device;
+    Device device(device_options);
+    if (device.info().timestamp_period_ns <= 0)
+        throw Error(device.info().name, "has no timestamps",
+                    "Choose another device (darb devices).");
+    const DeviceRates rates = measure_rates(device);
+    const nlohmann::json context = context_json(device, rates, flags.note);
+    fmt::print("{}", context_text(context));
+    if (flags.growth.on)
+        bench_growth(device, flags.growth, context, flags.json, options.progress);
+    else
+        run_cases(device, rates, cases, flags, context);
+    return 0;
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, Action& action) {
+    auto flags = std::make_shared<BenchFlags>();
+    CLI::App* command = app.add_subcommand("bench", "Measure speed: frames, training steps, sorts");
+    command->add_option("filter", flags->filter,
+                        "regular expression on the cases' names; without: all");
+    command->add_flag("--list", flags->list, "only print the names");
+    command->add_option("--data", flags->data,
+                        "folder of the data sets and of splats/; default: $DARB_TEST_DATA, else "
+                        "../shared/data");
+    command->add_option("--json", flags->json, "write every number to this file");
+    command->add_option("--note", flags->note, "about the machine, kept in the file");
+    command->add_flag("--full", flags->options.full,
+                      "the long set-up: fox_800 after 7,000 iterations, not 1,000");
+    command->add_option("--seconds", flags->options.sampling.seconds, "of each case, at least")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command->add_option("--samples", flags->options.sampling.least, "of each case, at least")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 200));
+    command->add_flag("--growth", flags->growth.on,
+                      "time against splats, pixels and pairs instead, with fitted exponents");
+    command->add_option("--most-splats", flags->growth.plan.most_splats, "of --growth")
+        ->capture_default_str()
+        ->check(CLI::Range(1'000u, 100'000'000u));
+    command->add_option("--html", flags->growth.html, "write the plots of --growth to this page");
+    command->add_flag("--brief", flags->brief, "a line a case, no passes");
+    command->add_flag("-q,--quiet", flags->quiet, "no progress");
+    command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    command->callback([flags, &action] { action = [flags] { return bench(*flags); }; });
+}
+
+}  // namespace darb
