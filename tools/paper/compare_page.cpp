@@ -67,17 +67,18 @@ std::string means_table(const Comparison& c, int iteration) {
     std::vector<std::vector<std::optional<double>>> means(columns.size());
     std::vector<Marks> marks;
     for (std::size_t k = 0; k < columns.size(); ++k) {
-        for (const std::string& kernel : c.kernels) {
-            double sum = 0;
-            bool all = true;
-            for (const ComparedDataset& dataset : c.datasets) {
-                const auto v = over_seeds(dataset, kernel, iteration, columns[k]).median;
-                all &= v.has_value();
-                sum += v.value_or(0);
-            }
-            means[k].push_back(all ? std::optional(sum / static_cast<double>(c.datasets.size()))
-                                   : std::nullopt);
+        std::vector<double> sums(c.kernels.size(), 0.0);
+        int count = 0;
+        for (const ComparedDataset& dataset : c.datasets) {
+            std::vector<std::optional<double>> values;
+            for (const std::string& kernel : c.kernels)
+                values.push_back(over_seeds(dataset, kernel, iteration, columns[k]).median);
+            if (std::count(values.begin(), values.end(), std::nullopt) > 0) continue;
+            for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += *values[i];
+            ++count;
         }
+        for (const double sum : sums)
+            means[k].push_back(count > 0 ? std::optional(sum / count) : std::nullopt);
         marks.push_back(marks_of(means[k], columns[k]));
     }
     std::string html = head_of("kernel", columns);
@@ -259,8 +260,10 @@ std::string comparison_html(const Comparison& c) {
     std::string body;
     if (c.datasets.size() > 1)
         for (const int iteration : c.iterations)
-            body += fmt::format("<h2>Means over {} data sets, {} iterations</h2>",
-                                c.datasets.size(), format_number(iteration)) +
+            body += fmt::format(
+                        "<h2>Means, {} iterations</h2><p class='soft'>Over the data sets "
+                        "where every kernel has the value.</p>",
+                        format_number(iteration)) +
                     means_table(c, iteration);
     for (const ComparedDataset& dataset : c.datasets) body += dataset_part(c, dataset);
     body += splat_figure(c);

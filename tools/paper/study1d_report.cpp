@@ -14,7 +14,7 @@ namespace darb {
 
 namespace {
 
-constexpr double kCellWidth = 150, kCellHeight = 62, kNameWidth = 120, kHead = 34;  // user units
+constexpr double kCellWidth = 150, kCellHeight = 62, kNameWidth = 120, kHead = 46;  // user units
 constexpr int kCurvePoints = 240;
 constexpr double kLowest = -0.35, kHighest = 1.35;  // of the y axis of a cell
 
@@ -59,7 +59,7 @@ std::string grid_figure(const Study1dResult& result, std::size_t signal) {
     const std::vector<float> target =
         sample_signal(signals_1d()[static_cast<std::size_t>(o.signals[signal])], o.fit.samples);
     for (std::size_t n = 0; n < o.primitives.size(); ++n)
-        svg += fmt::format("<text class='label' x='{:.0f}' y='26'>N = {}</text>",
+        svg += fmt::format("<text class='label' x='{:.0f}' y='38'>N = {}</text>",
                            kNameWidth + (kCellWidth + 8) * static_cast<double>(n), o.primitives[n]);
     for (std::size_t k = 0; k < o.kernels.size(); ++k) {
         const double top = kHead + (kCellHeight + 8) * static_cast<double>(k);
@@ -150,7 +150,9 @@ std::vector<std::vector<Standing>> standings(const Study1dResult& result) {
 }
 
 std::string ratio_text(const Standing& s) {
-    return s.compared > 0 ? fmt::format("{:.2f}", std::exp(s.log_ratio / s.compared)) : "-";
+    if (s.compared == 0) return "-";
+    const double ratio = std::exp(s.log_ratio / s.compared);
+    return ratio < 0.01 ? fmt::format("{:.1e}", ratio) : fmt::format("{:.2f}", ratio);
 }
 
 std::string html_standings(const Study1dResult& result) {

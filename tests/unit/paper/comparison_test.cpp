@@ -136,6 +136,28 @@ TEST(CompareStats, Marks_ofValuesThatPrintAlike_areAlike) {
     EXPECT_EQ(marks_of({27.112, 27.11, 27.114, 20.0}, psnr), (Marks{best, best, best, none}));
 }
 
+TEST(CompareStats, MeansOverDataSets_leaveOutWhereAKernelFailed) {
+    Comparison c;
+    c.kernels = {"sinc", "gaussian"};
+    c.iterations = {7000};
+    for (const double psnr : {21.25, 22.5, 90.0}) {
+        ComparedDataset dataset;
+        for (const std::string& kernel : c.kernels) {
+            ComparedRun run;
+            run.kernel = kernel;
+            run.failure = psnr > 80 && kernel == "sinc" ? "diverged" : "";
+            run.at.emplace_back();
+            run.at[0].iteration = 7000;
+            run.at[0].psnr_db = psnr;
+            dataset.runs.push_back(run);
+        }
+        c.datasets.push_back(dataset);
+    }
+    const std::string page = comparison_html(c);
+    EXPECT_NE(page.find("<tr><td>gaussian</td><td>21.88</td>"), std::string::npos);
+    EXPECT_EQ(page.find("<td>44.58</td>"), std::string::npos);
+}
+
 TEST(ComparePulses, MoreAgainstOne_isJudgedByModelAndPsnr) {
     ComparedDataset dataset;
     dataset.name = "set";
