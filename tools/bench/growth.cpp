@@ -45,10 +45,7 @@ GrowthPoint iteration(Device& device, std::uint32_t splats, int width, const Sam
     Dataset dataset;
     std::vector<ImageU8> photos;
     for (const double x : {-0.1, 0.1}) {  // two, as a scene's extent is that of its cameras
-        View view;
-        view.name = fmt::format("{}", x);
-        view.camera = camera_of(width, x);
-        dataset.views.push_back(view);
+        dataset.views.push_back(bench_view(camera_of(width, x), fmt::format("{}", x)));
         photos.emplace_back(width, height_of(width), 4);
         std::fill(photos.back().data.begin(), photos.back().data.end(), std::uint8_t{128});
     }

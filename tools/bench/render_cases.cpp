@@ -23,9 +23,7 @@ struct Planned {
 
 // As darb render draws it.
 Planned planned(const SplatModel& model, const Camera& camera) {
-    View view;
-    view.camera = camera;
-    Planned p{model, camera, plan_rendering(model, {view}, {})};
+    Planned p{model, camera, plan_rendering(model, {bench_view(camera, "view")}, {})};
     apply_plan(p.plan, p.model);
     return p;
 }

@@ -55,6 +55,15 @@ Camera bench_camera(const glm::dvec3& centre, bool upright, int width, int heigh
     return camera;
 }
 
+View bench_view(const Camera& camera, const std::string& name) {
+    View view;
+    view.name = name;
+    view.camera = camera;
+    view.lens = {
+        "PINHOLE", {camera.fx, camera.fy, camera.cx, camera.cy}, camera.width, camera.height};
+    return view;
+}
+
 std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::path& named) {
     std::error_code error;
     if (!named.empty()) {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "engine/scene/camera.h"
+#include "engine/data/dataset.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -17,6 +17,9 @@ SplatModel random_scene(std::size_t splats, int sh_degree = 3);
 /// At centre, looking along -z with y up, where upright; else turned 180 degrees about z, as scenes
 /// with y down want it. Horizontal field of view of 45 degrees.
 Camera bench_camera(const glm::dvec3& centre, bool upright, int width, int height);
+
+/// A view without a photo, its lens the camera's pinhole.
+View bench_view(const Camera& camera, const std::string& name);
 
 /// The folder of photos and trained scenes: named, else $DARB_TEST_DATA, else ../shared/data beside
 /// the working folder; nothing where there is none. Throws Error where the named one is missing.

@@ -56,13 +56,14 @@ BenchResult measure_sort(Device& device, std::uint32_t count, const DeviceRates&
         });
     result.counts.visible = count;
     rate_passes(rates, result);
+    for (PassFigure& pass : result.passes) pass.name = "radix sort";
     NativeSort native;
     std::vector<std::uint32_t> k = keys, v(count);
     for (std::uint32_t i = 0; i < count; ++i) v[i] = i;
     native.sort(k, v);
     const bool same =
         k == key.download<std::uint32_t>(count) && v == value.download<std::uint32_t>(count);
-    result.yardsticks.push_back(yardstick("depth sort", result, sampling, same, [&] {
+    result.yardsticks.push_back(yardstick("radix sort", result, sampling, same, [&] {
         k = keys;
         return milliseconds([&] { native.sort(k, v); });
     }));

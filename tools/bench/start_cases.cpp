@@ -83,11 +83,7 @@ void run_process(std::vector<std::string> arguments, std::vector<std::string> va
 
 BenchResult measure(const BenchOptions& options, const fs::path& scene, bool cold) {
     const ScratchFolder scratch;
-    View view;
-    view.name = "first.png";
-    view.camera = bench_camera({-0.06, -1.6, 4}, false, 1280, 720);
-    view.lens.width = view.camera.width;
-    view.lens.height = view.camera.height;
+    const View view = bench_view(bench_camera({-0.06, -1.6, 4}, false, 1280, 720), "first.png");
     const fs::path cameras = scratch.path() / "cameras.json", caches = scratch.path() / "caches",
                    pictures = scratch.path() / "pictures";
     write_camera_list(cameras, {view});
