@@ -5,7 +5,7 @@
 #include "types.h"
 
 #define MEASURE_THREADS 64
-#define MEASURE_CHAINS 8  // independent of one another, so that latency is hidden
+#define MEASURE_CHAINS 12  // independent of one another, so that latency is hidden
 #define MEASURE_STEPS 4096
 
 #ifdef __cplusplus
