@@ -14,7 +14,7 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full)
   unit       tests that need no device
   gpu        tests of shaders, pipelines, pictures and training
   clang      build with clang, warnings are errors, with ASan and UBSan, and the fuzzers
-  sanitize   unit tests and the quick device tests of that build
+  sanitize   unit tests and the quick tests of pipelines of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   sync       unit tests and the quick device tests under Vulkan synchronization validation
   quick      = setup style release unit
@@ -37,7 +37,8 @@ logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 
 # Device tests start their own threads, one per core, so two at a time are plenty.
-# Cases whose name ends in _slow run in the gpu step alone.
+# Cases whose name ends in _slow run in the gpu step alone, as do those that look at SPIR-V or at other vector widths.
+gpu_alone='_slow(/|$)|^PassSpirv|_at_vector_width_'
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
@@ -73,10 +74,10 @@ do_unit() { run_ctest build -L '^unit$'; }
 do_gpu() { run_ctest build -LE '^unit$'; }
 do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
-        run_ctest build-asan -L '^(unit|shader|pipeline)$' -E '_slow(/|$)' --timeout 300
+        run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone" --timeout 300
 }
 do_fuzz() { tools/fuzz.sh 0.02; }
-do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E '_slow(/|$)' --timeout 300; }
+do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E "$gpu_alone" --timeout 300; }
 
 started=$SECONDS
 for step in $steps; do
