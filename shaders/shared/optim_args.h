@@ -9,9 +9,8 @@ namespace darb::gpu {
 #endif
 
 struct ProjectBackwardArgs {
-    uint
-        first_splat;  // of this dispatch, whose harmonics and their moments are bound from there on
-    uint splat_end;   // one past its last
+    uint first_splat;  // of this dispatch; harmonics and their moments are bound from it on
+    uint splat_end;    // one past its last
     uint camera_index;
     float low_pass;  // px^2
     // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
