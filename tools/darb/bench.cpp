@@ -15,6 +15,7 @@
 #include "tools/darb/bench_growth.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
+#include "tools/darb/devices.h"
 #include "tools/darb/effect_flags.h"
 
 namespace darb {
@@ -100,9 +101,7 @@ int bench(BenchFlags flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    if (device.info().timestamp_period_ns <= 0)
-        throw Error(device.info().name, "has no timestamps",
-                    "Choose another device (darb devices).");
+    require_timestamps(device);
     const DeviceRates rates = measure_rates(device);
     const nlohmann::json context = context_json(device, rates, flags.note);
     fmt::print("{}", context_text(context));

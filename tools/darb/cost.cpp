@@ -10,6 +10,7 @@
 #include "tools/cost/report.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
+#include "tools/darb/devices.h"
 #include "tools/darb/scene_file.h"
 
 namespace darb {
@@ -59,9 +60,7 @@ int cost(const CostFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
-    if (device.info().timestamp_period_ns <= 0)
-        throw Error(device.info().name, "has no timestamps",
-                    "Choose another device (darb devices).");
+    require_timestamps(device);
     const CostResult result =
         measure_cost(device, model, views, glm::vec3(flags.white_background ? 1.0f : 0.0f),
                      extent.plan, [&](const std::string& line) {

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "engine/core/error.h"
 #include "engine/gpu/device.h"
 #include "tools/darb/commands.h"
 
@@ -47,6 +48,11 @@ void print_device(std::FILE* out, const DeviceInfo& info, bool chosen) {
 }
 
 }  // namespace
+
+void require_timestamps(const Device& device) {
+    if (device.info().timestamp_period_ns > 0) return;
+    throw Error(device.info().name, "has no timestamps", "Choose another device (darb devices).");
+}
 
 void print_devices(std::FILE* out, const std::string& select) {
     const std::vector<DeviceInfo> devices = list_devices();
