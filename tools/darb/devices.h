@@ -1,5 +1,5 @@
-// What `darb devices` prints: every Vulkan device with its limits, which is chosen, and why; and what
-// commands want of the chosen one.
+// What `darb devices` prints: every Vulkan device with its limits, which is chosen, and why; and
+// what commands want of the chosen one.
 #pragma once
 
 #include <cstdio>
