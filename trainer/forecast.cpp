@@ -8,6 +8,7 @@
 #include "engine/core/rng.h"
 #include "engine/render/gpu_splats.h"
 #include "trainer/initial_model.h"
+#include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -82,6 +83,7 @@ double timed_steps(Trainer& trainer, int most) {
 Measurement measure_training(Device& device, const Dataset& few, const SplatModel& model,
                              TrainOptions options) {
     options.densify_until = 0;
+    options.resolution_ramp = false;
     SplatModel placeholder;  // restore() brings the model; two at once would double the memory
     placeholder.sh_degree = model.sh_degree;
     placeholder.kernel = model.kernel;
@@ -129,6 +131,8 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
 
 std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit) {
+    if (options.strategy != Strategy::adc)
+        return std::max(start, simulate_growth(options, start, limit).end);
     const int first = std::max(options.densify_from, 0) / options.densify_interval;
     const int last = std::max(options.densify_end() - 1, 0) / options.densify_interval;
     const int rounds = std::max(0, last - first);
@@ -138,7 +142,17 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
     return std::max(start, static_cast<std::uint32_t>(std::min(wanted, most)));
 }
 
+std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
+    TrainOptions adc = options;
+    use_strategy(Strategy::adc, adc);
+    std::uint64_t pixels = 0;
+    for (const View& view : dataset.views)
+        if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
+    return predict_splats(initial_count(dataset, adc), pixels, adc, options.max_splats);
+}
+
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
+    if (options.strategy != Strategy::adc) return simulate_growth(options, start, end).mean;
     const double all = options.iterations;
     const double to = std::clamp<double>(options.densify_end(), 0, all);
     const double from = std::clamp<double>(options.densify_from, 0, to);

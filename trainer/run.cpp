@@ -50,6 +50,7 @@ class Run {
     void save_checkpoint(const std::filesystem::path& path);
     void train(const std::atomic<bool>* stop);
     void report_troubles();
+    void report_resolution();
     double seconds() const {
         return seconds_ +
                (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
@@ -73,6 +74,7 @@ class Run {
     RunSummary summary_;
     IterationResult latest_;
     size_t told_probes_ = 0;
+    int told_divisor_ = 1;
     double seconds_ = 0;
     bool running_ = false;
     Clock::time_point started_;
@@ -82,6 +84,7 @@ void Run::resume() {
     const Checkpoint checkpoint = read_checkpoint(run_.resume_from);
     check_resumable(checkpoint, run_.resume_from, options_, dataset_, fingerprint_);
     trainer_.restore(checkpoint.state);
+    told_divisor_ = trainer_.resolution_divisor();
     seconds_ = checkpoint.seconds;
     log_.cut_after(checkpoint.state.iteration);
     progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
@@ -184,6 +187,7 @@ void Run::train(const std::atomic<bool>* stop) {
     stopwatch(true);
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         trainer_.step();
+        report_resolution();
         if (const std::uint32_t n = trainer_.stopped_by_memory(); n != 0 && stopped == 0)
             progress_.note(fmt::format("growth stops at {} splats: --max-memory", stopped = n));
         if (const std::uint32_t n = trainer_.stopped_by_pairs(); n != 0 && stopped == 0)
@@ -211,6 +215,17 @@ void Run::train(const std::atomic<bool>* stop) {
     }
     trainer_.drain();
     stopwatch(false);
+}
+
+void Run::report_resolution() {
+    const int divisor = trainer_.resolution_divisor();
+    if (divisor == told_divisor_) return;
+    told_divisor_ = divisor;
+    const int i = trainer_.iteration();
+    log_.resolution(i, divisor);
+    progress_.note(divisor == 1
+                       ? fmt::format("iteration {}: photos at their full size", i)
+                       : fmt::format("iteration {}: photos at 1/{} of their sides", i, divisor));
 }
 
 void Run::report_troubles() {

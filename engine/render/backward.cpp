@@ -86,6 +86,13 @@ void Backward::record_blend(Commands& commands, const Forward& forward, const Bu
     }
 }
 
+void Backward::record_shares(Commands& commands, const Forward& forward, const Buffer& image,
+                             const gpu::CameraData& data) {
+    commands.fill(partials_, 0);
+    commands.fill(partial_rest_, 0);
+    record_blend(commands, forward, image, data, glm::vec3(0));
+}
+
 void Backward::record(Commands& commands, const Forward& forward, GpuSplats& splats,
                       const Buffer& d_image, const Buffer& cameras, std::uint32_t camera_index,
                       const gpu::CameraData& data, int sh_degree, const glm::vec3& background,

@@ -36,6 +36,14 @@ class Backward {
                 const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
                 const AdamStep& step);
 
+    /// The backward blend alone: the pairs' sums of alpha T times the planes of `image`, float
+    /// [3][H][W], where record() leaves those of dL/dcolour. Recorded between Forward::record and
+    /// record(); where lists take several dispatches it leaves another final transmittance.
+    void record_shares(Commands& commands, const Forward& forward, const Buffer& image,
+                       const gpu::CameraData& data);
+    /// [K][8] of each pair; the last three are those of the colour.
+    const Buffer& partials() const { return partials_; }
+
     /// After the splats' colour buffers changed their degree.
     void set_sh_stored(int degree);
 

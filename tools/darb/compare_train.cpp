@@ -51,6 +51,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     if (plan_sees_photos_)
         f.run.photos = photos_;  // else the plan of `darb train` has not seen them
     plan_effects(dataset_, f);
+    plan_strategy(dataset_, f);
     f.run.photos = photos_;
     const std::string settings = settings_text(f.train);
     const RunState state = run_state(f.run.output, settings, format_camera_list(dataset_.views),

@@ -69,6 +69,7 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
     check_effects(flags);
     Dataset dataset = load_training_data(flags);
     plan_effects(dataset, flags);
+    plan_strategy(dataset, flags);
     if (!recalled)  // only now: a command that fails above leaves that of an earlier run
         write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
     print_plan(device, dataset, flags);
