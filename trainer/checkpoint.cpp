@@ -60,6 +60,7 @@ Json header_of(const Checkpoint& c) {
                 {"seconds", c.seconds},
                 {"settings", c.settings},
                 {"dataset", c.dataset},
+                {"tuning", c.tuning},
                 {"counters", {n.redone_iterations, n.bad_gradients, n.cloned_or_split, n.pruned}},
                 {"culled", n.culled},
                 {"overflows", n.overflows},
@@ -87,6 +88,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     c.seconds = h.at("seconds").get<double>();
     c.settings = h.at("settings").get<std::string>();
     c.dataset = h.at("dataset").get<std::string>();
+    c.tuning = h.value("tuning", c.tuning);
     TrainCounters& n = c.state.counters;
     n.redone_iterations = h.at("counters").at(0).get<std::uint64_t>();
     n.bad_gradients = h.at("counters").at(1).get<std::uint64_t>();

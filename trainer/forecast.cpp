@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/render/gpu_splats.h"
+#include "engine/render/tuning.h"
 #include "trainer/initial_model.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
@@ -192,6 +193,8 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     const SplatModel start = initial_model(dataset, options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
+    if (tuning_of(scratch).backward == BackwardBlend::buckets)
+        f.demand.bucket = bucket_pairs(scratch);
     f.start_splats = static_cast<std::uint32_t>(start.size());
     const std::uint32_t limit = std::min(options.max_splats, GpuSplats::max_count(scratch, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "shaders/shared/effect_args.h"
+#include "shaders/shared/limits.h"
 #include "shaders/shared/render_args.h"
 
 namespace darb {
@@ -34,6 +35,10 @@ std::uint64_t rest_floats(int sh_degree) {
     return static_cast<std::uint64_t>((sh_degree + 1) * (sh_degree + 1) - 1) * 3;
 }
 
+std::uint64_t tiles(int pixels) {
+    return (static_cast<std::uint64_t>(pixels) + TILE_SIZE - 1) / TILE_SIZE;
+}
+
 }  // namespace
 
 MemoryPlan plan_memory(const MemoryDemand& demand) {
@@ -51,6 +56,10 @@ MemoryPlan plan_memory(const MemoryDemand& demand) {
             demand.image_pixels * kMappedBytes + demand.exposure_photos * kMapBytes + kMapPartials;
     if (demand.smoothing_photos > 0)
         plan.effects += n * kDeviationBytes + demand.smoothing_photos * sizeof(gpu::CameraData);
+    if (demand.bucket >
+        0)  // a record for each full bucket and for each tile, and its tile's number
+        plan.checkpoints = (demand.pairs / demand.bucket + demand.image_tiles) *
+                           (CHECKPOINT_BYTES + sizeof(std::uint32_t));
     // Attributes are replaced one at a time: the largest, the moments of one, exists twice.
     if (demand.densifies)
         plan.densify = n * (kDensifyBytes + 2 * kFloat * std::max<std::uint64_t>(rest, 4));
@@ -74,6 +83,8 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
     for (const View& view : views) {
         const std::uint64_t pixels = std::uint64_t(view.camera.width) * view.camera.height;
         demand.image_pixels = std::max(demand.image_pixels, pixels);
+        demand.image_tiles =
+            std::max(demand.image_tiles, tiles(view.camera.width) * tiles(view.camera.height));
         if (view.is_test) continue;
         demand.photo_pixels += pixels;
         ++training;

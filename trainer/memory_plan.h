@@ -21,19 +21,23 @@ struct MemoryDemand {
     bool densifies = true;               // density control runs at this N
     std::uint64_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
     std::uint64_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
+    std::uint64_t image_tiles = 0;       // of the view that has most
+    std::uint32_t bucket = 0;  // pairs of a checkpoint: Forward::bucket; 0: there are none
 };
 
 /// Bytes of device memory, by what they are for.
 struct MemoryPlan {
     std::uint64_t parameters = 0, moments = 0;
-    std::uint64_t frame = 0;    // per splat, of the forward and backward passes
-    std::uint64_t pairs = 0;    // per splat-tile pair
-    std::uint64_t photos = 0;   // ground truth
-    std::uint64_t images = 0;   // picture, its gradient, what the blend passes share
-    std::uint64_t effects = 0;  // of per-photo exposure and of the 3D filter
-    std::uint64_t densify = 0;  // for a moment, while density control runs
+    std::uint64_t frame = 0;        // per splat, of the forward and backward passes
+    std::uint64_t pairs = 0;        // per splat-tile pair
+    std::uint64_t photos = 0;       // ground truth
+    std::uint64_t images = 0;       // picture, its gradient, what the blend passes share
+    std::uint64_t effects = 0;      // of per-photo exposure and of the 3D filter
+    std::uint64_t checkpoints = 0;  // of the backward blend by buckets
+    std::uint64_t densify = 0;      // for a moment, while density control runs
     std::uint64_t total() const {
-        return parameters + moments + frame + pairs + photos + images + effects + densify;
+        return parameters + moments + frame + pairs + photos + images + effects + checkpoints +
+               densify;
     }
 };
 

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
+#include "engine/render/tuning.h"
 #include "engine/scene/ply.h"
 #include "trainer/checkpoint.h"
 #include "trainer/evaluation.h"
@@ -24,6 +27,17 @@ bool contains(const std::vector<int>& list, int value) {
     return std::find(list.begin(), list.end(), value) != list.end();
 }
 
+// Read before the trainer is made: the ways of the device that change bits are those that the run
+// began with.
+std::optional<Checkpoint> checkpoint_of(Device& device, const std::filesystem::path& path) {
+    if (path.empty()) return std::nullopt;
+    Checkpoint checkpoint = read_checkpoint(path);
+    Variants variants = parse_variants(device.info(), checkpoint.tuning, path.string());
+    variants.merge(Variants(device.variants()));
+    device.set_variants(std::move(variants));
+    return checkpoint;
+}
+
 // One run: the loop and what it writes. The stopwatch counts training alone.
 class Run {
   public:
@@ -35,6 +49,8 @@ class Run {
           loaded_(run.photos.empty() ? load_photos(dataset.views) : std::vector<ImageU8>{}),
           photos_(run.photos.empty() ? loaded_ : run.photos),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
+          tuning_(result_variants(device)),
+          checkpoint_(checkpoint_of(device, run.resume_from)),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
           log_(run.output, !run.resume_from.empty()),
           progress_(1, options.iterations, run.quiet) {}
@@ -68,6 +84,8 @@ class Run {
     const std::vector<ImageU8> loaded_;  // empty where RunOptions brought the photos
     const std::vector<ImageU8>& photos_;
     const std::string fingerprint_;
+    const std::string tuning_;              // of this device, before the checkpoint's is used
+    std::optional<Checkpoint> checkpoint_;  // to go on with, until resume()
     Trainer trainer_;
     RunLog log_;
     Progress progress_;
@@ -81,7 +99,8 @@ class Run {
 };
 
 void Run::resume() {
-    const Checkpoint checkpoint = read_checkpoint(run_.resume_from);
+    const Checkpoint checkpoint = std::move(checkpoint_.value());
+    checkpoint_.reset();
     check_resumable(checkpoint, run_.resume_from, options_, dataset_, fingerprint_);
     trainer_.restore(checkpoint.state);
     told_divisor_ = trainer_.resolution_divisor();
@@ -90,6 +109,9 @@ void Run::resume() {
     progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
+    if (checkpoint.tuning != tuning_)
+        progress_.note(
+            fmt::format("goes on with {} as it began, not with {}", checkpoint.tuning, tuning_));
 }
 
 // As 3DGS writes it: name -> three rows of four.
@@ -143,7 +165,8 @@ void Run::save_model(int iteration) {
 
 void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(false);
-    write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_});
+    write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_,
+                            result_variants(device_)});
     stopwatch(true);
 }
 

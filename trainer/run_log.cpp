@@ -9,6 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/render/tuning.h"
 #include "trainer/checkpoint.h"
 #include "trainer/strategy.h"
 
@@ -113,6 +114,7 @@ void RunLog::start(Device& device, const Dataset& dataset, const TrainOptions& o
               {"version", DARB_VERSION},
               {"device", device.info().name},
               {"driver", device.info().driver},
+              {"tuning", variants_text(all_variants(device))},
               {"dataset", dataset.root.string()},
               {"source", dataset.source},
               {"notes", dataset.notes},

@@ -22,19 +22,7 @@ AdamStep adam_step(const AdamStep& rates, int t) {
 }
 
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
-    : device_(&device), options_(options), result_(result) {
-    make_blend(false);
-    behind_ = Buffer(device, "behind", 4);
-}
-
-void Backward::make_blend(bool segmented) {
-    SpecConstants blend = kernel_constants(options_);
-    const std::uint32_t subgroup = add_block_constants(*device_, blend);
-    blend["THREADS"] = static_cast<std::int32_t>(subgroup);
-    blend["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
-    blend_ = Pipeline(*device_, "blend_backward", blend, true, subgroup);
-    segmented_ = segmented;
-}
+    : device_(&device), options_(options), result_(result), blend_(device, options) {}
 
 void Backward::set_sh_stored(int degree) {
     if (degree != options_.sh_stored) project_.clear();
@@ -60,30 +48,7 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
         gradient_sum_ = Buffer(*device_, "gradient sum", std::uint64_t(splat_capacity_) * 8);
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
-    if (pairs > pair_capacity_ || pair_capacity_ == 0) {
-        const std::uint64_t k = pair_capacity_ = std::max(pairs, 1024u);
-        partials_ = Buffer(*device_, "pair partials", k * 32);
-        partial_rest_ = Buffer(*device_, "pair partials, rest", k * 4);
-    }
-}
-
-// Long lists take several dispatches, the last part of every list first.
-void Backward::record_blend(Commands& commands, const Forward& forward, const Buffer& d_image,
-                            const gpu::CameraData& data, const glm::vec3& background) {
-    const std::uint32_t segments = forward.list_segments();
-    if (segments > 1 && !segmented_) make_blend(true);
-    if (segments > 1 && behind_.bytes() < forward.final_transmittance().bytes())
-        behind_ = Buffer(*device_, "behind", forward.final_transmittance().bytes());
-    for (std::uint32_t segment = segments; segment-- > 0;) {
-        const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x, background.r,
-                                   background.g, background.b, segment,      segments};
-        commands.dispatch(
-            blend_, blend,
-            {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
-             forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
-             forward.final_transmittance(), forward.last_pair(), partials_, partial_rest_, behind_},
-            data.tiles_x, data.tiles_y);
-    }
+    blend_.reserve(pairs);
 }
 
 void Backward::record_shares(Commands& commands, const Forward& forward, const Buffer& image,
@@ -99,9 +64,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                       const AdamStep& step) {
     DARB_CHECK(splats.has_moments() && forward.options().store_for_backward, "set up for training");
     commands.pass("blend backward");
-    commands.fill(partials_, 0);
-    commands.fill(partial_rest_, 0);
-    record_blend(commands, forward, d_image, data, background);
+    blend_.record(commands, forward, d_image, data, background);
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
@@ -137,8 +100,8 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                            splats.rows(splats.moments(kShRest), range),
                            forward.pair_count(),
                            forward.pair_begin(),
-                           partials_,
-                           partial_rest_,
+                           blend_.partials(),
+                           blend_.rest(),
                            gradient_sum_,
                            forward.status(),
                            splats.smoothing()},

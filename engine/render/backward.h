@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "engine/render/blend_backward.h"
 #include "engine/render/forward.h"
 #include "shaders/shared/optim_args.h"
 
@@ -53,19 +54,14 @@ class Backward {
 
   private:
     Pipeline& project_pipeline(int sh_degree);
-    void make_blend(bool segmented);
-    void record_blend(Commands& commands, const Forward& forward, const Buffer& d_image,
-                      const gpu::CameraData& data, const glm::vec3& background);
 
     Device* device_;
     ForwardOptions options_;
     BackwardResult result_;
-    Pipeline blend_;
-    bool segmented_ = false;  // whether blend_ takes segments
-    Buffer behind_;           // pixels' state between its dispatches
+    BlendBackward blend_;
     std::map<int, Pipeline> project_;
-    std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0;
-    Buffer partials_, partial_rest_, gradient_sum_;
+    std::uint32_t splat_capacity_ = 0;
+    Buffer gradient_sum_;
 };
 
 }  // namespace darb

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/render/groups.h"
 #include "engine/render/kernel_constants.h"
+#include "engine/render/tuning.h"
 #include "shaders/shared/lens.h"
 
 namespace darb {
@@ -93,6 +94,7 @@ std::uint32_t blend_subgroup(const Device& device) {
 std::uint32_t add_block_constants(const Device& device, SpecConstants& constants) {
     const std::uint32_t subgroup = blend_subgroup(device);
     constants["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    constants["PIXELS"] = static_cast<std::int32_t>(64 / subgroup);
     constants["LOCKSTEP"] = device.info().type == "cpu" ? 1 : 0;
     return subgroup;
 }
@@ -101,6 +103,11 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
     DARB_CHECK(!options.store_for_backward || options.depth_order != DEPTH_ORDER_PIXEL,
                "a resorted pixel cannot be walked back");
+    const Tuning tuning = tuning_of(device);
+    blend_threads_ = tuning.blend_threads;
+    if (options.store_for_backward && tuning.backward == BackwardBlend::buckets)
+        bucket_ = bucket_pairs(device);
+    checkpoints_ = Buffer(device, "no checkpoints", 4);
     const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
     SpecConstants of_splat = kernel_constants(options);
     of_splat["THREADS"] = SPLAT_GROUP;
@@ -131,7 +138,10 @@ void Forward::make_blend(std::uint32_t segments) {
     blend["MIN_TRANSMITTANCE"] = options_.transmittance_stop;
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
-    blend["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
+    blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);
+    blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / blend_threads_);
+    blend["CHECKPOINTS"] = bucket_ > 0 ? 1 : 0;
+    if (bucket_ > 0) blend["BUCKET"] = static_cast<std::int32_t>(bucket_);
     blend["SEGMENT"] = segments > 1 ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     blend_ = Pipeline(*device_, "blend", blend, true, subgroup);
     list_segments_ = segments;
@@ -197,9 +207,20 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
 }
 
 std::uint32_t Forward::max_pairs(const Device& device) {
-    // The widest entry per pair is the backward pass's: eight floats.
-    return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(device.info().max_storage_buffer_bytes / 32, 1u << 30));
+    // The widest entry per pair is the backward pass's: eight floats. Of the checkpoints' records
+    // half are left for the tiles, whose last buckets are not full.
+    const std::uint64_t binding = device.info().max_storage_buffer_bytes;
+    std::uint64_t most = std::min<std::uint64_t>(binding / 32, 1u << 30);
+    if (tuning_of(device).backward == BackwardBlend::buckets)
+        most = std::min(most, binding / CHECKPOINT_BYTES / 2 * bucket_pairs(device));
+    return static_cast<std::uint32_t>(most);
+}
+
+// Of every tile one more than its full buckets.
+void Forward::reserve_checkpoints() {
+    const std::uint64_t records = pair_capacity_ / bucket_ + std::uint64_t{tile_capacity_};
+    if (checkpoints_.bytes() < records * CHECKPOINT_BYTES)
+        checkpoints_ = Buffer(*device_, "checkpoints", records * CHECKPOINT_BYTES);
 }
 
 void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height) {
@@ -245,6 +266,7 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
             Buffer(d, "final transmittance", store || list_segments_ > 1 ? pixels * 4 : 4);
         last_pair_ = Buffer(d, "last pair", store ? pixels * 4 : 4);
     }
+    if (bucket_ > 0) reserve_checkpoints();
 }
 
 void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& cameras,
@@ -295,7 +317,7 @@ void Forward::record_blend(Commands& commands, const gpu::CameraData& data,
                                    background.g, background.b, segment,      list_segments_};
         commands.dispatch(blend_, blend,
                           {tile_range_, pair_order(), pair_splat_, splat_shape_, splat_light_,
-                           splat_bound_, image_, final_transmittance_, last_pair_},
+                           splat_bound_, image_, final_transmittance_, last_pair_, checkpoints_},
                           data.tiles_x, data.tiles_y);
     }
 }

@@ -51,7 +51,8 @@ Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& camera
 
 /// The subgroup size that the blend passes are compiled for and require.
 std::uint32_t blend_subgroup(const Device& device);
-/// Sets what shaders/lib/block.glsl asks for; returns the subgroup size to require.
+/// Sets what shaders/lib/area.glsl and lockstep.glsl ask for, an area a block; returns the subgroup
+/// size to require.
 std::uint32_t add_block_constants(const Device& device, SpecConstants& constants);
 
 class Forward {
@@ -111,6 +112,13 @@ class Forward {
     const Buffer& tile_range() const { return tile_range_; }
     const Buffer& final_transmittance() const { return final_transmittance_; }
     const Buffer& last_pair() const { return last_pair_; }
+    /// shaders/lib/bucket.glsl; only where the device blends back by buckets, else 0 records.
+    const Buffer& checkpoints() const { return checkpoints_; }
+    std::uint32_t checkpoint_records() const {
+        return static_cast<std::uint32_t>(checkpoints_.bytes() / CHECKPOINT_BYTES);
+    }
+    /// Pairs a record; 0: there are none.
+    std::uint32_t bucket() const { return bucket_; }
 
   private:
     Pipeline& project_pipeline(int sh_degree);
@@ -119,9 +127,11 @@ class Forward {
     void record_blend(Commands& commands, const gpu::CameraData& data, const glm::vec3& background);
     void make_blend(std::uint32_t segments);
     void make_cooperation();
+    void reserve_checkpoints();
 
     Device* device_;
     ForwardOptions options_;
+    std::uint32_t blend_threads_, bucket_ = 0;
     std::map<int, Pipeline> project_;  // by SH degree in use
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
         list_lengths_, blend_;
@@ -141,7 +151,7 @@ class Forward {
     Buffer pair_tile_, pair_splat_, pair_order_, tile_range_;
     Buffer huge_rank_,
         no_huge_rank_;  // [pair capacity / HUGE_PAIRS + 1] once there are any; a word
-    Buffer image_, final_transmittance_, last_pair_;
+    Buffer image_, final_transmittance_, last_pair_, checkpoints_;
 };
 
 }  // namespace darb

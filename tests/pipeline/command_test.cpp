@@ -62,6 +62,7 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"check --scene a.ply", "belong together"},
                     {"check --json a --scene a.ply --cameras b --dump c", "--json"},
                     {"check --device no_such_device", "no_such_device"},
+                    {"check --tune backward=no_such", "backward=subgroup|buckets"},
                     {"devices --device no_such_device", "no_such_device"}});
 }
 
@@ -99,6 +100,7 @@ TEST(Command, devices_marks_the_chosen_one) {
     EXPECT_EQ(o.code, 0) << o.err;
     EXPECT_NE(o.out.find("* 0"), std::string::npos) << o.out;
     EXPECT_NE(o.out.find("chosen: 0"), std::string::npos) << o.out;
+    EXPECT_NE(o.out.find("backward="), std::string::npos) << o.out;
 }
 
 TEST(Command, check_passes_on_this_device_slow) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "tests/support/scoped_variants.h"
 #include "trainer/initial_model.h"
 #include "trainer/trainer.h"
 
@@ -21,11 +22,13 @@ Dataset small_scene() {
 }
 
 // Trains, and plans with the counts that the run ended at.
-void compare_with_run(const TrainOptions& options) {
+void compare_with_run(const TrainOptions& options, const std::string& ways = "") {
     const Dataset dataset = small_scene();
     MemoryDemand demand;
     add_photos(dataset.views, options, demand);
     Device device;
+    const test::ScopedVariants variants(device, ways);
+    if (tuning_of(device).backward == BackwardBlend::buckets) demand.bucket = bucket_pairs(device);
     Trainer trainer(device, dataset, load_photos(dataset.views), initial_model(dataset, options),
                     options);
     trainer.on_result = [&](const IterationResult& r) {
@@ -46,6 +49,14 @@ TEST(MemoryPlan, run_without_density_control_is_met) {
     options.iterations = 3;
     options.densify_until = 0;
     compare_with_run(options);
+}
+
+TEST(MemoryPlan, run_with_checkpoints_is_met) {
+    TrainOptions options;
+    options.iterations = 3;
+    options.densify_until = 0;
+    options.sh_degree = 0;
+    compare_with_run(options, "backward=buckets");
 }
 
 TEST(MemoryPlan, run_of_degree_0_is_met) {

@@ -8,6 +8,7 @@
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_run.h"
+#include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_measure.h"
 #include "trainer/checkpoint.h"
 
@@ -64,6 +65,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     DeviceOptions options;
     options.select = flags_.device;
     Device device(options);  // of its own, so that the peak of memory is this run's
+    settle_tuning(device);
     run_training(device, dataset_, f.train, f.run, &stop);
 }
 
@@ -85,6 +87,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
             DeviceOptions options;
             options.select = flags_.device;
             Device device(options);
+            settle_tuning(device);
             measure_blending_of(run, device, cameras_, flags_.blending_views);
         }
     } catch (const std::exception& e) {

@@ -69,6 +69,7 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     DeviceOptions options;
     options.select = flags.device;
     Device scratch(options);
+    scratch.set_variants(device.variants());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
     const std::uint64_t bytes = plan_memory(f.demand).total();

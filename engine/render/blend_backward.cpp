@@ -1,0 +1,95 @@
+#include "engine/render/blend_backward.h"
+
+#include <algorithm>
+
+#include "engine/core/check.h"
+#include "engine/render/groups.h"
+
+namespace darb {
+
+BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
+    : device_(&device), options_(options), way_(tuning_of(device).backward) {
+    make_pipelines(false);
+    behind_ = Buffer(device, "behind", 4);
+}
+
+void BlendBackward::make_pipelines(bool segmented) {
+    SpecConstants constants = kernel_constants(options_);
+    const std::uint32_t subgroup = add_block_constants(*device_, constants);
+    constants["THREADS"] = static_cast<std::int32_t>(subgroup);
+    constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
+    constants["BUCKET"] = static_cast<std::int32_t>(bucket_pairs(*device_));
+    segmented_ = segmented;
+    if (way_ == BackwardBlend::subgroup) {
+        blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
+        return;
+    }
+    if (!blend_) blend_ = Pipeline(*device_, "blend_backward_buckets", constants, true, subgroup);
+    constants["THREADS"] = SPLAT_GROUP;
+    if (!bucket_tiles_) bucket_tiles_ = Pipeline(*device_, "bucket_tiles", constants);
+    bucket_behind_ = Pipeline(*device_, "bucket_behind", constants);
+}
+
+void BlendBackward::reserve(std::uint32_t pairs) {
+    if (pairs <= pair_capacity_ && pair_capacity_ > 0) return;
+    const std::uint64_t k = pair_capacity_ = std::max(pairs, 1024u);
+    partials_ = Buffer(*device_, "pair partials", k * 32);
+    rest_ = Buffer(*device_, "pair partials, rest", k * 4);
+}
+
+void BlendBackward::record(Commands& commands, const Forward& forward, const Buffer& d_image,
+                           const gpu::CameraData& data, const glm::vec3& background) {
+    const std::uint32_t segments = forward.list_segments();
+    DARB_CHECK(forward.pair_capacity() <= pair_capacity_, "{} pairs of {}", forward.pair_capacity(),
+               pair_capacity_);
+    if (segments > 1 && !segmented_) make_pipelines(true);
+    if (segments > 1 && behind_.bytes() < forward.final_transmittance().bytes())
+        behind_ = Buffer(*device_, "behind", forward.final_transmittance().bytes());
+    commands.fill(partials_, 0);
+    commands.fill(rest_, 0);
+    const gpu::BlendArgs args{data.width,   data.height, data.tiles_x, background.r, background.g,
+                              background.b, 0,           segments};
+    if (way_ == BackwardBlend::subgroup)
+        record_subgroup(commands, forward, d_image, args);
+    else
+        record_buckets(commands, forward, d_image, args);
+}
+
+// Long lists take several dispatches, the last part of every list first.
+void BlendBackward::record_subgroup(Commands& commands, const Forward& forward,
+                                    const Buffer& d_image, gpu::BlendArgs args) {
+    const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
+    for (args.segment = args.segments; args.segment-- > 0;)
+        commands.dispatch(
+            blend_, args,
+            {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
+             forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
+             forward.final_transmittance(), forward.last_pair(), partials_, rest_, behind_},
+            args.tiles_x, tiles_y);
+}
+
+void BlendBackward::record_buckets(Commands& commands, const Forward& forward,
+                                   const Buffer& d_image, gpu::BlendArgs args) {
+    const std::uint32_t records = forward.checkpoint_records();
+    DARB_CHECK(records > 0, "the forward pass stores no checkpoints");
+    if (bucket_tile_.bytes() < std::uint64_t{records} * 4)
+        bucket_tile_ = Buffer(*device_, "bucket tile", std::uint64_t{records} * 4);
+    const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
+    const gpu::BucketArgs buckets{args.width, args.height, args.tiles_x, records};
+    commands.fill(bucket_tile_, 0);
+    commands.dispatch(bucket_tiles_, buckets, {forward.tile_range(), bucket_tile_}, args.tiles_x,
+                      tiles_y);
+    for (args.segment = args.segments; args.segment-- > 0;)
+        commands.dispatch(
+            bucket_behind_, args,
+            {forward.tile_range(), d_image, forward.last_pair(), forward.checkpoints(), behind_},
+            args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
+    const Groups g = groups_for(records, 1);
+    commands.dispatch(blend_, buckets,
+                      {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
+                       forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
+                       forward.last_pair(), bucket_tile_, forward.checkpoints(), partials_, rest_},
+                      g.x, g.y);
+}
+
+}  // namespace darb
