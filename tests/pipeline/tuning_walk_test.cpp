@@ -35,18 +35,21 @@ TEST(TuningWalk, ways_change_bits_only_where_the_table_says_so) {
     ASSERT_GT(usual.status.pairs, 600U);
     for (const TuningGroup& group : tuning_groups(shared_device().info()))
         for (const std::string& way : group.ways) {
+            if (way == group.ways.front()) continue;  // the usual one
             SCOPED_TRACE(group.name + "=" + way);
             const ScopedVariants variants(shared_device(), group.name + "=" + way);
             const DeviceWalk walk = s.walk();
             EXPECT_EQ(walk.image.data, usual.image.data);
             EXPECT_EQ(walk.status.pairs, usual.status.pairs);
-            if (!group.changes_bits) EXPECT_EQ(walk.d, usual.d);
+            if (!group.changes_bits) {
+                EXPECT_EQ(walk.d, usual.d);
+            }
         }
 }
 
 TEST(TuningWalk, a_run_goes_on_in_the_way_that_it_began) {
     TinyTraining t = tiny_training();
-    t.options.iterations = 24;
+    t.options.iterations = 14;
     const auto folder = [](const char* name) {
         return fs::path(testing::TempDir()) / fmt::format("darb_ways_{}_{}", ::getpid(), name);
     };
@@ -55,7 +58,7 @@ TEST(TuningWalk, a_run_goes_on_in_the_way_that_it_began) {
         options.output = output;
         options.photos = t.photos;
         options.resume_from = resume;
-        options.checkpoint_iterations = {12};
+        options.checkpoint_iterations = {7};
         options.quiet = true;
         options.report = false;
         run_training(shared_device(), t.dataset, t.options, options);
@@ -69,7 +72,7 @@ TEST(TuningWalk, a_run_goes_on_in_the_way_that_it_began) {
     EXPECT_EQ(whole.tuning, "backward=buckets");
     const ScopedVariants variants(shared_device(), "backward=subgroup");
     const Checkpoint other = run(folder("other"), {});
-    const Checkpoint resumed = run(folder("resumed"), folder("whole") / "chkpnt12.darb");
+    const Checkpoint resumed = run(folder("resumed"), folder("whole") / "chkpnt7.darb");
     EXPECT_EQ(resumed.tuning, "backward=buckets");
     EXPECT_EQ(resumed.state.model.position, whole.state.model.position);
     EXPECT_EQ(resumed.state.moments, whole.state.moments);
