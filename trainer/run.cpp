@@ -24,6 +24,13 @@ bool contains(const std::vector<int>& list, int value) {
     return std::find(list.begin(), list.end(), value) != list.end();
 }
 
+// Measured before there is a budget of memory, and no part of the run's peak.
+DeviceRates rates_of(Device& device) {
+    const DeviceRates rates = measure_rates(device);
+    device.restart_peak();
+    return rates;
+}
+
 // One run: the loop and what it writes. The stopwatch counts training alone.
 class Run {
   public:
@@ -35,6 +42,7 @@ class Run {
           loaded_(run.photos.empty() ? load_photos(dataset.views) : std::vector<ImageU8>{}),
           photos_(run.photos.empty() ? loaded_ : run.photos),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
+          rates_(rates_of(device)),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
           log_(run.output, !run.resume_from.empty()),
           progress_(1, options.iterations, run.quiet) {}
@@ -67,6 +75,7 @@ class Run {
     const std::vector<ImageU8> loaded_;  // empty where RunOptions brought the photos
     const std::vector<ImageU8>& photos_;
     const std::string fingerprint_;
+    const DeviceRates rates_;
     Trainer trainer_;
     RunLog log_;
     Progress progress_;
@@ -156,7 +165,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
     if (!run_.resume_from.empty()) resume();
-    log_.start(device_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
+    log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
 
     try {
         train(stop);

@@ -50,6 +50,9 @@ struct PassTotal {
     double ms = 0;
 };
 
+/// The frames that training takes.
+ForwardOptions forward_options(const TrainOptions& options);
+
 class Trainer {
   public:
     /// photos: as load_photos gives them, in the order of dataset.views. The dataset must outlive
@@ -97,6 +100,10 @@ class Trainer {
     std::uint32_t stopped_by_memory() const { return stopped_by_memory_; }
     /// The same where frames came near the pairs that the device's bindings hold.
     std::uint32_t stopped_by_pairs() const { return stopped_by_pairs_; }
+    /// What plan_memory() asks for what the trainer holds now.
+    MemoryDemand memory_demand() const;
+    /// The peak that the plans for all it held so far come to; Device::peak_bytes measures it.
+    std::uint64_t planned_bytes() const;
 
     /// The state beside the model that a checkpoint holds. moments: [attribute][2 N stride].
     struct State {
@@ -138,6 +145,8 @@ class Trainer {
     void density_control(int iteration);
     glm::vec3 background_for(int iteration) const;
     std::uint32_t splats_within_memory() const;
+    void note_memory();                     // into planned_bytes_, what is held now
+    void note_round(std::uint32_t before);  // the same of a round of density control just over
     void check_gradients(int iteration, const gpu::FrameStatus& status) const;
     AdamStep rates(int iteration) const;
 
@@ -169,6 +178,8 @@ class Trainer {
     std::array<Flight, 2> flights_;
     int iteration_ = 0;
     MemoryDemand demand_;  // its photos
+    std::array<std::uint64_t, 5> noted_{};
+    std::uint64_t planned_bytes_ = 0;
     std::uint32_t stopped_by_memory_ = 0, stopped_by_pairs_ = 0;
     TrainCounters counters_;
     std::vector<PassTotal> pass_totals_;

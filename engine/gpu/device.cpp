@@ -256,6 +256,9 @@ std::uint64_t Device::allocated_bytes() const {
 std::uint64_t Device::peak_bytes() const {
     return state_->peak;
 }
+void Device::restart_peak() {
+    state_->peak = state_->allocated.load();
+}
 void Device::set_memory_budget(std::uint64_t bytes) {
     state_->budget = bytes;
 }

@@ -75,6 +75,8 @@ class Device {
     /// Bytes of live Buffers, and the most there ever were.
     std::uint64_t allocated_bytes() const;
     std::uint64_t peak_bytes() const;
+    /// The peak counts anew from what is live: after a measurement that is no part of the work.
+    void restart_peak();
     /// A budget for all Buffers together; 0 = none. Exceeding it throws as out of memory does.
     void set_memory_budget(std::uint64_t bytes);
 

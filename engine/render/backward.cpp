@@ -24,7 +24,25 @@ AdamStep adam_step(const AdamStep& rates, int t) {
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
     : device_(&device), options_(options), result_(result) {
     make_blend(false);
-    behind_ = Buffer(device, "behind", 4);
+    make_buffers(device, *this, segment_buffers({}));
+}
+
+BufferList<Backward> Backward::splat_buffers(std::uint64_t splats) {
+    return {{&Backward::gradient_sum_, "gradient sum", splats * 8}};
+}
+
+BufferList<Backward> Backward::pair_buffers(std::uint64_t pairs) {
+    return {{&Backward::partials_, "pair partials", pairs * 32},
+            {&Backward::partial_rest_, "pair partials, rest", pairs * 4}};
+}
+
+BufferList<Backward> Backward::segment_buffers(const FrameSize& size) {
+    return {{&Backward::behind_, "behind", size.list_segments > 1 ? size.pixels * 4 : 4}};
+}
+
+FrameBytes Backward::device_bytes(const FrameSize& size) {
+    return {charged_bytes(splat_buffers(size.splats)), charged_bytes(pair_buffers(size.pairs)),
+            charged_bytes(segment_buffers(size))};
 }
 
 void Backward::make_blend(bool segmented) {
@@ -57,13 +75,12 @@ Pipeline& Backward::project_pipeline(int sh_degree) {
 void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
     if (splats > splat_capacity_ || splat_capacity_ == 0) {
         splat_capacity_ = std::max(splats, 1024u);
-        gradient_sum_ = Buffer(*device_, "gradient sum", std::uint64_t(splat_capacity_) * 8);
+        make_buffers(*device_, *this, splat_buffers(splat_capacity_));
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
     if (pairs > pair_capacity_ || pair_capacity_ == 0) {
-        const std::uint64_t k = pair_capacity_ = std::max(pairs, 1024u);
-        partials_ = Buffer(*device_, "pair partials", k * 32);
-        partial_rest_ = Buffer(*device_, "pair partials, rest", k * 4);
+        pair_capacity_ = std::max(pairs, 1024u);
+        make_buffers(*device_, *this, pair_buffers(pair_capacity_));
     }
 }
 
@@ -72,8 +89,8 @@ void Backward::record_blend(Commands& commands, const Forward& forward, const Bu
                             const gpu::CameraData& data, const glm::vec3& background) {
     const std::uint32_t segments = forward.list_segments();
     if (segments > 1 && !segmented_) make_blend(true);
-    if (segments > 1 && behind_.bytes() < forward.final_transmittance().bytes())
-        behind_ = Buffer(*device_, "behind", forward.final_transmittance().bytes());
+    if (segments > 1 && behind_.bytes() < forward.size().pixels * 4)
+        make_buffers(*device_, *this, segment_buffers(forward.size()));
     for (std::uint32_t segment = segments; segment-- > 0;) {
         const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x, background.r,
                                    background.g, background.b, segment,      segments};

@@ -28,7 +28,11 @@ class Backward {
   public:
     Backward(Device& device, const ForwardOptions& options, BackwardResult result);
 
+    /// Buffers for so many splats and pairs: never shrinks, 0 of either asks for no more. Where
+    /// there are more splats, gradient_sum() starts at 0.
     void reserve(std::uint32_t splats, std::uint32_t pairs);
+    /// Device memory beside a Forward of this size.
+    static FrameBytes device_bytes(const FrameSize& size);
 
     /// d_image: float [3][H][W]. splats must have moments.
     void record(Commands& commands, const Forward& forward, GpuSplats& splats,
@@ -44,6 +48,9 @@ class Backward {
     void clear_gradient_sum(Commands& commands) { commands.fill(gradient_sum_, 0); }
 
   private:
+    static BufferList<Backward> splat_buffers(std::uint64_t splats);
+    static BufferList<Backward> pair_buffers(std::uint64_t pairs);
+    static BufferList<Backward> segment_buffers(const FrameSize& size);
     Pipeline& project_pipeline(int sh_degree);
     void make_blend(bool segmented);
     void record_blend(Commands& commands, const Forward& forward, const Buffer& d_image,
