@@ -27,6 +27,7 @@ COVARIANCE = "shaders/lib/covariance.glsl"
 GRADIENT = "shaders/backward/project_gradient.glsl"
 BLEND = "shaders/forward/blend.comp"
 BLEND_BACK = "shaders/backward/blend_backward.comp"
+SPLAT_SUMS = "shaders/backward/splat_sums.glsl"
 BACK = "shaders/backward/project_backward.comp"
 
 # case, guard, file, text that holds it, what stands there without it, test program, test (gtest filter)
@@ -87,15 +88,15 @@ GUARDS = [
     ("opacity at 1, thousands of opaque layers", "transmittance_stop", BLEND,
      "next >= MIN_TRANSMITTANCE;", "before >= 0.0;",
      "blend_test", "every_kernel/Blend.opaque_stack_stops_before_the_transmittance_limit/gaussian_psi"),
-    ("opacity at 1, thousands of opaque layers", "alpha_limit_gradient", BLEND_BACK,
+    ("opacity at 1, thousands of opaque layers", "alpha_limit_gradient", SPLAT_SUMS,
      "counts && raw < ALPHA_MAX ? before * ahead : 0.0", "counts ? before * ahead : 0.0",
-     "blend_backward_test", "BlendBackwardCases.alpha_at_its_limit_moves_only_the_colour"),
+     "blend_backward_test", "BlendBackwardCases/BothWays.alpha_at_its_limit_moves_only_the_colour/subgroup"),
     ("10,000 thin layers in one pixel", "gradient_ends_where_the_pixel_ended", BLEND_BACK,
-     "raw >= ALPHA_CUTOFF && number <= px.last[k]", "raw >= ALPHA_CUTOFF",
-     "blend_backward_test", "BlendBackwardCases.pairs_behind_the_stop_get_zero"),
-    ("10,000 thin layers in one pixel", "what_is_behind", BLEND_BACK,
-     "px.behind[k] += alpha * ahead;", "",
-     "blend_backward_test", "BlendBackwardCases.ten_thousand_thin_layers_match_double"),
+     "px.d_colour[k], number <= px.last[k]);", "px.d_colour[k], true);",
+     "blend_backward_test", "BlendBackwardCases/BothWays.pairs_behind_the_stop_get_zero/subgroup"),
+    ("10,000 thin layers in one pixel", "what_is_behind", SPLAT_SUMS,
+     "behind += alpha * ahead;", "",
+     "blend_backward_test", "BlendBackwardCases/BothWays.ten_thousand_thin_layers_match_double/subgroup"),
     ("equal depths, shuffled order", "stable_sort", "shaders/sort/radix_scatter_columns.comp",
      "for (uint i = begin; i < end; ++i) {", "for (uint i = end; i-- > begin;) {",
      "frame_test", "Frame.equal_depths_keep_file_order"),

@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -29,6 +30,7 @@ void for_each_array(State& state, Visit visit) {
     visit(state.gradient_sum);
     visit(state.smoothing);
     visit(state.exposure);
+    visit(state.error_shares);
 }
 
 std::uint32_t checksum(std::span<const std::byte> bytes) {
@@ -48,6 +50,7 @@ Json header_of(const Checkpoint& c) {
                 {"next_probe", c.state.next_probe},
                 {"smoothing", c.state.smoothing.size()},
                 {"exposure", c.state.exposure.size()},
+                {"error_shares", c.state.error_shares.size()},
                 {"splats", m.size()},
                 {"sh_degree", m.sh_degree},
                 {"kernel", kernel_name(m.kernel)},
@@ -57,6 +60,7 @@ Json header_of(const Checkpoint& c) {
                 {"seconds", c.seconds},
                 {"settings", c.settings},
                 {"dataset", c.dataset},
+                {"tuning", c.tuning},
                 {"counters", {n.redone_iterations, n.bad_gradients, n.cloned_or_split, n.pruned}},
                 {"culled", n.culled},
                 {"overflows", n.overflows},
@@ -84,6 +88,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     c.seconds = h.at("seconds").get<double>();
     c.settings = h.at("settings").get<std::string>();
     c.dataset = h.at("dataset").get<std::string>();
+    c.tuning = h.value("tuning", c.tuning);
     TrainCounters& n = c.state.counters;
     n.redone_iterations = h.at("counters").at(0).get<std::uint64_t>();
     n.bad_gradients = h.at("counters").at(1).get<std::uint64_t>();
@@ -147,20 +152,23 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     if (header_bytes > file.size() - kHeadBytes) throw fail("truncated in the header");
     const auto* text = reinterpret_cast<const char*>(file.data() + kHeadBytes);
     Checkpoint c;
-    std::uint64_t splats = 0, smoothing = 0, exposure = 0;
+    std::uint64_t splats = 0, smoothing = 0, exposure = 0, shares = 0;
     try {
         const Json header = Json::parse(text, text + header_bytes);
         read_header(header, c, where);
         splats = header.at("splats").get<std::uint64_t>();
         smoothing = header.at("smoothing").get<std::uint64_t>();
         exposure = header.at("exposure").get<std::uint64_t>();
-        if ((smoothing != 0 && smoothing != splats) || exposure > kMaxSplats)
+        shares = header.value("error_shares", std::uint64_t{0});  // absent in earlier files
+        if ((smoothing != 0 && smoothing != splats) || exposure > kMaxSplats ||
+            (shares != 0 && shares != 2 * splats))
             throw fail("the header's sizes make no sense");
     } catch (const Json::exception& e) {
         throw fail(std::string("the header cannot be read: ") + e.what());
     }
     const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
-    const std::uint64_t floats = splats * floats_per_splat(c.state.model) + smoothing + exposure;
+    const std::uint64_t floats =
+        splats * floats_per_splat(c.state.model) + smoothing + exposure + shares;
     const std::uint64_t expected = floats * sizeof(float);
     if (payload.size() != expected)
         throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
@@ -170,6 +178,7 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     size_arrays(c, splats);
     c.state.smoothing.resize(smoothing);
     c.state.exposure.resize(exposure);
+    c.state.error_shares.resize(shares);
     size_t at = 0;
     for_each_array(c.state, [&](std::vector<float>& values) {
         if (!values.empty())
@@ -184,44 +193,52 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
 }
 
 std::string settings_text(const TrainOptions& o) {
-    return Json{{"iterations", o.iterations},
-                {"seed", o.seed},
-                {"kernel", kernel_name(o.kernel)},
-                {"footprint", footprint_name(o.footprint)},
-                {"accuracy", accuracy_text(o.accuracy)},
-                {"sh_degree", o.sh_degree},
-                {"sh_interval", o.sh_interval},
-                {"effects",
-                 {{"probe_sh", o.probe_sh},
-                  {"antialias", o.antialias},
-                  {"exposure", o.exposure},
-                  {"off_centre", o.off_centre},
-                  {"lens", o.lens},
-                  {"alpha", o.alpha},
-                  {"near", o.near_care},
-                  {"exposure_lr", {o.exposure_lr_init, o.exposure_lr_final}}}},
-                {"white_background", o.white_background},
-                {"random_background", o.random_background},
-                {"lambda_dssim", o.lambda_dssim},
-                {"position_lr", {o.position_lr_start(), o.position_lr_end()}},
-                {"scale_lr", o.scale_lr},
-                {"rotation_lr", o.rotation_lr},
-                {"opacity_lr", o.opacity_lr},
-                {"sh_lr", {o.sh_dc_lr, o.sh_rest_lr}},
-                {"final_lr_share", o.final_lr_share},
-                {"densify_from", o.densify_from},
-                {"densify_until", o.densify_end()},
-                {"densify_interval", o.densify_interval},
-                {"densify_grad_threshold", o.densify_grad_threshold},
-                {"clone_split_extent", o.clone_split_extent},
-                {"prune_opacity", o.prune_opacity},
-                {"prune_extent", o.prune_extent},
-                {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
-                {"max_splats", o.max_splats},
-                {"regularisers", {o.opacity_weight, o.scale_weight}},
-                {"initial_opacity", o.initial_opacity},
-                {"random_points", o.random_points}}
-        .dump();
+    Json settings{{"iterations", o.iterations},
+                  {"seed", o.seed},
+                  {"kernel", kernel_name(o.kernel)},
+                  {"footprint", footprint_name(o.footprint)},
+                  {"accuracy", accuracy_text(o.accuracy)},
+                  {"sh_degree", o.sh_degree},
+                  {"sh_interval", o.sh_interval},
+                  {"effects",
+                   {{"probe_sh", o.probe_sh},
+                    {"antialias", o.antialias},
+                    {"exposure", o.exposure},
+                    {"off_centre", o.off_centre},
+                    {"lens", o.lens},
+                    {"alpha", o.alpha},
+                    {"near", o.near_care},
+                    {"exposure_lr", {o.exposure_lr_init, o.exposure_lr_final}}}},
+                  {"white_background", o.white_background},
+                  {"random_background", o.random_background},
+                  {"lambda_dssim", o.lambda_dssim},
+                  {"position_lr", {o.position_lr_start(), o.position_lr_end()}},
+                  {"scale_lr", o.scale_lr},
+                  {"rotation_lr", o.rotation_lr},
+                  {"opacity_lr", o.opacity_lr},
+                  {"sh_lr", {o.sh_dc_lr, o.sh_rest_lr}},
+                  {"final_lr_share", o.final_lr_share},
+                  {"densify_from", o.densify_from},
+                  {"densify_until", o.densify_end()},
+                  {"densify_interval", o.densify_interval},
+                  {"densify_grad_threshold", o.densify_grad_threshold},
+                  {"clone_split_extent", o.clone_split_extent},
+                  {"prune_opacity", o.prune_opacity},
+                  {"prune_extent", o.prune_extent},
+                  {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
+                  {"max_splats", o.max_splats},
+                  {"regularisers", {o.opacity_weight, o.scale_weight}},
+                  {"initial_opacity", o.initial_opacity},
+                  {"random_points", o.random_points}};
+    // What adc has not stands only where it is: its text is that of earlier versions.
+    if (o.strategy != Strategy::adc) {
+        settings["strategy"] = strategy_name(o.strategy);
+        settings["initial_scale"] = o.initial_scale;
+    }
+    if (o.strategy == Strategy::mcmc) settings["noise_lr"] = o.noise_lr;
+    if (o.strategy == Strategy::budget) settings["opacity_decay"] = o.opacity_decay;
+    if (o.resolution_ramp) settings["resolution_ramp"] = true;
+    return settings.dump();
 }
 
 std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU8>& photos) {
@@ -258,7 +275,15 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
                      const TrainOptions& options, const Dataset& dataset,
                      const std::string& fingerprint) {
     const Json before = Json::parse(checkpoint.settings, nullptr, false);
-    const Json now = Json::parse(settings_text(options));
+    Json now = Json::parse(settings_text(options));
+    const std::string strategy = before.is_object() ? before.value("strategy", "adc") : "adc";
+    if (strategy != strategy_name(options.strategy))
+        throw Error(path.string(),
+                    fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
+                                strategy_name(options.strategy)),
+                    "Repeat the strategy of that run, or start without --resume.");
+    if (before.is_object() && before.contains("resolution_ramp"))
+        now.emplace("resolution_ramp", false);
     std::string differences;
     for (const auto& [name, value] : now.items())
         if (!before.is_object() || !before.contains(name) || before[name] != value)

@@ -7,7 +7,9 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/render/gpu_splats.h"
+#include "engine/render/tuning.h"
 #include "trainer/initial_model.h"
+#include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -84,6 +86,7 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     options.densify_until = 0;
     options.probe_sh = false;
     options.sh_degree = model.sh_degree;
+    options.resolution_ramp = false;
     SplatModel placeholder;  // restore() brings the model; two at once would double the memory
     placeholder.sh_degree = model.sh_degree;
     placeholder.kernel = model.kernel;
@@ -131,6 +134,8 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
 
 std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit) {
+    if (options.strategy != Strategy::adc)
+        return std::max(start, simulate_growth(options, start, limit).end);
     const int first = std::max(options.densify_from, 0) / options.densify_interval;
     const int last = std::max(options.densify_end() - 1, 0) / options.densify_interval;
     const int rounds = std::max(0, last - first);
@@ -148,7 +153,17 @@ ColourDegrees predict_degrees(const TrainOptions& options) {
     return {std::min({1, options.sh_degree, trials}), std::min({2, options.sh_degree, trials})};
 }
 
+std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
+    TrainOptions adc = options;
+    use_strategy(Strategy::adc, adc);
+    std::uint64_t pixels = 0;
+    for (const View& view : dataset.views)
+        if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
+    return predict_splats(initial_count(dataset, adc), pixels, adc, options.max_splats);
+}
+
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
+    if (options.strategy != Strategy::adc) return simulate_growth(options, start, end).mean;
     const double all = options.iterations;
     const double to = std::clamp<double>(options.densify_end(), 0, all);
     const double from = std::clamp<double>(options.densify_from, 0, to);

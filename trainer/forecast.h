@@ -34,7 +34,11 @@ struct ColourDegrees {
 };
 ColourDegrees predict_degrees(const TrainOptions& options);
 
-/// Mean count over the run, where it grows evenly while density control runs.
+/// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
+/// end with, from the same start.
+std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options);
+
+/// Mean count over the run; adc: where it grows evenly while density control runs.
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options);
 
 /// `start` split into pieces, at least as many as it has and at most `count`, which cover what it

@@ -45,13 +45,16 @@ Region region_in_view(const std::vector<View>& views) {
     return {0.5 * (low + high), glm::max(0.5 * (high - low), glm::dvec3(1e-3))};
 }
 
-PointCloud random_points(const Dataset& dataset, const TrainOptions& options) {
+std::uint64_t random_count(const Dataset& dataset, const TrainOptions& options) {
     std::uint64_t pixels = 0;
     for (const View& v : dataset.views)
         if (!v.is_test) pixels += std::uint64_t(v.camera.width) * v.camera.height;
-    const std::uint64_t wanted = options.random_points
-                                     ? options.random_points
-                                     : std::clamp<std::uint64_t>(pixels / 32, 1'000, 100'000);
+    return options.random_points ? options.random_points
+                                 : std::clamp<std::uint64_t>(pixels / 32, 1'000, 100'000);
+}
+
+PointCloud random_points(const Dataset& dataset, const TrainOptions& options) {
+    const std::uint64_t wanted = random_count(dataset, options);
     const Region region = region_in_view(dataset.views);
     Pcg32 random(options.seed, 1);
     PointCloud cloud;
@@ -77,6 +80,12 @@ glm::dvec3 choose_origin(const PointCloud& points) {
 
 }  // namespace
 
+std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options) {
+    const std::uint64_t points =
+        dataset.points.size() > 0 ? dataset.points.size() : random_count(dataset, options);
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(points, options.max_splats));
+}
+
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     const PointCloud drawn =
         dataset.points.size() == 0 ? random_points(dataset, options) : PointCloud{};
@@ -96,7 +105,8 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
         for (int a = 0; a < 3; ++a) {
             const size_t at = 3 * i + a;
             model.position[at] = static_cast<float>(points.position[at] - model.origin[a]);
-            model.log_scale[at] = static_cast<float>(0.5 * std::log(distance2[i]));
+            model.log_scale[at] = static_cast<float>(0.5 * std::log(distance2[i]) +
+                                                     std::log(double{options.initial_scale}));
             model.sh_dc[at] = static_cast<float>((points.colour[at] / 255.0 - 0.5) / kShC0);
         }
     }

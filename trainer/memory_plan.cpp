@@ -5,14 +5,18 @@
 #include "engine/render/backward.h"
 #include "engine/render/loss.h"
 #include "trainer/densify/density_control.h"
+#include "trainer/densify/error_score.h"
+#include "trainer/densify/mcmc.h"
 #include "trainer/densify/round_buffers.h"
 #include "trainer/exposure.h"
+#include "trainer/resolution_ramp.h"
 #include "trainer/trainer.h"
 
 namespace darb {
 
 namespace {
 
+constexpr double kLastSmall = 0.3;       // share of a run: the resolution ramp's last smaller photos
 constexpr std::uint64_t kFewest = 1024;  // splats and pairs that Forward and Backward make room for
 
 FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
@@ -26,6 +30,7 @@ FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     size.tiles = image_tiles(demand.width, demand.height);
     size.list_segments = demand.list_segments;
     size.cooperates = demand.cooperates;
+    size.bucket = Forward::bucket(device, demand.frame);
     return size;
 }
 
@@ -61,6 +66,16 @@ std::uint64_t effect_bytes(const MemoryDemand& demand) {
     return bytes;
 }
 
+std::uint64_t strategy_bytes(const MemoryDemand& demand) {
+    std::uint64_t bytes = demand.small_pixels * 4;
+    if (demand.small_cameras > 0) bytes += cameras_bytes(demand.small_cameras);
+    if (demand.relocates) bytes += Mcmc::device_bytes();
+    if (demand.scores)
+        bytes += ErrorScore::device_bytes(demand.splats, std::uint64_t(demand.width) * demand.height,
+                                          demand.list_segments);
+    return bytes;
+}
+
 MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     const FrameSize size = frame_size(device, demand);
     FrameBytes bytes = Forward::device_bytes(device, demand.frame, size);
@@ -72,7 +87,7 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     plan.pairs = bytes.pairs;
     plan.photos = demand.photo_pixels * 4;
     plan.images = bytes.images + image_bytes(device, demand);
-    plan.effects = effect_bytes(demand);
+    plan.effects = effect_bytes(demand) + strategy_bytes(demand);
     return plan;
 }
 
@@ -137,6 +152,16 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
         demand.cooperates = true;
         demand.list_segments = 2;
     }
+    demand.relocates = options.strategy == Strategy::mcmc;
+    demand.scores = options.strategy == Strategy::budget;
+    const int divisor = ramp_divisor(options, static_cast<int>(kLastSmall * options.iterations),
+                                     std::max(demand.width, demand.height));
+    if (divisor == 1) return;
+    for (const View& view : views) {
+        const Camera small = divided(view.camera, divisor);
+        if (!view.is_test) demand.small_pixels += std::uint64_t(small.width) * small.height;
+    }
+    demand.small_cameras = demand.views;
 }
 
 }  // namespace darb

@@ -29,6 +29,11 @@ struct MemoryDemand {
     std::uint64_t photo_pixels = 0;      // of all training photos together
     std::uint32_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
     std::uint32_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
+    bool relocates = false;              // Strategy::mcmc
+    bool scores = false;                 // Strategy::budget
+    // Of the resolution ramp: its smaller photos, of all training photos together, and cameras.
+    std::uint64_t small_pixels = 0;
+    std::uint32_t small_cameras = 0;
 };
 
 /// Bytes of device memory, by what they are for.
@@ -38,7 +43,7 @@ struct MemoryPlan {
     std::uint64_t pairs = 0;    // per splat-tile pair
     std::uint64_t photos = 0;   // ground truth
     std::uint64_t images = 0;   // picture, its gradient, what the passes share
-    std::uint64_t effects = 0;  // of per-photo exposure and of the 3D filter
+    std::uint64_t effects = 0;  // of per-photo exposure, of the 3D filter and of the strategy
     // For a moment, beyond the rest: while density control runs; while host and device copy.
     std::uint64_t densify = 0, staging = 0;
 
@@ -63,8 +68,8 @@ std::uint64_t round_peak(const Device& device, const MemoryDemand& demand, std::
 std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
                             std::uint64_t budget_bytes);
 
-/// What a data set and the run's effects demand: all but splats, pairs and densifies. sh_degree:
-/// the highest that the run may reach.
+/// What a data set, the run's effects and its strategy demand: all but splats, pairs and densifies.
+/// sh_degree: the highest that the run may reach. Of a resolution ramp: its larger step.
 void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand);
 
 }  // namespace darb

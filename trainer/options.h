@@ -12,6 +12,9 @@
 
 namespace darb {
 
+/// How the splats grow in number; see trainer/strategy.h.
+enum class Strategy { adc, mcmc, budget };
+
 struct TrainOptions {
     int iterations = 30'000;
     std::uint64_t seed = 0;
@@ -50,7 +53,9 @@ struct TrainOptions {
     // with 0.1.
     double final_lr_share = 0.3;
 
-    // Density control (adc). densify_until -1: half of the run, at most 15,000.
+    // Density control. What is not adc is set by use_strategy. densify_until -1: half of the run,
+    // at most 15,000; mcmc: 5/6 of it, at most 25,000.
+    Strategy strategy = Strategy::adc;
     int densify_from = 500, densify_until = -1, densify_interval = 100;
     float densify_grad_threshold = 2e-4f;  // NDC units
     float clone_split_extent = 0.01f;      // share of the scene extent
@@ -63,6 +68,11 @@ struct TrainOptions {
     std::uint32_t max_splats = std::numeric_limits<std::uint32_t>::max();
     std::uint64_t max_memory_bytes = 0;  // of device memory: growth stops before it; 0: no budget
 
+    float noise_lr = 5e5f;    // mcmc: noise on positions, over the rate of positions
+    float opacity_decay = 0;  // budget: share of its opacity that a splat loses in a round
+    // The first iterations see smaller photos; see trainer/resolution_ramp.h.
+    bool resolution_ramp = false;
+
     // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
     // extents) in the loss. They take from splats what no photo holds up: a quarter fewer on
     // monstree at 200 px, at equal quality.
@@ -70,6 +80,7 @@ struct TrainOptions {
 
     // Start.
     float initial_opacity = 0.1f;
+    float initial_scale = 1;          // times the distance to the neighbours
     std::uint32_t random_points = 0;  // without a point cloud; 0: from the number of pixels
 
     /// An opacity reset leaves twice the opacity that is pruned, as 3DGS does.
@@ -84,7 +95,9 @@ struct TrainOptions {
         return position_lr_final > 0 ? position_lr_final : 1.6e-6f * position_lr_scale();
     }
     int densify_end() const {
-        return densify_until >= 0 ? densify_until : std::min(iterations / 2, 15'000);
+        if (densify_until >= 0) return densify_until;
+        if (strategy == Strategy::mcmc) return std::min(iterations / 6 * 5, 25'000);
+        return std::min(iterations / 2, 15'000);
     }
 };
 

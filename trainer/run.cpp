@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
+#include "engine/render/tuning.h"
 #include "engine/scene/ply.h"
 #include "trainer/checkpoint.h"
 #include "trainer/evaluation.h"
@@ -27,8 +30,19 @@ bool contains(const std::vector<int>& list, int value) {
 // Measured before there is a budget of memory, and no part of the run's peak.
 DeviceRates rates_of(Device& device) {
     const DeviceRates rates = measure_rates(device);
-    device.restart_peak();
+    device.forget_peak();
     return rates;
+}
+
+// Read before the trainer is made: the ways of the device that change bits are those that the run
+// began with.
+std::optional<Checkpoint> checkpoint_of(Device& device, const std::filesystem::path& path) {
+    if (path.empty()) return std::nullopt;
+    Checkpoint checkpoint = read_checkpoint(path);
+    Variants variants = parse_variants(device.info(), checkpoint.tuning, path.string());
+    variants.merge(Variants(device.variants()));
+    device.set_variants(std::move(variants));
+    return checkpoint;
 }
 
 // One run: the loop and what it writes. The stopwatch counts training alone.
@@ -43,6 +57,8 @@ class Run {
           photos_(run.photos.empty() ? loaded_ : run.photos),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
           rates_(rates_of(device)),
+          tuning_(result_variants(device)),
+          checkpoint_(checkpoint_of(device, run.resume_from)),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
           log_(run.output, !run.resume_from.empty()),
           progress_(1, options.iterations, run.quiet) {}
@@ -58,6 +74,7 @@ class Run {
     void save_checkpoint(const std::filesystem::path& path);
     void train(const std::atomic<bool>* stop);
     void report_troubles();
+    void report_resolution();
     double seconds() const {
         return seconds_ +
                (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
@@ -76,26 +93,34 @@ class Run {
     const std::vector<ImageU8>& photos_;
     const std::string fingerprint_;
     const DeviceRates rates_;
+    const std::string tuning_;              // of this device, before the checkpoint's is used
+    std::optional<Checkpoint> checkpoint_;  // to go on with, until resume()
     Trainer trainer_;
     RunLog log_;
     Progress progress_;
     RunSummary summary_;
     IterationResult latest_;
     size_t told_probes_ = 0;
+    int told_divisor_ = 1;
     double seconds_ = 0;
     bool running_ = false;
     Clock::time_point started_;
 };
 
 void Run::resume() {
-    const Checkpoint checkpoint = read_checkpoint(run_.resume_from);
+    const Checkpoint checkpoint = std::move(checkpoint_.value());
+    checkpoint_.reset();
     check_resumable(checkpoint, run_.resume_from, options_, dataset_, fingerprint_);
     trainer_.restore(checkpoint.state);
+    told_divisor_ = trainer_.resolution_divisor();
     seconds_ = checkpoint.seconds;
     log_.cut_after(checkpoint.state.iteration);
     progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
+    if (checkpoint.tuning != tuning_)
+        progress_.note(
+            fmt::format("goes on with {} as it began, not with {}", checkpoint.tuning, tuning_));
 }
 
 // As 3DGS writes it: name -> three rows of four.
@@ -149,7 +174,8 @@ void Run::save_model(int iteration) {
 
 void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(false);
-    write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_});
+    write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_,
+                            result_variants(device_)});
     stopwatch(true);
 }
 
@@ -193,6 +219,7 @@ void Run::train(const std::atomic<bool>* stop) {
     stopwatch(true);
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         trainer_.step();
+        report_resolution();
         if (const std::uint32_t n = trainer_.stopped_by_memory(); n != 0 && stopped == 0)
             progress_.note(fmt::format("growth stops at {} splats: --max-memory", stopped = n));
         if (const std::uint32_t n = trainer_.stopped_by_pairs(); n != 0 && stopped == 0)
@@ -220,6 +247,17 @@ void Run::train(const std::atomic<bool>* stop) {
     }
     trainer_.drain();
     stopwatch(false);
+}
+
+void Run::report_resolution() {
+    const int divisor = trainer_.resolution_divisor();
+    if (divisor == told_divisor_) return;
+    told_divisor_ = divisor;
+    const int i = trainer_.iteration();
+    log_.resolution(i, divisor);
+    progress_.note(divisor == 1
+                       ? fmt::format("iteration {}: photos at their full size", i)
+                       : fmt::format("iteration {}: photos at 1/{} of their sides", i, divisor));
 }
 
 void Run::report_troubles() {

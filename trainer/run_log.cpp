@@ -9,7 +9,9 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/render/tuning.h"
 #include "trainer/checkpoint.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -113,12 +115,14 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
               {"version", DARB_VERSION},
               {"device", device.info().name},
               {"driver", device.info().driver},
+              {"tuning", variants_text(all_variants(device))},
               {"dataset", dataset.root.string()},
               {"source", dataset.source},
               {"notes", dataset.notes},
               {"train_views", dataset.views.size() - held_out},
               {"held_out_views", held_out},
               {"splats", splats},
+              {"strategy", strategy_name(options.strategy)},
               {"copy_bytes_per_s", rates_.bytes_per_s},
               {"fma_per_s", rates_.fma_per_s},
               {"settings", Json::parse(settings_text(options))}};
@@ -139,6 +143,10 @@ std::string setting_text(const Json& value) {
 }
 
 }  // namespace
+
+void RunLog::resolution(int iteration, int divisor) {
+    write({{"event", "resolution"}, {"iteration", iteration}, {"divisor", divisor}});
+}
 
 void RunLog::failure(int iteration, const std::string& what) {
     write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
@@ -212,8 +220,10 @@ ReportData RunLog::report_data(const RunSummary& summary, const Json& metrics) c
             "Roofline: bytes and multiply-adds of a pass, estimated from counts, at the rates "
             "measured at the start: {:.1f} GB/s of copies, {:.1f} billion multiply-adds a second.",
             1e-9 * rates_.bytes_per_s, 1e-9 * rates_.fma_per_s));
+    data.settings.emplace_back("strategy", start_.value("strategy", "adc"));
     for (const auto& [name, value] : start_["settings"].items())
-        if (name != "effects") data.settings.emplace_back(name, setting_text(value));
+        if (name != "effects" && name != "strategy")
+            data.settings.emplace_back(name, setting_text(value));
     for (const Json& effect : start_.value("effects", Json::array()))
         data.settings.emplace_back(
             "effect " + effect.value("effect", ""),
@@ -254,6 +264,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"seconds", summary.seconds},
         {"ms_per_iteration", summary.seconds * 1000.0 / std::max(summary.iteration, 1)},
         {"splats", trainer.splat_count()},
+        {"strategy", start_.value("strategy", "adc")},
         {"passes_ms", passes},
         {"peak_device_bytes", device.peak_bytes()},
         {"planned_device_bytes", trainer.planned_bytes()},

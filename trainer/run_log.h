@@ -34,6 +34,8 @@ class RunLog {
     /// Trainer sums them.
     void iteration(const IterationResult& result, const TrainCounters& counters, double seconds,
                    const std::vector<PassTotal>& totals);
+    /// The photos' sides are divided by so much from this iteration on.
+    void resolution(int iteration, int divisor);
     /// What ended the run before its time.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);

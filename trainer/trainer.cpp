@@ -10,6 +10,7 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/render/renderer.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -77,6 +78,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       flights_{Flight(device), Flight(device)} {
     if (options_.max_memory_bytes > 0) device.set_memory_budget(options_.max_memory_bytes);
     add_photos(dataset.views, options, demand_);
+    demand_.bucket = forward_.bucket();
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
                dataset.views.size());
     std::uint64_t pixels = 1;
@@ -106,6 +108,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     }
     if (options_.exposure)
         exposure_.emplace(device, static_cast<std::uint32_t>(train_views_.size()), pixels);
+    make_strategy(dataset);
     settle_effects(0);
     forward_.reserve(splats_.count(), splats_.count() * 4, largest(dataset, &Camera::width),
                      largest(dataset, &Camera::height));
@@ -141,14 +144,18 @@ glm::vec3 Trainer::background_for(int iteration) const {
     return colour;
 }
 
+double Trainer::position_rate(int iteration) const {
+    const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
+    return std::exp((1 - t) * std::log(options_.position_lr_start()) +
+                    t * std::log(options_.position_lr_end()));
+}
+
 AdamStep Trainer::rates(int iteration) const {
     const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
-    const double position = std::exp((1 - t) * std::log(options_.position_lr_start()) +
-                                     t * std::log(options_.position_lr_end()));
     const auto late =
         static_cast<float>(std::pow(options_.final_lr_share, std::max(0.0, 2 * t - 1)));
     AdamStep step;
-    step.position = static_cast<float>(position * extent_);
+    step.position = static_cast<float>(position_rate(iteration) * extent_);
     step.scale = options_.scale_lr * late;
     step.rotation = options_.rotation_lr * late;
     step.opacity = options_.opacity_lr * late;
@@ -167,6 +174,7 @@ void Trainer::step() {
         density_control(iteration_);
         settle_effects(iteration_);
     }
+    settle_resolution(iteration_ + 1);
     launch(++iteration_);
     settle(flights_[(iteration_ + 1) & 1]);
     smoothing_stale_ |= iteration_ % kFilterInterval == 0;
@@ -182,7 +190,7 @@ void Trainer::launch(int iteration) {
     Flight& flight = flights_[iteration & 1];
     DARB_CHECK(flight.iteration == 0, "iteration {} is still in flight", flight.iteration);
     const int view = view_for(iteration);
-    const gpu::CameraData& data = camera_data_[view];
+    const gpu::CameraData& data = camera_data_of(view);
     const int width = static_cast<int>(data.width), height = static_cast<int>(data.height);
     const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
     forward_.reserve(splats_.count(), pairs, width, height);
@@ -199,16 +207,22 @@ void Trainer::launch(int iteration) {
 
 void Trainer::record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
                      const Buffer& loss) {
-    const gpu::CameraData& data = camera_data_[view];
+    const gpu::CameraData& data = camera_data_of(view);
+    const Buffer& cameras = divisor_ > 1 ? small_cameras_ : cameras_;
+    const Buffer& pixels_of_photo = divisor_ > 1 ? small_photos_[view] : photos_[view];
     const auto index = static_cast<std::uint32_t>(view);
     const std::uint32_t pixels = data.width * data.height;
     const std::uint32_t photo = photo_of(view);
     const glm::vec3 behind = background_for(iteration);
-    forward_.record(commands, splats_, cameras_, index, data, degree, behind);
+    forward_.record(commands, splats_, cameras, index, data, degree, behind);
     if (exposure_) exposure_->record(commands, forward_.image(), photo, pixels);
-    loss_.record(commands, exposure_ ? exposure_->mapped() : forward_.image(), photos_[view],
-                 d_image_, loss, 0, static_cast<int>(data.width), static_cast<int>(data.height),
-                 behind, options_.lambda_dssim);
+    const Buffer& compared = exposure_ ? exposure_->mapped() : forward_.image();
+    if (scores(iteration))
+        score_->record(commands, forward_, backward_, compared, pixels_of_photo, d_image_,
+                       splats_.count(), data, behind);
+    loss_.record(commands, compared, pixels_of_photo, d_image_, loss, 0,
+                 static_cast<int>(data.width), static_cast<int>(data.height), behind,
+                 options_.lambda_dssim);
     if (exposure_) {
         const double t = std::clamp(double(iteration) / options_.iterations, 0.0, 1.0);
         const double rate = options_.exposure_lr_init *
@@ -217,8 +231,9 @@ void Trainer::record(Commands& commands, int view, int iteration, int degree, co
         exposure_->record_backward(commands, forward_.image(), d_image_, forward_.status(), photo,
                                    pixels, static_cast<float>(rate), visits);
     }
-    backward_.record(commands, forward_, splats_, d_image_, cameras_, index, data, degree, behind,
+    backward_.record(commands, forward_, splats_, d_image_, cameras, index, data, degree, behind,
                      step);
+    if (mcmc_) record_noise(commands, iteration);
 }
 
 gpu::FrameStatus Trainer::finish(Flight& flight) {
@@ -286,14 +301,14 @@ void Trainer::check_gradients(int iteration, const gpu::FrameStatus& status) con
 
 void Trainer::density_control(int iteration) {
     if (iteration >= options_.densify_end()) return;
-    const bool refine =
-        iteration > options_.densify_from && iteration % options_.densify_interval == 0;
-    const bool reset = iteration % options_.opacity_reset_interval == 0 ||
-                       (options_.white_background && !options_.random_background &&
-                        iteration == options_.densify_from);
-    if (!refine && !reset) return;
+    const bool round = refines_after(options_, iteration);
+    const bool reset = options_.strategy == Strategy::adc &&
+                       (iteration % options_.opacity_reset_interval == 0 ||
+                        (options_.white_background && !options_.random_background &&
+                         iteration == options_.densify_from));
+    if (!round && !reset) return;
     drain();
-    if (refine) {
+    if (round) {
         gpu::DensifyArgs args{};
         const std::uint32_t within_memory = splats_within_memory();
         const bool pairs_are_near =
@@ -309,7 +324,7 @@ void Trainer::density_control(int iteration) {
                                ? static_cast<float>(options_.prune_extent * extent_)
                                : 0.0f;
         args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
-        const DensityResult result = density_.run(splats_, backward_.gradient_sum(), args, limit);
+        const DensityResult result = refine(iteration, args, limit);
         if (within_memory == limit && result.after >= within_memory)
             stopped_by_memory_ = within_memory;
         counters_.cloned_or_split += result.grown;
@@ -367,6 +382,7 @@ Trainer::State Trainer::state() {
     s.next_probe = next_probe_;
     if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
     if (exposure_) s.exposure = exposure_->state();
+    if (score_) s.error_shares = score_->state(splats_.count());
     for (int a = 0; a < kAttributeCount; ++a) {
         const size_t floats = size_t{splats_.count()} * splats_.stride(a) * 2;
         s.moments.push_back(floats ? splats_.moments(a).download<float>(floats)
@@ -397,6 +413,11 @@ void Trainer::restore(const State& s) {
     if (!s.gradient_sum.empty()) backward_.gradient_sum().upload(s.gradient_sum);
     iteration_ = s.iteration;
     counters_ = s.counters;
+    if (score_) {
+        score_->reset(splats_.count());
+        if (!s.error_shares.empty()) score_->restore(s.error_shares);
+    }
+    settle_resolution(std::max(iteration_, 1));
 }
 
 }  // namespace darb

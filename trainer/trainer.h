@@ -18,9 +18,12 @@
 #include "engine/render/forward.h"
 #include "engine/render/loss.h"
 #include "trainer/densify/density_control.h"
+#include "trainer/densify/error_score.h"
+#include "trainer/densify/mcmc.h"
 #include "trainer/exposure.h"
 #include "trainer/memory_plan.h"
 #include "trainer/options.h"
+#include "trainer/resolution_ramp.h"
 #include "trainer/smoothing.h"
 
 namespace darb {
@@ -40,7 +43,7 @@ struct TrainCounters {
     std::uint32_t huge_splats = 0;                       // most in any frame
     std::uint32_t most_pairs = 0;                        // of splats and tiles, most in any frame
     std::uint64_t bad_gradients = 0;
-    std::uint64_t cloned_or_split = 0, pruned = 0;
+    std::uint64_t cloned_or_split = 0, pruned = 0;     // mcmc: new, moved
     std::array<std::uint64_t, CULL_REASONS> culled{};  // summed over frames, by reason
 };
 
@@ -96,6 +99,8 @@ class Trainer {
     std::vector<PassTotal> pass_totals() const { return pass_totals_; }
     std::uint64_t timed_iterations() const { return timed_iterations_; }
     double extent() const { return extent_; }
+    /// What the sides of the photos are divided by now: 1 without a resolution ramp.
+    int resolution_divisor() const { return divisor_; }
     /// The splats at which TrainOptions::max_memory_bytes stopped the growth; 0: it did not.
     std::uint32_t stopped_by_memory() const { return stopped_by_memory_; }
     /// The same where frames came near the pairs that the device's bindings hold.
@@ -109,8 +114,9 @@ class Trainer {
     struct State {
         int iteration = 0;
         int next_probe = 0;
-        std::vector<float> smoothing;  // [N], or empty where the effect is off
-        std::vector<float> exposure;   // Exposure::state(), or empty
+        std::vector<float> smoothing;     // [N], or empty where the effect is off
+        std::vector<float> exposure;      // Exposure::state(), or empty
+        std::vector<float> error_shares;  // [N][2] ErrorScore, or empty
         SplatModel model;
         std::vector<std::vector<float>> moments;
         std::vector<float> gradient_sum;  // [N][2]
@@ -143,6 +149,13 @@ class Trainer {
     gpu::FrameStatus finish(Flight& flight);  // where it overflowed nothing was changed
     void settle(Flight& flight);              // finish, and do again what overflowed
     void density_control(int iteration);
+    void make_strategy(const Dataset& dataset);
+    DensityResult refine(int iteration, gpu::DensifyArgs args, std::uint32_t limit);
+    bool scores(int iteration) const;
+    void record_noise(Commands& commands, int iteration);
+    void settle_resolution(int iteration);
+    const gpu::CameraData& camera_data_of(int view) const;
+    double position_rate(int iteration) const;
     glm::vec3 background_for(int iteration) const;
     std::uint32_t splats_within_memory() const;
     void note_memory();                     // into planned_bytes_, what is held now
@@ -167,6 +180,8 @@ class Trainer {
     Backward backward_;
     Loss loss_;
     DensityControl density_;
+    std::optional<Mcmc> mcmc_;                  // Strategy::mcmc
+    std::optional<ErrorScore> score_;           // Strategy::budget
     bool smoothing_stale_ = true;               // splats came or went
     Buffer train_cameras_;                      // options.antialias
     std::optional<SmoothingFilter> smoothing_;  // options.antialias
@@ -174,11 +189,18 @@ class Trainer {
     std::vector<gpu::CameraData> camera_data_;
     Buffer cameras_;
     std::vector<Buffer> photos_;  // [view]: uint [H][W], R in the low byte; empty for test views
+    std::optional<ResolutionRamp> ramp_;       // options.resolution_ramp, and the next two
+    std::vector<Camera> photo_cameras_;        // [view]
+    int longest_side_ = 1;                     // px, of all views
+    int divisor_ = 1;                          // of the photos' sides, now; above 1 the next three
+    std::vector<gpu::CameraData> small_data_;  // [view]
+    Buffer small_cameras_;
+    std::vector<Buffer> small_photos_;  // [view], as photos_
     Buffer d_image_;
     std::array<Flight, 2> flights_;
     int iteration_ = 0;
     MemoryDemand demand_;  // its photos
-    std::array<std::uint64_t, 5> noted_{};
+    std::array<std::uint64_t, 6> noted_{};
     std::uint64_t planned_bytes_ = 0;
     std::uint32_t stopped_by_memory_ = 0, stopped_by_pairs_ = 0;
     TrainCounters counters_;

@@ -16,15 +16,18 @@ MemoryDemand Trainer::memory_demand() const {
     demand.cooperates = size.cooperates;
     demand.sh_degree = splats_.sh_degree();
     demand.densifies = false;
+    demand.small_pixels = 0;
+    for (const Buffer& photo : small_photos_) demand.small_pixels += photo.bytes() / 4;
+    demand.small_cameras = static_cast<std::uint32_t>(small_data_.size());
     return demand;
 }
 
 // Looked at before each iteration, planned where something has changed.
 void Trainer::note_memory() {
     const FrameSize& size = forward_.size();
-    const std::array<std::uint64_t, 5> now{splats_.count(), size.pairs,
-                                           std::uint64_t(splats_.sh_degree()), size.list_segments,
-                                           size.cooperates};
+    const std::array<std::uint64_t, 6> now{
+        splats_.count(),    size.pairs,      std::uint64_t(splats_.sh_degree()),
+        size.list_segments, size.cooperates, std::uint64_t(divisor_)};
     if (now == noted_) return;
     noted_ = now;
     planned_bytes_ = std::max(planned_bytes_, plan_memory(*device_, memory_demand()).total());

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
@@ -72,12 +73,6 @@ ListedDevice choose(const Instance& instance, const std::string& select) {
     return all[choose_device(infos, select)];
 }
 
-std::string hex(std::span<const std::uint8_t> bytes) {
-    std::string text;
-    for (const std::uint8_t byte : bytes) text += fmt::format("{:02x}", byte);
-    return text;
-}
-
 }  // namespace
 
 Device::State::State(const DeviceOptions& options, bool validation)
@@ -141,8 +136,7 @@ void Device::State::create_device(const DeviceOptions& options) {
 }
 
 void Device::State::create_cache(const DeviceOptions& options) {
-    const std::filesystem::path folder =
-        options.cache_folder.empty() ? default_cache_folder() : options.cache_folder;
+    cache_folder = options.cache_folder.empty() ? default_cache_folder() : options.cache_folder;
     VkPhysicalDeviceIDProperties id{};
     id.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES;
     VkPhysicalDeviceProperties2 properties{};
@@ -150,9 +144,9 @@ void Device::State::create_cache(const DeviceOptions& options) {
     properties.pNext = &id;
     vkGetPhysicalDeviceProperties2(physical, &properties);
     std::vector<std::byte> data;
-    if (!folder.empty()) {
-        cache_file = folder / fmt::format("pipelines-{}-{:08x}.bin", hex(id.deviceUUID),
-                                          properties.properties.driverVersion);
+    if (!cache_folder.empty()) {
+        cache_file = cache_folder / fmt::format("pipelines-{}-{:08x}.bin", hex(id.deviceUUID),
+                                                properties.properties.driverVersion);
         data = load_pipeline_cache(cache_file);
     }
     loaded_cache_bytes = data.size();
@@ -250,13 +244,22 @@ bool Device::queue_has_graphics() const {
 VkPipelineCache Device::pipeline_cache() const {
     return state_->cache;
 }
+const std::filesystem::path& Device::cache_folder() const {
+    return state_->cache_folder;
+}
+void Device::set_variants(Variants variants) {
+    state_->variants = std::move(variants);
+}
+const Variants& Device::variants() const {
+    return state_->variants;
+}
 std::uint64_t Device::allocated_bytes() const {
     return state_->allocated;
 }
 std::uint64_t Device::peak_bytes() const {
     return state_->peak;
 }
-void Device::restart_peak() {
+void Device::forget_peak() {
     state_->peak = state_->allocated.load();
 }
 void Device::set_memory_budget(std::uint64_t bytes) {

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,10 +17,12 @@ namespace darb {
 
 /// What `darb devices` prints, and what the choice is made from.
 struct DeviceInfo {
-    int index = 0;       // what --device N takes
-    std::string name;    // what --device NAME matches, case-insensitive, any part
-    std::string driver;  // name and version
-    std::string type;    // discrete, integrated, virtual, cpu, other
+    int index = 0;                     // what --device N takes
+    std::string name;                  // what --device NAME matches, case-insensitive, any part
+    std::string driver;                // name and version
+    std::uint32_t driver_version = 0;  // as the driver counts
+    std::string cache_uuid;            // pipelineCacheUUID in hex: another one, other machine code
+    std::string type;                  // discrete, integrated, virtual, cpu, other
     std::uint32_t api_version = 0;
     std::uint64_t heap_bytes = 0;                // largest device-local heap
     std::uint64_t max_storage_buffer_bytes = 0;  // maxStorageBufferRange
@@ -36,6 +39,10 @@ struct DeviceInfo {
     std::string reason;  // why it was rejected, or why it ranks where it does
 };
 
+/// Which of several equal ways a pass takes: name of the choice -> name of the way. What they mean,
+/// and what a missing one means, is known to engine/render/tuning.h.
+using Variants = std::map<std::string, std::string, std::less<>>;
+
 /// Every physical device, best first; never throws for want of a device (then: empty).
 std::vector<DeviceInfo> list_devices();
 
@@ -46,13 +53,16 @@ std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::str
 struct DeviceOptions {
     std::string select;       // "" = best usable; a number = index; else part of a name
     bool validation = false;  // core + synchronization validation; also DARB_VALIDATION=1
-    std::filesystem::path cache_folder;  // pipeline cache; "" = XDG cache folder / darb
+    std::filesystem::path cache_folder;  // pipeline cache; "" = default_cache_folder()
     /// For a window: surface extensions of the instance, VK_KHR_swapchain of the device. A name
     /// that is not offered is an Error. The queue does graphics too wherever the device has such a
     /// queue.
     std::vector<std::string> instance_extensions;
     std::vector<std::string> device_extensions;
 };
+
+/// $XDG_CACHE_HOME/darb, else $HOME/.cache/darb; "" where neither is set.
+std::filesystem::path default_cache_folder();
 
 class Device {
   public:
@@ -72,11 +82,17 @@ class Device {
     bool queue_has_graphics() const;
     VkPipelineCache pipeline_cache() const;
 
+    /// Where the pipeline cache lies and whatever else was measured of this device; "" = nowhere.
+    const std::filesystem::path& cache_folder() const;
+
+    /// For all objects that are made for this device from now on.
+    void set_variants(Variants variants);
+    const Variants& variants() const;
+
     /// Bytes of live Buffers, and the most there ever were.
     std::uint64_t allocated_bytes() const;
     std::uint64_t peak_bytes() const;
-    /// The peak counts anew from what is live: after a measurement that is no part of the work.
-    void restart_peak();
+    void forget_peak();  // peak_bytes counts from now on
     /// A budget for all Buffers together; 0 = none. Exceeding it throws as out of memory does.
     void set_memory_budget(std::uint64_t bytes);
 

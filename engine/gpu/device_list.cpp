@@ -130,6 +130,8 @@ DeviceInfo describe(VkPhysicalDevice device) {
     DeviceInfo info;
     info.name = core.deviceName;
     info.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
+    info.driver_version = core.driverVersion;
+    info.cache_uuid = hex(core.pipelineCacheUUID);
     info.type = type_name(core.deviceType);
     info.api_version = core.apiVersion;
     info.max_storage_buffer_bytes = limits.maxStorageBufferRange;
@@ -171,6 +173,12 @@ std::optional<std::size_t> parse_index(const std::string& text) {
 }
 
 }  // namespace
+
+std::string hex(std::span<const std::uint8_t> bytes) {
+    std::string text;
+    for (const std::uint8_t byte : bytes) text += fmt::format("{:02x}", byte);
+    return text;
+}
 
 int compute_queue_family(VkPhysicalDevice device) {
     std::uint32_t count = 0;

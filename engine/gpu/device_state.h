@@ -25,6 +25,8 @@ struct ListedDevice {
 /// Best first, indices set.
 std::vector<ListedDevice> list_devices(const Instance& instance);
 
+std::string hex(std::span<const std::uint8_t> bytes);
+
 /// The queue family that does compute, with graphics too if there is one; -1 = none.
 int compute_queue_family(VkPhysicalDevice device);
 
@@ -42,6 +44,7 @@ struct Device::State {
     Instance instance;
     Faults faults;
     DeviceInfo info;
+    Variants variants;
     bool lavapipe = false;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkPhysicalDeviceMemoryProperties memory{};
@@ -53,7 +56,7 @@ struct Device::State {
     VkDevice device = VK_NULL_HANDLE;
     VkQueue queue = VK_NULL_HANDLE;
     std::mutex queue_mutex;  // queues are externally synchronised
-    std::filesystem::path cache_file;
+    std::filesystem::path cache_folder, cache_file;
     std::size_t loaded_cache_bytes = 0;
     VkPipelineCache cache = VK_NULL_HANDLE;
 

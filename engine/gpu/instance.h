@@ -40,7 +40,4 @@ class Instance {
     std::unique_ptr<std::atomic<std::uint64_t>> messages_;
 };
 
-/// XDG_CACHE_HOME/darb or ~/.cache/darb; empty where neither variable is set.
-std::filesystem::path default_cache_folder();
-
 }  // namespace darb

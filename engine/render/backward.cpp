@@ -22,36 +22,16 @@ AdamStep adam_step(const AdamStep& rates, int t) {
 }
 
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
-    : device_(&device), options_(options), result_(result) {
-    make_blend(false);
-    make_buffers(device, *this, segment_buffers({}));
-}
+    : device_(&device), options_(options), result_(result), blend_(device, options) {}
 
 BufferList<Backward> Backward::splat_buffers(std::uint64_t splats) {
     return {{&Backward::gradient_sum_, "gradient sum", splats * 8}};
 }
 
-BufferList<Backward> Backward::pair_buffers(std::uint64_t pairs) {
-    return {{&Backward::partials_, "pair partials", pairs * 32},
-            {&Backward::partial_rest_, "pair partials, rest", pairs * 4}};
-}
-
-BufferList<Backward> Backward::segment_buffers(const FrameSize& size) {
-    return {{&Backward::behind_, "behind", size.list_segments > 1 ? size.pixels * 4 : 4}};
-}
-
 FrameBytes Backward::device_bytes(const FrameSize& size) {
-    return {charged_bytes(splat_buffers(size.splats)), charged_bytes(pair_buffers(size.pairs)),
-            charged_bytes(segment_buffers(size))};
-}
-
-void Backward::make_blend(bool segmented) {
-    SpecConstants blend = kernel_constants(options_);
-    const std::uint32_t subgroup = add_block_constants(*device_, blend);
-    blend["THREADS"] = static_cast<std::int32_t>(subgroup);
-    blend["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
-    blend_ = Pipeline(*device_, "blend_backward", blend, true, subgroup);
-    segmented_ = segmented;
+    FrameBytes bytes = BlendBackward::device_bytes(size);
+    bytes.splats += charged_bytes(splat_buffers(size.splats));
+    return bytes;
 }
 
 void Backward::set_sh_stored(int degree) {
@@ -78,29 +58,12 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
         make_buffers(*device_, *this, splat_buffers(splat_capacity_));
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
-    if (pairs > pair_capacity_ || pair_capacity_ == 0) {
-        pair_capacity_ = std::max(pairs, 1024u);
-        make_buffers(*device_, *this, pair_buffers(pair_capacity_));
-    }
+    blend_.reserve(pairs);
 }
 
-// Long lists take several dispatches, the last part of every list first.
-void Backward::record_blend(Commands& commands, const Forward& forward, const Buffer& d_image,
-                            const gpu::CameraData& data, const glm::vec3& background) {
-    const std::uint32_t segments = forward.list_segments();
-    if (segments > 1 && !segmented_) make_blend(true);
-    if (segments > 1 && behind_.bytes() < forward.size().pixels * 4)
-        make_buffers(*device_, *this, segment_buffers(forward.size()));
-    for (std::uint32_t segment = segments; segment-- > 0;) {
-        const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x, background.r,
-                                   background.g, background.b, segment,      segments};
-        commands.dispatch(
-            blend_, blend,
-            {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
-             forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
-             forward.final_transmittance(), forward.last_pair(), partials_, partial_rest_, behind_},
-            data.tiles_x, data.tiles_y);
-    }
+void Backward::record_shares(Commands& commands, const Forward& forward, const Buffer& image,
+                             const gpu::CameraData& data) {
+    blend_.record(commands, forward, image, data, glm::vec3(0));
 }
 
 void Backward::record(Commands& commands, const Forward& forward, GpuSplats& splats,
@@ -109,9 +72,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                       const AdamStep& step) {
     DARB_CHECK(splats.has_moments() && forward.options().store_for_backward, "set up for training");
     commands.pass("blend backward");
-    commands.fill(partials_, 0);
-    commands.fill(partial_rest_, 0);
-    record_blend(commands, forward, d_image, data, background);
+    blend_.record(commands, forward, d_image, data, background);
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
@@ -147,8 +108,8 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                            splats.rows(splats.moments(kShRest), range),
                            forward.pair_count(),
                            forward.pair_begin(),
-                           partials_,
-                           partial_rest_,
+                           blend_.partials(),
+                           blend_.rest(),
                            gradient_sum_,
                            forward.status(),
                            splats.smoothing()},

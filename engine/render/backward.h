@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "engine/render/blend_backward.h"
 #include "engine/render/forward.h"
 #include "shaders/shared/optim_args.h"
 
@@ -40,6 +41,14 @@ class Backward {
                 const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
                 const AdamStep& step);
 
+    /// The backward blend alone: the pairs' sums of alpha T times the planes of `image`, float
+    /// [3][H][W], where record() leaves those of dL/dcolour. Recorded between Forward::record and
+    /// record(); where lists take several dispatches it leaves another final transmittance.
+    void record_shares(Commands& commands, const Forward& forward, const Buffer& image,
+                       const gpu::CameraData& data);
+    /// [K][8] of each pair; the last three are those of the colour.
+    const Buffer& partials() const { return blend_.partials(); }
+
     /// After the splats' colour buffers changed their degree.
     void set_sh_stored(int degree);
 
@@ -49,22 +58,15 @@ class Backward {
 
   private:
     static BufferList<Backward> splat_buffers(std::uint64_t splats);
-    static BufferList<Backward> pair_buffers(std::uint64_t pairs);
-    static BufferList<Backward> segment_buffers(const FrameSize& size);
     Pipeline& project_pipeline(int sh_degree);
-    void make_blend(bool segmented);
-    void record_blend(Commands& commands, const Forward& forward, const Buffer& d_image,
-                      const gpu::CameraData& data, const glm::vec3& background);
 
     Device* device_;
     ForwardOptions options_;
     BackwardResult result_;
-    Pipeline blend_;
-    bool segmented_ = false;  // whether blend_ takes segments
-    Buffer behind_;           // pixels' state between its dispatches
+    BlendBackward blend_;
     std::map<int, Pipeline> project_;
-    std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0;
-    Buffer partials_, partial_rest_, gradient_sum_;
+    std::uint32_t splat_capacity_ = 0;
+    Buffer gradient_sum_;
 };
 
 }  // namespace darb

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/render/groups.h"
 #include "engine/render/kernel_constants.h"
+#include "engine/render/tuning.h"
 #include "shaders/shared/lens.h"
 
 namespace darb {
@@ -97,6 +98,7 @@ std::uint32_t blend_subgroup(const Device& device) {
 std::uint32_t add_block_constants(const Device& device, SpecConstants& constants) {
     const std::uint32_t subgroup = blend_subgroup(device);
     constants["SUBGROUP_SIZE"] = static_cast<std::int32_t>(subgroup);
+    constants["PIXELS"] = static_cast<std::int32_t>(64 / subgroup);
     constants["LOCKSTEP"] = device.info().type == "cpu" ? 1 : 0;
     return subgroup;
 }
@@ -105,6 +107,8 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
     DARB_CHECK(!options.store_for_backward || options.depth_order != DEPTH_ORDER_PIXEL,
                "a resorted pixel cannot be walked back");
+    blend_threads_ = tuning_of(device).blend_threads;
+    size_.bucket = bucket(device, options);
     const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
     SpecConstants of_splat = kernel_constants(options);
     of_splat["THREADS"] = SPLAT_GROUP;
@@ -119,6 +123,7 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     if (cooperates_) make_cooperation();
     make_blend(options.crowds == Crowds::always ? 2 : 1);
     make_buffers(device, *this, fixed_buffers());
+    make_buffers(device, *this, checkpoint_buffers(0));
     clear_status();
 }
 
@@ -127,7 +132,10 @@ void Forward::make_blend(std::uint32_t segments) {
     blend["MIN_TRANSMITTANCE"] = options_.transmittance_stop;
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
-    blend["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
+    blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);
+    blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / blend_threads_);
+    blend["CHECKPOINTS"] = size_.bucket > 0 ? 1 : 0;
+    if (size_.bucket > 0) blend["BUCKET"] = static_cast<std::int32_t>(size_.bucket);
     blend["SEGMENT"] = segments > 1 ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     blend_ = Pipeline(*device_, "blend", blend, true, subgroup);
     size_.list_segments = segments;
@@ -195,9 +203,18 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
 }
 
 std::uint32_t Forward::max_pairs(const Device& device) {
-    // The widest entry per pair is the backward pass's: eight floats.
-    return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(device.info().max_storage_buffer_bytes / 32, 1u << 30));
+    // The widest entry per pair is the backward pass's: eight floats. Of the checkpoints' records
+    // half are left for the tiles, whose last buckets are not full.
+    const std::uint64_t binding = device.info().max_storage_buffer_bytes;
+    std::uint64_t most = std::min<std::uint64_t>(binding / 32, 1u << 30);
+    if (tuning_of(device).backward == BackwardBlend::buckets)
+        most = std::min(most, binding / CHECKPOINT_BYTES / 2 * bucket_pairs(device));
+    return static_cast<std::uint32_t>(most);
+}
+
+std::uint32_t Forward::bucket(const Device& device, const ForwardOptions& options) {
+    const bool buckets = tuning_of(device).backward == BackwardBlend::buckets;
+    return options.store_for_backward && buckets ? bucket_pairs(device) : 0;
 }
 
 void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height) {
@@ -235,6 +252,8 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         make_buffers(d, *this, pixel_buffers(options_, pixels, size_.list_segments));
         size_.pixels = pixels;
     }
+    if (size_.checkpoint_records() > checkpoint_records())
+        make_buffers(d, *this, checkpoint_buffers(size_.checkpoint_records()));
 }
 
 void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& cameras,
@@ -285,7 +304,7 @@ void Forward::record_blend(Commands& commands, const gpu::CameraData& data,
                                    background.g, background.b, segment,      size_.list_segments};
         commands.dispatch(blend_, blend,
                           {tile_range_, pair_order(), pair_splat_, splat_shape_, splat_light_,
-                           splat_bound_, image_, final_transmittance_, last_pair_},
+                           splat_bound_, image_, final_transmittance_, last_pair_, checkpoints_},
                           data.tiles_x, data.tiles_y);
     }
 }

@@ -46,6 +46,11 @@ struct FrameSize {
     std::uint32_t tiles = 0;          // of the image with the most
     std::uint32_t list_segments = 1;  // dispatches of the blend passes
     bool cooperates = false;          // some frame had huge splats
+    std::uint32_t bucket = 0;         // pairs of a checkpoint; 0: there are none
+    /// Of every tile one more than its full buckets.
+    std::uint64_t checkpoint_records() const {
+        return bucket > 0 ? pairs / bucket + std::uint64_t{tiles} : 0;
+    }
 };
 /// Tiles of an image.
 std::uint32_t image_tiles(int width, int height);
@@ -73,7 +78,8 @@ Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& camera
 
 /// The subgroup size that the blend passes are compiled for and require.
 std::uint32_t blend_subgroup(const Device& device);
-/// Sets what shaders/lib/block.glsl asks for; returns the subgroup size to require.
+/// Sets what shaders/lib/area.glsl and lockstep.glsl ask for, an area a block; returns the subgroup
+/// size to require.
 std::uint32_t add_block_constants(const Device& device, SpecConstants& constants);
 
 class Forward {
@@ -138,6 +144,15 @@ class Forward {
     const Buffer& tile_range() const { return tile_range_; }
     const Buffer& final_transmittance() const { return final_transmittance_; }
     const Buffer& last_pair() const { return last_pair_; }
+    /// shaders/lib/bucket.glsl; only where the device blends back by buckets, else 0 records.
+    const Buffer& checkpoints() const { return checkpoints_; }
+    std::uint32_t checkpoint_records() const {
+        return static_cast<std::uint32_t>(checkpoints_.bytes() / CHECKPOINT_BYTES);
+    }
+    /// Pairs a record; 0: there are none.
+    std::uint32_t bucket() const { return size_.bucket; }
+    /// The same of a Forward that were made now.
+    static std::uint32_t bucket(const Device& device, const ForwardOptions& options);
 
   private:
     static BufferList<Forward> fixed_buffers();
@@ -145,6 +160,7 @@ class Forward {
     static BufferList<Forward> pair_buffers(std::uint64_t pairs);
     static BufferList<Forward> huge_buffers(std::uint64_t pairs);
     static BufferList<Forward> tile_buffers(std::uint64_t tiles);
+    static BufferList<Forward> checkpoint_buffers(std::uint64_t records);
     static BufferList<Forward> pixel_buffers(const ForwardOptions& options, std::uint64_t pixels,
                                              std::uint32_t list_segments);
     Pipeline& project_pipeline(int sh_degree);
@@ -156,6 +172,7 @@ class Forward {
 
     Device* device_;
     ForwardOptions options_;
+    std::uint32_t blend_threads_;
     std::map<int, Pipeline> project_;  // by SH degree in use
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
         list_lengths_, blend_;
@@ -173,7 +190,7 @@ class Forward {
     Buffer pair_tile_, pair_splat_, pair_order_, tile_range_;
     Buffer huge_rank_,
         no_huge_rank_;  // [pair capacity / HUGE_PAIRS + 1] once there are any; a word
-    Buffer image_, final_transmittance_, last_pair_;
+    Buffer image_, final_transmittance_, last_pair_, checkpoints_;
 };
 
 }  // namespace darb

@@ -45,6 +45,10 @@ BufferList<Forward> Forward::tile_buffers(std::uint64_t tiles) {
     return {{&Forward::tile_range_, "tile range", tiles * 8}};
 }
 
+BufferList<Forward> Forward::checkpoint_buffers(std::uint64_t records) {
+    return {{&Forward::checkpoints_, "checkpoints", records > 0 ? records * CHECKPOINT_BYTES : 4}};
+}
+
 BufferList<Forward> Forward::pixel_buffers(const ForwardOptions& options, std::uint64_t pixels,
                                            std::uint32_t list_segments) {
     const bool store = options.store_for_backward;
@@ -62,6 +66,7 @@ FrameBytes Forward::device_bytes(const Device& device, const ForwardOptions& opt
     bytes.pairs =
         charged_bytes(pair_buffers(size.pairs)) + RadixSort::device_bytes(device, size.pairs);
     if (size.cooperates) bytes.pairs += charged_bytes(huge_buffers(size.pairs));
+    bytes.pairs += charged_bytes(checkpoint_buffers(size.checkpoint_records()));
     bytes.images = charged_bytes(fixed_buffers()) + charged_bytes(tile_buffers(size.tiles)) +
                    charged_bytes(pixel_buffers(options, size.pixels, size.list_segments));
     return bytes;

@@ -7,6 +7,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/render/tuning.h"
 #include "shaders/shared/radix_args.h"
 
 namespace darb {
@@ -21,7 +22,7 @@ constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
 
 RadixSort::Strategy resolve(const Device& device, RadixSort::Strategy strategy) {
     if (strategy != RadixSort::Strategy::automatic) return strategy;
-    return device.is_lavapipe() ? RadixSort::Strategy::columns : RadixSort::Strategy::ballot;
+    return tuning_of(device).scatter;
 }
 
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,

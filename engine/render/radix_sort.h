@@ -17,7 +17,7 @@ class RadixSort {
   public:
     /// How the scatter pass ranks keys. Same result, other cost: see shaders/sort/radix_scatter_*.
     enum class Strategy {
-        automatic,  // columns on lavapipe, ballot elsewhere
+        automatic,  // as the device is tuned: engine/render/tuning.h
         ballot,
         columns,
     };

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/core/check.h"
+#include "engine/render/tuning.h"
 #include "shaders/shared/scan_args.h"
 
 namespace darb {
@@ -35,7 +36,7 @@ SpecConstants top_constants(const Device& device) {
 }  // namespace
 
 Scan::Strategy Scan::best_strategy(const Device& device) {
-    return {device.is_lavapipe(), 0};
+    return {tuning_of(device).scan_by_thread, 0};
 }
 
 Scan::Scan(Device& device, std::uint32_t capacity)

@@ -1,9 +1,8 @@
 // Gradients of blend.comp: from dL/dimage to sums over pixels from which dL/d(mean, l11, l21, l22, opacity, colour)
 // follow, PARTIALS floats for each splat-tile pair in the pair's own slot, so that sums per splat need no
 // atomics and repeat bit by bit. Place: after the loss. Source: KERNELS section 4 in moments form.
-// Back to front: T before a splat is T after it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; what is behind,
-// dotted with dL/dcolour, is a convex combination, so nothing cancels.
-// Work: one subgroup a tile, its blocks one after another, pixels dealt as in blend.comp; the lanes' sums are
+// One of two ways to the same sums; the other is blend_backward_buckets.comp.
+// Work: one subgroup a tile, its areas one after another, pixels dealt as in blend.comp; the lanes' sums are
 // reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.
 // Reads what the forward pass stored; slots must be zero before. Lists too long for one dispatch are worked off
 // SEGMENT pairs at a time, the last ones first; final_transmittance and behind hold the pixels' state in between.
@@ -38,20 +37,18 @@ layout(set = 0, binding = 11, scalar) buffer Behind { float behind[]; };  // [H]
 #define LIGHT_BINDING 4
 #define BOUND_BINDING 5
 #include "lib/projected.glsl"
-#include "lib/block.glsl"
+#include "lib/area.glsl"
+#include "lib/list_part.glsl"
+const uint CHUNK = 128u;
+#include "lib/hits.glsl"
 #include "lib/reduce.glsl"
+#include "backward/splat_sums.glsl"
 
 struct Pixels {
     float transmittance[PIXELS];
     float behind[PIXELS];
     vec3 d_colour[PIXELS];
     uint last[PIXELS];
-};
-
-// Sums over the thread's pixels; G = opacity dL/dalpha dw/dq without the opacity.
-struct Sums {
-    float gx, gxx, gxdy, gdy, gdydy, opacity;
-    vec3 colour;
 };
 
 uint load_pixels(uvec2 first, out Pixels px) {
@@ -76,33 +73,14 @@ uint load_pixels(uvec2 first, out Pixels px) {
 }
 
 Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number) {
-    Sums s = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const vec2 to_mean = d - vec2(slot_offset(k));
-        const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
-        float w, slope;
-        kernel_value_slope(x * x + y * y, w, slope);
-        const float raw = light.w * w;
-        const bool counts = raw >= ALPHA_CUTOFF && number <= px.last[k];
-        const float alpha = counts ? min(raw, ALPHA_MAX) : 0.0;
-        const float before = px.transmittance[k] / (1.0 - alpha);
-        const float ahead = dot(light.rgb, px.d_colour[k]) - px.behind[k];
-        const float d_alpha = counts && raw < ALPHA_MAX ? before * ahead : 0.0;
-        const float g = d_alpha * slope, gx = g * x, gdy = g * to_mean.y;
-        s.gx += gx;
-        s.gxx += gx * x;
-        s.gxdy += gx * to_mean.y;
-        s.gdy += gdy;
-        s.gdydy += gdy * to_mean.y;
-        s.opacity += d_alpha * w;
-        s.colour += (alpha * before) * px.d_colour[k];
-        px.behind[k] += alpha * ahead;
-        px.transmittance[k] = before;
-    }
+    Sums s = NO_SUMS;
+    for (uint k = 0u; k < PIXELS; ++k)
+        add_pixel(s, px.transmittance[k], px.behind[k], d - vec2(slot_offset(k)), shape, l22, light,
+                  px.d_colour[k], number <= px.last[k]);
     return s;
 }
 
-// The collected splats of a block, last to first.
+// The collected splats of an area, last to first.
 void blend_hits(inout Pixels px, vec2 centre, uint count) {
     for (uint rest = count; rest > 0u;) {
         const uint size = min(rest, SUBGROUP_SIZE);
@@ -149,15 +127,15 @@ void store_state(Pixels px, uvec2 first) {
     }
 }
 
-void blend_block(uint block, uvec2 tile, uvec2 range) {
-    const uvec2 first = tile * TILE_SIZE + first_pixel(block, gl_SubgroupInvocationID);
+void blend_area(uint area, uvec2 tile, uvec2 range) {
+    const uvec2 first = tile * TILE_SIZE + first_pixel(area, gl_SubgroupInvocationID);
     Pixels px;
     const uint last = subgroupMax(load_pixels(first, px));
     const uint end = min(last, range.y);
     if (end <= range.x) return;
     if (SEGMENT > 0u && last > range.y) load_behind(px, first);
     for (uint chunk = range.x + (end - 1u - range.x) / CHUNK * CHUNK;; chunk -= CHUNK) {
-        const uint count = collect_hits(chunk, min(chunk + CHUNK, end), block_bit(block));
+        const uint count = collect_hits(chunk, min(chunk + CHUNK, end), area_bits(area));
         if (count > 0u) blend_hits(px, vec2(first) + 0.5, count);
         if (chunk == range.x) break;
     }
@@ -168,5 +146,5 @@ void main() {
     const uvec2 tile = gl_WorkGroupID.xy;
     const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
     if (range.x >= range.y) return;
-    for (uint block = 0u; block < BLOCKS; ++block) blend_block(block, tile, range);
+    for (uint area = 0u; area < AREAS; ++area) blend_area(area, tile, range);
 }

@@ -1,11 +1,11 @@
 // Blends each tile's splats front to back. alpha = min(0.99, opacity * w(q)); below the cut-off nothing; a pixel
 // ends before the splat that would bring its transmittance below 1e-4. Place: last pass of the forward walk.
 // Source: 3DGS section 4; kernels of DARB-Splatting.
-// Work: one workgroup a tile, one subgroup a block of it, PIXELS pixels a thread in registers. Each lane loads one
-// pair of the tile's list; those whose ellipse touches the block are broadcast in turn. No shared memory, no
-// barrier. Reads pairs and projected splats; writes the image and, for the backward pass, the final
-// transmittance and where each pixel ended. Lists too long for one dispatch are worked off SEGMENT pairs at a time;
-// between the dispatches the outputs hold the pixels' state.
+// Work: one workgroup a tile, one subgroup an area of it, PIXELS pixels a thread in registers. Each lane loads one
+// pair of the tile's list; those whose ellipse touches the area are broadcast in turn. Shared memory: a subgroup's
+// own lists; no barrier. Reads pairs and projected splats; writes the image and, for the backward pass, the final
+// transmittance and where each pixel ended, with CHECKPOINTS also those of lib/bucket.glsl. Lists too long for one
+// dispatch are worked off SEGMENT pairs at a time; between the dispatches the outputs hold the pixels' state.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -16,11 +16,12 @@
 #include "shared/render_args.h"
 
 layout(local_size_x_id = 0) in;
-layout(constant_id = 0) const uint THREADS = 32;       // BLOCKS * SUBGROUP_SIZE
+layout(constant_id = 0) const uint THREADS = 32;       // TILE_PIXELS / PIXELS
 layout(constant_id = 1) const int STORE_FOR_BACKWARD = 0;
 layout(constant_id = 2) const float MIN_TRANSMITTANCE = TRANSMITTANCE_STOP;
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 4) const uint SEGMENT = 0;  // pairs of a list a dispatch; 0: all of them
+layout(constant_id = 8) const int CHECKPOINTS = 0;  // 1: a record a bucket for the backward pass
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
@@ -30,12 +31,17 @@ layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat
 layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W]
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) buffer LastPair { uint last_pair[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer Checkpoints { float checkpoints[]; };  // where CHECKPOINTS
 
 #define SHAPE_BINDING 3
 #define LIGHT_BINDING 4
 #define BOUND_BINDING 5
 #include "lib/projected.glsl"
-#include "lib/block.glsl"
+#include "lib/area.glsl"
+#include "lib/list_part.glsl"
+#include "lib/bucket.glsl"
+const uint CHUNK = CHECKPOINTS == 1 ? BUCKET : 128u;
+#include "lib/hits.glsl"
 #include "lib/window.glsl"
 
 struct Pixels {
@@ -43,6 +49,10 @@ struct Pixels {
     vec3 colour[PIXELS];
     uint last[PIXELS];  // 1 + the last pair looked at while it was alive; 0: none
 };
+
+// Light of the current bucket; not in Pixels, so that nothing of it is left without checkpoints.
+const uint BUCKET_COLOURS = CHECKPOINTS == 1 ? PIXELS : 1u;
+vec3 bucket_colour[BUCKET_COLOURS];
 
 vec3 load_depth(uint splat) {  // z and its slope
     const vec4 bound = splat_bound[splat];
@@ -55,6 +65,7 @@ void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, uint number
     const float next = before - wanted;
     const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
     px.colour[k] += (goes_on ? wanted : 0.0) * colour;
+    if (CHECKPOINTS == 1) bucket_colour[k] += (goes_on ? wanted : 0.0) * colour;
     px.transmittance[k] = goes_on ? next : -abs(before);
     if (STORE_FOR_BACKWARD == 1) px.last[k] = goes_on ? number : px.last[k];
 }
@@ -141,10 +152,22 @@ void store(Pixels px, uvec2 first) {
     }
 }
 
+// Closes a bucket.
+void store_checkpoint(Pixels px, uint record) {
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uint slot = gl_SubgroupID * AREA_PIXELS + k * SUBGROUP_SIZE + gl_SubgroupInvocationID;
+        for (int c = 0; c < 3; ++c)
+            checkpoints[checkpoint_at(record, uint(c), slot)] = bucket_colour[k][c];
+        checkpoints[checkpoint_at(record, TRANSMITTANCE_PLANE, slot)] = abs(px.transmittance[k]);
+        bucket_colour[k] = vec3(0.0);
+    }
+}
+
 void main() {
     const uvec2 tile = gl_WorkGroupID.xy;
-    const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
-    const uint bit = block_bit(gl_SubgroupID);
+    const uint tile_index = tile.y * args.tiles_x + tile.x;
+    const uvec2 whole = tile_range[tile_index], range = list_part(whole);
+    const uint bits = area_bits(gl_SubgroupID);
     const uvec2 first = tile * TILE_SIZE + first_pixel(gl_SubgroupID, gl_SubgroupInvocationID);
     const vec2 centre = vec2(first) + 0.5;
 
@@ -155,11 +178,15 @@ void main() {
         px.colour[k] = vec3(0.0);
         px.last[k] = 0u;
         if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) clear_window(k);
+        if (CHECKPOINTS == 1) bucket_colour[k] = vec3(0.0);
     }
     if (SEGMENT > 0u && args.segment > 0u) load(px, first);
     for (uint chunk = range.x; chunk < range.y; chunk += CHUNK) {
-        const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bit);
-        if (!blend_hits(px, centre, count)) break;
+        const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bits);
+        const bool alive = blend_hits(px, centre, count);
+        if (CHECKPOINTS == 1)
+            store_checkpoint(px, bucket_record(tile_index, whole.x, (chunk - whole.x) / BUCKET));
+        if (!alive) break;
     }
     if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) {
         for (uint k = 0u; k < PIXELS; ++k)

@@ -22,6 +22,12 @@
 // dispatch that takes seconds.
 #define LIST_SEGMENT 8192u
 
+// Pairs of a tile's list between two checkpoints of the forward blend, where the backward blend
+// works off buckets of them side by side (shaders/lib/bucket.glsl); where subgroups are larger, as
+// many as their threads. A record is four floats for each pixel of the tile.
+#define BUCKET_PAIRS 32u
+#define CHECKPOINT_BYTES (TILE_SIZE * TILE_SIZE * 16u)
+
 // A splat of more pairs than this is huge: one thread would write them long after all others are
 // done. With COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one cell of the
 // cover a thread.
@@ -118,6 +124,13 @@ struct BlendArgs {
     float background_r, background_g, background_b;
     uint segment;   // of every list that this dispatch works off, where SEGMENT > 0
     uint segments;  // in all
+};
+
+struct BucketArgs {
+    uint width;   // px
+    uint height;  // px
+    uint tiles_x;
+    uint records;  // that the buffers hold
 };
 
 struct UpsampleArgs {

@@ -207,6 +207,21 @@ TEST(BenchCommand, Result_saysWhereAndHowItWasMeasured) {
     EXPECT_EQ(one["yardsticks"]["scan"]["same_result"], 1.0);
 }
 
+TEST(BenchCommand, Tuning_hasARowForEveryWayOfThisDevice) {
+    const fs::path json = scratch() / "ways.json";
+    const Outcome o =
+        darb("bench tuning/scatter --samples 1 --seconds 0 --tune scatter=ballot --json " +
+             json.string());
+    ASSERT_EQ(o.code, 0) << o.err;
+    const auto result = nlohmann::json::parse(read_text_file(json));
+    EXPECT_NE(result["context"]["tuning"].get<std::string>().find("scatter=ballot"),
+              std::string::npos);
+    const auto& passes = result["benchmarks"][0]["passes"];
+    EXPECT_EQ(passes.size(), 2u);
+    for (const char* way : {"scatter=ballot", "scatter=columns"})
+        EXPECT_GT(passes[way]["median"].get<double>(), 0) << way;
+}
+
 TEST(BenchCommand, Growth_isATableFilesAndAPage_slow) {
     const fs::path json = scratch() / "growth.json", html = scratch() / "growth.html";
     const Outcome o = darb("bench --growth --most-splats 1000 --samples 1 --seconds 0 -q --json " +

@@ -45,6 +45,9 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {train + "--depth-order pixel", "no backward pass"},
                     {train + "--render-scale 1/2", "-r 2"},
                     {train + "--strategy no_such", "no such strategy"},
+                    {train + "--strategy mcmc --densify_grad_threshold 1e-4", "--strategy mcmc"},
+                    {train + "--opacity-decay 0.1", "goes with --strategy budget"},
+                    {train + "--resolution-ramp maybe", "--resolution-ramp"},
                     {"eval", "scene"},
                     {"eval a.ply b --split no_such", "--split"},
                     {"render a.ply -o b", "--cameras"},
@@ -59,6 +62,7 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"check --scene a.ply", "belong together"},
                     {"check --json a --scene a.ply --cameras b --dump c", "--json"},
                     {"check --device no_such_device", "no_such_device"},
+                    {"check --tune backward=no_such", "backward=subgroup|buckets"},
                     {"devices --device no_such_device", "no_such_device"}});
 }
 
@@ -79,8 +83,7 @@ TEST(Command, features_that_are_not_there_say_so) {
     const std::string train =
         fmt::format("train {} -o {} ", kScene, (scratch() / "unused").string());
     std::vector<BadCommand> commands;
-    for (const char* option :
-         {"--strategy mcmc", "--strategy=budget", "-d depths", "--depths depths"})
+    for (const char* option : {"-d depths", "--depths depths"})
         commands.push_back({train + option, "not part of this version"});
     expect_refused(commands);
 }
@@ -97,6 +100,7 @@ TEST(Command, devices_marks_the_chosen_one) {
     EXPECT_EQ(o.code, 0) << o.err;
     EXPECT_NE(o.out.find("* 0"), std::string::npos) << o.out;
     EXPECT_NE(o.out.find("chosen: 0"), std::string::npos) << o.out;
+    EXPECT_NE(o.out.find("backward="), std::string::npos) << o.out;
 }
 
 TEST(Command, check_passes_on_this_device_slow) {

@@ -9,6 +9,7 @@
 #include "engine/core/rng.h"
 #include "engine/reference/render.h"
 #include "tests/support/device_walk.h"
+#include "tests/support/scoped_variants.h"
 
 namespace darb::test {
 namespace {
@@ -162,6 +163,14 @@ TEST(WalkCases, needles_across_the_picture_match_double) {
     for (size_t i = 0; i < s.model.size(); ++i)
         for (int c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = c == 0 ? 3.0f : -8.0f;
     expect_walk_matches(s, {}, tolerance("gradient_scaled_float32"));
+}
+
+TEST(WalkCases, backward_by_buckets_matches_double) {
+    const ScopedVariants variants(shared_device(), "backward=buckets");
+    const TestScene scene = random_scene(
+        {.count = 600, .width = 121, .height = 83, .sh_degree = 1, .max_logit = 1, .seed = 21});
+    expect_walk_matches(scene, {.background = {0.2f, 0.4f, 0.7f}},
+                        tolerance("gradient_scaled_float32"));
 }
 
 // The runs at other vector widths are worth something only where the width takes effect.

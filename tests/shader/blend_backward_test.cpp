@@ -1,4 +1,5 @@
-// blend_backward.comp alone against the reference: one gradient for each splat-tile pair.
+// Both ways of the backward blend alone, blend_backward.comp and blend_backward_buckets.comp,
+// against the reference: one gradient for each splat-tile pair.
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare.h"
 
@@ -39,6 +40,22 @@ struct Result {
     BlendOutput out;
 };
 
+void expect_gradients_match(const Result& r, const Tolerance& allowed) {
+    const auto check = [&](const char* name, const auto& get) {
+        const std::vector<double> expected = column(r.truth, get);
+        EXPECT_TRUE(compare_scaled(name, expected, column(r.got, get), allowed));
+    };
+    check("d_mean.x", [](const auto& p) { return p.d_mean_px.x; });
+    check("d_mean.y", [](const auto& p) { return p.d_mean_px.y; });
+    check("d_l11", [](const auto& p) { return p.d_l11; });
+    check("d_l21", [](const auto& p) { return p.d_l21; });
+    check("d_l22", [](const auto& p) { return p.d_l22; });
+    check("d_opacity", [](const auto& p) { return p.d_opacity; });
+    for (int c = 0; c < 3; ++c)
+        check(fmt::format("d_colour.{}", c).c_str(), [c](const auto& p) { return p.d_colour[c]; });
+}
+
+/// Of the way that the scene names.
 Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed) {
     const size_t pixels = size_t(scene.width) * scene.height;
     Pcg32 rng(23);
@@ -56,19 +73,21 @@ Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed
                                        d_colour, {}, r.truth.data() + r.lists.begin[t]);
     r.out = blend_on_device(scene, r.lists, true, planes);
     r.got = gradients_of(scene, r.lists, r.out);
-    const auto check = [&](const char* name, const auto& get) {
-        const std::vector<double> expected = column(r.truth, get);
-        EXPECT_TRUE(compare_scaled(name, expected, column(r.got, get), allowed));
-    };
-    check("d_mean.x", [](const auto& p) { return p.d_mean_px.x; });
-    check("d_mean.y", [](const auto& p) { return p.d_mean_px.y; });
-    check("d_l11", [](const auto& p) { return p.d_l11; });
-    check("d_l21", [](const auto& p) { return p.d_l21; });
-    check("d_l22", [](const auto& p) { return p.d_l22; });
-    check("d_opacity", [](const auto& p) { return p.d_opacity; });
-    for (int c = 0; c < 3; ++c)
-        check(fmt::format("d_colour.{}", c).c_str(), [c](const auto& p) { return p.d_colour[c]; });
+    expect_gradients_match(r, allowed);
     return r;
+}
+
+// Layers of 0.985: the third would cross the stop; and clamped ones, without a gradient of alpha.
+void add_opaque_layers(BlendScene& scene) {
+    for (int i = 0; i < 12; ++i)
+        scene.add({4.0 + 3 * (i % 4), 8.2 - i % 3}, {9, 1, 7}, i % 2 ? 1 : 0.985,
+                  {i % 2 * 1.0, 1 - i % 2, 0.5});
+}
+
+// The mean on a pixel centre: dq = 0 and every gradient of the shape vanishes, none is NaN.
+void add_centred_layers(BlendScene& scene) {
+    scene.add({5.5, 7.5}, {0.3, 0, 0.3}, 0.7, {1, 0.5, 0});
+    scene.add({5.5, 7.5}, {4, 0.3, 6}, 0.7, {0, 0.5, 1});
 }
 
 class BlendBackward : public testing::TestWithParam<BlendVariant> {
@@ -79,6 +98,16 @@ class BlendBackward : public testing::TestWithParam<BlendVariant> {
     }
 };
 
+/// Whether by buckets.
+class BothWays : public testing::TestWithParam<bool> {
+  protected:
+    BlendScene empty_scene(int width = 16, int height = 16) const {
+        BlendScene s = BlendVariant{KERNEL_RAISED_COSINE}.scene(width, height);
+        s.buckets = GetParam();
+        return s;
+    }
+};
+
 TEST_P(BlendBackward, random_layers_match_double) {
     BlendScene scene = GetParam().scene(53, 37);
     scene.add_random(120, 4, 0.01, 0.98);
@@ -86,50 +115,77 @@ TEST_P(BlendBackward, random_layers_match_double) {
     EXPECT_GT(r.lists.pair_count(), 200U);
 }
 
+// The kernels' own code is that of the other way, so that one case of each is enough.
+class ByBuckets : public BlendBackward {};
+
+TEST_P(ByBuckets, random_layers_match_double) {
+    BlendScene scene = GetParam().scene(53, 37);
+    scene.buckets = true;
+    scene.add_random(120, 4, 0.01, 0.98);
+    const Result r = expect_backward_matches(scene, allowed());
+    EXPECT_GT(r.lists.pair_count(), 200U);
+}
+
 TEST_P(BlendBackward, opaque_layers_match_double_through_clamp_and_stop) {
     BlendScene scene = GetParam().scene();
-    // Layers of 0.985: the third would cross the stop; and clamped ones, without a gradient of
-    // alpha.
-    for (int i = 0; i < 12; ++i)
-        scene.add({4.0 + 3 * (i % 4), 8.2 - i % 3}, {9, 1, 7}, i % 2 ? 1 : 0.985,
-                  {i % 2 * 1.0, 1 - i % 2, 0.5});
+    add_opaque_layers(scene);
     expect_backward_matches(scene, allowed());
 }
 
-// The mean on a pixel centre: dq = 0 and every gradient of the shape vanishes, none is NaN.
 TEST_P(BlendBackward, mean_on_a_pixel_centre_gives_finite_gradients) {
     BlendScene scene = GetParam().scene();
-    scene.add({5.5, 7.5}, {0.3, 0, 0.3}, 0.7, {1, 0.5, 0});
-    scene.add({5.5, 7.5}, {4, 0.3, 6}, 0.7, {0, 0.5, 1});
+    add_centred_layers(scene);
     expect_backward_matches(scene, allowed());
 }
 
 INSTANTIATE_TEST_SUITE_P(every_kernel, BlendBackward, testing::ValuesIn(every_blend_variant()),
                          [](const auto& v) { return v.param.name(); });
 
-const BlendVariant kCosine{KERNEL_RAISED_COSINE, Footprint::psi, EVALUATION_POLYNOMIAL};
+std::vector<BlendVariant> every_polynomial() {
+    std::vector<BlendVariant> all = every_blend_variant();
+    std::erase_if(all, [](const BlendVariant& v) { return v.evaluation == EVALUATION_BUILTIN; });
+    return all;
+}
 
-TEST(BlendBackwardCases, ten_thousand_thin_layers_match_double) {
-    BlendScene scene = kCosine.scene();
+INSTANTIATE_TEST_SUITE_P(every_kernel, ByBuckets, testing::ValuesIn(every_polynomial()),
+                         [](const auto& v) { return v.param.name(); });
+
+INSTANTIATE_TEST_SUITE_P(BlendBackwardCases, BothWays, testing::Bool(),
+                         [](const auto& v) { return v.param ? "buckets" : "subgroup"; });
+
+TEST_P(BothWays, opaque_layers_match_double_through_clamp_and_stop) {
+    BlendScene scene = empty_scene();
+    add_opaque_layers(scene);
+    expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+}
+
+TEST_P(BothWays, mean_on_a_pixel_centre_gives_finite_gradients) {
+    BlendScene scene = empty_scene();
+    add_centred_layers(scene);
+    expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+}
+
+TEST_P(BothWays, ten_thousand_thin_layers_match_double) {
+    BlendScene scene = empty_scene();
     scene.cutoff = 1e-6f;
     for (int i = 0; i < 10'000; ++i)
         scene.add({8.5, 8.5}, {400, 0, 400}, 3e-4, {i % 7 / 7.0, i % 3 / 3.0, 0.5});
     expect_backward_matches(scene, tolerance("gradient_thin_layers"));
 }
 
-TEST(BlendBackwardCases, odd_image_sizes_match_double) {
+TEST_P(BothWays, odd_image_sizes_match_double) {
     for (const auto& [width, height] :
          std::vector<std::pair<int, int>>{{1, 1}, {17, 5}, {1, 300}, {300, 1}, {31, 33}}) {
         SCOPED_TRACE(fmt::format("{} x {}", width, height));
-        BlendScene scene = kCosine.scene(width, height);
+        BlendScene scene = empty_scene(width, height);
         scene.add_random(100, 6, 0.1, 0.9);
         const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
         EXPECT_GT(r.lists.pair_count(), 5U);
     }
 }
 
-TEST(BlendBackwardCases, pairs_behind_the_stop_get_zero) {
-    BlendScene scene = kCosine.scene();
+TEST_P(BothWays, pairs_behind_the_stop_get_zero) {
+    BlendScene scene = empty_scene();
     for (int i = 0; i < 100; ++i) scene.add({8.5, 8.5}, {400, 0, 400}, 0.97, {1, 0.5, 0.2});
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
     for (size_t k = 5; k < 100; ++k) {
@@ -140,8 +196,8 @@ TEST(BlendBackwardCases, pairs_behind_the_stop_get_zero) {
     }
 }
 
-TEST(BlendBackwardCases, alpha_at_its_limit_moves_only_the_colour) {
-    BlendScene scene = kCosine.scene();
+TEST_P(BothWays, alpha_at_its_limit_moves_only_the_colour) {
+    BlendScene scene = empty_scene();
     scene.add({8, 8}, {1e6, 0, 1e6}, 0.9999, {1, 0.5, 0.2});  // above 0.99 in every pixel
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
     const PairSums& p = r.out.pairs[0];
@@ -156,8 +212,8 @@ bool same_bits(const BlendOutput& a, const BlendOutput& b) {
            std::memcmp(a.pairs.data(), b.pairs.data(), a.pairs.size() * sizeof(PairSums)) == 0;
 }
 
-TEST(BlendBackwardCases, a_second_run_gives_the_same_bits) {
-    BlendScene scene = kCosine.scene(53, 37);
+TEST_P(BothWays, a_second_run_gives_the_same_bits) {
+    BlendScene scene = empty_scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);
     const std::vector<float> d_image(53 * 37 * 3, 0.3f);
     const reference::TileLists lists = scene.lists();
@@ -166,8 +222,8 @@ TEST(BlendBackwardCases, a_second_run_gives_the_same_bits) {
     EXPECT_NE(one.pairs[0].d_colour, glm::vec3(0));
 }
 
-TEST(BlendBackwardCases, skipping_blocks_that_are_not_touched_changes_no_bit) {
-    BlendScene scene = kCosine.scene(53, 37);
+TEST_P(BothWays, skipping_blocks_that_are_not_touched_changes_no_bit) {
+    BlendScene scene = empty_scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);
     const std::vector<float> d_image(53 * 37 * 3, 0.3f);
     const reference::TileLists lists = scene.lists();
@@ -175,8 +231,8 @@ TEST(BlendBackwardCases, skipping_blocks_that_are_not_touched_changes_no_bit) {
                           blend_on_device(scene, lists, true, d_image, true)));
 }
 
-TEST(BlendBackwardCases, lists_worked_off_in_parts_change_no_bit) {
-    BlendScene scene = kCosine.scene(53, 37);
+TEST_P(BothWays, lists_worked_off_in_parts_change_no_bit) {
+    BlendScene scene = empty_scene(53, 37);
     scene.add_random(2000, 4, 0.01, 0.3);
     const std::vector<float> d_image(53 * 37 * 3, 0.3f);
     const reference::TileLists lists = scene.lists();
@@ -186,8 +242,8 @@ TEST(BlendBackwardCases, lists_worked_off_in_parts_change_no_bit) {
 }
 
 // Mesa 22.3 would cut a dispatch after 12,800 splats, 10,700 at four lanes: see blend_test.
-TEST(BlendBackwardCases, twenty_five_thousand_layers_match_double) {
-    BlendScene scene = kCosine.scene();
+TEST_P(BothWays, twenty_five_thousand_layers_match_double) {
+    BlendScene scene = empty_scene();
     scene.cutoff = 1e-6f;
     scene.segment = LIST_SEGMENT;
     for (int i = 0; i < 25'000; ++i)

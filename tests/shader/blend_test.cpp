@@ -115,6 +115,37 @@ TEST(BlendCases, storing_for_the_backward_pass_changes_no_bit) {
               blend_on_device(scene, lists, false).image);
 }
 
+// Where a pixel ended may differ by pairs that miss its block, of which a larger area sees some.
+TEST(BlendCases, every_shape_of_workgroup_gives_the_same_bits) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.add_random(150, 4, 0.01, 1);
+    const reference::TileLists lists = scene.lists();
+    const BlendOutput usual = blend_on_device(scene, lists);
+    const std::vector<TuningGroup> groups = tuning_groups(shared_device().info());
+    const TuningGroup& shapes = groups[2];
+    ASSERT_EQ(shapes.name, "blend");
+    EXPECT_GE(shapes.ways.size(), 3U);
+    for (const std::string& shape : shapes.ways) {
+        SCOPED_TRACE(shape);
+        scene.threads = static_cast<std::uint32_t>(std::stoul(shape));
+        const BlendOutput out = blend_on_device(scene, lists);
+        EXPECT_EQ(out.image, usual.image);
+        EXPECT_EQ(out.transmittance, usual.transmittance);
+    }
+}
+
+TEST(BlendCases, checkpoints_change_no_bit) {
+    BlendScene scene = kCosine.scene(53, 37);
+    scene.add_random(150, 4, 0.01, 1);
+    const reference::TileLists lists = scene.lists();
+    const BlendOutput usual = blend_on_device(scene, lists);
+    scene.buckets = true;
+    const BlendOutput out = blend_on_device(scene, lists);
+    EXPECT_EQ(out.image, usual.image);
+    EXPECT_EQ(out.transmittance, usual.transmittance);
+    EXPECT_EQ(out.last, usual.last);
+}
+
 TEST(BlendCases, a_list_that_shows_nothing_changes_no_bit) {
     BlendScene scene = kCosine.scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);

@@ -1,8 +1,9 @@
-// Projected splats set by hand, blended by blend.comp and back by blend_backward.comp alone, with
-// the same lists for the reference.
+// Projected splats set by hand, blended by blend.comp and back by blend_backward.comp, or by the
+// passes over buckets, alone, with the same lists for the reference.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "engine/core/rng.h"
@@ -10,6 +11,7 @@
 #include "engine/reference/blend.h"
 #include "engine/render/forward.h"
 #include "engine/render/kernel_constants.h"
+#include "engine/render/tuning.h"
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 
@@ -22,7 +24,9 @@ struct BlendScene {
     int evaluation = EVALUATION_POLYNOMIAL;
     float cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     glm::vec3 background{0.0f};
-    std::uint32_t segment = 0;                              // pairs of a list a dispatch; 0: all
+    std::uint32_t segment = 0;  // pairs of a list a dispatch; 0: all
+    std::uint32_t threads = 0;  // of a workgroup of blend.comp; 0: a subgroup a block
+    bool buckets = false;       // back by blend_backward_buckets.comp
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first
 
     /// Mean in px, S' = [[xx, xy], [xy, yy]] in px^2. Everything is rounded to float, so that both
@@ -163,21 +167,38 @@ struct ShuffledPairs {
     }
 };
 
+struct BlendPipelines {
+    Pipeline blend, backward, bucket_tiles, bucket_behind;
+    std::uint32_t bucket = 0;  // pairs
+
+    BlendPipelines(Device& device, const BlendScene& scene, bool store) {
+        SpecConstants constants =
+            kernel_constants(scene.kernel, scene.footprint, scene.evaluation, 5, scene.cutoff);
+        const std::uint32_t subgroup = add_block_constants(device, constants);
+        bucket = bucket_pairs(device);
+        constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
+        constants["BUCKET"] = static_cast<std::int32_t>(bucket);
+        constants["THREADS"] = static_cast<std::int32_t>(subgroup);
+        backward = Pipeline(device, scene.buckets ? "blend_backward_buckets" : "blend_backward",
+                            constants, true, subgroup);
+        const std::uint32_t threads = scene.threads > 0 ? scene.threads : subgroup * 4;
+        constants["THREADS"] = static_cast<std::int32_t>(threads);
+        constants["PIXELS"] = static_cast<std::int32_t>(256 / threads);
+        constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
+        constants["CHECKPOINTS"] = scene.buckets ? 1 : 0;
+        blend = Pipeline(device, "blend", constants, true, subgroup);
+        constants["THREADS"] = SPLAT_GROUP;
+        bucket_tiles = Pipeline(device, "bucket_tiles", constants);
+        bucket_behind = Pipeline(device, "bucket_behind", constants);
+    }
+};
+
 /// d_image: [3][H][W], or empty for the forward pass alone.
 inline BlendOutput blend_on_device(const BlendScene& scene, const reference::TileLists& lists,
                                    bool store = true, const std::vector<float>& d_image = {},
                                    bool all_blocks = false) {
     Device& device = shared_device();
-    SpecConstants constants =
-        kernel_constants(scene.kernel, scene.footprint, scene.evaluation, 5, scene.cutoff);
-    constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
-    constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
-    const std::uint32_t subgroup = add_block_constants(device, constants);
-    constants["THREADS"] = static_cast<std::int32_t>(subgroup * 4);
-    const Pipeline blend(device, "blend", constants, true, subgroup);
-    constants["THREADS"] = static_cast<std::int32_t>(subgroup);
-    const Pipeline backward(device, "blend_backward", constants, true, subgroup);
-
+    const BlendPipelines pipelines(device, scene, store);
     const ShuffledPairs shuffled(scene, lists, all_blocks);
     std::vector<glm::vec4> shape, light, bound;
     for (const auto& s : scene.splats) {
@@ -186,6 +207,9 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         bound.emplace_back(s.l22, s.reach * (1 + 1e-5), s.depth, 0.0);
     }
     const size_t pixels = size_t(scene.width) * scene.height, pairs = lists.pair_count();
+    const size_t records = pairs / pipelines.bucket + lists.tile_count();
+    // A record that no pixel reaches must not be read: NaN would show.
+    const std::vector<float> unwritten(scene.buckets ? records * CHECKPOINT_BYTES / 4 : 1, NAN);
     const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
         order(device, "pair order", shuffled.order), splats(device, "pairs", shuffled.pair_splat),
         shapes(device, "shape", shape), lights(device, "light", light),
@@ -194,7 +218,9 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         behind(device, "behind", scene.segment > 0 ? pixels * 4 : 4),
         last(device, "last pair", store ? pixels * 4 : 4), d_images(device, "d_image", d_image),
         partials(device, "partials", std::vector<float>(pairs * 8, 0.0f)),
-        rest(device, "partial rest", std::vector<float>(pairs, 0.0f));
+        rest(device, "partial rest", std::vector<float>(pairs, 0.0f)),
+        checkpoints(device, "checkpoints", unwritten),
+        bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0));
     std::uint32_t longest = 0;
     for (const glm::uvec2& r : shuffled.ranges) longest = std::max(longest, r.y - r.x);
     gpu::BlendArgs args{static_cast<std::uint32_t>(scene.width),
@@ -211,20 +237,36 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     Commands commands(device);
     commands.begin();
     for (; args.segment < args.segments; ++args.segment)
-        commands.dispatch(blend, args,
-                          {ranges, order, splats, shapes, lights, bounds, image, final_t, last},
-                          groups_x, groups_y);
+        commands.dispatch(
+            pipelines.blend, args,
+            {ranges, order, splats, shapes, lights, bounds, image, final_t, last, checkpoints},
+            groups_x, groups_y);
     commands.submit_and_wait();
     BlendOutput out{image.read<float>(), final_t.read<float>(), last.read<std::uint32_t>(), {}};
     commands.begin();
+    const gpu::BucketArgs bucket_args{args.width, args.height, args.tiles_x,
+                                      static_cast<std::uint32_t>(records)};
+    if (scene.buckets)
+        commands.dispatch(pipelines.bucket_tiles, bucket_args, {ranges, bucket_tile}, groups_x,
+                          groups_y);
     while (args.segment-- > 0 && !d_image.empty())
-        commands.dispatch(backward, args,
-                          {ranges, order, splats, shapes, lights, bounds, d_images, final_t, last,
-                           partials, rest, behind},
-                          groups_x, groups_y);
+        if (scene.buckets)
+            commands.dispatch(pipelines.bucket_behind, args,
+                              {ranges, d_images, last, checkpoints, behind}, groups_x, groups_y, 4);
+        else
+            commands.dispatch(pipelines.backward, args,
+                              {ranges, order, splats, shapes, lights, bounds, d_images, final_t,
+                               last, partials, rest, behind},
+                              groups_x, groups_y);
+    if (scene.buckets && !d_image.empty())
+        commands.dispatch(pipelines.backward, bucket_args,
+                          {ranges, order, splats, shapes, lights, bounds, d_images, last,
+                           bucket_tile, checkpoints, partials, rest},
+                          static_cast<std::uint32_t>(records));
     commands.submit_and_wait();
-    for (const GuardedBuffer* buffer : {&ranges, &order, &splats, &shapes, &lights, &bounds, &image,
-                                        &final_t, &last, &partials, &rest, &behind})
+    for (const GuardedBuffer* buffer :
+         {&ranges, &order, &splats, &shapes, &lights, &bounds, &image, &final_t, &last, &partials,
+          &rest, &behind, &checkpoints, &bucket_tile})
         EXPECT_TRUE(buffer->intact());
     const auto sums = partials.read<float>(), rests = rest.read<float>();
     for (size_t j = 0; j < pairs; ++j) {

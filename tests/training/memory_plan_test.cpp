@@ -10,9 +10,11 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/files.h"
+#include "tests/support/scoped_variants.h"
 #include "trainer/forecast.h"
 #include "trainer/initial_model.h"
 #include "trainer/run.h"
+#include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -21,9 +23,9 @@ namespace {
 // Of the peak of a run: what is there for a moment and not planned for, as a picture's one camera.
 constexpr double kTolerance = 0.01;
 
-Dataset small_scene() {
+Dataset small_scene(int resolution = 2) {
     DatasetOptions options;
-    options.resolution = 2;  // 100 x 75 px: splats and photos weigh about the same
+    options.resolution = resolution;  // 2: 100 x 75 px, splats and photos weigh about the same
     return load_dataset(std::filesystem::path(DARB_SOURCE_DIR) / "assets" / "scene", options);
 }
 
@@ -37,9 +39,11 @@ TrainOptions options_of(int sh_degree, bool effects = false) {
 }
 
 // What is there after an iteration from `splats` splats, by the plan for them and by the device.
-void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats) {
-    const Dataset dataset = small_scene();
+void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats,
+                         const std::string& ways = "", int resolution = 2) {
+    const Dataset dataset = small_scene(resolution);
     Device device;
+    const test::ScopedVariants variants(device, ways);
     SplatModel start = split_model(initial_model(dataset, options), splats, 1);
     start.resize(std::min<std::size_t>(start.size(), splats));
     Trainer trainer(device, dataset, load_photos(dataset.views), start, options);
@@ -52,7 +56,8 @@ void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats) {
     demand.densifies = false;
     ASSERT_GE(demand.pairs, 4U * splats);
     EXPECT_EQ(plan_memory(device, demand).resident(), device.allocated_bytes())
-        << splats << " splats, degree " << options.sh_degree << ", effects " << options.exposure;
+        << splats << " splats, degree " << options.sh_degree << ", effects " << options.exposure
+        << ", " << ways << strategy_name(options.strategy);
     const auto peak = static_cast<double>(device.peak_bytes());
     EXPECT_NEAR(static_cast<double>(plan_memory(device, demand).total()), peak, kTolerance * peak);
 }
@@ -74,6 +79,24 @@ TEST(MemoryPlan, exposure_and_antialiasing_are_met_to_the_byte) {
     with.splats = without.splats = 4'000;
     EXPECT_GT(plan_memory(device, with).effects, 100U * 75U * 12U + 4'000U * 4U);
     EXPECT_LE(plan_memory(device, without).effects, 16U);
+}
+
+TEST(MemoryPlan, checkpoints_of_buckets_are_met_to_the_byte) {
+    compare_to_the_byte(options_of(0), 4'000, "backward=buckets");
+}
+
+TEST(MemoryPlan, strategies_are_met_to_the_byte) {
+    for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
+        TrainOptions options = options_of(0);
+        use_strategy(strategy, options);
+        options.densify_until = 0;
+        options.iterations = 10;
+        options.resolution_ramp = strategy == Strategy::budget;
+        MemoryDemand demand;
+        add_photos(small_scene(1).views, options, demand);
+        EXPECT_EQ(demand.small_pixels > 0, options.resolution_ramp);
+        compare_to_the_byte(options, 4'000, "", 1);
+    }
 }
 
 TEST(MemoryPlan, no_splats_are_met_to_the_byte) {

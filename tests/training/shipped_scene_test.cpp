@@ -4,7 +4,9 @@
 #include "engine/core/files.h"
 #include "tests/support/shared_device.h"
 #include "trainer/evaluation.h"
+#include "trainer/forecast.h"
 #include "trainer/initial_model.h"
+#include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
 namespace darb::test {
@@ -36,6 +38,21 @@ TEST(ShippedScene, a_short_run_gains_3_db) {
         load_dataset(kSources / "assets/scene", {.resolution = 8, .hold_out = true});
     TrainOptions options;
     options.iterations = 400;
+    const Outcome outcome = train(dataset, options);
+    EXPECT_GT(outcome.psnr_before, 5) << "the start already shows something";
+    EXPECT_GT(outcome.psnr_after, outcome.psnr_before + 3);
+}
+
+// Rounds from the start on, so that the strategy takes part in a run this short.
+TEST(ShippedScene, a_short_run_of_mcmc_gains_3_db) {
+    const Dataset dataset =
+        load_dataset(kSources / "assets/scene", {.resolution = 8, .hold_out = true});
+    TrainOptions options;
+    use_strategy(Strategy::mcmc, options);
+    options.iterations = 400;
+    options.densify_from = 50;
+    options.densify_interval = 50;
+    options.max_splats = default_budget(dataset, options);
     const Outcome outcome = train(dataset, options);
     EXPECT_GT(outcome.psnr_before, 5) << "the start already shows something";
     EXPECT_GT(outcome.psnr_after, outcome.psnr_before + 3);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "engine/render/tuning.h"
 #include "tools/bench/native_blend.h"
 
 namespace darb {
@@ -78,6 +79,7 @@ Json context_json(const Device& device, const DeviceRates& rates, const std::str
     context["executable"] = "darb bench";
     context["device"] = device.info().name;
     context["driver"] = device.info().driver;
+    context["tuning"] = variants_text(all_variants(device));
     context["copy_bytes_per_s"] = rates.bytes_per_s;
     context["fma_per_s"] = rates.fma_per_s;
     context["native_instructions"] = native_instructions();
@@ -90,15 +92,17 @@ std::string context_text(const Json& c) {
     for (const Json& one : c["load_avg"]) load += fmt::format(" {:.2f}", one.get<double>());
     return fmt::format(
         "{}\n{}, {}\n{} x {}; load average{}; {}; darb {} ({})\n"
-        "copies {}B/s, {} multiply-adds/s; native loops: {}\n{}\n{:<{}} {:>13} {:>8} {:>13} {:>6}\n"
+        "copies {}B/s, {} multiply-adds/s; native loops: {}\npasses: {}\n{}\n{:<{}} {:>13} {:>8} "
+        "{:>13} {:>6}\n"
         "{}\n",
         c["date"].get<std::string>(), c["device"].get<std::string>(),
         c["driver"].get<std::string>(), c["num_cpus"].get<unsigned>(),
         c["processor"].get<std::string>(), load, c["scheduling"].get<std::string>(),
         c["version"].get<std::string>(), c["commit"].get<std::string>(),
         si(c["copy_bytes_per_s"].get<double>()), si(c["fma_per_s"].get<double>()),
-        c["native_instructions"].get<std::string>(), std::string(100, '-'), "Benchmark", kNameWidth,
-        "Median", "Spread", "CPU", "Runs", std::string(100, '-'));
+        c["native_instructions"].get<std::string>(), c["tuning"].get<std::string>(),
+        std::string(100, '-'), "Benchmark", kNameWidth, "Median", "Spread", "CPU", "Runs",
+        std::string(100, '-'));
 }
 
 std::string result_text(const BenchResult& r, const DeviceRates& rates, bool details) {

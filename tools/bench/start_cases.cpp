@@ -11,6 +11,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
+#include "engine/render/tuning.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
 
@@ -81,15 +82,22 @@ void run_process(std::vector<std::string> arguments, std::vector<std::string> va
                     "Run the command by hand; see what it says above.");
 }
 
-BenchResult measure(const BenchOptions& options, const fs::path& scene, bool cold) {
+BenchResult measure(const Device& device, const BenchOptions& options, const fs::path& scene,
+                    bool cold) {
     const ScratchFolder scratch;
     const View view = bench_view(bench_camera({-0.06, -1.6, 4}, false, 1280, 720), "first.png");
     const fs::path cameras = scratch.path() / "cameras.json", caches = scratch.path() / "caches",
                    pictures = scratch.path() / "pictures";
     write_camera_list(cameras, {view});
-    std::vector<std::string> command = {
-        options.program.string(), "render", scene.string(),   "--cameras",
-        cameras.string(),         "-o",     pictures.string()};
+    std::vector<std::string> command = {options.program.string(),
+                                        "render",
+                                        scene.string(),
+                                        "--cameras",
+                                        cameras.string(),
+                                        "-o",
+                                        pictures.string(),
+                                        "--tune",
+                                        variants_text(all_variants(device))};  // nothing to measure
     if (!options.device.empty()) {
         command.push_back("--device");
         command.push_back(options.device);
@@ -124,15 +132,16 @@ std::vector<BenchCase> start_cases() {
     const fs::path scene = "splats/biker.compressed.ply";
     for (const bool cold : {false, true})
         cases.push_back({fmt::format("start/biker/{}", cold ? "cold" : "warm"), scene,
-                         [=](Device&, const DeviceRates&, const BenchOptions& options) {
-                             return measure(options, *options.data / scene, cold);
+                         [=](Device& device, const DeviceRates&, const BenchOptions& options) {
+                             return measure(device, options, *options.data / scene, cold);
                          }});
     return cases;
 }
 
 std::vector<BenchCase> bench_cases(bool full) {
     std::vector<BenchCase> all;
-    for (const auto& some : {render_cases(), train_cases(full), sort_cases(), start_cases()})
+    for (const auto& some :
+         {render_cases(), train_cases(full), sort_cases(), tuning_cases(), start_cases()})
         all.insert(all.end(), some.begin(), some.end());
     return all;
 }

@@ -4,9 +4,8 @@
 #include <cmath>
 
 #include "engine/core/rng.h"
-#include "engine/gpu/pipeline.h"
 #include "engine/render/accuracy.h"
-#include "engine/render/forward.h"
+#include "engine/render/blend_backward.h"
 #include "tools/bench/native_blend.h"
 
 namespace darb {
@@ -37,14 +36,15 @@ void add_error(const std::vector<float>& a, const std::vector<float>& b, double&
     }
 }
 
-// One camera: its frame on the device, and the same natively. The backward blend is recorded as
-// Backward does it, but with pair sums that can be read, and without the passes after it.
+// One camera: its frame on the device, and the same natively. The backward blend is that of
+// Backward, without the passes after it.
 class Side {
   public:
     Side(Device& device, const SplatModel& model, const Camera& camera,
          const ProjectionEffects& effects)
         : splats_(device, model, false),
           forward_(device, options_of(model, effects)),
+          backward_(device, forward_.options()),
           commands_(device),
           data_(camera_data(camera, splats_.origin())),
           cameras_(upload_cameras(device, {data_})),
@@ -62,7 +62,7 @@ class Side {
             commands_.submit_and_wait();
             status_ = forward_.read_status();
         } while (forward_.make_room(status_));
-        make_backward(device);
+        backward_.reserve(forward_.pair_capacity());
         draw();
         if (forward_.options().kernel == KERNEL_GAUSSIAN)
             frame_ = download_frame(forward_, data_, splats_.count(), status_.pairs, background_);
@@ -73,20 +73,7 @@ class Side {
         commands_.begin();
         record_forward();
         commands_.pass("blend backward");
-        commands_.fill(partials_on_device_, 0);
-        commands_.fill(rest_on_device_, 0);
-        const std::uint32_t segments = forward_.list_segments();
-        for (std::uint32_t segment = segments; segment-- > 0;) {
-            const gpu::BlendArgs args{data_.width,   data_.height,  data_.tiles_x, background_.r,
-                                      background_.g, background_.b, segment,       segments};
-            commands_.dispatch(
-                backward_, args,
-                {forward_.tile_range(), forward_.pair_order(), forward_.pair_splat(),
-                 forward_.splat_shape(), forward_.splat_light(), forward_.splat_bound(),
-                 d_image_on_device_, forward_.final_transmittance(), forward_.last_pair(),
-                 partials_on_device_, rest_on_device_, behind_},
-                data_.tiles_x, data_.tiles_y);
-        }
+        backward_.record(commands_, forward_, d_image_on_device_, data_, background_);
         commands_.submit_and_wait();
         std::pair<double, double> ms;
         for (const PassTime& pass : commands_.pass_times()) {
@@ -108,9 +95,9 @@ class Side {
     }
     double sums_error() const {
         double error = 0, norm = 0;
-        add_error(partials_.first, partials_on_device_.download<float>(partials_.first.size()),
+        add_error(partials_.first, backward_.partials().download<float>(partials_.first.size()),
                   error, norm);
-        add_error(partials_.rest, rest_on_device_.download<float>(partials_.rest.size()), error,
+        add_error(partials_.rest, backward_.rest().download<float>(partials_.rest.size()), error,
                   norm);
         return std::sqrt(error / std::max(norm, 1e-300));
     }
@@ -122,25 +109,10 @@ class Side {
     void record_forward() {
         forward_.record(commands_, splats_, cameras_, 0, data_, degree_, background_);
     }
-    void make_backward(Device& device) {
-        SpecConstants constants = kernel_constants(forward_.options());
-        const std::uint32_t subgroup = add_block_constants(device, constants);
-        const bool segmented = forward_.list_segments() > 1;
-        constants["THREADS"] = static_cast<std::int32_t>(subgroup);
-        constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
-        backward_ = Pipeline(device, "blend_backward", constants, true, subgroup);
-        behind_ =
-            Buffer(device, "behind", segmented ? std::uint64_t{data_.width} * data_.height * 4 : 4);
-        partials_on_device_ =
-            Buffer(device, "pair partials", std::uint64_t{forward_.pair_capacity()} * 32);
-        rest_on_device_ =
-            Buffer(device, "pair partials, rest", std::uint64_t{forward_.pair_capacity()} * 4);
-    }
 
     GpuSplats splats_;
     Forward forward_;
-    Pipeline backward_;
-    Buffer behind_, partials_on_device_, rest_on_device_;
+    BlendBackward backward_;
     Commands commands_;
     gpu::CameraData data_;
     Buffer cameras_, d_image_on_device_;

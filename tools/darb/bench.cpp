@@ -17,6 +17,7 @@
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/devices.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/tune_flags.h"
 
 namespace darb {
 
@@ -27,6 +28,7 @@ struct BenchFlags {
     std::filesystem::path data, json;
     BenchOptions options;
     GrowthFlags growth;
+    TuneFlags tune;
     bool list = false, quiet = false, brief = false;
 };
 
@@ -101,6 +103,7 @@ int bench(BenchFlags flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
+    settle_tuning(device, flags.tune);
     require_timestamps(device);
     const DeviceRates rates = measure_rates(device);
     const nlohmann::json context = context_json(device, rates, flags.note);
@@ -133,15 +136,11 @@ void add_bench(CLI::App& app, Action& action) {
     command->add_option("--samples", flags->options.sampling.least, "of each case, at least")
         ->capture_default_str()
         ->check(CLI::Range(1, 200));
-    command->add_flag("--growth", flags->growth.on,
-                      "time against splats, pixels and pairs instead, with fitted exponents");
-    command->add_option("--most-splats", flags->growth.plan.most_splats, "of --growth")
-        ->capture_default_str()
-        ->check(CLI::Range(1'000u, 100'000'000u));
-    command->add_option("--html", flags->growth.html, "write the plots of --growth to this page");
+    add_growth_flags(*command, flags->growth);
     command->add_flag("--brief", flags->brief, "a line a case, no passes");
     command->add_flag("-q,--quiet", flags->quiet, "no progress");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    add_tune_flags(*command, flags->tune);
     command->callback([flags, &action] { action = [flags] { return bench(*flags); }; });
 }
 

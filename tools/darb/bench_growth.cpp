@@ -7,6 +7,15 @@
 
 namespace darb {
 
+void add_growth_flags(CLI::App& command, GrowthFlags& flags) {
+    command.add_flag("--growth", flags.on,
+                     "time against splats, pixels and pairs instead, with fitted exponents");
+    command.add_option("--most-splats", flags.plan.most_splats, "of --growth")
+        ->capture_default_str()
+        ->check(CLI::Range(1'000u, 100'000'000u));
+    command.add_option("--html", flags.html, "write the plots of --growth to this page");
+}
+
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
                   const std::filesystem::path& json,
                   const std::function<void(const std::string&)>& progress) {

@@ -1,6 +1,7 @@
 // darb bench --growth.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -15,6 +16,9 @@ struct GrowthFlags {
     GrowthPlan plan;
     std::filesystem::path html;
 };
+
+/// Adds --growth and what goes with it.
+void add_growth_flags(CLI::App& command, GrowthFlags& flags);
 
 /// Measures, prints the table and writes the files that are named.
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,

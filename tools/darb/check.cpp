@@ -13,6 +13,7 @@
 #include "engine/data/camera_list.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/scene_file.h"
+#include "tools/darb/tune_flags.h"
 
 namespace darb {
 
@@ -23,6 +24,7 @@ struct CheckFlags {
     std::filesystem::path json, scene, cameras, dump;
     int view = 0;
     bool reference = false;
+    TuneFlags tune;
     DatasetOptions data;
     check::CheckOptions checks;
 };
@@ -99,6 +101,7 @@ int dump_view(const CheckFlags& flags) {
         DeviceOptions options;
         options.select = flags.device;
         Device device(options);
+        settle_tuning(device, flags.tune);
         check::dump_from_device(device, model, view.camera, flags.dump);
         from = device.info().name;
     }
@@ -117,6 +120,7 @@ int check_command(const CheckFlags& flags) {
     DeviceOptions options;
     options.select = flags.device;
     Device device(options);
+    settle_tuning(device, flags.tune);
     return check_device(device, flags);
 }
 
@@ -130,6 +134,7 @@ void add_check(CLI::App& app, Action& action) {
     command->add_flag("--every-kernel", flags->checks.every_kernel,
                       "walks and hard cases in every kernel and footprint: minutes, not seconds");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    add_tune_flags(*command, flags->tune);
     command->add_option("--scene", flags->scene, "a PLY file whose view --dump writes");
     command->add_option("--cameras", flags->cameras, "a cameras.json, transforms.json or data set");
     command->add_option("--view", flags->view, "number of the view, from 0")->capture_default_str();

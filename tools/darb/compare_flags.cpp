@@ -50,6 +50,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     forward(command, flags, "-i,--images", "--images", "as in darb train");
     forward(command, flags, "--effects", "--effects", "as in darb train");
     forward(command, flags, "--footprint", "--footprint", "psi or exact");
+    forward(command, flags, "--strategy", "--strategy", "adc, mcmc or budget");
     command.add_option("--train-options", flags.train_options,
                        "more options of darb train, as one word in quotes");
     command.add_option("--lpips", flags.lpips,

@@ -8,6 +8,7 @@
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_run.h"
+#include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_measure.h"
 #include "trainer/checkpoint.h"
 
@@ -51,6 +52,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     if (plan_sees_photos_)
         f.run.photos = photos_;  // else the plan of `darb train` has not seen them
     plan_effects(dataset_, f);
+    plan_strategy(dataset_, f);
     f.run.photos = photos_;
     const std::string settings = settings_text(f.train);
     const RunState state = run_state(f.run.output, settings, format_camera_list(dataset_.views),
@@ -63,6 +65,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     DeviceOptions options;
     options.select = flags_.device;
     Device device(options);  // of its own, so that the peak of memory is this run's
+    settle_tuning(device);
     run_training(device, dataset_, f.train, f.run, &stop);
 }
 
@@ -84,6 +87,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
             DeviceOptions options;
             options.select = flags_.device;
             Device device(options);
+            settle_tuning(device);
             measure_blending_of(run, device, cameras_, flags_.blending_views);
         }
     } catch (const std::exception& e) {

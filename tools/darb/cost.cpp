@@ -60,6 +60,7 @@ int cost(const CostFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
+    settle_tuning(device, flags.tune);
     require_timestamps(device);
     const CostResult result =
         measure_cost(device, model, views, glm::vec3(flags.white_background ? 1.0f : 0.0f),
@@ -111,6 +112,7 @@ void add_cost(CLI::App& app, Action& action) {
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
     command->add_flag("-q,--quiet", flags->quiet, "no progress");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    add_tune_flags(*command, flags->tune);
     command->callback([flags, &action] { action = [flags] { return cost(*flags); }; });
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "engine/data/dataset.h"
+#include "tools/darb/tune_flags.h"
 
 namespace darb {
 
@@ -15,6 +16,7 @@ struct CostFlags {
     std::filesystem::path json, html;
     bool quick = false, full = false, quiet = false, white_background = false;
     DatasetOptions data;
+    TuneFlags tune;
     std::string size = "640x480";
 };
 

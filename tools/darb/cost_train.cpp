@@ -32,6 +32,7 @@ int train_cost(const CostFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
+    settle_tuning(device, flags.tune);
     const TrainCostResult result =
         measure_train_cost(device, dataset, options, plan, [&](const std::string& line) {
             if (!flags.quiet) fmt::print(stderr, "{}\n", line);

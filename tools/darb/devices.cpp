@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/gpu/device.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/tune_flags.h"
 
 namespace darb {
 
@@ -44,6 +45,7 @@ void print_device(std::FILE* out, const DeviceInfo& info, bool chosen) {
     row("float atomics", info.float_atomics ? "yes" : "no");
     row("timestamps",
         info.timestamp_period_ns > 0 ? fmt::format("every {} ns", info.timestamp_period_ns) : "no");
+    if (info.usable) row("passes", tuning_of_listed(info));
     row("status", info.reason);
 }
 

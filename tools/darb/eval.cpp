@@ -14,6 +14,7 @@
 #include "tools/darb/commands.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
+#include "tools/darb/tune_flags.h"
 #include "trainer/evaluation.h"
 #include "trainer/exposure_fit.h"
 
@@ -72,6 +73,7 @@ int eval(EvalFlags flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
+    settle_tuning(device);
     const EffectPlan plan = plan_rendering(model, views, {}, choice);
     apply_plan(plan, model);
     apply_plan(plan, views);

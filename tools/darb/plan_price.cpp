@@ -7,6 +7,7 @@
 
 #include "engine/render/renderer.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/tune_flags.h"
 #include "trainer/initial_model.h"
 #include "trainer/trainer.h"
 
@@ -35,6 +36,7 @@ double sum_of(const std::vector<PassTime>& passes) {
 Measured measure_rendering(const DeviceOptions& device_options, const SplatModel& model,
                            const std::vector<View>& views, const EffectPlan& plan) {
     Device device(device_options);
+    settle_tuning(device);
     SplatModel planned = model;
     apply_plan(plan, planned);
     std::vector<View> seen = views;
@@ -60,6 +62,7 @@ Measured measure_rendering(const DeviceOptions& device_options, const SplatModel
 Measured measure_training(const DeviceOptions& device_options, const Dataset& dataset,
                           const TrainOptions& options, const EffectPlan& plan) {
     Device device(device_options);
+    settle_tuning(device);
     Dataset few = dataset;
     std::erase_if(few.views, [](const View& v) { return v.is_test; });
     apply_plan(plan, few.views);

@@ -17,6 +17,7 @@
 #include "tools/darb/depth_file.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
+#include "tools/darb/tune_flags.h"
 #include "trainer/evaluation.h"
 
 namespace darb {
@@ -32,6 +33,7 @@ struct RenderFlags {
     double depth_unit = 0.001;
     DatasetOptions data;
     AccuracyFlags accuracy;
+    TuneFlags tune;
 };
 
 // -r of a camera list, which states sizes rather than photos: divisor up to 8, width above.
@@ -67,6 +69,7 @@ int render(const RenderFlags& flags) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
+    settle_tuning(device, flags.tune);
     EffectPlan plan = plan_rendering(
         model, views, {.depth = !flags.depth.empty(), .near_plane = flags.near_plane}, choice);
     apply_plan(plan, model);
@@ -124,6 +127,7 @@ void add_render(CLI::App& app, Action& action) {
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    add_tune_flags(*command, flags->tune);
     command->callback([flags, &action] { action = [flags] { return render(*flags); }; });
 }
 

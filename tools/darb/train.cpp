@@ -14,13 +14,14 @@
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
 #include "tools/darb/train_run.h"
+#include "tools/darb/tune_flags.h"
 
 namespace darb {
 
 namespace {
 
 // `darb train --resume -o OUT` alone: the arguments of the run that it goes on with.
-void recall_arguments(TrainFlags& flags) {
+void recall_arguments(TrainFlags& flags, TuneFlags& tune) {
     const auto path = flags.run.output / "command.json";
     const auto saved = nlohmann::json::parse(read_text_file(path), nullptr, false);
     if (!saved.is_array())
@@ -28,8 +29,11 @@ void recall_arguments(TrainFlags& flags) {
                     "Repeat the whole command with --resume.");
     std::vector<std::string> arguments = saved.get<std::vector<std::string>>();
     TrainFlags recalled;
+    TuneFlags recalled_tune;
     CLI::App app;
-    add_train_flags(*app.add_subcommand("train"), recalled);
+    CLI::App* command = app.add_subcommand("train");
+    add_train_flags(*command, recalled);
+    add_tune_flags(*command, recalled_tune);
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     recalled.resume = true;
     recalled.run.output = flags.run.output;
@@ -37,6 +41,7 @@ void recall_arguments(TrainFlags& flags) {
     recalled.run.quiet = flags.run.quiet;
     recalled.view = flags.view;
     flags = recalled;
+    if (tune.choice.empty()) tune.choice = recalled_tune.choice;
 }
 
 void print_summary(const RunSummary& summary, const TrainFlags& flags) {
@@ -55,9 +60,9 @@ void print_summary(const RunSummary& summary, const TrainFlags& flags) {
                    flags.run.output.string());
 }
 
-int train(TrainFlags flags, std::vector<std::string> arguments) {
+int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
-    if (recalled) recall_arguments(flags);
+    if (recalled) recall_arguments(flags, tune);
     finish_train_flags(flags);
     if (flags.dataset.empty())
         throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
@@ -66,9 +71,11 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
     device_options.select = flags.device;
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
+    settle_tuning(device, tune);
     check_effects(flags);
     Dataset dataset = load_training_data(flags);
     plan_effects(dataset, flags);
+    plan_strategy(dataset, flags);
     if (!recalled)  // only now: a command that fails above leaves that of an earlier run
         write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
     print_plan(device, dataset, flags);
@@ -85,10 +92,12 @@ int train(TrainFlags flags, std::vector<std::string> arguments) {
 
 void add_train(CLI::App& app, Action& action, const std::vector<std::string>& arguments) {
     auto flags = std::make_shared<TrainFlags>();
+    auto tune = std::make_shared<TuneFlags>();
     CLI::App* command = app.add_subcommand("train", "Train a splat scene from photos");
     add_train_flags(*command, *flags);
-    command->callback([flags, arguments, &action] {
-        action = [flags, arguments] { return train(*flags, arguments); };
+    add_tune_flags(*command, *tune);
+    command->callback([flags, tune, arguments, &action] {
+        action = [flags, tune, arguments] { return train(*flags, *tune, arguments); };
     });
 }
 

@@ -94,7 +94,7 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
 void add_train_flags(CLI::App& command, TrainFlags& f) {
     add_data_flags(command, f);
     add_schedule_flags(command, f);
-    add_density_flags(command, f.train);
+    add_density_flags(command, f);
     command
         .add_option(
             "--kernel", f.kernel,
@@ -107,8 +107,6 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
         ->capture_default_str()
         ->check(CLI::Range(1, KERNEL_MAX_PULSES));
     add_accuracy_flags(command, f.accuracy, true);
-    command.add_option("--strategy", f.strategy, "how the splats grow: adc, as 3DGS")
-        ->capture_default_str();
     command.add_option("--seed", f.train.seed)->capture_default_str();
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`");
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training");

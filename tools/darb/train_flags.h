@@ -4,6 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "engine/data/dataset.h"
 #include "tools/darb/accuracy_flags.h"
@@ -23,6 +25,11 @@ struct TrainFlags {
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
     std::string kernel = "gaussian", strategy = "adc";
+    std::string resolution_ramp;     // on, off, or empty: as the strategy has it
+    std::string strategy_note;       // what plan_strategy decided, for people
+    bool own_prune_opacity = false;  // --prune-opacity was given
+    // Options that were given and the strategies that know them.
+    std::vector<std::pair<std::string, std::string>> of_strategies;
     int pulses = 1;
     AccuracyFlags accuracy;
     DatasetOptions data;
@@ -34,7 +41,10 @@ struct TrainFlags {
 void add_train_flags(CLI::App& command, TrainFlags& flags);
 
 /// The part of it that concerns density control.
-void add_density_flags(CLI::App& command, TrainOptions& options);
+void add_density_flags(CLI::App& command, TrainFlags& flags);
+/// --strategy and what goes with it to options: defaults of the strategy, then what was given.
+/// Throws Error for an option that the strategy does not know.
+void finish_strategy(TrainFlags& flags);
 
 /// Names to ids, lists to their defaults, contradictions to an Error.
 void finish_train_flags(TrainFlags& flags);

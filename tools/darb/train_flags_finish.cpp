@@ -10,14 +10,6 @@ namespace {
 
 constexpr int kStandardEvaluations[] = {7'000, 30'000};
 
-void check_strategy(const std::string& name) {
-    if (name == "adc") return;
-    const bool planned = name == "mcmc" || name == "budget";
-    throw Error("--strategy " + name,
-                planned ? "this strategy is not part of this version" : "no such strategy",
-                "Use adc, or leave the option out.");
-}
-
 }  // namespace
 
 void finish_train_flags(TrainFlags& f) {
@@ -30,7 +22,7 @@ void finish_train_flags(TrainFlags& f) {
         throw Error(fmt::format("--kernel {} --pulses {}", f.kernel, f.pulses),
                     "there is no such kernel",
                     "Only raised_cosine and sinc have --pulses 2 or 3; others have one.");
-    check_strategy(f.strategy);
+    finish_strategy(f);
     f.train.kernel = *row;
     f.train.accuracy = chosen_accuracy(f.accuracy, true);
     f.train.footprint =

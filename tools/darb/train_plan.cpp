@@ -35,13 +35,16 @@ std::string about(std::uint32_t count) {
     return fmt::format("about {}", std::uint64_t{(count + unit / 2) / unit} * unit);
 }
 
-std::string time_text(const Forecast& f, int iterations) {
+// The forecast measures full-sized photos: a run with a resolution ramp takes less.
+std::string time_text(const Forecast& f, const TrainOptions& options) {
+    const int iterations = options.iterations;
     const bool grows = f.splats > f.start_splats;
     const std::string end = grows ? about(f.splats) : std::to_string(f.splats);
     if (f.seconds <= 0) return fmt::format("{} iterations, {} splats at the end", iterations, end);
     const std::string later = grows ? fmt::format(", {:.1f} ms at {}", f.end_ms, end) : "";
-    return fmt::format("about {} for {} iterations, {:.1f} ms each at {} splats{}",
-                       format_duration(f.seconds), iterations, f.start_ms, f.start_splats, later);
+    return fmt::format("{} {} for {} iterations, {:.1f} ms each at {} splats{}",
+                       options.resolution_ramp ? "at most" : "about", format_duration(f.seconds),
+                       iterations, f.start_ms, f.start_splats, later);
 }
 
 // Exact where the counts come true; the counts are a rule of thumb, so what a splat takes is said,
@@ -85,10 +88,11 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     DeviceOptions options;
     options.select = flags.device;
     Device scratch(options);
+    scratch.set_variants(device.variants());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
     const std::uint64_t bytes = plan_memory(device, f.demand).total();
-    fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train.iterations),
+    fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train),
                memory_text(device, f, flags.train.sh_degree));
     print_advice(device, dataset, f, bytes);
 }
@@ -105,6 +109,7 @@ void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags)
     for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}\n", note);
     fmt::print(stderr, "device: {} ({})\n", device.info().name, device.info().driver);
     fmt::print(stderr, "effects: {}\n", flags.run.effects);
+    if (!flags.strategy_note.empty()) fmt::print(stderr, "{}\n", flags.strategy_note);
     // A resumed run knows better: its progress shows the time left.
     if (flags.run.resume_from.empty() && held_out < dataset.views.size())
         print_forecast(device, dataset, flags);

@@ -1,10 +1,14 @@
 #include "tools/darb/train_run.h"
 
+#include <fmt/format.h>
+
 #include <csignal>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "tools/darb/effect_flags.h"
+#include "trainer/forecast.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -39,6 +43,16 @@ void plan_effects(Dataset& dataset, TrainFlags& flags) {
     flags.run.effects = plan_line(plan);
     flags.run.effects_json =
         plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+void plan_strategy(const Dataset& dataset, TrainFlags& flags) {
+    TrainOptions& t = flags.train;
+    if (t.strategy == Strategy::adc) return;
+    const bool given = t.max_splats != TrainOptions{}.max_splats;
+    if (!given) t.max_splats = default_budget(dataset, t);
+    flags.strategy_note =
+        fmt::format("strategy: {}, up to {} splats{}", strategy_name(t.strategy), t.max_splats,
+                    given ? "" : ", what adc is forecast to end with; --budget sets another count");
 }
 
 std::atomic<bool>& stop_on_signals() {

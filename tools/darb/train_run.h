@@ -16,6 +16,9 @@ void check_effects(const TrainFlags& flags);
 /// yet.
 void plan_effects(Dataset& dataset, TrainFlags& flags);
 
+/// Sets the count that mcmc and budget grow to where none was given; after plan_effects.
+void plan_strategy(const Dataset& dataset, TrainFlags& flags);
+
 /// Set by SIGINT and SIGTERM from now on; a second signal ends the process at once.
 std::atomic<bool>& stop_on_signals();
 

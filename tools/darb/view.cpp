@@ -21,6 +21,7 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
+    settle_tuning(device, flags.tune);
     Viewer viewer(device, options);
     apply_flags(viewer, flags, size);
     if (!flags.scene.empty()) viewer.open(flags.scene);
@@ -57,6 +58,7 @@ int view(const ViewFlags& flags) {
     device_options.select = flags.device;
     windows.require(device_options);
     Device device(device_options);
+    settle_tuning(device, flags.tune);
     ViewerWindow window(device, options, size.width, size.height);
     apply_flags(window.viewer(), flags, size);
     if (!flags.scene.empty()) {

@@ -99,6 +99,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     add_effects_flag(c, flags.effects);
     add_lens_flag(c, flags.data);
     c.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
+    add_tune_flags(c, flags.tune);
 }
 
 }  // namespace darb

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/darb/accuracy_flags.h"
+#include "tools/darb/tune_flags.h"
 #include "viewer/viewer.h"
 
 namespace darb {
@@ -20,6 +21,7 @@ struct ViewFlags {
     AccuracyFlags accuracy;
     std::string effects = "auto";
     DatasetOptions data;
+    TuneFlags tune;
 };
 
 struct PixelSize {

@@ -6,6 +6,7 @@
 
 #include "engine/core/check.h"
 #include "engine/render/groups.h"
+#include "shaders/shared/strategy_args.h"
 #include "trainer/densify/round_buffers.h"
 
 namespace darb {
@@ -21,8 +22,11 @@ void limit_growth(const std::vector<glm::vec2>& gradient_sum, std::uint32_t room
     for (std::uint32_t i = 0; i < grow.size(); ++i)
         if (grow[i] != 0) growing.push_back(i);
     const auto mean = [&](std::uint32_t i) { return gradient_sum[i].x / gradient_sum[i].y; };
-    std::stable_sort(growing.begin(), growing.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return mean(a) > mean(b); });
+    if (room >= growing.size()) return;
+    std::nth_element(growing.begin(), growing.begin() + room, growing.end(),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                         return mean(a) != mean(b) ? mean(a) > mean(b) : a < b;
+                     });
     for (size_t k = room; k < growing.size(); ++k) {
         action[growing[k]] = DENSIFY_KEEP;
         grow[growing[k]] = 0;
@@ -38,6 +42,7 @@ DensityControl::DensityControl(Device& device, int kernel) : device_(&device), c
     split_ =
         Pipeline(device, "densify_split", {{"THREADS", SPLAT_GROUP}, {"QUANTILES", kQuantiles}});
     reset_ = Pipeline(device, "reset_opacity", threads);
+    decay_ = Pipeline(device, "decay_opacity", threads);
     std::vector<float> quantiles(kQuantiles);
     for (int k = 0; k < kQuantiles; ++k)
         quantiles[k] = static_cast<float>(kernel_radius_quantile(kernel, (k + 0.5) / kQuantiles));
@@ -92,14 +97,7 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
                        g.y);
     commands_.submit_and_wait();
 
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const std::uint32_t stride = splats.stride(a);
-        if (stride == 0) continue;
-        gather(sources, result.after, stride, false, splats.parameters(a));
-        if (splats.has_moments())
-            gather(sources, result.after, stride * 2, true, splats.moments(a));
-    }
-    splats.set_count(result.after);
+    move(splats, sources, result.after);
     args.splat_count = result.after;
     const Groups after = groups_for(result.after);
     commands_.begin();
@@ -110,6 +108,16 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
                        after.x, after.y);
     commands_.submit_and_wait();
     return result;
+}
+
+void DensityControl::move(GpuSplats& splats, const Buffer& sources, std::uint32_t count) {
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::uint32_t stride = splats.stride(a);
+        if (stride == 0) continue;
+        gather(sources, count, stride, false, splats.parameters(a));
+        if (splats.has_moments()) gather(sources, count, stride * 2, true, splats.moments(a));
+    }
+    splats.set_count(count);
 }
 
 void DensityControl::gather(const Buffer& sources, std::uint32_t count, std::uint32_t stride,
@@ -146,6 +154,16 @@ void DensityControl::reset_opacity(GpuSplats& splats, float opacity) {
     commands_.pass("reset opacity");
     commands_.dispatch(reset_, gpu::ResetOpacityArgs{splats.count(), logit},
                        {splats.parameters(kOpacity), splats.moments(kOpacity)}, g.x, g.y);
+    commands_.submit_and_wait();
+}
+
+void DensityControl::decay_opacity(GpuSplats& splats, float keep) {
+    if (splats.count() == 0) return;
+    const Groups g = groups_for(splats.count());
+    commands_.begin();
+    commands_.pass("decay opacity");
+    commands_.dispatch(decay_, gpu::DecayOpacityArgs{splats.count(), keep},
+                       {splats.parameters(kOpacity)}, g.x, g.y);
     commands_.submit_and_wait();
 }
 

@@ -32,6 +32,13 @@ class DensityControl {
 
     /// Every opacity down to at most `opacity`, its moments to zero.
     void reset_opacity(GpuSplats& splats, float opacity);
+    /// Every opacity times `keep`, between 0 and 1.
+    void decay_opacity(GpuSplats& splats, float keep);
+
+    /// Parameters and moments to a generation of `count`: sources holds, for each, the splat that
+    /// it comes from and DENSIFY_*; what is not kept starts with moments of zero. The queue must be
+    /// idle.
+    void move(GpuSplats& splats, const Buffer& sources, std::uint32_t count);
 
   private:
     void gather(const Buffer& sources, std::uint32_t count, std::uint32_t stride, bool clear_new,
@@ -39,7 +46,7 @@ class DensityControl {
 
     Device* device_;
     Commands commands_;
-    Pipeline decide_, sources_, gather_, split_, reset_;
+    Pipeline decide_, sources_, gather_, split_, reset_, decay_;
     Buffer quantile_;
 };
 

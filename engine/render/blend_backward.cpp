@@ -1,0 +1,116 @@
+#include "engine/render/blend_backward.h"
+
+#include <algorithm>
+
+#include "engine/core/check.h"
+#include "engine/render/groups.h"
+
+namespace darb {
+
+BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
+    : device_(&device), options_(options), way_(tuning_of(device).backward) {
+    make_pipelines(false);
+    make_buffers(device, *this, segment_buffers({}));
+}
+
+BufferList<BlendBackward> BlendBackward::pair_buffers(std::uint64_t pairs) {
+    return {{&BlendBackward::partials_, "pair partials", pairs * 32},
+            {&BlendBackward::rest_, "pair partials, rest", pairs * 4}};
+}
+
+BufferList<BlendBackward> BlendBackward::segment_buffers(const FrameSize& size) {
+    return {{&BlendBackward::behind_, "behind", size.list_segments > 1 ? size.pixels * 4 : 4}};
+}
+
+BufferList<BlendBackward> BlendBackward::bucket_buffers(std::uint64_t records) {
+    return {{&BlendBackward::bucket_tile_, "bucket tile", records * 4}};
+}
+
+FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
+    FrameBytes bytes;
+    bytes.pairs = charged_bytes(pair_buffers(size.pairs));
+    bytes.images = charged_bytes(segment_buffers(size));
+    if (const std::uint64_t records = size.checkpoint_records(); records > 0)
+        bytes.pairs += charged_bytes(bucket_buffers(records));
+    return bytes;
+}
+
+void BlendBackward::make_pipelines(bool segmented) {
+    SpecConstants constants = kernel_constants(options_);
+    const std::uint32_t subgroup = add_block_constants(*device_, constants);
+    constants["THREADS"] = static_cast<std::int32_t>(subgroup);
+    constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
+    constants["BUCKET"] = static_cast<std::int32_t>(bucket_pairs(*device_));
+    segmented_ = segmented;
+    if (way_ == BackwardBlend::subgroup) {
+        blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
+        return;
+    }
+    if (!blend_) blend_ = Pipeline(*device_, "blend_backward_buckets", constants, true, subgroup);
+    constants["THREADS"] = SPLAT_GROUP;
+    if (!bucket_tiles_) bucket_tiles_ = Pipeline(*device_, "bucket_tiles", constants);
+    bucket_behind_ = Pipeline(*device_, "bucket_behind", constants);
+}
+
+void BlendBackward::reserve(std::uint32_t pairs) {
+    if (pairs <= pair_capacity_ && pair_capacity_ > 0) return;
+    pair_capacity_ = std::max(pairs, 1024u);
+    make_buffers(*device_, *this, pair_buffers(pair_capacity_));
+}
+
+void BlendBackward::record(Commands& commands, const Forward& forward, const Buffer& d_image,
+                           const gpu::CameraData& data, const glm::vec3& background) {
+    const std::uint32_t segments = forward.list_segments();
+    DARB_CHECK(forward.pair_capacity() <= pair_capacity_, "{} pairs of {}", forward.pair_capacity(),
+               pair_capacity_);
+    if (segments > 1 && !segmented_) make_pipelines(true);
+    if (segments > 1 && behind_.bytes() < forward.size().pixels * 4)
+        make_buffers(*device_, *this, segment_buffers(forward.size()));
+    commands.fill(partials_, 0);
+    commands.fill(rest_, 0);
+    const gpu::BlendArgs args{data.width,   data.height, data.tiles_x, background.r, background.g,
+                              background.b, 0,           segments};
+    if (way_ == BackwardBlend::subgroup)
+        record_subgroup(commands, forward, d_image, args);
+    else
+        record_buckets(commands, forward, d_image, args);
+}
+
+// Long lists take several dispatches, the last part of every list first.
+void BlendBackward::record_subgroup(Commands& commands, const Forward& forward,
+                                    const Buffer& d_image, gpu::BlendArgs args) {
+    const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
+    for (args.segment = args.segments; args.segment-- > 0;)
+        commands.dispatch(
+            blend_, args,
+            {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
+             forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
+             forward.final_transmittance(), forward.last_pair(), partials_, rest_, behind_},
+            args.tiles_x, tiles_y);
+}
+
+void BlendBackward::record_buckets(Commands& commands, const Forward& forward,
+                                   const Buffer& d_image, gpu::BlendArgs args) {
+    const std::uint32_t records = forward.checkpoint_records();
+    DARB_CHECK(records > 0, "the forward pass stores no checkpoints");
+    if (bucket_tile_.bytes() < std::uint64_t{records} * 4)
+        make_buffers(*device_, *this, bucket_buffers(records));
+    const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
+    const gpu::BucketArgs buckets{args.width, args.height, args.tiles_x, records};
+    commands.fill(bucket_tile_, 0);
+    commands.dispatch(bucket_tiles_, buckets, {forward.tile_range(), bucket_tile_}, args.tiles_x,
+                      tiles_y);
+    for (args.segment = args.segments; args.segment-- > 0;)
+        commands.dispatch(
+            bucket_behind_, args,
+            {forward.tile_range(), d_image, forward.last_pair(), forward.checkpoints(), behind_},
+            args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
+    const Groups g = groups_for(records, 1);
+    commands.dispatch(blend_, buckets,
+                      {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
+                       forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
+                       forward.last_pair(), bucket_tile_, forward.checkpoints(), partials_, rest_},
+                      g.x, g.y);
+}
+
+}  // namespace darb

@@ -1,0 +1,7 @@
+// The stretch of a tile's list that a dispatch works off. Needs the specialization constant SEGMENT: pairs of a
+// stretch, or 0 for whole lists in one dispatch.
+uvec2 list_part(uvec2 range) {
+    if (SEGMENT == 0u) return range;
+    const uint begin = min(range.x + args.segment * SEGMENT, range.y);
+    return uvec2(begin, min(begin + SEGMENT, range.y));
+}

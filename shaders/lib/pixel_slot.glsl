@@ -1,0 +1,18 @@
+// A tile's 256 pixels by slots, block after block of 8 x 8: bits 0-2 of a slot are x, 3-5 are y, 6 is the block's x,
+// 7 its y. Slots of disjoint bits add up to pixels.
+#ifndef DARB_PIXEL_SLOT_GLSL
+#define DARB_PIXEL_SLOT_GLSL
+
+const uint TILE_PIXELS = 256u;
+const uint BLOCK_PIXELS = 64u;
+
+uvec2 slot_to_pixel(uint slot) {
+    return uvec2((slot & 7u) | ((slot >> 3) & 8u), ((slot >> 3) & 7u) | ((slot >> 4) & 8u));
+}
+
+// The bit of a pair that says whether its ellipse touches the block.
+uint block_bit(uint block) {
+    return 1u << (PAIR_BLOCK_SHIFT + block);
+}
+
+#endif

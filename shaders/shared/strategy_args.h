@@ -1,0 +1,56 @@
+// Arguments of the passes of the strategies mcmc and budget, and of the resolution ramp.
+#ifndef DARB_STRATEGY_ARGS_H
+#define DARB_STRATEGY_ARGS_H
+
+#include "types.h"
+
+#define RELOCATION_OPACITIES 128  // columns of the table of scales
+#define RELOCATION_COUNTS 51      // rows: splats in the place of one, as 3DGS-MCMC counts at most
+
+#ifdef __cplusplus
+namespace darb::gpu {
+#endif
+
+struct RelocationArgs {
+    uint splat_count;    // N before
+    uint splats_after;   // N after: draws go to the dead, then behind the last
+    uint dead_count;     // of the N before
+    uint weight_total;   // of the live
+    float dead_opacity;  // below it a splat is dead
+    float weight_scale;  // integer weight of opacity 1; the sum of all stays below 2^32
+    uint seed;           // of the draws, differs at each call
+};
+
+struct NoiseArgs {
+    uint splat_count;
+    uint seed;           // differs at each iteration
+    float rate;          // 1 / world unit: what the covariance times a normal vector is scaled by
+    float dead_opacity;  // the noise is gated by sigmoid(-100 (opacity - dead_opacity))
+};
+
+struct DecayOpacityArgs {
+    uint splat_count;
+    float keep;  // what every opacity is multiplied by
+};
+
+struct ErrorImageArgs {
+    uint width, height;  // px
+    float background_r, background_g, background_b;
+};
+
+struct ErrorShareArgs {
+    uint splat_count;
+    float scale;  // 1 / (H W)
+};
+
+struct DownsampleArgs {
+    uint width, height;          // px, of the photo
+    uint out_width, out_height;  // px
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(RelocationArgs) == 28);
+static_assert(sizeof(NoiseArgs) == 16);
+}  // namespace darb::gpu
+#endif
+#endif

@@ -1,0 +1,82 @@
+// The walk in every way of its passes gives the same bits where the tuning says so, and a run keeps
+// the way that it began with. walk_test compares both backward blends with double.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "engine/core/rng.h"
+#include "tests/support/device_walk.h"
+#include "tests/support/scoped_variants.h"
+#include "tests/support/tiny_training.h"
+#include "trainer/checkpoint.h"
+#include "trainer/run.h"
+
+namespace darb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct WalkScene {
+    TestScene scene = random_scene(
+        {.count = 600, .width = 121, .height = 83, .sh_degree = 1, .max_logit = 1, .seed = 21});
+    Image<double> weights{scene.camera.width, scene.camera.height, 3};
+
+    WalkScene() {
+        Pcg32 random(3);
+        for (double& w : weights.data) w = static_cast<float>(random.uniform(-1, 1));
+    }
+    DeviceWalk walk() const { return walk_on_device(scene.model, scene.camera, weights, {}); }
+};
+
+TEST(TuningWalk, ways_change_bits_only_where_the_table_says_so) {
+    const WalkScene s;
+    const DeviceWalk usual = s.walk();
+    ASSERT_GT(usual.status.pairs, 600U);
+    for (const TuningGroup& group : tuning_groups(shared_device().info()))
+        for (const std::string& way : group.ways) {
+            SCOPED_TRACE(group.name + "=" + way);
+            const ScopedVariants variants(shared_device(), group.name + "=" + way);
+            const DeviceWalk walk = s.walk();
+            EXPECT_EQ(walk.image.data, usual.image.data);
+            EXPECT_EQ(walk.status.pairs, usual.status.pairs);
+            if (!group.changes_bits) EXPECT_EQ(walk.d, usual.d);
+        }
+}
+
+TEST(TuningWalk, a_run_goes_on_in_the_way_that_it_began) {
+    TinyTraining t = tiny_training();
+    t.options.iterations = 24;
+    const auto folder = [](const char* name) {
+        return fs::path(testing::TempDir()) / fmt::format("darb_ways_{}_{}", ::getpid(), name);
+    };
+    const auto run = [&](const fs::path& output, const fs::path& resume) {
+        RunOptions options;
+        options.output = output;
+        options.photos = t.photos;
+        options.resume_from = resume;
+        options.checkpoint_iterations = {12};
+        options.quiet = true;
+        options.report = false;
+        run_training(shared_device(), t.dataset, t.options, options);
+        return read_checkpoint(output / "checkpoint.darb");
+    };
+    Checkpoint whole;
+    {
+        const ScopedVariants variants(shared_device(), "backward=buckets");
+        whole = run(folder("whole"), {});
+    }
+    EXPECT_EQ(whole.tuning, "backward=buckets");
+    const ScopedVariants variants(shared_device(), "backward=subgroup");
+    const Checkpoint other = run(folder("other"), {});
+    const Checkpoint resumed = run(folder("resumed"), folder("whole") / "chkpnt12.darb");
+    EXPECT_EQ(resumed.tuning, "backward=buckets");
+    EXPECT_EQ(resumed.state.model.position, whole.state.model.position);
+    EXPECT_EQ(resumed.state.moments, whole.state.moments);
+    EXPECT_EQ(other.tuning, "backward=subgroup");
+    EXPECT_NE(other.state.moments, whole.state.moments) << "both ways summed in one order";
+    for (const char* name : {"whole", "other", "resumed"}) fs::remove_all(folder(name));
+}
+
+}  // namespace
+}  // namespace darb::test

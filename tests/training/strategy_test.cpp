@@ -1,0 +1,218 @@
+// The strategies mcmc and budget in whole training runs: they repeat bit by bit, go on from a
+// checkpoint as if never stopped, keep to their counts and bring held-out pictures closer.
+#include "trainer/strategy.h"
+
+#include <filesystem>
+
+#include "engine/core/error.h"
+#include "tests/support/tiny_training.h"
+#include "trainer/checkpoint.h"
+#include "trainer/forecast.h"
+
+namespace darb::test {
+namespace {
+
+void run_to(Trainer& trainer, int iteration) {
+    while (trainer.iteration() < iteration) trainer.step();
+}
+
+TinyTraining tiny_with(Strategy strategy, const TinyOptions& tiny = {}) {
+    TinyTraining t = tiny_training(tiny);
+    use_strategy(strategy, t.options);
+    t.options.max_splats = 90;
+    return t;
+}
+
+class EveryStrategy : public testing::TestWithParam<Strategy> {};
+
+// Photos of 210 px: the ramp of budget has a step, up to iteration 18.
+TEST_P(EveryStrategy, a_resumed_run_equals_one_that_never_stopped) {
+    const TinyTraining t = tiny_with(GetParam(), {.width = 210, .height = 60});
+    Trainer whole = t.trainer();
+    run_to(whole, 60);
+    EXPECT_GT(whole.splat_count(), 60U) << "growth must take part";
+    EXPECT_LE(whole.splat_count(), 90U);
+    for (const int stop : {9, 18, 30}) {
+        SCOPED_TRACE(fmt::format("stopped at {}", stop));
+        const auto path = std::filesystem::path(testing::TempDir()) /
+                          fmt::format("darb_strategy_{}_{}", ::getpid(), stop);
+        {
+            Trainer first = t.trainer();
+            run_to(first, stop);
+            write_checkpoint(path, {first.state(), settings_text(t.options),
+                                    dataset_fingerprint(t.dataset, t.photos), 1.0});
+        }
+        const Checkpoint checkpoint = read_checkpoint(path);
+        check_resumable(checkpoint, path, t.options, t.dataset,
+                        dataset_fingerprint(t.dataset, t.photos));
+        Trainer second = t.trainer();
+        second.restore(checkpoint.state);
+        run_to(second, 60);
+        EXPECT_TRUE(same_state(whole, second));
+        EXPECT_EQ(whole.state().error_shares, second.state().error_shares);
+        EXPECT_EQ(second.counters().pruned, whole.counters().pruned);
+        std::filesystem::remove(path);
+    }
+}
+
+TEST_P(EveryStrategy, held_out_picture_gets_closer_to_the_photo) {
+    TinyTraining t = tiny_with(GetParam());
+    t.options.iterations = 300;
+    t.options.densify_until = 200;
+    Trainer trainer = t.trainer();
+    const double before = evaluate_held_out(trainer, t.dataset, t.photos).views[0].psnr_db;
+    run_to(trainer, 300);
+    const double after = evaluate_held_out(trainer, t.dataset, t.photos).views[0].psnr_db;
+    EXPECT_GT(after, before + 3) << "from " << before << " dB";
+    EXPECT_EQ(trainer.counters().bad_gradients, 0U);
+}
+
+// Frames that want more pairs than there is room for are done again, noise and scores with them.
+TEST_P(EveryStrategy, frames_that_overflow_leave_no_trace) {
+    TinyTraining t =
+        tiny_with(GetParam(), {.width = 320, .height = 200, .splats = 24, .close_up = 3});
+    t.options.initial_scale = 1;
+    t.options.resolution_ramp = false;
+    t.options.iterations = 30;
+    Trainer tight = t.trainer(), roomy = t.trainer();
+    for (const View& view : t.dataset.views) roomy.render(view.camera);
+    run_to(tight, 30);
+    run_to(roomy, 30);
+    EXPECT_TRUE(same_state(tight, roomy));
+    EXPECT_EQ(tight.state().error_shares, roomy.state().error_shares);
+    EXPECT_GT(tight.counters().redone_iterations, 0U);
+    EXPECT_EQ(roomy.counters().redone_iterations, 0U) << "the comparison must not overflow";
+}
+
+INSTANTIATE_TEST_SUITE_P(strategies, EveryStrategy,
+                         testing::Values(Strategy::mcmc, Strategy::budget),
+                         [](const auto& p) { return std::string(strategy_name(p.param)); });
+
+TEST(Strategy, another_one_cannot_resume) {
+    const TinyTraining adc = tiny_training(), mcmc = tiny_with(Strategy::mcmc);
+    for (const auto& [then, now] : {std::pair{&adc, &mcmc}, std::pair{&mcmc, &adc}}) {
+        const Checkpoint checkpoint{{}, settings_text(then->options), "", 0};
+        try {
+            check_resumable(checkpoint, "file", now->options, now->dataset, "");
+            FAIL() << "no error";
+        } catch (const Error& e) {
+            const std::string what = e.what();
+            EXPECT_NE(what.find(fmt::format("was written with --strategy {}",
+                                            strategy_name(then->options.strategy))),
+                      std::string::npos)
+                << what;
+        }
+    }
+    TinyTraining ramp = tiny_training();
+    ramp.options.resolution_ramp = true;
+    const Checkpoint checkpoint{{}, settings_text(ramp.options), "", 0};
+    EXPECT_THROW(check_resumable(checkpoint, "file", adc.options, adc.dataset, ""), Error);
+}
+
+TEST(Strategy, adc_has_the_settings_that_it_always_had) {
+    TrainOptions options;
+    EXPECT_EQ(settings_text(options).find("strategy"), std::string::npos);
+    options.prune_opacity = 0.3f;
+    use_strategy(Strategy::adc, options);
+    EXPECT_EQ(settings_text(options), settings_text({}));
+}
+
+TEST(Strategy, mcmc_keeps_every_splat_and_moves_the_dead) {
+    TinyTraining t = tiny_with(Strategy::mcmc);
+    t.options.max_splats = 60;
+    t.options.prune_opacity = 0.55f;  // all start below it, some are above at the first round
+    Trainer trainer = t.trainer();
+    run_to(trainer, 30);
+    EXPECT_EQ(trainer.splat_count(), 60U);
+    EXPECT_GT(trainer.counters().pruned, 0U);
+}
+
+TEST(Strategy, budget_ends_at_its_budget) {
+    TinyTraining t = tiny_with(Strategy::budget);
+    t.options.prune_opacity = 0.01f;
+    Trainer trainer = t.trainer();
+    run_to(trainer, 50);
+    EXPECT_EQ(trainer.splat_count(), 90U);
+}
+
+TEST(GrowthTarget, follows_its_rule_to_the_limit) {
+    TrainOptions options;
+    use_strategy(Strategy::mcmc, options);
+    EXPECT_EQ(growth_target(options, 600, 1000, 5000), 1050U);
+    EXPECT_EQ(growth_target(options, 600, 1000, 1020), 1020U);
+    EXPECT_EQ(growth_target(options, 600, 1000, 900), 1000U) << "never below what is there";
+    EXPECT_EQ(options.densify_end(), 25'000);
+    use_strategy(Strategy::budget, options);
+    const int last = options.densify_end() - options.densify_interval;
+    EXPECT_EQ(growth_target(options, last, 1000, 5000), 5000U);
+    EXPECT_EQ(growth_target(options, last - options.densify_interval, 1000, 5000), 4000U)
+        << "a quarter of the gap is left for the last of two rounds";
+    EXPECT_EQ(growth_target(options, 600, 7000, 5000), 5000U);
+}
+
+TEST(GrowthTarget, the_forecast_knows_it) {
+    TrainOptions options;
+    for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
+        SCOPED_TRACE(std::string(strategy_name(strategy)));
+        use_strategy(strategy, options);
+        EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 100'000U);
+        const double mean = mean_splats(4'000, 100'000, options);
+        EXPECT_GT(mean, 50'000);
+        EXPECT_LT(mean, 100'000);
+    }
+    options.iterations = 1'200;  // one round of budget, which at most doubles
+    EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 4'000U);
+    options.iterations = 1'300;
+    EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 8'000U);
+}
+
+TEST(ResolutionRamp, divisors_follow_the_run_and_the_size_of_the_photos) {
+    TrainOptions options;
+    EXPECT_EQ(ramp_divisor(options, 1, 1600), 1);
+    options.resolution_ramp = true;
+    EXPECT_EQ(ramp_divisor(options, 1, 1600), 4);
+    EXPECT_EQ(ramp_divisor(options, 3'000, 1600), 4);
+    EXPECT_EQ(ramp_divisor(options, 3'001, 1600), 2);
+    EXPECT_EQ(ramp_divisor(options, 9'001, 1600), 1);
+    EXPECT_EQ(ramp_divisor(options, 1, 399), 2);
+    EXPECT_EQ(ramp_divisor(options, 1, 199), 1);
+}
+
+TEST(ResolutionRamp, a_divided_camera_sees_the_same) {
+    Camera camera;
+    camera.width = 203;
+    camera.height = 98;
+    camera.fx = 150;
+    camera.fy = 160;
+    camera.cx = 90;
+    camera.cy = 49;
+    const Camera smaller = divided(camera, 4);
+    EXPECT_EQ(smaller.width, 51);
+    EXPECT_EQ(smaller.height, 25);
+    for (const double edge : {0.0, 1.0}) {  // rays through the picture's edges
+        EXPECT_NEAR((edge * smaller.width - smaller.cx) / smaller.fx,
+                    (edge * camera.width - camera.cx) / camera.fx, 1e-12);
+        EXPECT_NEAR((edge * smaller.height - smaller.cy) / smaller.fy,
+                    (edge * camera.height - camera.cy) / camera.fy, 1e-12);
+    }
+}
+
+TEST(ResolutionRamp, serves_adc_too_and_ends_at_the_full_size) {
+    TinyTraining t = tiny_training({.width = 400, .height = 32});
+    t.options.resolution_ramp = true;
+    t.options.iterations = 20;
+    Trainer trainer = t.trainer();
+    std::vector<int> divisors;
+    while (trainer.iteration() < 20) {
+        trainer.step();
+        divisors.push_back(trainer.resolution_divisor());
+    }
+    trainer.drain();
+    EXPECT_EQ(std::count(divisors.begin(), divisors.end(), 4), 2);
+    EXPECT_EQ(std::count(divisors.begin(), divisors.end(), 2), 4);
+    EXPECT_EQ(std::count(divisors.begin(), divisors.end(), 1), 14);
+    EXPECT_EQ(trainer.counters().bad_gradients, 0U);
+}
+
+}  // namespace
+}  // namespace darb::test

@@ -1,0 +1,30 @@
+#include "tools/darb/tune_flags.h"
+
+#include <fmt/format.h>
+
+#include "engine/render/tuner.h"
+
+namespace darb {
+
+void add_tune_flags(CLI::App& command, TuneFlags& flags) {
+    command.add_option("--tune", flags.choice,
+                       "run passes in these ways, such as scatter=ballot,backward=buckets; an "
+                       "unknown name lists those of the device");
+    command.add_flag("--retune", flags.retune,
+                     "measure which ways are the fastest on this device, and keep the result");
+}
+
+void settle_tuning(Device& device, const TuneFlags& flags) {
+    tune(device, {flags.choice, flags.retune,
+                  [](const std::string& line) { fmt::print(stderr, "{}\n", line); }});
+}
+
+std::string tuning_of_listed(const DeviceInfo& info) {
+    if (const auto record = read_tuning(info, default_cache_folder()))
+        return "measured: " + tuning_text(*record);
+    const std::string usual = variants_text(default_variants(info));
+    return usual + (is_known_device(info) ? " (known; --retune measures)"
+                                          : " (to be measured at the first use)");
+}
+
+}  // namespace darb

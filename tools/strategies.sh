@@ -1,0 +1,109 @@
+#!/usr/bin/env bash
+# The strategies adc, mcmc and budget side by side on data sets: the time that each takes to adc's final PSNR on
+# held-out views, and its final PSNR at adc's number of splats, which is the budget of the two others.
+#   tools/strategies.sh [-o OUT] [-n ITERATIONS] [-s "SEED..."] [-e EVALUATIONS] SET... [-- options of darb train...]
+# Default: -o strategies -n 30000 -s 0 -e 30. Runs lie in OUT/SET/STRATEGY/seedN: finished ones are kept, one that was
+# interrupted goes on. Times are those of training alone; run it on a quiet machine. DARB= names another command.
+set -euo pipefail
+
+usage() { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+fail() { echo "strategies.sh: $*" >&2; exit 2; }
+out=strategies iterations=30000 seeds=0 evaluations=30 sets=() options=()
+while [[ $# -gt 0 ]]; do
+    case $1 in
+        -o) out=${2:?} ;;
+        -n) iterations=${2:?} ;;
+        -s) seeds=${2:?} ;;
+        -e) evaluations=${2:?} ;;
+        --) shift; options=("$@"); break ;;
+        -*) usage ;;
+        *) sets+=("$1"); shift; continue ;;
+    esac
+    shift 2
+done
+[[ ${#sets[@]} -gt 0 ]] || usage
+[[ $iterations -ge $evaluations && $evaluations -ge 1 ]] || fail "fewer iterations than evaluations"
+darb=${DARB:-$(cd "$(dirname "$0")/.." && pwd)/build/darb}
+[[ -x $darb ]] || fail "$darb is not built; name another with DARB="
+
+at=()
+for ((k = 1; k <= evaluations; ++k)); do at+=($((iterations * k / evaluations))); done
+
+value() { # FILE KEY
+    python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$1" "$2"
+}
+
+finished() { # FOLDER
+    [[ -f $1/metrics.json ]] && [[ $(value "$1/metrics.json" interrupted) == False ]] &&
+        [[ $(value "$1/metrics.json" iteration) == "$iterations" ]]
+}
+
+run() { # SET FOLDER options of darb train...
+    local set=$1 folder=$2 resume=()
+    shift 2
+    if finished "$folder"; then echo "$folder: is there" >&2; return; fi
+    [[ ! -f $folder/checkpoint.darb ]] || resume=(--resume)
+    echo "$folder" >&2
+    "$darb" train "$set" -o "$folder" --eval --iterations "$iterations" --test-iterations "${at[@]}" \
+        --save-iterations "$iterations" --no-report -q "${resume[@]}" "${options[@]}" "$@"
+    finished "$folder" || { echo "strategies.sh: interrupted; the same command goes on" >&2; exit 1; }
+}
+
+for set in "${sets[@]}"; do
+    for seed in $seeds; do
+        folder=$out/$(basename "$set")
+        run "$set" "$folder/adc/seed$seed" --seed "$seed" --strategy adc
+        splats=$(value "$folder/adc/seed$seed/metrics.json" splats)
+        for strategy in mcmc budget; do
+            run "$set" "$folder/$strategy/seed$seed" --seed "$seed" --strategy "$strategy" --budget "$splats"
+        done
+    done
+done
+
+python3 - "$out" "$iterations" "$seeds" "${sets[@]}" <<'PYTHON'
+import json
+import os
+import sys
+
+out, iterations, seeds, sets = sys.argv[1], int(sys.argv[2]), sys.argv[3].split(), sys.argv[4:]
+
+
+def time_to(evaluations, psnr):
+    """Seconds of training until the PSNR is first reached, linear between evaluations; None: never."""
+    before = None
+    for e in evaluations:
+        if e["psnr_db"] >= psnr:
+            if before is None:
+                return e["seconds"]
+            share = (psnr - before["psnr_db"]) / (e["psnr_db"] - before["psnr_db"])
+            return before["seconds"] + share * (e["seconds"] - before["seconds"])
+        before = e
+    return None
+
+
+def mean(values):
+    return sum(values) / len(values)
+
+
+print(f"\n{iterations} iterations, seeds {' '.join(seeds)}: means over the seeds, times in s of training alone\n")
+print("| set | strategy | splats | PSNR dB | SSIM | whole run | to adc's final PSNR | seeds that got there |")
+print("|---|---|---|---|---|---|---|---|")
+for name in sets:
+    rows = {}
+    for strategy in ("adc", "mcmc", "budget"):
+        for seed in seeds:
+            path = os.path.join(out, os.path.basename(name.rstrip("/")), strategy, f"seed{seed}", "metrics.json")
+            metrics = json.load(open(path))
+            goal = rows["adc"][len(rows.get(strategy, []))]["psnr_db"] if strategy != "adc" else None
+            last = metrics["evaluations"][-1]
+            rows.setdefault(strategy, []).append({
+                "splats": metrics["splats"], "psnr_db": last["psnr_db"], "ssim": last["ssim"],
+                "seconds": metrics["seconds"],
+                "to": time_to(metrics["evaluations"], last["psnr_db"] if goal is None else goal)})
+    for strategy, runs in rows.items():
+        there = [r["to"] for r in runs if r["to"] is not None]
+        to = f"{mean(there):.1f}" if there else "-"
+        print(f"| {os.path.basename(name.rstrip('/'))} | {strategy} | {mean([r['splats'] for r in runs]):.0f} | "
+              f"{mean([r['psnr_db'] for r in runs]):.2f} | {mean([r['ssim'] for r in runs]):.4f} | "
+              f"{mean([r['seconds'] for r in runs]):.1f} | {to} | {len(there)} of {len(runs)} |")
+PYTHON

@@ -1,0 +1,75 @@
+#include "trainer/densify/error_score.h"
+
+#include <algorithm>
+
+#include "engine/render/groups.h"
+
+namespace darb {
+
+ErrorScore::ErrorScore(Device& device, const LossOptions& photos)
+    : device_(&device),
+      image_(device, "error_image",
+             {{"THREADS", SPLAT_GROUP},
+              {"USE_MASK", photos.use_mask ? 1 : 0},
+              {"USE_ALPHA", photos.use_alpha ? 1 : 0}}),
+      share_(device, "error_share", {{"THREADS", SPLAT_GROUP}}) {
+    reset(0);
+}
+
+BufferList<ErrorScore> ErrorScore::share_buffers(std::uint64_t splats) {
+    return {{&ErrorScore::shares_, "error shares", splats * 2 * sizeof(float)}};
+}
+
+BufferList<ErrorScore> ErrorScore::segment_buffers(std::uint64_t pixels) {
+    return {{&ErrorScore::transmittance_, "transmittance kept", pixels * 4}};
+}
+
+std::uint64_t ErrorScore::device_bytes(std::uint64_t splats, std::uint64_t pixels,
+                                       std::uint32_t list_segments) {
+    std::uint64_t bytes = charged_bytes(share_buffers(std::max<std::uint64_t>(splats, 1)));
+    if (list_segments > 1) bytes += charged_bytes(segment_buffers(pixels));
+    return bytes;
+}
+
+void ErrorScore::reset(std::uint32_t splats) {
+    restore(std::vector<float>(std::size_t{std::max(splats, 1u)} * 2, 0.0f));
+}
+
+std::vector<float> ErrorScore::state(std::uint32_t splats) const {
+    return shares_.download<float>(std::size_t{splats} * 2);
+}
+
+void ErrorScore::restore(const std::vector<float>& state) {
+    const std::uint64_t bytes = state.size() * sizeof(float);
+    if (shares_.bytes() != bytes) make_buffers(*device_, *this, share_buffers(state.size() / 2));
+    shares_.upload(state);
+}
+
+// Long lists: blend_backward keeps the pixels' state in the final transmittance, which the backward
+// pass of the loss wants as it was.
+void ErrorScore::record(Commands& commands, const Forward& forward, Backward& backward,
+                        const Buffer& image, const Buffer& photo, const Buffer& d_image,
+                        std::uint32_t splats, const gpu::CameraData& data,
+                        const glm::vec3& background) {
+    if (splats == 0) return;
+    const std::uint32_t pixels = data.width * data.height;
+    const Groups each_pixel = groups_for(pixels), each_splat = groups_for(splats);
+    const Buffer& transmittance = forward.final_transmittance();
+    const bool several = forward.list_segments() > 1;
+    if (several && transmittance_.bytes() < transmittance.bytes())
+        make_buffers(*device_, *this, segment_buffers(forward.size().pixels));
+    commands.pass("error share");
+    commands.dispatch(
+        image_,
+        gpu::ErrorImageArgs{data.width, data.height, background.r, background.g, background.b},
+        {image, photo, d_image}, each_pixel.x, each_pixel.y);
+    if (several) commands.copy(transmittance, transmittance_, std::uint64_t{pixels} * 4);
+    backward.record_shares(commands, forward, d_image, data);
+    if (several) commands.copy(transmittance_, transmittance, std::uint64_t{pixels} * 4);
+    commands.dispatch(share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
+                      {forward.pair_count(), forward.pair_begin(), backward.partials(),
+                       forward.status(), shares_},
+                      each_splat.x, each_splat.y);
+}
+
+}  // namespace darb

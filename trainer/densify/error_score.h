@@ -1,0 +1,49 @@
+// ErrorScore: which splats stand where the pictures are wrong. Of several training photos since the
+// last round, each splat's share of the error |picture - photo|, weighted as it is blended there:
+// sum over pixels of alpha T e. Place: budget. The idea of scores over several views is that of
+// Taming 3DGS (arXiv 2406.15643) and FastGS (arXiv 2511.04283); this form needs no pass of its own
+// over the pixels: blend_backward sums alpha T dL/dcolour, and is given e for dL/dcolour.
+#pragma once
+
+#include <vector>
+
+#include "engine/render/backward.h"
+#include "engine/render/forward.h"
+#include "engine/render/loss.h"
+#include "shaders/shared/strategy_args.h"
+
+namespace darb {
+
+class ErrorScore {
+  public:
+    /// photos: how the loss reads them.
+    ErrorScore(Device& device, const LossOptions& photos);
+
+    /// Room for so many splats, all at zero; forgets what was there. The queue must be idle.
+    void reset(std::uint32_t splats);
+
+    /// Device memory for so many splats beside frames of so many pixels.
+    static std::uint64_t device_bytes(std::uint64_t splats, std::uint64_t pixels,
+                                      std::uint32_t list_segments);
+
+    /// Recorded between Forward::record of a frame and its loss; image: the picture that is
+    /// compared. d_image [3][H][W] is scratch here.
+    void record(Commands& commands, const Forward& forward, Backward& backward, const Buffer& image,
+                const Buffer& photo, const Buffer& d_image, std::uint32_t splats,
+                const gpu::CameraData& data, const glm::vec3& background);
+
+    /// [N][2]: sum over the photos of the splat's share of their mean error; 1 where one saw it.
+    const Buffer& shares() const { return shares_; }
+    std::vector<float> state(std::uint32_t splats) const;
+    void restore(const std::vector<float>& state);
+
+  private:
+    static BufferList<ErrorScore> share_buffers(std::uint64_t splats);
+    static BufferList<ErrorScore> segment_buffers(std::uint64_t pixels);
+
+    Device* device_;
+    Pipeline image_, share_;
+    Buffer shares_, transmittance_;  // the latter: a copy, where lists take several dispatches
+};
+
+}  // namespace darb

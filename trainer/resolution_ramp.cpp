@@ -1,0 +1,64 @@
+#include "trainer/resolution_ramp.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/render/groups.h"
+#include "shaders/shared/strategy_args.h"
+
+namespace darb {
+
+namespace {
+
+struct Step {
+    double until;  // share of the run
+    int divisor;
+};
+constexpr Step kSteps[] = {{0.1, 4}, {0.3, 2}};
+constexpr int kSmallestSide = 100;  // px
+
+}  // namespace
+
+int ramp_divisor(const TrainOptions& options, int iteration, int longest_side) {
+    if (!options.resolution_ramp) return 1;
+    for (const Step& step : kSteps)
+        if (iteration <= step.until * options.iterations &&
+            longest_side >= kSmallestSide * step.divisor)
+            return step.divisor;
+    return 1;
+}
+
+Camera divided(const Camera& camera, int divisor) {
+    Camera smaller = camera;
+    smaller.width = std::max(1, static_cast<int>(std::lround(double(camera.width) / divisor)));
+    smaller.height = std::max(1, static_cast<int>(std::lround(double(camera.height) / divisor)));
+    const double x = double(smaller.width) / camera.width,
+                 y = double(smaller.height) / camera.height;
+    smaller.fx *= x;
+    smaller.cx *= x;
+    smaller.fy *= y;
+    smaller.cy *= y;
+    return smaller;
+}
+
+ResolutionRamp::ResolutionRamp(Device& device)
+    : device_(&device),
+      commands_(device),
+      pipeline_(device, "downsample_photo", {{"THREADS", SPLAT_GROUP}}) {}
+
+Buffer ResolutionRamp::downsample(const Buffer& photo, const Camera& camera,
+                                  const Camera& smaller) {
+    const gpu::DownsampleArgs args{
+        static_cast<std::uint32_t>(camera.width), static_cast<std::uint32_t>(camera.height),
+        static_cast<std::uint32_t>(smaller.width), static_cast<std::uint32_t>(smaller.height)};
+    const std::uint64_t pixels = std::uint64_t{args.out_width} * args.out_height;
+    Buffer result(*device_, "smaller " + photo.name(), pixels * 4);
+    const Groups g = groups_for(pixels);
+    commands_.begin();
+    commands_.pass("downsample");
+    commands_.dispatch(pipeline_, args, {photo, result}, g.x, g.y);
+    commands_.submit_and_wait();
+    return result;
+}
+
+}  // namespace darb

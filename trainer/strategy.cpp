@@ -1,0 +1,82 @@
+#include "trainer/strategy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace darb {
+
+namespace {
+
+constexpr std::pair<Strategy, std::string_view> kNames[] = {
+    {Strategy::adc, "adc"}, {Strategy::mcmc, "mcmc"}, {Strategy::budget, "budget"}};
+
+constexpr double kGrowth = 1.05;  // of mcmc, a round
+
+}  // namespace
+
+std::string_view strategy_name(Strategy strategy) {
+    for (const auto& [row, name] : kNames)
+        if (row == strategy) return name;
+    return "";
+}
+
+std::optional<Strategy> strategy_from_name(std::string_view name) {
+    for (const auto& [strategy, row] : kNames)
+        if (row == name) return strategy;
+    return std::nullopt;
+}
+
+void use_strategy(Strategy strategy, TrainOptions& options) {
+    const TrainOptions adc;
+    options.strategy = strategy;
+    options.initial_opacity = adc.initial_opacity;
+    options.initial_scale = adc.initial_scale;
+    options.prune_opacity = adc.prune_opacity;
+    options.opacity_decay = adc.opacity_decay;
+    options.resolution_ramp = adc.resolution_ramp;
+    if (strategy == Strategy::mcmc) {  // its authors' values
+        options.initial_opacity = 0.5f;
+        options.initial_scale = 0.1f;
+        options.prune_opacity = 0.005f;
+    }
+    if (strategy == Strategy::budget) {
+        options.opacity_decay = 0.01f;
+        options.resolution_ramp = true;
+    }
+}
+
+bool refines_after(const TrainOptions& options, int iteration) {
+    return iteration > options.densify_from && iteration < options.densify_end() &&
+           iteration % options.densify_interval == 0;
+}
+
+std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uint32_t count,
+                            std::uint32_t limit) {
+    if (options.strategy == Strategy::mcmc) {
+        const double grown = std::ceil(kGrowth * count);
+        return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
+    }
+    if (options.strategy != Strategy::budget || count >= limit) return limit;
+    const int interval = options.densify_interval;
+    const int last = (options.densify_end() - 1) / interval * interval;
+    const double rounds = std::max(1, (last - iteration) / interval + 1);  // this one counted
+    const double stays = (rounds - 1) / rounds;
+    return limit - static_cast<std::uint32_t>((limit - count) * stays * stays);
+}
+
+Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit) {
+    double count = start, sum = 0;
+    int since = 0;
+    for (int i = options.densify_interval; i < options.iterations; i += options.densify_interval) {
+        if (!refines_after(options, i)) continue;
+        sum += count * (i - since);
+        since = i;
+        const auto target = growth_target(options, i, static_cast<std::uint32_t>(count), limit);
+        if (count < limit) count = std::min<double>(2 * count, target);
+    }
+    sum += count * (options.iterations - since);
+    return {static_cast<std::uint32_t>(count), sum / std::max(options.iterations, 1)};
+}
+
+}  // namespace darb
