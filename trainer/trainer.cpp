@@ -106,6 +106,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
         for (const int view : train_views_) train_data.push_back(camera_data_[view]);
         train_cameras_ = upload_cameras(device, train_data);
     }
+    if (options_.morton_order) morton_.emplace(device);
     if (options_.exposure)
         exposure_.emplace(device, static_cast<std::uint32_t>(train_views_.size()), pixels);
     make_strategy(dataset);
@@ -331,6 +332,7 @@ void Trainer::density_control(int iteration) {
         counters_.pruned += result.pruned;
         if (result.grown > 0 || result.pruned > 0) note_round(result.before);
         smoothing_stale_ |= result.grown > 0 || result.pruned > 0;
+        settle_order();
         backward_.reserve(splats_.count(), 0);
         Commands& commands = flights_[0].commands;
         commands.begin();

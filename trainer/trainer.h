@@ -20,6 +20,7 @@
 #include "trainer/densify/density_control.h"
 #include "trainer/densify/error_score.h"
 #include "trainer/densify/mcmc.h"
+#include "trainer/densify/morton_order.h"
 #include "trainer/exposure.h"
 #include "trainer/memory_plan.h"
 #include "trainer/options.h"
@@ -158,6 +159,7 @@ class Trainer {
     double position_rate(int iteration) const;
     glm::vec3 background_for(int iteration) const;
     std::uint32_t splats_within_memory() const;
+    void settle_order();                    // after a round of density control
     void note_memory();                     // into planned_bytes_, what is held now
     void note_round(std::uint32_t before);  // the same of a round of density control just over
     void check_gradients(int iteration, const gpu::FrameStatus& status) const;
@@ -182,6 +184,7 @@ class Trainer {
     DensityControl density_;
     std::optional<Mcmc> mcmc_;                  // Strategy::mcmc
     std::optional<ErrorScore> score_;           // Strategy::budget
+    std::optional<MortonOrder> morton_;         // options.morton_order
     bool smoothing_stale_ = true;               // splats came or went
     Buffer train_cameras_;                      // options.antialias
     std::optional<SmoothingFilter> smoothing_;  // options.antialias
