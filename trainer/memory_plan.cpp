@@ -16,7 +16,7 @@ namespace darb {
 
 namespace {
 
-constexpr double kLastSmall = 0.3;       // share of a run: the resolution ramp's last smaller photos
+constexpr double kLastSmall = 0.3;  // share of a run: the resolution ramp's last smaller photos
 constexpr std::uint64_t kFewest = 1024;  // splats and pairs that Forward and Backward make room for
 
 FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
@@ -71,8 +71,8 @@ std::uint64_t strategy_bytes(const MemoryDemand& demand) {
     if (demand.small_cameras > 0) bytes += cameras_bytes(demand.small_cameras);
     if (demand.relocates) bytes += Mcmc::device_bytes();
     if (demand.scores)
-        bytes += ErrorScore::device_bytes(demand.splats, std::uint64_t(demand.width) * demand.height,
-                                          demand.list_segments);
+        bytes += ErrorScore::device_bytes(
+            demand.splats, std::uint64_t(demand.width) * demand.height, demand.list_segments);
     return bytes;
 }
 
