@@ -78,7 +78,6 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       flights_{Flight(device), Flight(device)} {
     if (options_.max_memory_bytes > 0) device.set_memory_budget(options_.max_memory_bytes);
     add_photos(dataset.views, options, demand_);
-    demand_.bucket = forward_.bucket();
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
                dataset.views.size());
     std::uint64_t pixels = 1;
