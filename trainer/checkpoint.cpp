@@ -238,6 +238,7 @@ std::string settings_text(const TrainOptions& o) {
     if (o.strategy == Strategy::mcmc) settings["noise_lr"] = o.noise_lr;
     if (o.strategy == Strategy::budget) settings["opacity_decay"] = o.opacity_decay;
     if (o.resolution_ramp) settings["resolution_ramp"] = true;
+    if (o.morton_order) settings["morton_order"] = true;
     return settings.dump();
 }
 
@@ -282,8 +283,8 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
                     fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
                                 strategy_name(options.strategy)),
                     "Repeat the strategy of that run, or start without --resume.");
-    if (before.is_object() && before.contains("resolution_ramp"))
-        now.emplace("resolution_ramp", false);
+    for (const char* option : {"resolution_ramp", "morton_order"})
+        if (before.is_object() && before.contains(option)) now.emplace(option, false);
     std::string differences;
     for (const auto& [name, value] : now.items())
         if (!before.is_object() || !before.contains(name) || before[name] != value)

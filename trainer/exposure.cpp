@@ -23,16 +23,24 @@ Exposure::Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels)
     : photos_(photos),
       map_(device, "exposure", {{"THREADS", SPLAT_GROUP}}),
       backward_(device, "exposure_backward", {}, false),
-      update_(device, "exposure_update", {}, false),
-      maps_(device, "exposure maps", std::uint64_t{photos} * EXPOSURE_TERMS * 4),
-      moments_(device, "exposure moments", std::uint64_t{photos} * EXPOSURE_TERMS * 8),
-      mapped_(device, "mapped image", pixels * 12),
-      partials_(device, "exposure partials", EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS * 4) {
+      update_(device, "exposure_update", {}, false) {
+    make_buffers(device, *this, buffers(photos, pixels));
     std::vector<float> start;
     for (std::uint32_t p = 0; p < photos; ++p)
         start.insert(start.end(), kIdentityColours.begin(), kIdentityColours.end());
     start.resize(state_size(photos));
     restore(start);
+}
+
+BufferList<Exposure> Exposure::buffers(std::uint64_t photos, std::uint64_t pixels) {
+    return {{&Exposure::maps_, "exposure maps", photos * EXPOSURE_TERMS * 4},
+            {&Exposure::moments_, "exposure moments", photos * EXPOSURE_TERMS * 8},
+            {&Exposure::mapped_, "mapped image", pixels * 12},
+            {&Exposure::partials_, "exposure partials", EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS * 4}};
+}
+
+std::uint64_t Exposure::device_bytes(std::uint32_t photos, std::uint64_t pixels) {
+    return charged_bytes(buffers(photos, pixels));
 }
 
 void Exposure::record(Commands& commands, const Buffer& image, std::uint32_t photo,

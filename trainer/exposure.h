@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 #include "trainer/exposure_fit.h"
@@ -15,6 +16,9 @@ class Exposure {
   public:
     /// For `photos` photos of at most `pixels` pixels, all identities.
     Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels);
+
+    /// Device memory of an Exposure made with these arguments.
+    static std::uint64_t device_bytes(std::uint32_t photos, std::uint64_t pixels);
 
     /// image [3][H W] -> mapped(), the picture as this photo shows it.
     void record(Commands& commands, const Buffer& image, std::uint32_t photo, std::uint32_t pixels);
@@ -33,6 +37,7 @@ class Exposure {
     static std::size_t state_size(std::size_t photos) { return photos * 36; }
 
   private:
+    static BufferList<Exposure> buffers(std::uint64_t photos, std::uint64_t pixels);
     std::uint32_t photos_;
     Pipeline map_, backward_, update_;
     Buffer maps_, moments_, mapped_, partials_;

@@ -84,6 +84,8 @@ double timed_steps(Trainer& trainer, int most) {
 Measurement measure_training(Device& device, const Dataset& few, const SplatModel& model,
                              TrainOptions options) {
     options.densify_until = 0;
+    options.probe_sh = false;
+    options.sh_degree = model.sh_degree;
     options.resolution_ramp = false;
     SplatModel placeholder;  // restore() brings the model; two at once would double the memory
     placeholder.sh_degree = model.sh_degree;
@@ -143,6 +145,14 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
     return std::max(start, static_cast<std::uint32_t>(std::min(wanted, most)));
 }
 
+// Probes on the photos of five small data sets admitted degree 0 or 1 and never 2.
+ColourDegrees predict_degrees(const TrainOptions& options) {
+    if (!options.probe_sh) return {options.sh_degree, options.sh_degree};
+    const int interval = std::max(options.sh_interval, 1);
+    const int trials = (options.iterations - 1) / interval;  // the first at the interval
+    return {std::min({1, options.sh_degree, trials}), std::min({2, options.sh_degree, trials})};
+}
+
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
     TrainOptions adc = options;
     use_strategy(Strategy::adc, adc);
@@ -190,11 +200,13 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
 
 Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
                            bool measure) {
-    const SplatModel start = initial_model(dataset, options);
+    SplatModel start = initial_model(dataset, options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
-    if (tuning_of(scratch).backward == BackwardBlend::buckets)
-        f.demand.bucket = bucket_pairs(scratch);
+    const ColourDegrees degrees = predict_degrees(options);
+    start.sh_degree = degrees.end;
+    start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
+    f.demand.sh_degree = degrees.most;
     f.start_splats = static_cast<std::uint32_t>(start.size());
     const std::uint32_t limit = std::min(options.max_splats, GpuSplats::max_count(scratch, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);

@@ -17,13 +17,22 @@ struct Forecast {
     std::uint32_t splats = 0;         // at the end
     double start_ms = 0, end_ms = 0;  // an iteration at these counts; 0: not measured
     double seconds = 0;               // of the whole run; 0: not measured
-    MemoryDemand demand;              // at the end
+    // At the end. Exact is what the plan makes of it; splats, pairs and degree are as uncertain as
+    // the constants in the .cpp.
+    MemoryDemand demand;
 };
 
 /// Splats at the end, from those at the start and the pixels of all training photos: a rule of
 /// thumb, see the constants in the .cpp. limit: what the device and options.max_splats allow.
 std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit);
+
+/// The degree of colour that a run is expected to end with, and the most that its buffers hold on
+/// the way: with options.probe_sh one more is on trial.
+struct ColourDegrees {
+    int end = 0, most = 0;
+};
+ColourDegrees predict_degrees(const TrainOptions& options);
 
 /// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
 /// end with, from the same start.

@@ -2,95 +2,166 @@
 
 #include <algorithm>
 
-#include "shaders/shared/effect_args.h"
-#include "shaders/shared/limits.h"
-#include "shaders/shared/render_args.h"
+#include "engine/render/backward.h"
+#include "engine/render/loss.h"
+#include "trainer/densify/density_control.h"
+#include "trainer/densify/error_score.h"
+#include "trainer/densify/mcmc.h"
+#include "trainer/densify/round_buffers.h"
+#include "trainer/exposure.h"
+#include "trainer/resolution_ramp.h"
+#include "trainer/trainer.h"
 
 namespace darb {
 
 namespace {
 
-constexpr std::uint64_t kFloat = 4;
-constexpr std::uint64_t kOtherFloats = 14;  // position 3, scale 3, rotation 4, opacity 1, colour 3
+constexpr double kLastSmall = 0.3;  // share of a run: the resolution ramp's last smaller photos
+constexpr std::uint64_t kFewest = 1024;  // splats and pairs that Forward and Backward make room for
 
-// Shape, light, bound and cover, 16 bytes each; eight words; a key and a value of the depth sort;
-// the sums of gradients for density control.
-constexpr std::uint64_t kFrameBytes = 4 * 16 + 8 * 4 + 2 * 4 + 2 * 4;
-// Tile, splat and order; a key and a value of the tile sort; three partial gradients.
-constexpr std::uint64_t kPairBytes = 3 * 4 + 2 * 4 + 3 * 16;
-constexpr std::uint64_t kPhotoBytes = 4;  // RGBA
-// Picture and its gradient, three planes each; final transmittance and last pair.
-constexpr std::uint64_t kImageBytes = 2 * 12 + 2 * 4;
-// Five words and two offsets into sources, two words each for up to twice the splats.
-constexpr std::uint64_t kDensifyBytes = 5 * 4 + 2 * 2 * 4;
-// Exposure: a second picture of three planes; a map and two moments a photo; partial sums.
-constexpr std::uint64_t kMappedBytes = 12, kMapBytes = 3 * EXPOSURE_TERMS * 4,
-                        kMapPartials = EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS * 4;
-// The 3D filter: a deviation a splat, and the cameras a second time.
-constexpr std::uint64_t kDeviationBytes = 4;
-// Counters of sort and scan, smaller than a word per splat or pair together.
-constexpr double kCounters = 0.25;
-
-std::uint64_t rest_floats(int sh_degree) {
-    return static_cast<std::uint64_t>((sh_degree + 1) * (sh_degree + 1) - 1) * 3;
+FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
+    const auto room = [](std::uint64_t wanted, std::uint64_t most) {
+        return static_cast<std::uint32_t>(std::max(std::min(wanted, most), kFewest));
+    };
+    FrameSize size;
+    size.splats = room(std::max(demand.splats, demand.room_splats), 0xFFFFFFFFu);
+    size.pairs = room(demand.pairs, Forward::max_pairs(device));
+    size.pixels = std::uint64_t(demand.width) * demand.height;
+    size.tiles = image_tiles(demand.width, demand.height);
+    size.list_segments = demand.list_segments;
+    size.cooperates = demand.cooperates;
+    size.bucket = Forward::bucket(device, demand.frame);
+    return size;
 }
 
-std::uint64_t tiles(int pixels) {
-    return (static_cast<std::uint64_t>(pixels) + TILE_SIZE - 1) / TILE_SIZE;
+std::uint64_t moment_bytes(std::uint64_t splats, int sh_degree, bool largest) {
+    std::uint64_t sum = 0, most = 0;
+    for (const std::uint64_t stride : GpuSplats::strides(sh_degree)) {
+        const std::uint64_t bytes = Buffer::charged_bytes(2 * splats * stride * sizeof(float));
+        sum += bytes;
+        most = std::max(most, bytes);
+    }
+    return largest ? most : sum;
+}
+
+std::uint64_t cameras_bytes(std::uint64_t cameras) {
+    return Buffer::charged_bytes(cameras * sizeof(gpu::CameraData));
+}
+
+std::uint64_t image_bytes(const Device& device, const MemoryDemand& demand) {
+    constexpr std::uint64_t flight = Buffer::charged_bytes(sizeof(gpu::LossResult)) +
+                                     Buffer::charged_bytes(sizeof(gpu::FrameStatus));
+    return Buffer::charged_bytes(demand.image_pixels * 12) +
+           Loss::device_bytes(device, demand.width, demand.height) + cameras_bytes(demand.views) +
+           2 * flight + DensityControl::fixed_bytes();
+}
+
+std::uint64_t effect_bytes(const MemoryDemand& demand) {
+    std::uint64_t bytes = Buffer::charged_bytes(4);  // of the smoothing filter, where it is off
+    if (demand.smoothing_photos > 0)
+        bytes = Buffer::charged_bytes(std::max<std::uint64_t>(demand.splats, 1) * 4) +
+                cameras_bytes(demand.smoothing_photos);
+    if (demand.exposure_photos > 0)
+        bytes += Exposure::device_bytes(demand.exposure_photos, demand.image_pixels);
+    return bytes;
+}
+
+std::uint64_t strategy_bytes(const MemoryDemand& demand) {
+    std::uint64_t bytes = demand.small_pixels * 4;
+    if (demand.small_cameras > 0) bytes += cameras_bytes(demand.small_cameras);
+    if (demand.relocates) bytes += Mcmc::device_bytes();
+    if (demand.scores)
+        bytes += ErrorScore::device_bytes(
+            demand.splats, std::uint64_t(demand.width) * demand.height, demand.list_segments);
+    return bytes;
+}
+
+MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
+    const FrameSize size = frame_size(device, demand);
+    FrameBytes bytes = Forward::device_bytes(device, demand.frame, size);
+    bytes += Backward::device_bytes(size);
+    MemoryPlan plan;
+    plan.parameters = GpuSplats::parameter_bytes(demand.splats, demand.sh_degree);
+    plan.moments = moment_bytes(demand.splats, demand.sh_degree, false);
+    plan.frame = bytes.splats;
+    plan.pairs = bytes.pairs;
+    plan.photos = demand.photo_pixels * 4;
+    plan.images = bytes.images + image_bytes(device, demand);
+    plan.effects = effect_bytes(demand) + strategy_bytes(demand);
+    return plan;
 }
 
 }  // namespace
 
-MemoryPlan plan_memory(const MemoryDemand& demand) {
-    const std::uint64_t n = demand.splats, rest = rest_floats(demand.sh_degree);
-    MemoryPlan plan;
-    plan.parameters = n * kFloat * (kOtherFloats + rest);
-    plan.moments = 2 * plan.parameters;
-    plan.frame = n * kFrameBytes + static_cast<std::uint64_t>(kCounters * static_cast<double>(n));
-    plan.pairs = demand.pairs * kPairBytes +
-                 static_cast<std::uint64_t>(kCounters * static_cast<double>(demand.pairs));
-    plan.photos = demand.photo_pixels * kPhotoBytes;
-    plan.images = demand.image_pixels * kImageBytes;
-    if (demand.exposure_photos > 0)
-        plan.effects +=
-            demand.image_pixels * kMappedBytes + demand.exposure_photos * kMapBytes + kMapPartials;
-    if (demand.smoothing_photos > 0)
-        plan.effects += n * kDeviationBytes + demand.smoothing_photos * sizeof(gpu::CameraData);
-    if (demand.bucket >
-        0)  // a record for each full bucket and for each tile, and its tile's number
-        plan.checkpoints = (demand.pairs / demand.bucket + demand.image_tiles) *
-                           (CHECKPOINT_BYTES + sizeof(std::uint32_t));
-    // Attributes are replaced one at a time: the largest, the moments of one, exists twice.
-    if (demand.densifies)
-        plan.densify = n * (kDensifyBytes + 2 * kFloat * std::max<std::uint64_t>(rest, 4));
+std::uint64_t round_peak(const Device& device, const MemoryDemand& demand, std::uint32_t before,
+                         std::uint32_t after) {
+    const MemoryPlan plan = plan_resident(device, demand);
+    return plan.resident() - plan.parameters - plan.moments +
+           round_bytes(before, after, demand.sh_degree);
+}
+
+MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand) {
+    MemoryPlan plan = plan_resident(device, demand);
+    if (demand.densifies) {
+        const auto n = static_cast<std::uint32_t>(demand.splats);
+        plan.densify = round_peak(device, demand, n, n) - plan.resident();
+    }
+    if (!device.info().unified_memory)
+        plan.staging = Buffer::staging_bytes(moment_bytes(demand.splats, demand.sh_degree, true));
     return plan;
 }
 
-std::uint64_t splats_within(const MemoryDemand& demand, std::uint64_t budget_bytes) {
-    MemoryDemand fixed = demand;
-    fixed.splats = fixed.pairs = 0;
-    const std::uint64_t fixed_bytes = plan_memory(fixed).total();
-    const std::uint64_t bytes = plan_memory(demand).total() - fixed_bytes;
-    if (budget_bytes <= fixed_bytes || bytes == 0) return 0;
-    return static_cast<std::uint64_t>(static_cast<double>(demand.splats) *
-                                      static_cast<double>(budget_bytes - fixed_bytes) /
-                                      static_cast<double>(bytes));
+std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
+                            std::uint64_t budget_bytes) {
+    const double pairs = double(demand.pairs) / std::max(double(demand.splats), 1.0);
+    const auto total = [&](std::uint64_t splats) {
+        MemoryDemand d = demand;
+        d.splats = splats;
+        d.pairs = static_cast<std::uint64_t>(pairs * static_cast<double>(splats));
+        return plan_memory(device, d).total();
+    };
+    const std::uint64_t fixed_bytes = total(0), all_bytes = total(demand.splats);
+    if (budget_bytes <= fixed_bytes || all_bytes <= fixed_bytes) return 0;
+    const double each = double(all_bytes - fixed_bytes) / double(demand.splats);
+    auto splats = static_cast<std::uint64_t>(double(budget_bytes - fixed_bytes) / each);
+    // Almost a line: what whole blocks add is taken off again.
+    for (std::uint64_t bytes; splats > 0 && (bytes = total(splats)) > budget_bytes;)
+        splats -=
+            std::min(splats, 1 + static_cast<std::uint64_t>(double(bytes - budget_bytes) / each));
+    return splats;
 }
 
 void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand) {
     demand.sh_degree = options.sh_degree;
-    std::uint64_t training = 0;
+    demand.frame = forward_options(options);
+    std::uint32_t training = 0;
     for (const View& view : views) {
+        demand.width = std::max(demand.width, view.camera.width);
+        demand.height = std::max(demand.height, view.camera.height);
+        ++demand.views;
+        if (view.is_test) continue;
         const std::uint64_t pixels = std::uint64_t(view.camera.width) * view.camera.height;
         demand.image_pixels = std::max(demand.image_pixels, pixels);
-        demand.image_tiles =
-            std::max(demand.image_tiles, tiles(view.camera.width) * tiles(view.camera.height));
-        if (view.is_test) continue;
         demand.photo_pixels += pixels;
         ++training;
     }
     demand.exposure_photos = options.exposure ? training : 0;
     demand.smoothing_photos = options.antialias ? training : 0;
+    // With Crowds::always every frame is cut and shared from the first on.
+    if (options.crowds == Crowds::always) {
+        demand.cooperates = true;
+        demand.list_segments = 2;
+    }
+    demand.relocates = options.strategy == Strategy::mcmc;
+    demand.scores = options.strategy == Strategy::budget;
+    const int divisor = ramp_divisor(options, static_cast<int>(kLastSmall * options.iterations),
+                                     std::max(demand.width, demand.height));
+    if (divisor == 1) return;
+    for (const View& view : views) {
+        const Camera small = divided(view.camera, divisor);
+        if (!view.is_test) demand.small_pixels += std::uint64_t(small.width) * small.height;
+    }
+    demand.small_cameras = demand.views;
 }
 
 }  // namespace darb

@@ -1,56 +1,75 @@
-// MemoryPlan: how much device memory a training run takes, from the sizes of its buffers (those of
-// trainer.cpp, exposure.cpp, smoothing.cpp, gpu_splats.cpp, forward.cpp, backward.cpp,
-// radix_sort.cpp and density_control.cpp).
+// MemoryPlan: how much device memory a training run takes. Exact where splats, pairs and degree are
+// given: it adds up the lists from which the parts of the trainer make their buffers. What a run
+// will come to is another matter, see forecast.h.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
+#include "engine/render/forward.h"
 #include "trainer/options.h"
 
 namespace darb {
 
 /// What decides the size of a run.
 struct MemoryDemand {
-    std::uint64_t splats = 0;            // N
-    std::uint64_t pairs = 0;             // K that the buffers hold
-    int sh_degree = 3;                   // of the buffers
+    std::uint64_t splats = 0;  // N
+    std::uint64_t pairs = 0;   // K that the buffers hold
+    int sh_degree = 3;         // of the buffers
+    bool densifies = true;     // density control runs at this N
+    ForwardOptions frame;
+    std::uint64_t room_splats = 0;       // N that the frame's buffers hold, where there were more
+    std::uint32_t list_segments = 1;     // as FrameSize
+    bool cooperates = false;             // as FrameSize
+    std::uint32_t views = 0;             // held-out ones, too
+    int width = 1, height = 1;           // px, the most of any view
+    std::uint64_t image_pixels = 1;      // of the largest training photo
     std::uint64_t photo_pixels = 0;      // of all training photos together
-    std::uint64_t image_pixels = 0;      // of the largest view: its width times its height
-    bool densifies = true;               // density control runs at this N
-    std::uint64_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
-    std::uint64_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
-    std::uint64_t image_tiles = 0;       // of the view that has most
-    std::uint32_t bucket = 0;  // pairs of a checkpoint: Forward::bucket; 0: there are none
+    std::uint32_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
+    std::uint32_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
+    bool relocates = false;              // Strategy::mcmc
+    bool scores = false;                 // Strategy::budget
+    // Of the resolution ramp: its smaller photos, of all training photos together, and cameras.
+    std::uint64_t small_pixels = 0;
+    std::uint32_t small_cameras = 0;
 };
 
 /// Bytes of device memory, by what they are for.
 struct MemoryPlan {
     std::uint64_t parameters = 0, moments = 0;
-    std::uint64_t frame = 0;        // per splat, of the forward and backward passes
-    std::uint64_t pairs = 0;        // per splat-tile pair
-    std::uint64_t photos = 0;       // ground truth
-    std::uint64_t images = 0;       // picture, its gradient, what the blend passes share
-    std::uint64_t effects = 0;      // of per-photo exposure and of the 3D filter
-    std::uint64_t checkpoints = 0;  // of the backward blend by buckets
-    std::uint64_t densify = 0;      // for a moment, while density control runs
-    std::uint64_t total() const {
-        return parameters + moments + frame + pairs + photos + images + effects + checkpoints +
-               densify;
+    std::uint64_t frame = 0;    // per splat, of the forward and backward passes
+    std::uint64_t pairs = 0;    // per splat-tile pair
+    std::uint64_t photos = 0;   // ground truth
+    std::uint64_t images = 0;   // picture, its gradient, what the passes share
+    std::uint64_t effects = 0;  // of per-photo exposure, of the 3D filter and of the strategy
+    // For a moment, beyond the rest: while density control runs; while host and device copy.
+    std::uint64_t densify = 0, staging = 0;
+
+    /// What is there between iterations.
+    std::uint64_t resident() const {
+        return parameters + moments + frame + pairs + photos + images + effects;
     }
+    std::uint64_t total() const { return resident() + (densify > staging ? densify : staging); }
 };
 
-/// The peak of a run that ends at this demand; within 10 % of Device::peak_bytes where the demand
-/// is right.
-MemoryPlan plan_memory(const MemoryDemand& demand);
+/// resident() is what Device::allocated_bytes says of a Trainer at this demand, to the byte;
+/// total() the peak of a run that ends there, its last round of density control a small one.
+MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand);
+
+/// The peak of one round of density control in a run of this demand, from `before` to `after`
+/// splats.
+std::uint64_t round_peak(const Device& device, const MemoryDemand& demand, std::uint32_t before,
+                         std::uint32_t after);
 
 /// The most splats whose plan stays within budget_bytes, with pairs in the demand's proportion to
 /// splats; 0 where the photos alone exceed it.
-std::uint64_t splats_within(const MemoryDemand& demand, std::uint64_t budget_bytes);
+std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
+                            std::uint64_t budget_bytes);
 
-/// What a data set and the run's effects demand: all but splats, pairs and densifies. sh_degree:
-/// the highest that the run may reach.
+/// What a data set, the run's effects and its strategy demand: all but splats, pairs and densifies.
+/// sh_degree: the highest that the run may reach. Of a resolution ramp: its larger step.
 void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand);
 
 }  // namespace darb

@@ -65,6 +65,8 @@ struct TrainOptions {
     float prune_opacity = 0.1f;
     float prune_extent = 0.1f;  // share of the scene extent, after the first opacity reset
     int opacity_reset_interval = 3'000;
+    // Whether each round of density control ends with the splats in Morton order in memory.
+    bool morton_order = false;
     std::uint32_t max_splats = std::numeric_limits<std::uint32_t>::max();
     std::uint64_t max_memory_bytes = 0;  // of device memory: growth stops before it; 0: no budget
 

@@ -27,6 +27,13 @@ bool contains(const std::vector<int>& list, int value) {
     return std::find(list.begin(), list.end(), value) != list.end();
 }
 
+// Measured before there is a budget of memory, and no part of the run's peak.
+DeviceRates rates_of(Device& device) {
+    const DeviceRates rates = measure_rates(device);
+    device.forget_peak();
+    return rates;
+}
+
 // Read before the trainer is made: the ways of the device that change bits are those that the run
 // began with.
 std::optional<Checkpoint> checkpoint_of(Device& device, const std::filesystem::path& path) {
@@ -49,6 +56,7 @@ class Run {
           loaded_(run.photos.empty() ? load_photos(dataset.views) : std::vector<ImageU8>{}),
           photos_(run.photos.empty() ? loaded_ : run.photos),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
+          rates_(rates_of(device)),
           tuning_(result_variants(device)),
           checkpoint_(checkpoint_of(device, run.resume_from)),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
@@ -84,6 +92,7 @@ class Run {
     const std::vector<ImageU8> loaded_;  // empty where RunOptions brought the photos
     const std::vector<ImageU8>& photos_;
     const std::string fingerprint_;
+    const DeviceRates rates_;
     const std::string tuning_;              // of this device, before the checkpoint's is used
     std::optional<Checkpoint> checkpoint_;  // to go on with, until resume()
     Trainer trainer_;
@@ -182,7 +191,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
     if (!run_.resume_from.empty()) resume();
-    log_.start(device_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
+    log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
 
     try {
         train(stop);

@@ -99,9 +99,10 @@ void RunLog::write(const Json& event) {
     events_.push_back(event);
 }
 
-void RunLog::start(Device& device, const Dataset& dataset, const TrainOptions& options,
-                   std::uint32_t splats, const std::string& effects_json) {
-    rates_ = measure_rates(device);
+void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
+                   const TrainOptions& options, std::uint32_t splats,
+                   const std::string& effects_json) {
+    rates_ = rates;
     int held_out = 0;
     double pixels = 0;
     for (const View& v : dataset.views) {
@@ -266,6 +267,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"strategy", start_.value("strategy", "adc")},
         {"passes_ms", passes},
         {"peak_device_bytes", device.peak_bytes()},
+        {"planned_device_bytes", trainer.planned_bytes()},
         {"peak_host_bytes", peak_host_bytes()},
         {"redone_iterations", c.redone_iterations},
         {"overflows", c.overflows},

@@ -27,8 +27,9 @@ class RunLog {
     /// Forgets events after an iteration: a resumed run writes them again.
     void cut_after(int iteration);
 
-    void start(Device& device, const Dataset& dataset, const TrainOptions& options,
-               std::uint32_t splats, const std::string& effects_json);
+    /// rates: of the device, for the roofline.
+    void start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
+               const TrainOptions& options, std::uint32_t splats, const std::string& effects_json);
     /// Keeps one line in kLogInterval. counters: of the run so far; totals: of the passes, as
     /// Trainer sums them.
     void iteration(const IterationResult& result, const TrainCounters& counters, double seconds,

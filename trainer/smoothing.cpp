@@ -18,8 +18,10 @@ SmoothingFilter::SmoothingFilter(Device& device, const ProjectionEffects& effect
 
 void SmoothingFilter::update(GpuSplats& splats, const Buffer& cameras, std::uint32_t camera_count) {
     const std::uint64_t bytes = std::uint64_t{std::max(splats.count(), 1u)} * sizeof(float);
-    if (splats.smoothing().bytes() != bytes)
+    if (splats.smoothing().bytes() != bytes) {
+        splats.smoothing() = Buffer();  // first, so that there are never two
         splats.smoothing() = Buffer(*device_, "smoothing", bytes);
+    }
     if (splats.count() == 0) return;
     const Groups g = groups_for(splats.count());
     commands_.begin();

@@ -21,19 +21,6 @@ namespace {
 constexpr float kProbeRestRate = 8;
 constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
-ForwardOptions forward_options(const TrainOptions& options) {
-    ForwardOptions f;
-    f.kernel = options.kernel;
-    f.footprint = options.footprint;
-    set_options(options.accuracy, f);
-    f.sh_stored = options.probe_sh ? 0 : options.sh_degree;
-    f.effects = {options.off_centre || options.lens, options.antialias, options.antialias,
-                 options.lens, options.near_care};
-    f.crowds = options.crowds;
-    f.store_for_backward = true;
-    return f;
-}
-
 // More splats than this share with a gradient that is not finite: something is broken.
 constexpr std::uint64_t kBadGradientShare = 1'000;
 constexpr double kMostPairs =
@@ -55,6 +42,19 @@ int largest(const Dataset& dataset, int Camera::*side) {
 }
 
 }  // namespace
+
+ForwardOptions forward_options(const TrainOptions& options) {
+    ForwardOptions f;
+    f.kernel = options.kernel;
+    f.footprint = options.footprint;
+    set_options(options.accuracy, f);
+    f.sh_stored = options.probe_sh ? 0 : options.sh_degree;
+    f.effects = {options.off_centre || options.lens, options.antialias, options.antialias,
+                 options.lens, options.near_care};
+    f.crowds = options.crowds;
+    f.store_for_backward = true;
+    return f;
+}
 
 Trainer::Flight::Flight(Device& device)
     : loss(device, "loss result", sizeof(gpu::LossResult), Memory::host),
@@ -78,7 +78,6 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       flights_{Flight(device), Flight(device)} {
     if (options_.max_memory_bytes > 0) device.set_memory_budget(options_.max_memory_bytes);
     add_photos(dataset.views, options, demand_);
-    demand_.bucket = forward_.bucket();
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
                dataset.views.size());
     std::uint64_t pixels = 1;
@@ -106,6 +105,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
         for (const int view : train_views_) train_data.push_back(camera_data_[view]);
         train_cameras_ = upload_cameras(device, train_data);
     }
+    if (options_.morton_order) morton_.emplace(device);
     if (options_.exposure)
         exposure_.emplace(device, static_cast<std::uint32_t>(train_views_.size()), pixels);
     make_strategy(dataset);
@@ -195,6 +195,7 @@ void Trainer::launch(int iteration) {
     const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
     forward_.reserve(splats_.count(), pairs, width, height);
     backward_.reserve(splats_.count(), forward_.pair_capacity());
+    note_memory();
 
     flight.iteration = iteration;
     Commands& commands = flight.commands;
@@ -298,20 +299,6 @@ void Trainer::check_gradients(int iteration, const gpu::FrameStatus& status) con
                 "the learning rates.");
 }
 
-// With as many pairs a splat as the buffers hold now, and what is in use beyond the plan.
-std::uint32_t Trainer::splats_within_memory() const {
-    if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
-    MemoryDemand demand = demand_;
-    demand.splats = splats_.count();
-    demand.pairs = forward_.pair_capacity();
-    const MemoryPlan plan = plan_memory(demand);
-    const std::uint64_t in_use = device_->allocated_bytes();
-    const std::uint64_t extra = in_use - std::min(in_use, plan.total() - plan.densify);
-    const std::uint64_t budget = options_.max_memory_bytes;
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(
-        splats_within(demand, budget - std::min(budget, extra)), 0xFFFFFFFFu));
-}
-
 void Trainer::density_control(int iteration) {
     if (iteration >= options_.densify_end()) return;
     const bool round = refines_after(options_, iteration);
@@ -342,7 +329,9 @@ void Trainer::density_control(int iteration) {
             stopped_by_memory_ = within_memory;
         counters_.cloned_or_split += result.grown;
         counters_.pruned += result.pruned;
+        if (result.grown > 0 || result.pruned > 0) note_round(result.before);
         smoothing_stale_ |= result.grown > 0 || result.pruned > 0;
+        settle_order();
         backward_.reserve(splats_.count(), 0);
         Commands& commands = flights_[0].commands;
         commands.begin();
@@ -409,6 +398,7 @@ Trainer::State Trainer::state() {
 
 void Trainer::restore(const State& s) {
     drain();
+    splats_ = GpuSplats();  // first, so that there are never two
     splats_ = GpuSplats(*device_, s.model, true);
     forward_.set_sh_stored(s.model.sh_degree);
     backward_.set_sh_stored(s.model.sh_degree);

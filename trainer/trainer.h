@@ -20,6 +20,7 @@
 #include "trainer/densify/density_control.h"
 #include "trainer/densify/error_score.h"
 #include "trainer/densify/mcmc.h"
+#include "trainer/densify/morton_order.h"
 #include "trainer/exposure.h"
 #include "trainer/memory_plan.h"
 #include "trainer/options.h"
@@ -52,6 +53,9 @@ struct PassTotal {
     std::string name;
     double ms = 0;
 };
+
+/// The frames that training takes.
+ForwardOptions forward_options(const TrainOptions& options);
 
 class Trainer {
   public:
@@ -102,6 +106,10 @@ class Trainer {
     std::uint32_t stopped_by_memory() const { return stopped_by_memory_; }
     /// The same where frames came near the pairs that the device's bindings hold.
     std::uint32_t stopped_by_pairs() const { return stopped_by_pairs_; }
+    /// What plan_memory() asks for what the trainer holds now.
+    MemoryDemand memory_demand() const;
+    /// The peak that the plans for all it held so far come to; Device::peak_bytes measures it.
+    std::uint64_t planned_bytes() const;
 
     /// The state beside the model that a checkpoint holds. moments: [attribute][2 N stride].
     struct State {
@@ -151,6 +159,9 @@ class Trainer {
     double position_rate(int iteration) const;
     glm::vec3 background_for(int iteration) const;
     std::uint32_t splats_within_memory() const;
+    void settle_order();                    // after a round of density control
+    void note_memory();                     // into planned_bytes_, what is held now
+    void note_round(std::uint32_t before);  // the same of a round of density control just over
     void check_gradients(int iteration, const gpu::FrameStatus& status) const;
     AdamStep rates(int iteration) const;
 
@@ -173,6 +184,7 @@ class Trainer {
     DensityControl density_;
     std::optional<Mcmc> mcmc_;                  // Strategy::mcmc
     std::optional<ErrorScore> score_;           // Strategy::budget
+    std::optional<MortonOrder> morton_;         // options.morton_order
     bool smoothing_stale_ = true;               // splats came or went
     Buffer train_cameras_;                      // options.antialias
     std::optional<SmoothingFilter> smoothing_;  // options.antialias
@@ -191,6 +203,8 @@ class Trainer {
     std::array<Flight, 2> flights_;
     int iteration_ = 0;
     MemoryDemand demand_;  // its photos
+    std::array<std::uint64_t, 6> noted_{};
+    std::uint64_t planned_bytes_ = 0;
     std::uint32_t stopped_by_memory_ = 0, stopped_by_pairs_ = 0;
     TrainCounters counters_;
     std::vector<PassTotal> pass_totals_;

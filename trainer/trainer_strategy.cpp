@@ -78,6 +78,7 @@ void Trainer::settle_resolution(int iteration) {
     divisor_ = divisor;
     small_data_.clear();
     small_photos_.clear();
+    small_cameras_ = Buffer();
     if (divisor == 1) return;
     for (size_t v = 0; v < photo_cameras_.size(); ++v) {
         const Camera& camera = photo_cameras_[v];

@@ -81,7 +81,7 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
     Device::State& state = device.state();
     const std::string what = describe(name_, bytes_);
     // Copies and fills work on words.
-    const std::uint64_t whole_words = (bytes_ + 3) / 4 * 4;
+    const std::uint64_t whole_words = charged_bytes(bytes);
     check_limits(state, name_, whole_words, what);
     try {
         buffer_ = create_handle(state, whole_words, what);
@@ -107,6 +107,10 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
     const std::uint64_t now = state.allocated += allocated_;
     if (now > state.peak) state.peak = now;
     state.set_name(VK_OBJECT_TYPE_BUFFER, reinterpret_cast<std::uint64_t>(buffer_), name_);
+}
+
+std::uint64_t Buffer::staging_bytes(std::uint64_t copied) {
+    return std::min(kStagingBytes, copied);
 }
 
 void Buffer::release() noexcept {
@@ -154,7 +158,7 @@ void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
         std::memcpy(static_cast<std::byte*>(direct_) + offset, source.data(), source.size());
         return;
     }
-    const Buffer staging(*device_, "staging", std::min(kStagingBytes, source.size()), Memory::host);
+    const Buffer staging(*device_, "staging", staging_bytes(source.size()), Memory::host);
     for (std::uint64_t done = 0; done < source.size(); done += kStagingBytes) {
         const std::uint64_t piece = std::min(kStagingBytes, source.size() - done);
         std::memcpy(staging.direct_, source.data() + done, piece);
@@ -172,7 +176,7 @@ void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
         std::memcpy(target.data(), static_cast<const std::byte*>(direct_) + offset, target.size());
         return;
     }
-    const Buffer staging(*device_, "staging", std::min(kStagingBytes, target.size()), Memory::host);
+    const Buffer staging(*device_, "staging", staging_bytes(target.size()), Memory::host);
     for (std::uint64_t done = 0; done < target.size(); done += kStagingBytes) {
         const std::uint64_t piece = std::min(kStagingBytes, target.size() - done);
         state.copy_now(buffer_, offset + done, staging.buffer_, 0, piece, "download of " + name_);

@@ -28,6 +28,11 @@ class Buffer {
     Buffer(Buffer&&) noexcept;
     Buffer& operator=(Buffer&&) noexcept;
 
+    /// What a buffer of so many bytes adds to Device::allocated_bytes: whole words, 16 bytes for 0.
+    static constexpr std::uint64_t charged_bytes(std::uint64_t bytes) {
+        return bytes == 0 ? 16 : (bytes + 3) / 4 * 4;
+    }
+
     VkBuffer handle() const { return buffer_; }
     std::uint64_t bytes() const { return bytes_; }
     const std::string& name() const { return name_; }
@@ -50,6 +55,10 @@ class Buffer {
         download(std::as_writable_bytes(std::span(values)), offset);
         return values;
     }
+
+    /// Of the buffer that copies to and from memory which the host cannot map go through, for a
+    /// copy of so many bytes.
+    static std::uint64_t staging_bytes(std::uint64_t copied);
 
   private:
     Device* device_ = nullptr;

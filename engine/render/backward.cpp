@@ -24,6 +24,16 @@ AdamStep adam_step(const AdamStep& rates, int t) {
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
     : device_(&device), options_(options), result_(result), blend_(device, options) {}
 
+BufferList<Backward> Backward::splat_buffers(std::uint64_t splats) {
+    return {{&Backward::gradient_sum_, "gradient sum", splats * 8}};
+}
+
+FrameBytes Backward::device_bytes(const FrameSize& size) {
+    FrameBytes bytes = BlendBackward::device_bytes(size);
+    bytes.splats += charged_bytes(splat_buffers(size.splats));
+    return bytes;
+}
+
 void Backward::set_sh_stored(int degree) {
     if (degree != options_.sh_stored) project_.clear();
     options_.sh_stored = degree;
@@ -45,7 +55,7 @@ Pipeline& Backward::project_pipeline(int sh_degree) {
 void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
     if (splats > splat_capacity_ || splat_capacity_ == 0) {
         splat_capacity_ = std::max(splats, 1024u);
-        gradient_sum_ = Buffer(*device_, "gradient sum", std::uint64_t(splat_capacity_) * 8);
+        make_buffers(*device_, *this, splat_buffers(splat_capacity_));
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
     blend_.reserve(pairs);
@@ -53,9 +63,7 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
 
 void Backward::record_shares(Commands& commands, const Forward& forward, const Buffer& image,
                              const gpu::CameraData& data) {
-    commands.fill(partials_, 0);
-    commands.fill(partial_rest_, 0);
-    record_blend(commands, forward, image, data, glm::vec3(0));
+    blend_.record(commands, forward, image, data, glm::vec3(0));
 }
 
 void Backward::record(Commands& commands, const Forward& forward, GpuSplats& splats,

@@ -29,7 +29,11 @@ class Backward {
   public:
     Backward(Device& device, const ForwardOptions& options, BackwardResult result);
 
+    /// Buffers for so many splats and pairs: never shrinks, 0 of either asks for no more. Where
+    /// there are more splats, gradient_sum() starts at 0.
     void reserve(std::uint32_t splats, std::uint32_t pairs);
+    /// Device memory beside a Forward of this size.
+    static FrameBytes device_bytes(const FrameSize& size);
 
     /// d_image: float [3][H][W]. splats must have moments.
     void record(Commands& commands, const Forward& forward, GpuSplats& splats,
@@ -43,7 +47,7 @@ class Backward {
     void record_shares(Commands& commands, const Forward& forward, const Buffer& image,
                        const gpu::CameraData& data);
     /// [K][8] of each pair; the last three are those of the colour.
-    const Buffer& partials() const { return partials_; }
+    const Buffer& partials() const { return blend_.partials(); }
 
     /// After the splats' colour buffers changed their degree.
     void set_sh_stored(int degree);
@@ -53,6 +57,7 @@ class Backward {
     void clear_gradient_sum(Commands& commands) { commands.fill(gradient_sum_, 0); }
 
   private:
+    static BufferList<Backward> splat_buffers(std::uint64_t splats);
     Pipeline& project_pipeline(int sh_degree);
 
     Device* device_;

@@ -10,7 +10,29 @@ namespace darb {
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options), way_(tuning_of(device).backward) {
     make_pipelines(false);
-    behind_ = Buffer(device, "behind", 4);
+    make_buffers(device, *this, segment_buffers({}));
+}
+
+BufferList<BlendBackward> BlendBackward::pair_buffers(std::uint64_t pairs) {
+    return {{&BlendBackward::partials_, "pair partials", pairs * 32},
+            {&BlendBackward::rest_, "pair partials, rest", pairs * 4}};
+}
+
+BufferList<BlendBackward> BlendBackward::segment_buffers(const FrameSize& size) {
+    return {{&BlendBackward::behind_, "behind", size.list_segments > 1 ? size.pixels * 4 : 4}};
+}
+
+BufferList<BlendBackward> BlendBackward::bucket_buffers(std::uint64_t records) {
+    return {{&BlendBackward::bucket_tile_, "bucket tile", records * 4}};
+}
+
+FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
+    FrameBytes bytes;
+    bytes.pairs = charged_bytes(pair_buffers(size.pairs));
+    bytes.images = charged_bytes(segment_buffers(size));
+    if (const std::uint64_t records = size.checkpoint_records(); records > 0)
+        bytes.pairs += charged_bytes(bucket_buffers(records));
+    return bytes;
 }
 
 void BlendBackward::make_pipelines(bool segmented) {
@@ -32,9 +54,8 @@ void BlendBackward::make_pipelines(bool segmented) {
 
 void BlendBackward::reserve(std::uint32_t pairs) {
     if (pairs <= pair_capacity_ && pair_capacity_ > 0) return;
-    const std::uint64_t k = pair_capacity_ = std::max(pairs, 1024u);
-    partials_ = Buffer(*device_, "pair partials", k * 32);
-    rest_ = Buffer(*device_, "pair partials, rest", k * 4);
+    pair_capacity_ = std::max(pairs, 1024u);
+    make_buffers(*device_, *this, pair_buffers(pair_capacity_));
 }
 
 void BlendBackward::record(Commands& commands, const Forward& forward, const Buffer& d_image,
@@ -43,8 +64,8 @@ void BlendBackward::record(Commands& commands, const Forward& forward, const Buf
     DARB_CHECK(forward.pair_capacity() <= pair_capacity_, "{} pairs of {}", forward.pair_capacity(),
                pair_capacity_);
     if (segments > 1 && !segmented_) make_pipelines(true);
-    if (segments > 1 && behind_.bytes() < forward.final_transmittance().bytes())
-        behind_ = Buffer(*device_, "behind", forward.final_transmittance().bytes());
+    if (segments > 1 && behind_.bytes() < forward.size().pixels * 4)
+        make_buffers(*device_, *this, segment_buffers(forward.size()));
     commands.fill(partials_, 0);
     commands.fill(rest_, 0);
     const gpu::BlendArgs args{data.width,   data.height, data.tiles_x, background.r, background.g,
@@ -73,7 +94,7 @@ void BlendBackward::record_buckets(Commands& commands, const Forward& forward,
     const std::uint32_t records = forward.checkpoint_records();
     DARB_CHECK(records > 0, "the forward pass stores no checkpoints");
     if (bucket_tile_.bytes() < std::uint64_t{records} * 4)
-        bucket_tile_ = Buffer(*device_, "bucket tile", std::uint64_t{records} * 4);
+        make_buffers(*device_, *this, bucket_buffers(records));
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     const gpu::BucketArgs buckets{args.width, args.height, args.tiles_x, records};
     commands.fill(bucket_tile_, 0);

@@ -15,6 +15,8 @@ class BlendBackward {
 
     /// Makes the outputs fit; never shrinks. The queue must be idle.
     void reserve(std::uint32_t pairs);
+    /// Device memory beside a Forward of this size, once a frame was recorded.
+    static FrameBytes device_bytes(const FrameSize& size);
 
     /// d_image: float [3][H][W]. Belongs to the current pass() of commands.
     void record(Commands& commands, const Forward& forward, const Buffer& d_image,
@@ -25,6 +27,9 @@ class BlendBackward {
     const Buffer& rest() const { return rest_; }          // float [K]
 
   private:
+    static BufferList<BlendBackward> pair_buffers(std::uint64_t pairs);
+    static BufferList<BlendBackward> segment_buffers(const FrameSize& size);
+    static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
     void make_pipelines(bool segmented);
     void record_subgroup(Commands& commands, const Forward& forward, const Buffer& d_image,
                          gpu::BlendArgs args);

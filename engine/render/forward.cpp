@@ -35,6 +35,10 @@ std::uint32_t most_pairs(const Device& device, const ForwardOptions& options) {
 
 }  // namespace
 
+std::uint32_t image_tiles(int width, int height) {
+    return tiles(static_cast<std::uint32_t>(width)) * tiles(static_cast<std::uint32_t>(height));
+}
+
 SpecConstants kernel_constants(const ForwardOptions& options) {
     SpecConstants constants =
         kernel_constants(options.kernel, options.footprint, options.evaluation,
@@ -103,11 +107,8 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
     DARB_CHECK(!options.store_for_backward || options.depth_order != DEPTH_ORDER_PIXEL,
                "a resorted pixel cannot be walked back");
-    const Tuning tuning = tuning_of(device);
-    blend_threads_ = tuning.blend_threads;
-    if (options.store_for_backward && tuning.backward == BackwardBlend::buckets)
-        bucket_ = bucket_pairs(device);
-    checkpoints_ = Buffer(device, "no checkpoints", 4);
+    blend_threads_ = tuning_of(device).blend_threads;
+    size_.bucket = bucket(device, options);
     const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
     SpecConstants of_splat = kernel_constants(options);
     of_splat["THREADS"] = SPLAT_GROUP;
@@ -118,18 +119,11 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     tile_ranges_ = Pipeline(device, "tile_ranges", per_item);
     list_lengths_ = Pipeline(device, "list_lengths", per_item);
     emit_ = Pipeline(device, "emit", of_splat);
-    no_huge_rank_ = Buffer(device, "no huge splats", 4);
     cooperates_ = options.crowds == Crowds::always;
     if (cooperates_) make_cooperation();
     make_blend(options.crowds == Crowds::always ? 2 : 1);
-
-    status_ = Buffer(device, "frame status", sizeof(gpu::FrameStatus));
-    groups_ = Buffer(device, "frame groups", sizeof(gpu::FrameGroups));
-    splat_total_ = Buffer(device, "splat total", 4);
-    visible_total_ = Buffer(device, "visible total", 4);
-    visible_in_use_ = Buffer(device, "visible in use", 4);
-    pairs_total_ = Buffer(device, "pairs total", 4);
-    pairs_in_use_ = Buffer(device, "pairs in use", 4);
+    make_buffers(device, *this, fixed_buffers());
+    make_buffers(device, *this, checkpoint_buffers(0));
     clear_status();
 }
 
@@ -140,11 +134,11 @@ void Forward::make_blend(std::uint32_t segments) {
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
     blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);
     blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / blend_threads_);
-    blend["CHECKPOINTS"] = bucket_ > 0 ? 1 : 0;
-    if (bucket_ > 0) blend["BUCKET"] = static_cast<std::int32_t>(bucket_);
+    blend["CHECKPOINTS"] = size_.bucket > 0 ? 1 : 0;
+    if (size_.bucket > 0) blend["BUCKET"] = static_cast<std::int32_t>(size_.bucket);
     blend["SEGMENT"] = segments > 1 ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     blend_ = Pipeline(*device_, "blend", blend, true, subgroup);
-    list_segments_ = segments;
+    size_.list_segments = segments;
 }
 
 // At most so many huge splats begin within the capacity, each with more than HUGE_PAIRS pairs.
@@ -156,9 +150,10 @@ void Forward::make_cooperation() {
         emit_others_.emplace(*device_, "emit", constants);
         emit_huge_.emplace(*device_, "emit_huge", kernel_constants(options_));
     }
-    const std::uint64_t bytes = (std::uint64_t{pair_capacity_} / HUGE_PAIRS + 1) * 4;
-    if (!huge_rank_ || huge_rank_.bytes() < bytes)
-        huge_rank_ = Buffer(*device_, "huge splats", bytes);
+    const BufferList<Forward> buffers = huge_buffers(size_.pairs);
+    if (!huge_rank_ || huge_rank_.bytes() < buffers.front().bytes)
+        make_buffers(*device_, *this, buffers);
+    size_.cooperates = true;
 }
 
 void Forward::note_crowds(const gpu::FrameStatus& status) {
@@ -179,12 +174,13 @@ bool Forward::make_room(const gpu::FrameStatus& status) {
                                 wanted == 0xFFFFFFFFu ? "more than " : "", wanted, most),
                     "Lower the resolution (-r) or the number of splats (--cap-max).");
     if ((status.overflow & OVERFLOW_PAIRS) != 0)
-        reserve(splat_capacity_, std::min(wanted + wanted / 2, most), 1, 1);
+        reserve(size_.splats, std::min(wanted + wanted / 2, most), 1, 1);
     const std::uint32_t segments = (status.longest_list + LIST_SEGMENT - 1) / LIST_SEGMENT;
-    if (segments > list_segments_) {
+    if (segments > size_.list_segments) {
         make_blend(segments + segments / 4);
-        if (!options_.store_for_backward)  // where the pixels' state is kept between dispatches
-            final_transmittance_ = Buffer(*device_, "final transmittance", pixel_capacity_ * 4);
+        if (!options_.store_for_backward)  // the pixels' state is kept between dispatches
+            make_buffers(*device_, *this,
+                         pixel_buffers(options_, size_.pixels, size_.list_segments));
     }
     clear_status();
     return true;
@@ -216,65 +212,56 @@ std::uint32_t Forward::max_pairs(const Device& device) {
     return static_cast<std::uint32_t>(most);
 }
 
-// Of every tile one more than its full buckets.
-void Forward::reserve_checkpoints() {
-    const std::uint64_t records = pair_capacity_ / bucket_ + std::uint64_t{tile_capacity_};
-    if (checkpoints_.bytes() < records * CHECKPOINT_BYTES)
-        checkpoints_ = Buffer(*device_, "checkpoints", records * CHECKPOINT_BYTES);
+std::uint32_t Forward::bucket(const Device& device, const ForwardOptions& options) {
+    const bool buckets = tuning_of(device).backward == BackwardBlend::buckets;
+    return options.store_for_backward && buckets ? bucket_pairs(device) : 0;
 }
 
 void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height) {
     Device& d = *device_;
     const std::uint64_t pixels = std::uint64_t(width) * height;
-    const std::uint32_t tile_count = tiles(width) * tiles(height);
-    if (splats > splat_capacity_ || splat_capacity_ == 0) {
-        const std::uint64_t n = splat_capacity_ = std::max(splats, kMinCapacity);
-        splat_shape_ = Buffer(d, "splat shape", n * 16);
-        splat_light_ = Buffer(d, "splat light", n * (options_.storage == STORAGE_FLOAT16 ? 8 : 16));
-        splat_bound_ = Buffer(d, "splat bound", n * 16);
-        cover_ = Buffer(d, "tile cover", n * 16);
-        for (auto [buffer, name] : {std::pair{&pair_count_, "pair count"},
-                                    {&visible_, "visible"},
-                                    {&visible_offset_, "visible offset"},
-                                    {&depth_key_, "depth key"},
-                                    {&depth_order_, "depth order"},
-                                    {&pair_count_sorted_, "pair count by depth"},
-                                    {&pair_offset_, "pair offset"},
-                                    {&pair_begin_, "pair begin"}})
-            *buffer = Buffer(d, name, n * 4);
-        scan_.emplace(d, splat_capacity_);
-        depth_sort_.emplace(d, splat_capacity_);
+    // A size is taken note of once its buffers are there: where one cannot be had, the next call
+    // makes them all.
+    if (splats > size_.splats || size_.splats == 0) {
+        size_.splats = 0;
+        scan_.reset();
+        depth_sort_.reset();
+        splats = std::max(splats, kMinCapacity);
+        make_buffers(d, *this, splat_buffers(options_, splats));
+        scan_.emplace(d, splats);
+        depth_sort_.emplace(d, splats);
+        size_.splats = splats;
     }
     pairs = std::min(pairs, most_pairs(d, options_));
-    if (pairs > pair_capacity_ || pair_capacity_ == 0) {
-        const std::uint64_t k = pair_capacity_ = std::max(pairs, kMinCapacity);
-        pair_tile_ = Buffer(d, "pair tile", k * 4);
-        pair_splat_ = Buffer(d, "pair splat", k * 4);
-        pair_order_ = Buffer(d, "pair order", k * 4);
-        tile_sort_.emplace(d, pair_capacity_);
+    if (pairs > size_.pairs || size_.pairs == 0) {
+        size_.pairs = 0;
+        tile_sort_.reset();
+        pairs = std::max(pairs, kMinCapacity);
+        make_buffers(d, *this, pair_buffers(pairs));
+        tile_sort_.emplace(d, pairs);
+        size_.pairs = pairs;
         if (emit_huge_) make_cooperation();
     }
-    if (tile_count > tile_capacity_) {
-        tile_capacity_ = tile_count;
-        tile_range_ = Buffer(d, "tile range", std::uint64_t(tile_count) * 8);
+    if (const std::uint32_t tiled = image_tiles(width, height); tiled > size_.tiles) {
+        size_.tiles = 0;
+        make_buffers(d, *this, tile_buffers(tiled));
+        size_.tiles = tiled;
     }
-    if (pixels > pixel_capacity_) {
-        pixel_capacity_ = pixels;
-        image_ = Buffer(d, "image", pixels * 12);
-        const bool store = options_.store_for_backward;
-        final_transmittance_ =
-            Buffer(d, "final transmittance", store || list_segments_ > 1 ? pixels * 4 : 4);
-        last_pair_ = Buffer(d, "last pair", store ? pixels * 4 : 4);
+    if (pixels > size_.pixels) {
+        size_.pixels = 0;
+        make_buffers(d, *this, pixel_buffers(options_, pixels, size_.list_segments));
+        size_.pixels = pixels;
     }
-    if (bucket_ > 0) reserve_checkpoints();
+    if (size_.checkpoint_records() > checkpoint_records())
+        make_buffers(d, *this, checkpoint_buffers(size_.checkpoint_records()));
 }
 
 void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& cameras,
                      std::uint32_t camera_index, const gpu::CameraData& data, int sh_degree,
                      const glm::vec3& background) {
     const std::uint32_t n = splats.count();
-    DARB_CHECK(n <= splat_capacity_ && std::uint64_t(data.width) * data.height <= pixel_capacity_,
-               "{} splats of {}, {} x {} px", n, splat_capacity_, data.width, data.height);
+    DARB_CHECK(n <= size_.splats && std::uint64_t(data.width) * data.height <= size_.pixels,
+               "{} splats of {}, {} x {} px", n, size_.splats, data.width, data.height);
     commands.pass("project");
     constexpr std::uint64_t of_frame = offsetof(gpu::FrameStatus, bad_gradients);
     commands.fill(BufferRange(status_, of_frame, sizeof(gpu::FrameStatus) - of_frame), 0);
@@ -312,9 +299,9 @@ void Forward::record_blend(Commands& commands, const gpu::CameraData& data,
                            const glm::vec3& background) {
     if (before_blend) before_blend(commands);
     commands.pass("blend");
-    for (std::uint32_t segment = 0; segment < list_segments_; ++segment) {
+    for (std::uint32_t segment = 0; segment < size_.list_segments; ++segment) {
         const gpu::BlendArgs blend{data.width,   data.height,  data.tiles_x, background.r,
-                                   background.g, background.b, segment,      list_segments_};
+                                   background.g, background.b, segment,      size_.list_segments};
         commands.dispatch(blend_, blend,
                           {tile_range_, pair_order(), pair_splat_, splat_shape_, splat_light_,
                            splat_bound_, image_, final_transmittance_, last_pair_, checkpoints_},
@@ -324,7 +311,7 @@ void Forward::record_blend(Commands& commands, const gpu::CameraData& data,
 
 void Forward::record_depth_order(Commands& commands, std::uint32_t n, float near_plane) {
     const gpu::CompactArgs args{n, near_plane};
-    const gpu::PairArgs pair_args{pair_capacity_, 0, 0, 0};
+    const gpu::PairArgs pair_args{size_.pairs, 0, 0, 0};
     const Groups g = groups_for(n);
     commands.pass("compact");
     commands.fill(splat_total_, n);
@@ -341,8 +328,8 @@ void Forward::record_depth_order(Commands& commands, std::uint32_t n, float near
 
 void Forward::record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t n) {
     const std::uint32_t tile_count = data.tiles_x * data.tiles_y;
-    const gpu::PairArgs args{pair_capacity_, data.tiles_x, tile_count,
-                             list_segments_ * LIST_SEGMENT};
+    const gpu::PairArgs args{size_.pairs, data.tiles_x, tile_count,
+                             size_.list_segments * LIST_SEGMENT};
     commands.pass("emit");
     commands.dispatch_indirect(gather_counts_, gpu::SplatArgs{n},
                                {status_, depth_order_, pair_count_, pair_count_sorted_}, groups_,

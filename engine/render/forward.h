@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "engine/gpu/buffer.h"
+#include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 #include "engine/render/effects.h"
@@ -39,6 +39,33 @@ struct ForwardOptions {
     Crowds crowds = Crowds::by_counters;
 };
 
+/// What the buffers of a frame are made for.
+struct FrameSize {
+    std::uint32_t splats = 0, pairs = 0;
+    std::uint64_t pixels = 0;         // of the largest image
+    std::uint32_t tiles = 0;          // of the image with the most
+    std::uint32_t list_segments = 1;  // dispatches of the blend passes
+    bool cooperates = false;          // some frame had huge splats
+    std::uint32_t bucket = 0;         // pairs of a checkpoint; 0: there are none
+    /// Of every tile one more than its full buckets.
+    std::uint64_t checkpoint_records() const {
+        return bucket > 0 ? pairs / bucket + std::uint64_t{tiles} : 0;
+    }
+};
+/// Tiles of an image.
+std::uint32_t image_tiles(int width, int height);
+
+/// Device memory, by what it grows with.
+struct FrameBytes {
+    std::uint64_t splats = 0, pairs = 0, images = 0;  // images: pixels, tiles and what is fixed
+    FrameBytes& operator+=(const FrameBytes& other) {
+        splats += other.splats;
+        pairs += other.pairs;
+        images += other.images;
+        return *this;
+    }
+};
+
 /// The constants of these options that several passes share: kernel, storage and depth order.
 SpecConstants kernel_constants(const ForwardOptions& options);
 
@@ -62,9 +89,14 @@ class Forward {
     /// Makes the buffers fit: never shrinks. pairs: a guess, as a frame that needs more says so.
     /// The queue must be idle.
     void reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height);
-    std::uint32_t pair_capacity() const { return pair_capacity_; }
+    std::uint32_t pair_capacity() const { return size_.pairs; }
+    /// What the buffers are made for now.
+    const FrameSize& size() const { return size_; }
+    /// Device memory of a Forward whose size() this is.
+    static FrameBytes device_bytes(const Device& device, const ForwardOptions& options,
+                                   const FrameSize& size);
     /// How many dispatches the blend passes take, LIST_SEGMENT pairs of every tile's list each.
-    std::uint32_t list_segments() const { return list_segments_; }
+    std::uint32_t list_segments() const { return size_.list_segments; }
     /// After a frame whose status is given: false where it is whole. Else makes room for what it
     /// wanted and clears the status; the frame must then be recorded again. Throws Error where it
     /// can never fit. The queue must be idle.
@@ -118,20 +150,29 @@ class Forward {
         return static_cast<std::uint32_t>(checkpoints_.bytes() / CHECKPOINT_BYTES);
     }
     /// Pairs a record; 0: there are none.
-    std::uint32_t bucket() const { return bucket_; }
+    std::uint32_t bucket() const { return size_.bucket; }
+    /// The same of a Forward that were made now.
+    static std::uint32_t bucket(const Device& device, const ForwardOptions& options);
 
   private:
+    static BufferList<Forward> fixed_buffers();
+    static BufferList<Forward> splat_buffers(const ForwardOptions& options, std::uint64_t splats);
+    static BufferList<Forward> pair_buffers(std::uint64_t pairs);
+    static BufferList<Forward> huge_buffers(std::uint64_t pairs);
+    static BufferList<Forward> tile_buffers(std::uint64_t tiles);
+    static BufferList<Forward> checkpoint_buffers(std::uint64_t records);
+    static BufferList<Forward> pixel_buffers(const ForwardOptions& options, std::uint64_t pixels,
+                                             std::uint32_t list_segments);
     Pipeline& project_pipeline(int sh_degree);
     void record_depth_order(Commands& commands, std::uint32_t splat_count, float near_plane);
     void record_pairs(Commands& commands, const gpu::CameraData& data, std::uint32_t splat_count);
     void record_blend(Commands& commands, const gpu::CameraData& data, const glm::vec3& background);
     void make_blend(std::uint32_t segments);
     void make_cooperation();
-    void reserve_checkpoints();
 
     Device* device_;
     ForwardOptions options_;
-    std::uint32_t blend_threads_, bucket_ = 0;
+    std::uint32_t blend_threads_;
     std::map<int, Pipeline> project_;  // by SH degree in use
     Pipeline compact_, gather_counts_, groups_visible_, groups_pairs_, emit_, tile_ranges_,
         list_lengths_, blend_;
@@ -140,9 +181,7 @@ class Forward {
     bool cooperates_ = false;
     std::optional<Scan> scan_;
     std::optional<RadixSort> depth_sort_, tile_sort_;
-    std::uint32_t splat_capacity_ = 0, pair_capacity_ = 0, tile_capacity_ = 0;
-    std::uint64_t pixel_capacity_ = 0;
-    std::uint32_t list_segments_ = 0;
+    FrameSize size_;
 
     Buffer status_, groups_, splat_total_, visible_total_, visible_in_use_, pairs_total_,
         pairs_in_use_;

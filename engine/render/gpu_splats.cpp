@@ -37,6 +37,17 @@ const std::vector<float>& attribute_values(const SplatModel& model, int attribut
     return attribute_values(const_cast<SplatModel&>(model), attribute);
 }
 
+std::array<std::uint32_t, kAttributeCount> GpuSplats::strides(int sh_degree) {
+    return {3, 3, 4, 1, 3, static_cast<std::uint32_t>((sh_degree + 1) * (sh_degree + 1) - 1) * 3};
+}
+
+std::uint64_t GpuSplats::parameter_bytes(std::uint64_t count, int sh_degree) {
+    std::uint64_t bytes = 0;
+    for (const std::uint32_t stride : strides(sh_degree))
+        bytes += Buffer::charged_bytes(count * stride * sizeof(float));
+    return bytes;
+}
+
 GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments)
     : count_(static_cast<std::uint32_t>(model.size())),
       binding_bytes_(device.info().max_storage_buffer_bytes) {
@@ -46,7 +57,7 @@ GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments)
     header_.antialias = model.antialias;
     header_.origin = model.origin;
     smoothing_ = Buffer(device, "smoothing", 4);
-    strides_ = {3, 3, 4, 1, 3, static_cast<std::uint32_t>(model.rest_count())};
+    strides_ = strides(model.sh_degree);
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& values = attribute_values(model, a);
         DARB_CHECK(values.size() == size_t{count_} * strides_[a], "{}: {} values, {} splats of {}",

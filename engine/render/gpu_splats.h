@@ -52,6 +52,11 @@ class GpuSplats {
     /// The rows of a range in one of the buffers of the harmonics.
     BufferRange rows(const Buffer& of_rest, const SplatRange& range) const;
 
+    /// Device memory of the parameters of so many splats; their moments take twice as much.
+    static std::uint64_t parameter_bytes(std::uint64_t count, int sh_degree);
+    /// Floats per splat of the attributes.
+    static std::array<std::uint32_t, kAttributeCount> strides(int sh_degree);
+
     /// The most splats that this device's bindings allow.
     static std::uint32_t max_count(const Device& device, bool with_moments);
 

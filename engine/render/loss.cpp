@@ -31,7 +31,7 @@ int cluster_lanes(const Device& device) {
     return static_cast<int>(std::min(32u, std::bit_floor(smallest)));
 }
 
-// Columns a thread: the fewest columns computed in all for this width of image.
+// Columns a thread on a CPU: the fewest columns computed in all for this width of image.
 int cpu_columns(int lanes, int width) {
     int best = kMaxCpuColumns, best_cost = std::numeric_limits<int>::max();
     for (int columns = kMaxCpuColumns; columns >= kMinCpuColumns; --columns) {
@@ -44,25 +44,28 @@ int cpu_columns(int lanes, int width) {
     return best;
 }
 
+int columns_of(const Device& device, int lanes, int max_width, const LossOptions& options) {
+    if (options.columns > 0) return options.columns;
+    return device.is_lavapipe() ? cpu_columns(lanes, max_width) : kGpuStripWidth / lanes;
+}
+
 }  // namespace
 
 Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& options)
     : max_width_(max_width),
       max_height_(max_height),
       lanes_(cluster_lanes(device)),
+      columns_(columns_of(device, lanes_, max_width, options)),
       rows_(options.rows) {
     DARB_CHECK(max_width > 0 && max_height > 0, "{} x {}", max_width, max_height);
     const DeviceInfo& info = device.info();
     if (device.is_lavapipe()) {
-        columns_ = cpu_columns(lanes_, max_width);
         threads_ = static_cast<int>(info.subgroup_size);
         wanted_works_ = 4 * static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     } else {
-        columns_ = kGpuStripWidth / lanes_;
         threads_ = static_cast<int>(std::max(64u, info.max_subgroup_size));
         wanted_works_ = 4096;
     }
-    if (options.columns > 0) columns_ = options.columns;
     DARB_CHECK(lanes_ * columns_ > 2 * LOSS_HALO, "{} lanes, {} columns", lanes_, columns_);
     const SpecConstants constants = {{"THREADS", threads_},
                                      {"LANES", lanes_},
@@ -71,11 +74,23 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
                                      {"USE_ALPHA", options.use_alpha ? 1 : 0}};
     loss_ = Pipeline(device, "loss", constants);
     sum_ = Pipeline(device, "loss_sum", {}, false);
-    // The most strips that any size up to the largest can be cut into.
-    const int strips = ceil_divide(max_width, lanes_ * columns_ - 2 * LOSS_HALO);
-    const std::uint64_t works =
-        std::uint64_t{3} * strips * ceil_divide(max_height, rows_ > 0 ? rows_ : kMinRows);
-    partial_ = Buffer(device, "loss.partial", works * sizeof(glm::vec4));
+    make_buffers(device, *this, buffers(device, max_width, max_height, options));
+}
+
+// The most strips that any size up to the largest can be cut into.
+BufferList<Loss> Loss::buffers(const Device& device, int max_width, int max_height,
+                               const LossOptions& options) {
+    const int lanes = cluster_lanes(device);
+    const int columns = columns_of(device, lanes, max_width, options);
+    const int strips = ceil_divide(max_width, lanes * columns - 2 * LOSS_HALO);
+    const int rows = options.rows > 0 ? options.rows : kMinRows;
+    const std::uint64_t works = std::uint64_t{3} * strips * ceil_divide(max_height, rows);
+    return {{&Loss::partial_, "loss.partial", works * sizeof(glm::vec4)}};
+}
+
+std::uint64_t Loss::device_bytes(const Device& device, int max_width, int max_height,
+                                 const LossOptions& options) {
+    return charged_bytes(buffers(device, max_width, max_height, options));
 }
 
 gpu::LossArgs Loss::arguments(int width, int height) const {

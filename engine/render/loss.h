@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 
-#include "engine/gpu/buffer.h"
+#include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/device.h"
 #include "engine/gpu/pipeline.h"
@@ -33,6 +33,10 @@ class Loss {
     /// fewer than 4 lanes.
     Loss(Device& device, int max_width, int max_height, const LossOptions& options = {});
 
+    /// Device memory of a Loss made with these arguments.
+    static std::uint64_t device_bytes(const Device& device, int max_width, int max_height,
+                                      const LossOptions& options = {});
+
     /// image [3][H][W] float, ground_truth [H][W] R | G << 8 | B << 16 | A << 24 with straight
     /// alpha, d_image [3][H][W] float: dL/dimage, every pixel is written. results: LossResult[], of
     /// which result_index is written. Two dispatches under the pass "loss". Where x = y the
@@ -47,6 +51,8 @@ class Loss {
     }
 
   private:
+    static BufferList<Loss> buffers(const Device& device, int max_width, int max_height,
+                                    const LossOptions& options);
     gpu::LossArgs arguments(int width, int height) const;
 
     int max_width_, max_height_;

@@ -72,14 +72,27 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, Strategy strategy,
     scatter_ = Pipeline(device, scatter_name(strategy_), plain, true, subgroup_size);
     scatter_iota_ = Pipeline(device, scatter_name(strategy_), iota, true, subgroup_size);
 
+    make_buffers(device, *this, buffers(capacity, shape_));
+    scan_.emplace(device, static_cast<std::uint32_t>(counters(capacity, shape_)));
+}
+
+std::uint64_t RadixSort::counters(std::uint32_t capacity, const Shape& shape) {
+    return (std::uint64_t{capacity} + shape.block() - 1) / shape.block() * RADIX_MAX_DIGITS;
+}
+
+BufferList<RadixSort> RadixSort::buffers(std::uint32_t capacity, const Shape& shape) {
     const std::uint64_t pair_bytes = std::uint64_t{capacity} * 4;
-    const std::uint64_t counters = blocks * RADIX_MAX_DIGITS;
-    plan_ = Buffer(device, "sort plan", sizeof(gpu::RadixPlan));
-    histograms_ = Buffer(device, "sort histograms", counters * 4);
-    total_ = Buffer(device, "sort total", 4);
-    keys_temp_ = Buffer(device, "sort keys", pair_bytes);
-    values_temp_ = Buffer(device, "sort values", pair_bytes);
-    scan_.emplace(device, static_cast<std::uint32_t>(counters));
+    return {{&RadixSort::plan_, "sort plan", sizeof(gpu::RadixPlan)},
+            {&RadixSort::histograms_, "sort histograms", counters(capacity, shape) * 4},
+            {&RadixSort::total_, "sort total", 4},
+            {&RadixSort::keys_temp_, "sort keys", pair_bytes},
+            {&RadixSort::values_temp_, "sort values", pair_bytes}};
+}
+
+std::uint64_t RadixSort::device_bytes(const Device& device, std::uint32_t capacity) {
+    const Shape shape = choose_shape(device, resolve(device, Strategy::automatic), 0);
+    return charged_bytes(buffers(capacity, shape)) +
+           Scan::device_bytes(static_cast<std::uint32_t>(counters(capacity, shape)));
 }
 
 void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& values,

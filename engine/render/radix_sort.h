@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "engine/gpu/buffer.h"
+#include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 #include "engine/render/scan.h"
@@ -28,9 +28,11 @@ class RadixSort {
               std::uint32_t subgroup_size = 0);
 
     std::uint32_t capacity() const { return capacity_; }
+    /// Device memory of an automatic sort of this capacity.
+    static std::uint64_t device_bytes(const Device& device, std::uint32_t capacity);
     Strategy strategy() const { return strategy_; }
     /// Pairs of one workgroup.
-    std::uint32_t block() const { return shape_.threads * shape_.items; }
+    std::uint32_t block() const { return shape_.block(); }
 
     /// Sorts the first n pairs by the lowest key_bits (1..32) bits of their keys, in place; higher
     /// bits ride along and pairs from n on are not touched. n is the word of count_buffer at
@@ -47,7 +49,10 @@ class RadixSort {
         std::uint32_t threads = 0;
         std::uint32_t items = 0;      // keys of one thread
         std::uint32_t subgroups = 0;  // of one workgroup, ballot only
+        std::uint32_t block() const { return threads * items; }
     };
+    static BufferList<RadixSort> buffers(std::uint32_t capacity, const Shape& shape);
+    static std::uint64_t counters(std::uint32_t capacity, const Shape& shape);
     static Shape choose_shape(const Device& device, Strategy strategy, std::uint32_t subgroup_size);
     void record_pass(Commands& commands, std::uint32_t shift, std::uint32_t digits, bool iota,
                      const Buffer& keys_in, const Buffer& values_in, const Buffer& keys_out,

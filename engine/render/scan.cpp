@@ -47,14 +47,22 @@ Scan::Scan(Device& device, std::uint32_t capacity, const Strategy& strategy)
       prepare_(device, "scan_prepare"),
       reduce_(device, "scan_reduce", constants(device, strategy), true, strategy.subgroup_size),
       top_(device, "scan_top", top_constants(device), true, strategy.subgroup_size),
-      apply_(device, "scan_apply", constants(device, strategy), true, strategy.subgroup_size),
-      plan_(device, "scan plan", sizeof(gpu::ScanPlan)),
-      chunk_sums_(device, "scan chunk sums",
-                  (std::uint64_t{capacity} + kChunk - 1) / kChunk * sizeof(std::uint32_t)) {
+      apply_(device, "scan_apply", constants(device, strategy), true, strategy.subgroup_size) {
     DARB_CHECK(capacity > 0);
+    make_buffers(device, *this, buffers(capacity));
     teams_per_group_ = std::max(reduce_.threads_x() / team_threads(device, strategy), 1U);
     const std::uint64_t elements_per_group = std::uint64_t{kChunk} * teams_per_group_;
     DARB_CHECK(capacity / elements_per_group < device.info().max_groups_x, "capacity {}", capacity);
+}
+
+BufferList<Scan> Scan::buffers(std::uint32_t capacity) {
+    const std::uint64_t chunks = (std::uint64_t{capacity} + kChunk - 1) / kChunk;
+    return {{&Scan::plan_, "scan plan", sizeof(gpu::ScanPlan)},
+            {&Scan::chunk_sums_, "scan chunk sums", chunks * sizeof(std::uint32_t)}};
+}
+
+std::uint64_t Scan::device_bytes(std::uint32_t capacity) {
+    return charged_bytes(buffers(capacity));
 }
 
 void Scan::prepare(Commands& commands, const Buffer& count_buffer, std::uint64_t count_offset) {

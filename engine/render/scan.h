@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "engine/gpu/buffer.h"
+#include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 
@@ -25,6 +25,9 @@ class Scan {
 
     std::uint32_t capacity() const { return capacity_; }
 
+    /// Device memory of a scan of this capacity.
+    static std::uint64_t device_bytes(std::uint32_t capacity);
+
     /// offsets[i] = counts[0] + ... + counts[i - 1] for i < n, modulo 2^32, with n the word of
     /// count_buffer at count_offset (bytes, a multiple of 4), at most the capacity; n = 0 is legal.
     /// The sum of all n goes to the word of total at its offset (a multiple of 4). counts and
@@ -40,6 +43,8 @@ class Scan {
              const BufferRange& total);
 
   private:
+    static BufferList<Scan> buffers(std::uint32_t capacity);
+
     std::uint32_t capacity_;
     std::uint32_t teams_per_group_;
     Pipeline prepare_, reduce_, top_, apply_;

@@ -107,6 +107,9 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
         ->capture_default_str()
         ->check(CLI::Range(1, KERNEL_MAX_PULSES));
     add_accuracy_flags(command, f.accuracy, true);
+    command.add_flag("--morton-order", f.train.morton_order,
+                     "after each round of density control, splats that are neighbours in the scene "
+                     "become neighbours in memory");
     command.add_option("--seed", f.train.seed)->capture_default_str();
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`");
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training");

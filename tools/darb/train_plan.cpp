@@ -47,6 +47,25 @@ std::string time_text(const Forecast& f, const TrainOptions& options) {
                        iterations, f.start_ms, f.start_splats, later);
 }
 
+// Exact where the counts come true; the counts are a rule of thumb, so what a splat takes is said,
+// too.
+std::string memory_text(const Device& device, const Forecast& f, int most_degree) {
+    const auto bytes = [&](const MemoryDemand& demand) {
+        return static_cast<double>(plan_memory(device, demand).total());
+    };
+    MemoryDemand empty = f.demand, colourful = f.demand;
+    empty.splats = empty.pairs = 0;
+    colourful.sh_degree = most_degree;
+    const double all = bytes(f.demand), fixed = bytes(empty);
+    std::string text =
+        fmt::format("{} of device memory ({} and {:.0f} bytes a splat", format_bytes(all),
+                    format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.demand.splats)));
+    if (most_degree > f.demand.sh_degree)
+        text += fmt::format("; {} where the photos call for colour of degree {}",
+                            format_bytes(bytes(colourful)), most_degree);
+    return text + ")";
+}
+
 void print_advice(const Device& device, const Dataset& dataset, const Forecast& f,
                   std::uint64_t bytes) {
     const auto budget =
@@ -56,7 +75,7 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
     std::string advice;
     if (const auto r = smaller_resolution(dataset.views))
         advice += fmt::format(" -r {} takes about a quarter.", *r);
-    if (const std::uint64_t most = splats_within(f.demand, budget); too_large && most > 0)
+    if (const std::uint64_t most = splats_within(device, f.demand, budget); too_large && most > 0)
         advice += fmt::format(" --cap-max {} stays within the memory.", most);
     if (too_large)
         fmt::print(stderr, "warning: more than the {} of this device allow.{}\n",
@@ -72,9 +91,9 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     scratch.set_variants(device.variants());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
-    const std::uint64_t bytes = plan_memory(f.demand).total();
-    fmt::print(stderr, "forecast: {}; {} of device memory\n", time_text(f, flags.train),
-               format_bytes(static_cast<double>(bytes)));
+    const std::uint64_t bytes = plan_memory(device, f.demand).total();
+    fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train),
+               memory_text(device, f, flags.train.sh_degree));
     print_advice(device, dataset, f, bytes);
 }
 

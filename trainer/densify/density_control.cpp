@@ -7,6 +7,7 @@
 #include "engine/core/check.h"
 #include "engine/render/groups.h"
 #include "shaders/shared/strategy_args.h"
+#include "trainer/densify/round_buffers.h"
 
 namespace darb {
 
@@ -45,8 +46,12 @@ DensityControl::DensityControl(Device& device, int kernel) : device_(&device), c
     std::vector<float> quantiles(kQuantiles);
     for (int k = 0; k < kQuantiles; ++k)
         quantiles[k] = static_cast<float>(kernel_radius_quantile(kernel, (k + 0.5) / kQuantiles));
-    quantile_ = Buffer(device, "radius quantiles", kQuantiles * sizeof(float));
+    quantile_ = Buffer(device, "radius quantiles", fixed_bytes());
     quantile_.upload(quantiles);
+}
+
+std::uint64_t DensityControl::fixed_bytes() {
+    return kQuantiles * sizeof(float);
 }
 
 DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
@@ -54,15 +59,11 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
     const std::uint32_t n = args.splat_count = splats.count();
     DensityResult result{n, n, 0, 0};
     if (n == 0) return result;
-    const std::uint64_t bytes = std::uint64_t(n) * 4;
-    Device& d = *device_;
-    Buffer keep(d, "densify keep", bytes), grow(d, "densify grow", bytes),
-        action(d, "densify action", bytes);
-    Buffer keep_offset(d, "keep offset", bytes), grow_offset(d, "grow offset", bytes);
-    Buffer count(d, "densify count", 4), keep_total(d, "keep total", 4),
-        grow_total(d, "grow total", 4);
-    Buffer sources(d, "densify sources", bytes * 4);  // at most twice as many, two words each
-    Scan scan(d, n);
+    RoundBuffers buffers;
+    make_buffers(*device_, buffers, RoundBuffers::list(n));
+    auto& [keep, grow, action, keep_offset, grow_offset, count, keep_total, grow_total, sources] =
+        buffers;
+    Scan scan(*device_, n);
     const Groups g = groups_for(n);
     commands_.begin();
     commands_.pass("densify");

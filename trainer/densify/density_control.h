@@ -27,6 +27,9 @@ class DensityControl {
     DensityResult run(GpuSplats& splats, const Buffer& gradient_sum, gpu::DensifyArgs args,
                       std::uint32_t max_splats);
 
+    /// Device memory between rounds.
+    static std::uint64_t fixed_bytes();
+
     /// Every opacity down to at most `opacity`, its moments to zero.
     void reset_opacity(GpuSplats& splats, float opacity);
     /// Every opacity times `keep`, between 0 and 1.

@@ -16,6 +16,21 @@ ErrorScore::ErrorScore(Device& device, const LossOptions& photos)
     reset(0);
 }
 
+BufferList<ErrorScore> ErrorScore::share_buffers(std::uint64_t splats) {
+    return {{&ErrorScore::shares_, "error shares", splats * 2 * sizeof(float)}};
+}
+
+BufferList<ErrorScore> ErrorScore::segment_buffers(std::uint64_t pixels) {
+    return {{&ErrorScore::transmittance_, "transmittance kept", pixels * 4}};
+}
+
+std::uint64_t ErrorScore::device_bytes(std::uint64_t splats, std::uint64_t pixels,
+                                       std::uint32_t list_segments) {
+    std::uint64_t bytes = charged_bytes(share_buffers(std::max<std::uint64_t>(splats, 1)));
+    if (list_segments > 1) bytes += charged_bytes(segment_buffers(pixels));
+    return bytes;
+}
+
 void ErrorScore::reset(std::uint32_t splats) {
     restore(std::vector<float>(std::size_t{std::max(splats, 1u)} * 2, 0.0f));
 }
@@ -26,7 +41,7 @@ std::vector<float> ErrorScore::state(std::uint32_t splats) const {
 
 void ErrorScore::restore(const std::vector<float>& state) {
     const std::uint64_t bytes = state.size() * sizeof(float);
-    if (shares_.bytes() != bytes) shares_ = Buffer(*device_, "error shares", bytes);
+    if (shares_.bytes() != bytes) make_buffers(*device_, *this, share_buffers(state.size() / 2));
     shares_.upload(state);
 }
 
@@ -42,7 +57,7 @@ void ErrorScore::record(Commands& commands, const Forward& forward, Backward& ba
     const Buffer& transmittance = forward.final_transmittance();
     const bool several = forward.list_segments() > 1;
     if (several && transmittance_.bytes() < transmittance.bytes())
-        transmittance_ = Buffer(*device_, "transmittance kept", transmittance.bytes());
+        make_buffers(*device_, *this, segment_buffers(forward.size().pixels));
     commands.pass("error share");
     commands.dispatch(
         image_,

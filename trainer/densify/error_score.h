@@ -22,6 +22,10 @@ class ErrorScore {
     /// Room for so many splats, all at zero; forgets what was there. The queue must be idle.
     void reset(std::uint32_t splats);
 
+    /// Device memory for so many splats beside frames of so many pixels.
+    static std::uint64_t device_bytes(std::uint64_t splats, std::uint64_t pixels,
+                                      std::uint32_t list_segments);
+
     /// Recorded between Forward::record of a frame and its loss; image: the picture that is
     /// compared. d_image [3][H][W] is scratch here.
     void record(Commands& commands, const Forward& forward, Backward& backward, const Buffer& image,
@@ -34,6 +38,9 @@ class ErrorScore {
     void restore(const std::vector<float>& state);
 
   private:
+    static BufferList<ErrorScore> share_buffers(std::uint64_t splats);
+    static BufferList<ErrorScore> segment_buffers(std::uint64_t pixels);
+
     Device* device_;
     Pipeline image_, share_;
     Buffer shares_, transmittance_;  // the latter: a copy, where lists take several dispatches

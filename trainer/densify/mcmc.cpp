@@ -27,8 +27,12 @@ Mcmc::Mcmc(Device& device, int kernel, Footprint footprint) : device_(&device), 
     noise_ = Pipeline(device, "position_noise", threads);
     const std::vector<float> table =
         relocation_table(kernel, footprint, RELOCATION_OPACITIES, RELOCATION_COUNTS);
-    table_ = Buffer(device, "relocation table", table.size() * sizeof(float));
+    table_ = Buffer(device, "relocation table", device_bytes());
     table_.upload(table);
+}
+
+std::uint64_t Mcmc::device_bytes() {
+    return std::uint64_t{RELOCATION_OPACITIES} * RELOCATION_COUNTS * sizeof(float);
 }
 
 DensityResult Mcmc::run(GpuSplats& splats, DensityControl& density, float dead_opacity,

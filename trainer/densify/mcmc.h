@@ -12,6 +12,9 @@ class Mcmc {
     /// The table of scales takes about 0.1 s.
     Mcmc(Device& device, int kernel, Footprint footprint);
 
+    /// Device memory between rounds. A round takes a little less than one of DensityControl.
+    static std::uint64_t device_bytes();
+
     /// One round: splats of an opacity up to dead_opacity move onto live ones, drawn in proportion
     /// to their opacities, and `grown` more are drawn likewise; all that share a place take the
     /// opacity and scale by which the picture stays. Moments of the moved, the new and the drawn

@@ -1,0 +1,22 @@
+// What one round of density control works with, and what the round takes of device memory.
+#pragma once
+
+#include "engine/gpu/buffer_list.h"
+
+namespace darb {
+
+/// The working space of a round over N splats.
+struct RoundBuffers {
+    Buffer keep, grow, action;        // uint [N]
+    Buffer keep_offset, grow_offset;  // uint [N]
+    Buffer count, keep_total, grow_total;
+    Buffer sources;  // uint [2 N][2]
+
+    static BufferList<RoundBuffers> list(std::uint64_t splats);
+};
+
+/// The most bytes that parameters, moments and working space take at a time while a round makes
+/// `after` splats out of `before`: attributes are replaced one at a time, so that one exists twice.
+std::uint64_t round_bytes(std::uint32_t before, std::uint32_t after, int sh_degree);
+
+}  // namespace darb

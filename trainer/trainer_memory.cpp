@@ -1,0 +1,61 @@
+// What the trainer knows of its own device memory: the plan for what it holds now, the peak of the
+// plans so far, and how many splats a budget leaves room for.
+#include <algorithm>
+
+#include "trainer/trainer.h"
+
+namespace darb {
+
+MemoryDemand Trainer::memory_demand() const {
+    MemoryDemand demand = demand_;
+    const FrameSize& size = forward_.size();
+    demand.splats = splats_.count();
+    demand.room_splats = size.splats;
+    demand.pairs = size.pairs;
+    demand.list_segments = size.list_segments;
+    demand.cooperates = size.cooperates;
+    demand.sh_degree = splats_.sh_degree();
+    demand.densifies = false;
+    demand.small_pixels = 0;
+    for (const Buffer& photo : small_photos_) demand.small_pixels += photo.bytes() / 4;
+    demand.small_cameras = static_cast<std::uint32_t>(small_data_.size());
+    return demand;
+}
+
+// Looked at before each iteration, planned where something has changed.
+void Trainer::note_memory() {
+    const FrameSize& size = forward_.size();
+    const std::array<std::uint64_t, 6> now{
+        splats_.count(),    size.pairs,      std::uint64_t(splats_.sh_degree()),
+        size.list_segments, size.cooperates, std::uint64_t(divisor_)};
+    if (now == noted_) return;
+    noted_ = now;
+    planned_bytes_ = std::max(planned_bytes_, plan_memory(*device_, memory_demand()).total());
+}
+
+// What a frame works with still has the size from before the round.
+void Trainer::note_round(std::uint32_t before) {
+    MemoryDemand demand = memory_demand();
+    demand.splats = before;
+    planned_bytes_ =
+        std::max(planned_bytes_, round_peak(*device_, demand, before, splats_.count()));
+}
+
+std::uint64_t Trainer::planned_bytes() const {
+    return std::max(planned_bytes_, plan_memory(*device_, memory_demand()).total());
+}
+
+// With as many pairs a splat as the buffers hold now, and what is in use beyond the plan.
+std::uint32_t Trainer::splats_within_memory() const {
+    if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
+    MemoryDemand demand = memory_demand();
+    demand.densifies = true;
+    const std::uint64_t in_use = device_->allocated_bytes();
+    const std::uint64_t planned = plan_memory(*device_, demand).resident();
+    const std::uint64_t extra = in_use - std::min(in_use, planned);
+    const std::uint64_t budget = options_.max_memory_bytes;
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(
+        splats_within(*device_, demand, budget - std::min(budget, extra)), 0xFFFFFFFFu));
+}
+
+}  // namespace darb
