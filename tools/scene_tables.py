@@ -14,7 +14,7 @@ import sys
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FIGURES = os.path.join(ROOT, "assets/results/scenes_lavapipe.json")
 PAGE = os.path.join(ROOT, "docs/paper.md")
-KEPT = {"psnr_db": 3, "ssim": 4, "lpips": 4, "model_mb": 3, "splats": 0, "peak_mb": 1, "training_s": 1}
+KEPT = {"psnr_db": 3, "ssim": 4, "lpips": 4, "model_mb": 3, "splats": 0, "training_s": 1}
 
 
 def kept(report):
@@ -44,7 +44,7 @@ def table(title, figures):
     steps = sorted({r["iteration"] for r in rows})
     lines = [f"**{title}** {figures['settings']}", "",
              "| data set | kernel | " + " | ".join(f"PSNR dB, SSIM at {n:,}" for n in steps) +
-             " | splats | peak MB | seconds |", "|---|---|" + "---|" * (len(steps) + 3)]
+             " | splats | seconds |", "|---|---|" + "---|" * (len(steps) + 2)]
     before = None
     for name, kernel in dict.fromkeys((r["dataset"], r["kernel"]) for r in rows):
         at = {r["iteration"]: r for r in rows if (r["dataset"], r["kernel"]) == (name, kernel)}
@@ -55,8 +55,7 @@ def table(title, figures):
             cells.append(f"{mark}{spread(at[step]['psnr_db'], '{:.2f}')}{mark}, "
                          f"{spread(at[step]['ssim'], '{:.4f}')}" if step in at else "-")
         last = at[max(at)]
-        cells += [spread(last["splats"], "{:,.0f}"), spread(last["peak_mb"], "{:.0f}"),
-                  spread(last["training_s"], "{:.0f}")]
+        cells += [spread(last["splats"], "{:,.0f}"), spread(last["training_s"], "{:.0f}")]
         lines.append("| " + " | ".join(cells) + " |")
         before = name
     failed = [f"{r['dataset']}, {r['kernel']}, seed {r['seed']}: {r['failure']}"

@@ -115,8 +115,16 @@ TEST(BlendCases, storing_for_the_backward_pass_changes_no_bit) {
               blend_on_device(scene, lists, false).image);
 }
 
-// Where a pixel ended may differ by pairs that miss its block, of which a larger area sees some.
-TEST(BlendCases, every_shape_of_workgroup_gives_the_same_bits) {
+double largest_difference(const std::vector<float>& a, const std::vector<float>& b) {
+    if (a.size() != b.size()) return HUGE_VAL;
+    double most = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(double(a[i]) - b[i]));
+    return most;
+}
+
+// Where a pixel ended may differ by pairs that miss its block, of which a larger area sees some; q
+// rounds otherwise, as a thread has it from its first pixel.
+TEST(BlendCases, every_shape_of_workgroup_gives_the_same_picture) {
     BlendScene scene = kCosine.scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);
     const reference::TileLists lists = scene.lists();
@@ -129,8 +137,8 @@ TEST(BlendCases, every_shape_of_workgroup_gives_the_same_bits) {
         SCOPED_TRACE(shape);
         scene.threads = static_cast<std::uint32_t>(std::stoul(shape));
         const BlendOutput out = blend_on_device(scene, lists);
-        EXPECT_EQ(out.image, usual.image);
-        EXPECT_EQ(out.transmittance, usual.transmittance);
+        EXPECT_LE(largest_difference(out.image, usual.image), 2e-6);
+        EXPECT_LE(largest_difference(out.transmittance, usual.transmittance), 2e-6);
     }
 }
 
