@@ -49,7 +49,8 @@ std::string known_names(const std::vector<TuningGroup>& groups) {
 
 Variants checked(const DeviceInfo& info, const Variants& variants, const std::string& where) {
     const std::vector<TuningGroup> groups = tuning_groups(info);
-    for (const auto& [name, way] : variants) {
+    for (const auto& variant : variants) {
+        const std::string &name = variant.first, &way = variant.second;
         const auto group = std::find_if(groups.begin(), groups.end(),
                                         [&](const TuningGroup& g) { return g.name == name; });
         const std::string known = "Known here: " + known_names(groups) + ".";
