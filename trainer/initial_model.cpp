@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <numeric>
 
 #include "engine/core/rng.h"
 
@@ -19,7 +20,10 @@ struct Region {
 };
 
 // Least squares point of the optical axes: sum (I - d d^T) x = sum (I - d d^T) c.
-Region region_in_view(const std::vector<View>& views) {
+Region region_in_view(const Dataset& dataset) {
+    std::vector<View> views;
+    for (const View& v : dataset.views)
+        if (!v.is_test) views.push_back(v);
     glm::dmat3 normal(0.0);
     glm::dvec3 right(0.0), low(1e300), high(-1e300);
     for (const View& v : views) {
@@ -42,7 +46,7 @@ Region region_in_view(const std::vector<View>& views) {
         }
         return {focus, glm::dvec3(half / scale)};
     }
-    return {0.5 * (low + high), glm::max(0.5 * (high - low), glm::dvec3(1e-3))};
+    return {0.5 * (low + high), glm::max(0.5 * (high - low), glm::dvec3(scene_extent(dataset)))};
 }
 
 std::uint64_t random_count(const Dataset& dataset, const TrainOptions& options) {
@@ -55,7 +59,7 @@ std::uint64_t random_count(const Dataset& dataset, const TrainOptions& options) 
 
 PointCloud random_points(const Dataset& dataset, const TrainOptions& options) {
     const std::uint64_t wanted = random_count(dataset, options);
-    const Region region = region_in_view(dataset.views);
+    const Region region = region_in_view(dataset);
     Pcg32 random(options.seed, 1);
     PointCloud cloud;
     for (std::uint64_t i = 0; i < wanted; ++i)
@@ -64,6 +68,23 @@ PointCloud random_points(const Dataset& dataset, const TrainOptions& options) {
             cloud.colour.push_back(static_cast<std::uint8_t>(random.below(256)));
         }
     return cloud;
+}
+
+// A drawn part of the cloud: a file's order follows its making, from one end of a scene to the
+// other.
+PointCloud drawn_from(const PointCloud& cloud, std::uint32_t count, std::uint64_t seed) {
+    std::vector<std::uint32_t> order(cloud.size());
+    std::iota(order.begin(), order.end(), 0U);
+    Pcg32 random(seed, 2);
+    PointCloud part;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        std::swap(order[i], order[i + random.below(static_cast<std::uint32_t>(order.size()) - i)]);
+        for (int a = 0; a < 3; ++a) {
+            part.position.push_back(cloud.position[3 * order[i] + a]);
+            part.colour.push_back(cloud.colour[3 * order[i] + a]);
+        }
+    }
+    return part;
 }
 
 glm::dvec3 choose_origin(const PointCloud& points) {
@@ -87,18 +108,23 @@ std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options)
 }
 
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
-    const PointCloud drawn =
-        dataset.points.size() == 0 ? random_points(dataset, options) : PointCloud{};
-    const PointCloud& points = dataset.points.size() == 0 ? drawn : dataset.points;
+    PointCloud drawn;
+    const bool random = dataset.points.size() == 0;
+    if (random) drawn = random_points(dataset, options);
+    const PointCloud& given = random ? drawn : dataset.points;
+    const bool too_many = given.size() > options.max_splats;
+    if (too_many) drawn = drawn_from(given, options.max_splats, options.seed);
+    const PointCloud& points = random || too_many ? drawn : given;
     const std::vector<double> distance2 = neighbour_distance2(points.position);
     SplatModel model;
     model.sh_degree = options.sh_degree;
     model.kernel = options.kernel;
     model.footprint = options.footprint;
     model.origin = choose_origin(points);
-    model.resize(std::min<size_t>(points.size(), options.max_splats));
-    const auto logit =
-        static_cast<float>(std::log(options.initial_opacity / (1.0 - options.initial_opacity)));
+    model.resize(points.size());
+    // A hair above: the default is what is pruned, too, and a point that no frame has shown stays.
+    const double opacity = std::min(1.001 * options.initial_opacity, 0.999);
+    const auto logit = static_cast<float>(std::log(opacity / (1 - opacity)));
     for (size_t i = 0; i < model.size(); ++i) {
         model.rotation[4 * i] = 1.0f;
         model.opacity[i] = logit;

@@ -85,8 +85,12 @@ struct TrainOptions {
     float initial_scale = 1;          // times the distance to the neighbours
     std::uint32_t random_points = 0;  // without a point cloud; 0: from the number of pixels
 
-    /// An opacity reset leaves twice the opacity that is pruned, as 3DGS does.
-    float opacity_reset_to() const { return std::min(2.0f * prune_opacity, 0.9f); }
+    /// An opacity reset leaves twice the opacity that is pruned, as 3DGS does, and at least 0.01,
+    /// its value, or twice what is drawn at all: what is not seen never comes back.
+    float opacity_reset_to() const {
+        const auto seen = static_cast<float>(2 * accuracy.value(kAlphaCutoff));
+        return std::clamp(2.0f * prune_opacity, std::max(0.01f, seen), 0.9f);
+    }
     float position_lr_scale() const {
         return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(iterations, 1))));
     }

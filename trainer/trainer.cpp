@@ -66,7 +66,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     : device_(&device),
       options_(options),
       background_(options.white_background ? 1.0f : 0.0f),
-      extent_(scene_extent(dataset.views)),
+      extent_(scene_extent(dataset)),
       next_probe_(std::max(options.sh_interval, 1)),
       splats_(device, start_model(start, options), true),
       forward_(device, forward_options(options)),
@@ -164,6 +164,7 @@ AdamStep Trainer::rates(int iteration) const {
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight = options_.scale_weight / static_cast<float>(extent_);
+    step.regularise_unseen = options_.strategy == Strategy::mcmc;  // as its authors do
     return step;
 }
 

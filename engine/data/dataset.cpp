@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <sstream>
 
 #include "engine/core/error.h"
@@ -19,6 +20,8 @@ namespace {
 
 constexpr std::size_t kHoldOutEvery = 8;
 constexpr double kExtentMargin = 1.1;
+constexpr double kLeastExtent = 1e-9;        // world units: below, cameras stand in one place
+constexpr double kLeastShareOfDepth = 1e-3;  // of the distance to the points: below, likewise
 
 // A list of held-out photos beside a COLMAP model, one name a line, as several loaders of the field
 // read it.
@@ -101,6 +104,17 @@ void index_tracks(Dataset& dataset) {
     points.seen_begin = std::move(begin);
 }
 
+double median_distance(const PointCloud& points, const glm::dvec3& from) {
+    std::vector<double> distance(points.size());
+    for (size_t i = 0; i < points.size(); ++i)
+        distance[i] =
+            glm::distance(from, glm::dvec3(points.position[3 * i], points.position[3 * i + 1],
+                                           points.position[3 * i + 2]));
+    const auto middle = distance.begin() + static_cast<std::ptrdiff_t>(distance.size() / 2);
+    std::nth_element(distance.begin(), middle, distance.end());
+    return *middle;
+}
+
 }  // namespace
 
 Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
@@ -115,13 +129,20 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
     return dataset;
 }
 
-double scene_extent(const std::vector<View>& views) {
-    glm::dvec3 mean(0.0);
-    for (const View& view : views) mean += view.camera.centre() / static_cast<double>(views.size());
+double scene_extent(const Dataset& dataset) {
+    std::vector<glm::dvec3> centres;
+    for (const View& view : dataset.views)
+        if (!view.is_test) centres.push_back(view.camera.centre());
+    if (centres.empty()) return 1;
+    const glm::dvec3 mean =
+        std::accumulate(centres.begin(), centres.end(), glm::dvec3(0.0)) / double(centres.size());
     double largest = 0;
-    for (const View& view : views)
-        largest = std::max(largest, glm::distance(mean, view.camera.centre()));
-    return kExtentMargin * largest;
+    for (const glm::dvec3& centre : centres)
+        largest = std::max(largest, glm::distance(mean, centre));
+    const double extent = kExtentMargin * largest;
+    if (dataset.points.size() == 0) return extent > kLeastExtent ? extent : 1;
+    const double depth = median_distance(dataset.points, mean);
+    return extent > kLeastShareOfDepth * depth ? extent : std::max(depth, kLeastExtent);
 }
 
 }  // namespace darb

@@ -85,7 +85,9 @@ ImageU8 load_photo(const View& view);
 /// Loads all, on `threads` threads (0 = all cores), in the order of views.
 std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads = 0);
 
-/// scene extent of 3DGS: 1.1 x the largest distance of a camera from the mean camera centre.
-double scene_extent(const std::vector<View>& views);
+/// scene extent of 3DGS: 1.1 x the largest distance of a training camera from their mean centre.
+/// Where that says nothing, as one camera or several in one place stand there: the median distance
+/// to the points, and 1 where there are none.
+double scene_extent(const Dataset& dataset);
 
 }  // namespace darb

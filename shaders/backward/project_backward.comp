@@ -131,7 +131,9 @@ void main() {
         const vec2 ndc = g.mean * 0.5 * vec2(camera.width, camera.height);
         gradient_sum[i] += vec2(length(ndc), 1.0);
     }
-    if (UPDATE == 1) {  // the regularisers: weight / N of the sum of opacities, weight / 3N of that of scales
+    // The regularisers. Adam makes a step of full length of any gradient that comes alone: on splats without moments
+    // (new, or after an opacity reset) that few photos show, they would take what the photos never get to hold up.
+    if (UPDATE == 1 && (pair_count[i] > 0u || args.regularise_unseen == 1u)) {
         const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
         g.opacity_logit += args.opacity_weight * o * (1.0 - o);
         for (uint c = 0u; c < 3u; ++c) {

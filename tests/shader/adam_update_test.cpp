@@ -117,7 +117,7 @@ TEST(AdamUpdate, zero_moments_and_zero_gradient_move_nothing) {
     EXPECT_EQ(training.update(state, 3000), state);
 }
 
-// An unseen splat: its gradient is the regularisers' alone, weight o (1 - o) and weight s.
+// An unseen splat of mcmc: its gradient is the regularisers' alone, weight o (1 - o) and weight s.
 TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     Training training(20);
     training.partials.count.assign(20, 0);
@@ -125,6 +125,7 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     AdamStep step = adam_step(kRates, 1);
     step.opacity_weight = 0.3f;
     step.scale_weight = 0.7f;
+    step.regularise_unseen = true;
     const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
                                               state, training.partials, step);
     for (size_t i = 0; i < 20; ++i) {
@@ -140,6 +141,29 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     EXPECT_EQ(after.parameters[kPosition], state.parameters[kPosition]);
 }
 
+// Adam would make full steps of them, where no photo has said anything yet.
+TEST(AdamUpdate, regularisers_leave_what_the_frame_does_not_show) {
+    Training training(20);
+    const PassState state = start_state(training.scene.model);
+    AdamStep step = adam_step(kRates, 1);
+    step.opacity_weight = 0.3f;
+    step.scale_weight = 0.7f;
+    const PassState plain = training.update(state, 1);
+    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
+                                              state, training.partials, step);
+    int seen = 0;
+    for (size_t i = 0; i < 20; ++i) {
+        const bool shown = training.partials.count[i] > 0;
+        seen += shown;
+        EXPECT_EQ(after.moments[kOpacity][2 * i] != plain.moments[kOpacity][2 * i], shown) << i;
+        for (size_t at = 3 * i; at < 3 * i + 3; ++at)
+            EXPECT_EQ(after.moments[kLogScale][2 * at] != plain.moments[kLogScale][2 * at], shown)
+                << i;
+    }
+    EXPECT_GT(seen, 0);
+    EXPECT_LT(seen, 20);
+}
+
 // exp(100) is no float: beyond the limit the regulariser has no gradient, as all that reads a
 // scale.
 TEST(AdamUpdate, regularisers_leave_scales_beyond_their_limit) {
@@ -149,6 +173,7 @@ TEST(AdamUpdate, regularisers_leave_scales_beyond_their_limit) {
     state.parameters[kLogScale] = std::vector<float>(60, 100.0f);
     AdamStep step = adam_step(kRates, 1);
     step.scale_weight = 0.7f;
+    step.regularise_unseen = true;
     const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
                                               state, training.partials, step);
     EXPECT_EQ(after.parameters[kLogScale], state.parameters[kLogScale]);

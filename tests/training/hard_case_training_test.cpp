@@ -146,7 +146,7 @@ TEST(HardCaseTraining, losses_match_double_and_density_control_leaves_everything
         EXPECT_EQ(result.bad_gradients, 0U);
         grown += result.splats > c.scene.model.size() ? 1 : 0;
 
-        std::vector<double> expected = losses_in_double(t, c, scene_extent(t.dataset.views));
+        std::vector<double> expected = losses_in_double(t, c, scene_extent(t.dataset));
         const size_t steps = comparable_steps(c);
         expected.resize(steps);
         EXPECT_TRUE(compare(c.name, expected, std::span(result.loss).first(steps),

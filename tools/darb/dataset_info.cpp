@@ -65,7 +65,7 @@ json dataset_info(const std::filesystem::path& path, const DatasetOptions& optio
             {"sizes", count_sizes(dataset)},
             {"lenses", count_lenses(dataset)},
             {"points", dataset.points.size()},
-            {"extent", scene_extent(dataset.views)},
+            {"extent", scene_extent(dataset)},
             {"has_alpha", dataset.has_alpha},
             {"notes", dataset.notes}};
 }

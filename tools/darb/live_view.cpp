@@ -28,7 +28,7 @@ Bounds bounds_of(const Dataset& dataset) {
     Bounds bounds;
     for (const View& view : dataset.views)
         bounds.centre += view.camera.centre() / double(dataset.views.size());
-    bounds.radius = std::max(scene_extent(dataset.views), 1e-3);
+    bounds.radius = std::max(scene_extent(dataset), 1e-3);
     return bounds;
 }
 

@@ -57,7 +57,7 @@ TEST_P(RealScene, load_has_documented_counts_and_sizes) {
     EXPECT_EQ(tests, scene.tests);
     EXPECT_TRUE(std::is_sorted(dataset.views.begin(), dataset.views.end(),
                                [](const View& a, const View& b) { return a.name < b.name; }));
-    EXPECT_GT(scene_extent(dataset.views), 0.1);
+    EXPECT_GT(scene_extent(dataset), 0.1);
 }
 
 TEST_P(RealScene, photos_match_their_cameras) {
