@@ -73,6 +73,7 @@ class Run {
     void show_step();
     void save_checkpoint(const std::filesystem::path& path);
     void train(const std::atomic<bool>* stop);
+    bool is_finished() const;
     void report_troubles();
     void report_resolution();
     double seconds() const {
@@ -185,12 +186,27 @@ void Run::show_step() {
                   summary_.evaluations});
 }
 
+// Whether metrics.json is that of a whole run, which nothing is to be added to.
+bool Run::is_finished() const {
+    const std::filesystem::path path = run_.output / "metrics.json";
+    if (trainer_.iteration() < options_.iterations || !std::filesystem::exists(path)) return false;
+    const auto metrics = nlohmann::json::parse(read_text_file(path), nullptr, false);
+    return metrics.is_object() && !metrics.value("interrupted", true) &&
+           metrics.value("iteration", 0) == options_.iterations;
+}
+
 RunSummary Run::execute(const std::atomic<bool>* stop) {
     const std::filesystem::path latest = run_.output / "checkpoint.darb";
     trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
     if (!run_.resume_from.empty()) resume();
+    if (!run_.resume_from.empty() && is_finished()) {
+        progress_.note("the run is finished: nothing is left to do");
+        summary_.iteration = trainer_.iteration();
+        summary_.seconds = seconds_;
+        return summary_;
+    }
     log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
 
     try {
@@ -209,6 +225,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     progress_.finish();
     summary_.iteration = trainer_.iteration();
     summary_.seconds = seconds_;
+    summary_.passes = log_.passes(trainer_);
     summary_.report = log_.finish(summary_, trainer_, device_, run_.report);
     return summary_;
 }

@@ -65,6 +65,8 @@ struct RunSummary {
     std::vector<ReportPicture>
         pictures;  // held-out views beside their photos, of the last evaluation
     std::filesystem::path report;
+    std::vector<ReportPass>
+        passes;  // mean ms an iteration and share of the roofline, in their order
 };
 
 /// Trains until options.iterations or until *stop; saves, evaluates and logs as RunOptions says.

@@ -189,15 +189,11 @@ void RunLog::evaluation(const Evaluation& evaluation) {
     write(evaluation_json(evaluation));
 }
 
-ReportData RunLog::report_data(const RunSummary& summary, const Json& metrics) const {
+ReportData RunLog::report_data(const RunSummary& summary) const {
     ReportData data;
     data.title = start_.value("dataset", "");
     data.device = start_.value("device", "") + ", " + start_.value("driver", "");
-    for (const Json& p : metrics["passes_ms"]) {
-        ReportPass pass{p.value("name", ""), p.value("ms", 0.0), std::nullopt};
-        if (p.contains("roofline")) pass.roofline = p.value("roofline", 0.0);
-        data.passes.push_back(std::move(pass));
-    }
+    data.passes = summary.passes;
     for (const Json& e : events_) {
         const std::string kind = e.value("event", "");
         if (kind == "iteration") {
@@ -233,20 +229,29 @@ ReportData RunLog::report_data(const RunSummary& summary, const Json& metrics) c
     return data;
 }
 
-std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& trainer,
-                                     const Device& device, bool with_report) {
-    const TrainCounters& c = trainer.counters();
-    Json passes = Json::array();
+std::vector<ReportPass> RunLog::passes(const Trainer& trainer) const {
+    std::vector<ReportPass> passes;
     FrameCounts mean = counts_;
     mean.splats /= std::max(counted_, 1.0);
     mean.visible /= std::max(counted_, 1.0);
     mean.pairs /= std::max(counted_, 1.0);
     for (const PassTotal& p : trainer.pass_totals()) {
         const double ms = p.ms / std::max<double>(1.0, double(trainer.timed_iterations()));
-        Json pass{{"name", p.name}, {"ms", ms}};
+        ReportPass pass{p.name, ms, std::nullopt};
         if (const auto work = pass_work(p.name, mean))
-            pass["roofline"] = roofline_share(*work, rates_, ms);
+            pass.roofline = roofline_share(*work, rates_, ms);
         passes.push_back(std::move(pass));
+    }
+    return passes;
+}
+
+std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& trainer,
+                                     const Device& device, bool with_report) {
+    const TrainCounters& c = trainer.counters();
+    Json passes = Json::array();
+    for (const ReportPass& pass : summary.passes) {
+        passes.push_back({{"name", pass.name}, {"ms", pass.ms}});
+        if (pass.roofline) passes.back()["roofline"] = *pass.roofline;
     }
     Json evaluations = Json::array();
     for (const Json& e : events_)
@@ -287,7 +292,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
     write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
     if (!with_report) return {};
     const auto report = folder_ / "report.html";
-    write_report(report, report_data(summary, metrics));
+    write_report(report, report_data(summary));
     return report;
 }
 

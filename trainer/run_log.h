@@ -39,6 +39,8 @@ class RunLog {
     /// What ended the run before its time.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);
+    /// The passes of the run so far, in their order.
+    std::vector<ReportPass> passes(const Trainer& trainer) const;
     /// metrics.json and, with_report, report.html; returns the path of the report, if any.
     std::filesystem::path finish(const RunSummary& summary, const Trainer& trainer,
                                  const Device& device, bool with_report);
@@ -47,7 +49,7 @@ class RunLog {
 
   private:
     void write(const nlohmann::json& event);
-    ReportData report_data(const RunSummary& summary, const nlohmann::json& metrics) const;
+    ReportData report_data(const RunSummary& summary) const;
 
     std::filesystem::path folder_;
     std::vector<nlohmann::json> events_;

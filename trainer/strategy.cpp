@@ -46,6 +46,16 @@ void use_strategy(Strategy strategy, TrainOptions& options) {
     }
 }
 
+void use_3dgs_schedule(TrainOptions& options) {
+    options.position_lr_init = 1.6e-4f;
+    options.position_lr_final = 1.6e-6f;
+    options.opacity_lr = 0.025f;
+    options.final_lr_share = 1;
+    options.prune_opacity = 0.005f;
+    options.opacity_weight = options.scale_weight = 0;
+    options.random_background = false;
+}
+
 bool refines_after(const TrainOptions& options, int iteration) {
     return iteration > options.densify_from && iteration < options.densify_end() &&
            iteration % options.densify_interval == 0;

@@ -20,6 +20,12 @@ std::optional<Strategy> strategy_from_name(std::string_view name);
 /// TrainOptions.
 void use_strategy(Strategy strategy, TrainOptions& options);
 
+/// What 3DGS does where the defaults depart from it (ARCHITECTURE says why they do): constant rates
+/// but the position's, those of its paper, pruning below 0.005, no regularisers, one background.
+/// Effects are not part of it: 3DGS has harmonics by the iteration, +sh, and neither anti-aliasing
+/// nor exposure.
+void use_3dgs_schedule(TrainOptions& options);
+
 /// Splats after the round of this iteration, for `count` before it and at most `limit` in the end:
 /// mcmc grows by 5 %; budget comes to the limit with the last round, the gap closing as a parabola,
 /// fast at first. Never below count for mcmc; adc has no target: the limit.

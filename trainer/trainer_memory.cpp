@@ -45,7 +45,8 @@ std::uint64_t Trainer::planned_bytes() const {
     return std::max(planned_bytes_, plan_memory(*device_, memory_demand()).total());
 }
 
-// With as many pairs a splat as the buffers hold now, and what is in use beyond the plan.
+// With half more pairs a splat than the buffers hold now, which is what they grow by, and what is
+// in use beyond the plan.
 std::uint32_t Trainer::splats_within_memory() const {
     if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
     MemoryDemand demand = memory_demand();
@@ -54,6 +55,7 @@ std::uint32_t Trainer::splats_within_memory() const {
     const std::uint64_t planned = plan_memory(*device_, demand).resident();
     const std::uint64_t extra = in_use - std::min(in_use, planned);
     const std::uint64_t budget = options_.max_memory_bytes;
+    demand.pairs += demand.pairs / 2;
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(
         splats_within(*device_, demand, budget - std::min(budget, extra)), 0xFFFFFFFFu));
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -44,6 +45,21 @@ void recall_arguments(TrainFlags& flags, TuneFlags& tune) {
     if (tune.choice.empty()) tune.choice = recalled_tune.choice;
 }
 
+// The dearest first; what takes less than a hundredth of an iteration is not printed.
+void print_passes(std::vector<ReportPass> passes) {
+    std::sort(passes.begin(), passes.end(),
+              [](const ReportPass& a, const ReportPass& b) { return a.ms > b.ms; });
+    double all_ms = 0;
+    for (const ReportPass& pass : passes) all_ms += pass.ms;
+    if (all_ms > 0) fmt::print("{:.2f} ms an iteration on the device:\n", all_ms);
+    for (const ReportPass& pass : passes)
+        if (pass.ms > 0.01 * all_ms)
+            fmt::print("  {:<18} {:8.3f} ms{}\n", pass.name, pass.ms,
+                       pass.roofline
+                           ? fmt::format("  {:4.1f} % of the roofline", 100 * *pass.roofline)
+                           : "");
+}
+
 void print_summary(const RunSummary& summary, const TrainFlags& flags) {
     fmt::print("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
     if (!summary.evaluations.empty() && !summary.evaluations.back().views.empty()) {
@@ -51,6 +67,7 @@ void print_summary(const RunSummary& summary, const TrainFlags& flags) {
         fmt::print("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
                    e.splats);
     }
+    print_passes(summary.passes);
     if (!summary.model.empty()) fmt::print("scene    {}\n", summary.model.string());
     if (!summary.pictures.empty())
         fmt::print("picture  {}\n", summary.pictures.front().file.string());

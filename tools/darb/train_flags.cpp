@@ -2,6 +2,7 @@
 
 #include "engine/core/error.h"
 #include "tools/darb/effect_flags.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -40,6 +41,23 @@ void add_data_flags(CLI::App& command, TrainFlags& f) {
                      "one that pictures are compared over");
     command.add_flag("--sequential", f.sequential,
                      "photos without cameras: match neighbours in name order only");
+}
+
+// Before every option that it changes: values are taken over in this order.
+void add_schedule_flag(CLI::App& command, TrainFlags& f) {
+    command
+        .add_option_function<std::string>(
+            "--schedule",
+            [&f](const std::string& schedule) {
+                f.schedule = schedule;
+                if (schedule != "3dgs") return;
+                use_3dgs_schedule(f.train);
+                f.effects = "+sh,-exposure,-antialias";
+            },
+            "3dgs: its rates, limits and background, no regularisers, harmonics by the iteration; "
+            "options that are given beside it count")
+        ->check(CLI::IsMember({"darb", "3dgs"}))
+        ->default_str("darb");
 }
 
 void add_schedule_flags(CLI::App& command, TrainFlags& f) {
@@ -92,6 +110,7 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
 }  // namespace
 
 void add_train_flags(CLI::App& command, TrainFlags& f) {
+    add_schedule_flag(command, f);
     add_data_flags(command, f);
     add_schedule_flags(command, f);
     add_density_flags(command, f);

@@ -25,6 +25,7 @@ struct TrainFlags {
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
     std::string kernel = "gaussian", strategy = "adc";
+    std::string schedule = "darb";   // or 3dgs
     std::string resolution_ramp;     // on, off, or empty: as the strategy has it
     std::string strategy_note;       // what plan_strategy decided, for people
     bool own_prune_opacity = false;  // --prune-opacity was given

@@ -97,9 +97,12 @@ void finish_strategy(TrainFlags& f) {
     const auto strategy = strategy_from_name(f.strategy);
     if (!strategy)
         throw Error("--strategy " + f.strategy, "no such strategy", "Use adc, mcmc or budget.");
+    if (f.schedule == "3dgs" && *strategy != Strategy::adc)
+        throw Error("--schedule 3dgs", fmt::format("means nothing with --strategy {}", f.strategy),
+                    "Leave one of the two out.");
     const TrainOptions given = f.train;
     use_strategy(*strategy, f.train);
-    if (f.own_prune_opacity) f.train.prune_opacity = given.prune_opacity;
+    if (f.own_prune_opacity || f.schedule == "3dgs") f.train.prune_opacity = given.prune_opacity;
     for (const auto& [name, strategies] : f.of_strategies) {
         if (strategies.find(f.strategy) == std::string::npos)
             throw Error(name, fmt::format("means nothing with --strategy {}", f.strategy),

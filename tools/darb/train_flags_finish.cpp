@@ -36,8 +36,10 @@ void finish_train_flags(TrainFlags& f) {
             list->assign(std::begin(kStandardEvaluations), std::end(kStandardEvaluations));
     if (f.run.output.empty())
         throw Error("darb train", "no output folder", "Name one with -o OUT.");
-    if (f.resume && f.start_checkpoint.empty())
-        f.start_checkpoint = f.run.output / "checkpoint.darb";
+    // The run's own checkpoint, once there is one, is further than the one that it began with.
+    const std::filesystem::path own = f.run.output / "checkpoint.darb";
+    if (f.resume && (f.start_checkpoint.empty() || std::filesystem::exists(own)))
+        f.start_checkpoint = own;
     f.run.resume_from = f.start_checkpoint;
 }
 

@@ -81,16 +81,17 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
     result.grown = grow_total.download<std::uint32_t>(1)[0];
     result.pruned = n - kept;
     result.after = kept + std::min(result.grown, room);
+    const bool too_many = result.grown > room;
+    result.grown = result.after - kept;
     if (result.after == n && result.pruned == 0) return result;
 
     commands_.begin();
     commands_.pass("densify");
-    if (result.grown > room) {
+    if (too_many) {
         auto actions = action.download<std::uint32_t>(n), grows = grow.download<std::uint32_t>(n);
         limit_growth(gradient_sum.download<glm::vec2>(n), room, actions, grows);
         action.upload(actions);
         grow.upload(grows);
-        result.grown = room;
         scan.record(commands_, grow, grow_offset, count, 0, grow_total);
     }
     commands_.dispatch(sources_, args, {action, keep_offset, grow_offset, keep_total, sources}, g.x,
