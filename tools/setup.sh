@@ -15,7 +15,7 @@ usage: tools/setup.sh [options]
 TEXT
 }
 
-# group  package              what for; the names are the same on both systems
+# group  package              what for; the names are the same on both systems, but for pages
 packages='
 build    g++                  compiler
 build    cmake                build system
@@ -46,6 +46,9 @@ tests    xvfb                 a display for the tests of the window
 tests    xdotool              mouse and keys in them
 tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
 tests    python3              style script (standard library only)
+tests    ffmpeg               the video of a camera path
+pages    chromium             opens the reports; Debian alone: that of Ubuntu is no package
+pages    fonts-dejavu-core    their letters
 torch    python3-torch        the truth of the LPIPS test, which skips without it; optional
 colmap   colmap               cameras from photos; optional
 '
@@ -84,6 +87,7 @@ is_installed() {
     [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]
 }
 
+[[ $distribution == debian* && " $groups " == *" tests "* ]] && groups+=" pages"
 missing=()
 while read -r group package _; do
     [[ -n $group && " $groups " == *" $group "* ]] || continue

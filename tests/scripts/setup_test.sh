@@ -40,11 +40,13 @@ mapfile -t all < <(sed -n "/^packages='/,/^'/p" "$setup" | awk 'NF > 2 { print $
 [[ ${#all[@]} -gt 10 ]] || { echo "FAILED  the package table was not found"; exit 1; }
 
 machine "debian 12" none=1
-expect "bare Debian lists every package" 0 'to install: g\+\+ cmake .*mesa-vulkan-drivers .*python3'
+expect "bare Debian lists every package" 0 "to install: g\+\+ cmake .*mesa-vulkan-drivers .*python3 .*chromium"
 expect "--no-tests leaves the test packages out" 0 'libimgui-dev mesa-vulkan-drivers *$' --no-tests
 expect "--with-colmap adds it" 0 'mesa-vulkan-drivers colmap *$' --no-tests --with-colmap
 machine "ubuntu 24.04" none=1
 expect "bare Ubuntu lists every package" 0 'to install: g\+\+ cmake .*python3'
+machine "ubuntu 24.04" "${all[@]/chromium=22.3/nothing=1}"
+expect "Chromium is for Debian" 0 "everything is installed"
 expect "the backport is for Debian" 2 'is for Debian 12' --with-mesa-backport
 machine "debian 12" "${all[@]}"
 expect "complete machine" 0 'everything is installed'
