@@ -19,6 +19,9 @@ export DARB=$fake/darb
 output=$("$script" "$fake/root" "$fake/out" --seeds 2 2>&1)
 check "sizes of 3DGS" "bicycle@images_4 .*room@images_2 .*Truck@images " "$output"
 check "iterations and options" "--iterations 7000,30000 .*--seeds 2" "$output"
+check "the paper's schedule" "--train-options=--schedule 3dgs" "$output"
+check "another schedule" "--lpips-as-3dgs --train-options --schedule darb$" \
+    "$("$script" "$fake/root" "$fake/out" --train-options "--schedule darb" 2>/dev/null)"
 check "missing scenes are named" "left out, not found: .*garden.*playroom" "$output"
 "$script" "$fake/nowhere" "$fake/out" 2>/dev/null
 check "no folder" '^2$' "$?"

@@ -135,14 +135,16 @@ std::string curves(const Comparison& c, const ComparedDataset& dataset) {
             return points;
         };
     };
-    const auto speed = [](const ComparedRun& run) {
-        Points points;
-        for (std::size_t i = 1; i < run.curve.size(); ++i) {
-            const CurvePoint &a = run.curve[i - 1], &b = run.curve[i];
-            points.emplace_back(
-                b.iteration, (b.iteration - a.iteration) / std::max(b.seconds - a.seconds, 1e-9));
-        }
-        return points;
+    const auto speed = [](auto x) {
+        return [x](const ComparedRun& run) {
+            Points points;
+            for (std::size_t i = 1; i < run.curve.size(); ++i) {
+                const CurvePoint &a = run.curve[i - 1], &b = run.curve[i];
+                const double seconds = std::max(b.seconds - a.seconds, 1e-9);
+                points.emplace_back(double(b.*x), (b.iteration - a.iteration) / seconds);
+            }
+            return points;
+        };
     };
     std::string html;
     html += plot(c, dataset, {"Loss", "iterations", "loss", {}, true}, false,
@@ -150,7 +152,9 @@ std::string curves(const Comparison& c, const ComparedDataset& dataset) {
     html += plot(c, dataset, {"Loss", "training time (s)", "loss", {}, true}, false,
                  of_curve(&CurvePoint::seconds, &CurvePoint::loss));
     html += plot(c, dataset, {"Speed", "iterations", "iterations a second", {}, false, true}, false,
-                 speed);
+                 speed(&CurvePoint::iteration));
+    html += plot(c, dataset, {"Speed", "training time (s)", "iterations a second", {}, false, true},
+                 false, speed(&CurvePoint::seconds));
     html += plot(c, dataset, {"Splats", "iterations", "splats", {}, false, true}, false,
                  of_curve(&CurvePoint::iteration, &CurvePoint::splats));
     html += plot(c, dataset, {"Held-out PSNR", "training time (s)", "PSNR (dB)", {}}, true,
