@@ -175,17 +175,24 @@ TEST(TrainCost, prices_every_setting_of_training) {
     const TrainCostResult result =
         measure_train_cost(shared_device(), dataset, options, {1, 2}, [](const std::string&) {});
     EXPECT_EQ(result.rows[0].name, "balanced");
+    std::set<std::string> names;
     for (const TrainCostRow& r : result.rows) {
         EXPECT_GT(r.ms.median, 0) << r.name;
         EXPECT_GT(r.psnr_db.median, 5) << r.name;
-        EXPECT_GT(r.gradient_error, 0) << r.name;
+        names.insert(r.name);
+        EXPECT_EQ(r.gradient_error.has_value(), !r.change) << r.name;
+        if (!r.gradient_error) continue;
+        EXPECT_GT(r.gradient_error->low, 0) << r.name;
         if (r.name == "exact") {
-            EXPECT_LT(r.gradient_error, 0.01) << "the gradient of the truth";
+            EXPECT_LT(r.gradient_error->high, 0.01) << "the gradient of the truth";
         }
         if (r.name == "alpha_cutoff 1/64") {
-            EXPECT_GT(r.gradient_error, result.rows[0].gradient_error);
+            EXPECT_GT(r.gradient_error->median, result.rows[0].gradient_error->median);
         }
     }
+    EXPECT_EQ(names.size(), result.rows.size());
+    EXPECT_TRUE(names.contains("with resolution ramp"));
+    EXPECT_TRUE(names.contains("sh degree 2 by the iteration"));
     EXPECT_EQ(train_cost_json(result)["rows"].size(), result.rows.size());
     expect_all_drawn(train_cost_html(result), 3);
 }

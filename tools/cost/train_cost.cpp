@@ -11,6 +11,7 @@
 #include "engine/reference/loss.h"
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
+#include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -20,6 +21,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double kBelow[] = {3, 1, 0.3};  // dB below the end of balanced
+constexpr size_t kGradientPhotos = 3;
 
 struct TrainedRun {
     double ms = 0;
@@ -27,10 +29,40 @@ struct TrainedRun {
     SplatModel model;
 };
 
-std::vector<TrainCostRow> training_rows() {
+// What training does beside the accuracy settings that changes a gradient or a picture, each turned
+// the other way.
+std::vector<TrainCostRow> departures(const TrainOptions& options) {
+    std::vector<TrainCostRow> rows;
+    const auto add = [&](std::string name, std::function<void(TrainOptions&)> change) {
+        rows.emplace_back();
+        rows.back().name = std::move(name);
+        rows.back().change = std::move(change);
+    };
+    for (int degree = 0; degree <= options.sh_degree; ++degree)
+        if (options.probe_sh || degree < options.sh_degree)
+            add(fmt::format("sh degree {} by the iteration", degree), [degree](TrainOptions& o) {
+                o.sh_degree = degree;
+                o.probe_sh = false;
+            });
+    add(options.antialias ? "without antialias" : "with antialias",
+        [](TrainOptions& o) { o.antialias = !o.antialias; });
+    add(options.exposure ? "without exposure" : "with exposure",
+        [](TrainOptions& o) { o.exposure = !o.exposure; });
+    add(options.resolution_ramp ? "without resolution ramp" : "with resolution ramp",
+        [](TrainOptions& o) { o.resolution_ramp = !o.resolution_ramp; });
+    if (options.random_background)
+        add("one background", [](TrainOptions& o) { o.random_background = false; });
+    if (options.opacity_weight > 0 || options.scale_weight > 0)
+        add("no regularisers", [](TrainOptions& o) { o.opacity_weight = o.scale_weight = 0; });
+    if (options.strategy == Strategy::adc)
+        add("schedule of 3DGS", [](TrainOptions& o) { use_3dgs_schedule(o); });
+    return rows;
+}
+
+std::vector<TrainCostRow> training_rows(const TrainOptions& options) {
     std::vector<TrainCostRow> rows(1);
     for (int s = 0; s < kAccuracyCount; ++s) {
-        if (s == kShDegree) continue;  // has its own schedule in training
+        if (s == kShDegree) continue;  // among the departures: it has its own schedule in training
         for (size_t c = 1; c < accuracy_settings()[s].choices.size(); ++c) {
             TrainCostRow row;
             row.accuracy.choice[s] = static_cast<int>(c);
@@ -45,13 +77,17 @@ std::vector<TrainCostRow> training_rows() {
         rows.push_back(row);
     }
     for (TrainCostRow& row : rows) row.name = accuracy_text(row.accuracy);
+    for (TrainCostRow& row : departures(options)) rows.push_back(std::move(row));
     return rows;
 }
 
-TrainOptions with(TrainOptions options, const Accuracy& accuracy, int seed) {
-    options.accuracy = accuracy;
-    options.footprint =
-        accuracy.value(kFootprint) == FOOTPRINT_EXACT ? Footprint::exact : options.footprint;
+TrainOptions with(TrainOptions options, const TrainCostRow& row, int seed) {
+    if (row.change) {
+        row.change(options);
+    } else {
+        options.accuracy = row.accuracy;
+        if (row.accuracy.value(kFootprint) == FOOTPRINT_EXACT) options.footprint = Footprint::exact;
+    }
     options.seed += static_cast<std::uint64_t>(seed);
     return options;
 }
@@ -126,12 +162,30 @@ double gradient_error(Device& device, SplatModel model, const View& view, const 
     return off / std::max(attributes, 1);
 }
 
-const View& first_view(const Dataset& dataset, bool test) {
-    for (const View& view : dataset.views)
-        if (view.is_test == test) return view;
-    throw Error(dataset.root.string(),
-                test ? "holds out no photo to measure on" : "has no photo to train on",
-                "Use a data set of two photos or more.");
+/// Indices of views, in their order.
+std::vector<size_t> views_of(const Dataset& dataset, bool test) {
+    std::vector<size_t> views;
+    for (size_t i = 0; i < dataset.views.size(); ++i)
+        if (dataset.views[i].is_test == test) views.push_back(i);
+    if (views.empty())
+        throw Error(dataset.root.string(),
+                    test ? "holds out no photo to measure on" : "has no photo to train on",
+                    "Use a data set of two photos or more.");
+    return views;
+}
+
+Spread gradient_errors(Device& device, const SplatModel& model, const Dataset& dataset,
+                       const std::vector<ImageU8>& photos, const Accuracy& accuracy,
+                       const TrainOptions& options) {
+    const std::vector<size_t> views = views_of(dataset, false);
+    const size_t count = std::min(views.size(), kGradientPhotos);
+    std::vector<double> errors;
+    for (size_t k = 0; k < count; ++k) {
+        const size_t view = views[k * views.size() / count];
+        errors.push_back(
+            gradient_error(device, model, dataset.views[view], photos[view], accuracy, options));
+    }
+    return spread_of(std::move(errors));
 }
 
 }  // namespace
@@ -140,24 +194,22 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
                                    const TrainOptions& options, const TrainCostPlan& plan,
                                    const std::function<void(const std::string&)>& progress) {
     TrainCostResult result;
-    const View& shown = first_view(dataset, false);
-    first_view(dataset, true);
+    views_of(dataset, false);  // an Error before any photo is read
+    views_of(dataset, true);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
-    result.rows = training_rows();
+    result.rows = training_rows(options);
     std::vector<std::vector<TrainedRun>> runs(result.rows.size());
     for (int seed = 0; seed < plan.seeds; ++seed)
         for (size_t r = 0; r < result.rows.size(); ++r) {
             progress(fmt::format("seed {} of {}, {} of {}: {}", seed + 1, plan.seeds, r + 1,
                                  result.rows.size(), result.rows[r].name));
             runs[r].push_back(train_once(device, dataset, photos,
-                                         with(options, result.rows[r].accuracy, seed),
-                                         plan.evaluations));
+                                         with(options, result.rows[r], seed), plan.evaluations));
         }
     std::vector<double> ends;
     for (const TrainedRun& run : runs[0]) ends.push_back(run.curve.back().second);
     for (const double below : kBelow) result.targets.push_back(spread_of(ends).median - below);
 
-    const ImageU8& photo = photos[static_cast<size_t>(&shown - dataset.views.data())];
     for (size_t r = 0; r < result.rows.size(); ++r) {
         TrainCostRow& row = result.rows[r];
         std::vector<double> ms, psnr;
@@ -175,8 +227,9 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
             row.seconds_to.push_back(spread_of(std::move(seconds)));
         }
         row.curve = runs[r][0].curve;
-        row.gradient_error =
-            gradient_error(device, runs[0][0].model, shown, photo, row.accuracy, options);
+        if (!row.change)
+            row.gradient_error =
+                gradient_errors(device, runs[0][0].model, dataset, photos, row.accuracy, options);
     }
     result.seeds = plan.seeds;
     result.iterations = options.iterations;

@@ -1,9 +1,11 @@
-// What the accuracy settings cost and change in training: gradients against double precision, time
-// an iteration, seconds to given held-out PSNRs, final PSNR, over several seeds.
+// What the accuracy settings, and the other shortcuts and departures of training, cost and change:
+// gradients against double precision, time an iteration, seconds to given held-out PSNRs, final
+// PSNR, over several seeds.
 #pragma once
 
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +23,10 @@ struct TrainCostPlan {
 struct TrainCostRow {
     Accuracy accuracy;
     std::string name;
-    double gradient_error = 0;       // |g - g*| / |g*| over all parameters of a trained scene
+    std::function<void(TrainOptions&)> change;  // what a row that is no accuracy setting does
+    // |g - g*| / |g*| over all parameters of a trained scene, over some photos; none where the row
+    // changes what is trained, not how exactly.
+    std::optional<Spread> gradient_error;
     Spread ms;                       // an iteration, over the seeds
     Spread psnr_db;                  // held out, at the end
     std::vector<Spread> seconds_to;  // by TrainCostResult::targets; over the seeds that

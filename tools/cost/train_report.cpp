@@ -18,6 +18,10 @@ Json spread_json(const Spread& s) {
     return {{"median", s.median}, {"quartile_low", s.low}, {"quartile_high", s.high}};
 }
 
+std::string error_text(const TrainCostRow& row) {
+    return row.gradient_error ? fmt::format("{:.2e}", row.gradient_error->median) : "-";
+}
+
 std::string seconds_text(const TrainCostRow& row, size_t target, int seeds) {
     if (row.reached[target] == 0) return "-";
     std::string text = fmt::format("{:.2f}", row.seconds_to[target].median);
@@ -34,9 +38,9 @@ std::string numbers(const TrainCostResult& result) {
     html += "</tr>\n";
     for (const TrainCostRow& row : result.rows) {
         html += fmt::format(
-            "<tr><td class='text'>{}</td><td>{:.2e}</td><td>{:.3f}</td><td>{:.3f} to {:.3f}</td>"
+            "<tr><td class='text'>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f} to {:.3f}</td>"
             "<td>{:.3f}</td><td>{:.3f} to {:.3f}</td>",
-            html_escape(row.name), row.gradient_error, row.ms.median, row.ms.low, row.ms.high,
+            html_escape(row.name), error_text(row), row.ms.median, row.ms.low, row.ms.high,
             row.psnr_db.median, row.psnr_db.low, row.psnr_db.high);
         for (size_t t = 0; t < result.targets.size(); ++t)
             html += "<td>" + seconds_text(row, t, result.seeds) + "</td>";
@@ -56,7 +60,7 @@ std::string train_cost_table(const TrainCostResult& result) {
     text += "\n";
     for (const TrainCostRow& row : result.rows) {
         text += fmt::format(
-            "{:<{}}  {:>9.2e} {:>9.3f} {:>15} {:>9.3f} {:>15}", row.name, width, row.gradient_error,
+            "{:<{}}  {:>9} {:>9.3f} {:>15} {:>9.3f} {:>15}", row.name, width, error_text(row),
             row.ms.median, fmt::format("{:.3f}-{:.3f}", row.ms.low, row.ms.high),
             row.psnr_db.median, fmt::format("{:.2f}-{:.2f}", row.psnr_db.low, row.psnr_db.high));
         for (size_t t = 0; t < result.targets.size(); ++t)
@@ -70,18 +74,19 @@ Json train_cost_json(const TrainCostResult& result) {
     Json rows = Json::array();
     for (const TrainCostRow& row : result.rows) {
         Json choices = Json::object(), seconds = Json::array();
-        for (int s = 0; s < kAccuracyCount; ++s)
+        for (int s = 0; s < kAccuracyCount && !row.change; ++s)
             choices[std::string(accuracy_settings()[s].name)] = row.accuracy.of(s).name;
         for (size_t t = 0; t < result.targets.size(); ++t)
             seconds.push_back({{"psnr_db", result.targets[t]},
                                {"seeds_that_reached_it", row.reached[t]},
                                {"seconds", spread_json(row.seconds_to[t])}});
-        rows.push_back({{"name", row.name},
-                        {"accuracy", choices},
-                        {"gradient_error", row.gradient_error},
-                        {"ms_per_iteration", spread_json(row.ms)},
-                        {"psnr_db", spread_json(row.psnr_db)},
-                        {"seconds_to", seconds}});
+        rows.push_back(
+            {{"name", row.name},
+             {"accuracy", choices},
+             {"gradient_error", row.gradient_error ? spread_json(*row.gradient_error) : Json()},
+             {"ms_per_iteration", spread_json(row.ms)},
+             {"psnr_db", spread_json(row.psnr_db)},
+             {"seconds_to", seconds}});
     }
     return {{"version", DARB_VERSION},
             {"device", result.device},
@@ -104,13 +109,16 @@ std::string train_cost_html(const TrainCostResult& result) {
         ends.series[0].points.emplace_back(row.ms.median, row.psnr_db.median);
         ends.series[0].titles.push_back(
             fmt::format("{}: {:.3f} ms, {:.3f} dB", row.name, row.ms.median, row.psnr_db.median));
-        gradients.series[0].points.emplace_back(row.ms.median, row.gradient_error);
-        gradients.series[0].titles.push_back(
-            fmt::format("{}: {:.3f} ms, {:.2e}", row.name, row.ms.median, row.gradient_error));
+        if (row.gradient_error) {
+            gradients.series[0].points.emplace_back(row.ms.median, row.gradient_error->median);
+            gradients.series[0].titles.push_back(
+                fmt::format("{}: {:.3f} ms, {}", row.name, row.ms.median, error_text(row)));
+        }
         const bool shown = row.accuracy == Accuracy{} ||
                            row.accuracy == preset_accuracy(kFast, true) ||
                            row.accuracy == preset_accuracy(kExact, true);
-        if (shown) curves.series.push_back({row.name, row.curve, true, true, false, {}});
+        if (shown && !row.change)
+            curves.series.push_back({row.name, row.curve, true, true, false, {}});
     }
     return html_page(
         result.dataset,
@@ -118,10 +126,13 @@ std::string train_cost_html(const TrainCostResult& result) {
                     result.seeds, result.iterations, result.device, result.driver),
         "<div class='plots'>" + svg_plot(ends) + svg_plot(gradients) + svg_plot(curves) +
             "</div>\n" + numbers(result) +
-            "<h2>How to read it</h2><p>Each setting alone, and the presets; row after row within a "
+            "<h2>How to read it</h2><p>Each setting alone, the presets, and what training does "
+            "beside "
+            "the settings, each turned the other way; row after row within a "
             "seed, so that drift hits all alike. Quartiles over the seeds. Gradient error: "
-            "|g - g*| / |g*|, mean over the kinds of parameters, on one photo and the scene that "
-            "balanced trained, g* in double precision with the true kernel profile, cut-off 1/1024 "
+            "|g - g*| / |g*|, mean over the kinds of parameters, median over three photos, of the "
+            "scene that balanced trained, g* in double precision with the true kernel profile, "
+            "cut-off 1/1024 "
             "and stop 1e-6. Seconds count training alone.</p>\n");
 }
 

@@ -92,7 +92,7 @@ TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset,
                           std::uint64_t seed) {
     const std::string name(kernel_name(kernel)), path = dataset_path(dataset);
     const auto folder = flags.output / dataset_name(dataset) / name / fmt::format("seed{}", seed);
-    std::vector<std::string> words{"train", path, "-o", folder.string(), "--eval"};
+    std::vector<std::string> words{path, "-o", folder.string(), "--eval"};
     words.push_back("--kernel=" + std::string(kernel_name(*kernel_with_pulses(kernel, 1))));
     words.push_back(fmt::format("--pulses={}", kernel_pulses(kernel)));
     words.push_back(fmt::format("--seed={}", seed));
@@ -105,18 +105,7 @@ TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset,
     if (own_images) words.push_back("--images=" + dataset.substr(path.size() + 1));
     for (const std::string& word : flags.forwarded)
         if (!own_images || !word.starts_with("--images=")) words.push_back(word);
-    for (const std::string& word : CLI::detail::split_up(flags.train_options))
-        words.push_back(word);
-    TrainFlags f;
-    CLI::App app;
-    add_train_flags(*app.add_subcommand("train"), f);
-    try {
-        app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
-    } catch (const CLI::ParseError& e) {
-        throw Error("darb compare", e.what(),
-                    "`darb train --help` lists what --train-options takes.");
-    }
-    finish_train_flags(f);
+    TrainFlags f = parse_train_flags(std::move(words), flags.train_options, "darb compare");
     f.run.quiet = flags.quiet;
     return f;
 }

@@ -89,6 +89,10 @@ void add_cost(CLI::App& app, Action& action) {
         "dataset", flags->dataset, "photos with cameras; without: eight views around the splats");
     auto* train = command->add_option("--train", flags->train,
                                       "price the settings in training on this data set instead");
+    command
+        ->add_option("--train-options", flags->train_options,
+                     "options of darb train, as \"--kernel sinc --effects none\"")
+        ->needs(train);
     command->add_option("--seeds", flags->seeds, "runs a setting with --train (default 3)")
         ->check(CLI::Range(1, 100))
         ->needs(train);

@@ -11,7 +11,7 @@
 namespace darb {
 
 struct CostFlags {
-    std::string scene, dataset, device, train;
+    std::string scene, dataset, device, train, train_options;
     int seeds = 0, iterations = 0;
     std::filesystem::path json, html;
     bool quick = false, full = false, quiet = false, white_background = false;

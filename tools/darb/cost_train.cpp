@@ -6,6 +6,7 @@
 #include "engine/core/files.h"
 #include "tools/cost/train_cost.h"
 #include "tools/darb/cost_flags.h"
+#include "tools/darb/train_run.h"
 
 namespace darb {
 
@@ -19,22 +20,28 @@ int train_cost(const CostFlags& flags) {
     if (!flags.scene.empty())
         throw Error("darb cost " + flags.scene + " --train " + flags.train,
                     "--train takes no scene: it trains its own", "Leave the scene out.");
-    TrainOptions options;
-    options.iterations = flags.quick ? 300 : flags.full ? 7'000 : 1'500;
-    if (flags.iterations > 0) options.iterations = flags.iterations;
-    options.white_background = flags.white_background;
+    int iterations = flags.quick ? 300 : flags.full ? 7'000 : 1'500;
+    if (flags.iterations > 0) iterations = flags.iterations;
+    std::vector<std::string> words{flags.train, "-o",       ".",
+                                   "--eval",    "--images", flags.data.images_folder};
+    words.push_back(fmt::format("--iterations={}", iterations));
+    if (flags.data.resolution != DatasetOptions{}.resolution)
+        words.push_back(fmt::format("--resolution={}", flags.data.resolution));
+    if (flags.white_background) words.emplace_back("--white-background");
+    TrainFlags run = parse_train_flags(words, flags.train_options, "darb cost --train");
     TrainCostPlan plan;
     plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
     if (flags.seeds > 0) plan.seeds = flags.seeds;
-    DatasetOptions data = flags.data;
-    data.hold_out = true;
-    const Dataset dataset = load_dataset(flags.train, data);
+    Dataset dataset = load_dataset(run.dataset, run.data);
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
     settle_tuning(device, flags.tune);
+    plan_effects(dataset, run);
+    plan_strategy(dataset, run);
+    if (!flags.quiet) fmt::print(stderr, "effects: {}\n", run.run.effects);
     const TrainCostResult result =
-        measure_train_cost(device, dataset, options, plan, [&](const std::string& line) {
+        measure_train_cost(device, dataset, run.train, plan, [&](const std::string& line) {
             if (!flags.quiet) fmt::print(stderr, "{}\n", line);
         });
     fmt::print("{}: {} iterations, {} seeds, {}\n\n{}", flags.train, result.iterations,

@@ -47,6 +47,11 @@ void add_density_flags(CLI::App& command, TrainFlags& flags);
 /// Throws Error for an option that the strategy does not know.
 void finish_strategy(TrainFlags& flags);
 
+/// As if `darb train` had got these words, `train` left out; options: more of them in one text,
+/// from the --train-options of `command`, which an Error names.
+TrainFlags parse_train_flags(std::vector<std::string> words, const std::string& options,
+                             const std::string& command);
+
 /// Names to ids, lists to their defaults, contradictions to an Error.
 void finish_train_flags(TrainFlags& flags);
 

@@ -12,6 +12,22 @@ constexpr int kStandardEvaluations[] = {7'000, 30'000};
 
 }  // namespace
 
+TrainFlags parse_train_flags(std::vector<std::string> words, const std::string& options,
+                             const std::string& command) {
+    words.insert(words.begin(), "train");
+    for (const std::string& word : CLI::detail::split_up(options)) words.push_back(word);
+    TrainFlags f;
+    CLI::App app;
+    add_train_flags(*app.add_subcommand("train"), f);
+    try {
+        app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    } catch (const CLI::ParseError& e) {
+        throw Error(command, e.what(), "`darb train --help` lists what --train-options takes.");
+    }
+    finish_train_flags(f);
+    return f;
+}
+
 void finish_train_flags(TrainFlags& f) {
     const auto kernel = kernel_from_name(f.kernel);
     if (!kernel)
