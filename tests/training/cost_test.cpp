@@ -170,7 +170,7 @@ TEST(TrainCost, prices_every_setting_of_training) {
     const Dataset dataset = load_dataset(std::filesystem::path(DARB_SOURCE_DIR) / "assets/scene",
                                          {.resolution = 8, .hold_out = true});
     TrainOptions options;
-    options.iterations = 20;
+    options.iterations = 8;
     options.kernel = KERNEL_RAISED_COSINE;
     const TrainCostResult result =
         measure_train_cost(shared_device(), dataset, options, {1, 2}, [](const std::string&) {});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 
 #include "engine/check/walk_truth.h"
 #include "engine/core/error.h"
@@ -121,47 +122,6 @@ double seconds_to(const std::vector<std::pair<double, double>>& curve, double ps
     return -1;
 }
 
-/// Relative distance of the device's gradients from the double ones at the most accurate settings,
-/// for the loss of one photo.
-double gradient_error(Device& device, SplatModel model, const View& view, const ImageU8& photo,
-                      const Accuracy& accuracy, const TrainOptions& options) {
-    const FrameAccuracy frame = frame_accuracy(accuracy, model);
-    model.footprint = frame.footprint;
-    check::WalkSettings walk, exact;
-    exact.background = walk.background = glm::vec3(options.white_background ? 1.0f : 0.0f);
-    exact.alpha_cutoff = static_cast<float>(preset_accuracy(kExact).value(kAlphaCutoff));
-    exact.transmittance_stop =
-        static_cast<float>(preset_accuracy(kExact).value(kTransmittanceStop));
-    walk.evaluation = frame.options.evaluation;
-    walk.polynomial_degree = frame.options.polynomial_degree;
-    walk.storage = frame.options.storage;
-    walk.depth_order = frame.options.depth_order;
-    walk.alpha_cutoff = frame.options.alpha_cutoff;
-    walk.transmittance_stop = frame.options.transmittance_stop;
-
-    const ImageF target = composite(photo, exact.background);
-    Image<double> wanted(target.width, target.height, 3), shown = wanted;
-    std::copy(target.data.begin(), target.data.end(), wanted.data.begin());
-    shown.data = check::walk_in_double(model, view.camera, {}, exact).image;
-    const auto loss = reference::loss(shown, wanted, {options.lambda_dssim});
-    const auto truth = check::walk_in_double(model, view.camera, loss.d_image, exact);
-    const auto got = check::walk_on_device(device, model, view.camera, loss.d_image, walk);
-    double off = 0;
-    int attributes = 0;
-    for (int a = 0; a < kAttributeCount; ++a) {
-        double difference = 0, size = 0;
-        for (size_t i = 0; i < truth.d[a].size(); ++i) {
-            const double e = truth.d[a][i] - got.d[a][i];
-            difference += e * e;
-            size += truth.d[a][i] * truth.d[a][i];
-        }
-        if (!(size > 0)) continue;
-        off += std::sqrt(difference / size);
-        ++attributes;
-    }
-    return off / std::max(attributes, 1);
-}
-
 /// Indices of views, in their order.
 std::vector<size_t> views_of(const Dataset& dataset, bool test) {
     std::vector<size_t> views;
@@ -174,19 +134,95 @@ std::vector<size_t> views_of(const Dataset& dataset, bool test) {
     return views;
 }
 
-Spread gradient_errors(Device& device, const SplatModel& model, const Dataset& dataset,
-                       const std::vector<ImageU8>& photos, const Accuracy& accuracy,
-                       const TrainOptions& options) {
-    const std::vector<size_t> views = views_of(dataset, false);
-    const size_t count = std::min(views.size(), kGradientPhotos);
-    std::vector<double> errors;
-    for (size_t k = 0; k < count; ++k) {
-        const size_t view = views[k * views.size() / count];
-        errors.push_back(
-            gradient_error(device, model, dataset.views[view], photos[view], accuracy, options));
+/// Gradients of a trained scene for the losses of some photos, against those in double precision at
+/// the most accurate settings, which are computed once for each footprint.
+class GradientErrors {
+  public:
+    GradientErrors(Device& device, SplatModel model, const Dataset& dataset,
+                   const std::vector<ImageU8>& photos, const TrainOptions& options)
+        : device_(device), model_(std::move(model)) {
+        const glm::vec3 background(options.white_background ? 1.0f : 0.0f);
+        exact_.background = background;
+        exact_.alpha_cutoff = static_cast<float>(preset_accuracy(kExact).value(kAlphaCutoff));
+        exact_.transmittance_stop =
+            static_cast<float>(preset_accuracy(kExact).value(kTransmittanceStop));
+        lambda_dssim_ = options.lambda_dssim;
+        const std::vector<size_t> views = views_of(dataset, false);
+        const size_t count = std::min(views.size(), kGradientPhotos);
+        for (size_t k = 0; k < count; ++k) {
+            const size_t view = views[k * views.size() / count];
+            photos_.push_back({dataset.views[view].camera, composite(photos[view], background)});
+        }
     }
-    return spread_of(std::move(errors));
-}
+
+    Spread of(const Accuracy& accuracy) {
+        const FrameAccuracy frame = frame_accuracy(accuracy, model_);
+        model_.footprint = frame.footprint;
+        check::WalkSettings walk;
+        walk.background = exact_.background;
+        walk.evaluation = frame.options.evaluation;
+        walk.polynomial_degree = frame.options.polynomial_degree;
+        walk.storage = frame.options.storage;
+        walk.depth_order = frame.options.depth_order;
+        walk.alpha_cutoff = frame.options.alpha_cutoff;
+        walk.transmittance_stop = frame.options.transmittance_stop;
+        std::vector<double> errors;
+        for (Photo& photo : photos_) {
+            const Truth& truth = truth_of(photo);
+            const auto got =
+                check::walk_on_device(device_, model_, photo.camera, truth.d_image, walk);
+            errors.push_back(distance(truth.walk.d, got.d));
+        }
+        return spread_of(std::move(errors));
+    }
+
+  private:
+    struct Truth {
+        Image<double> d_image;
+        check::WalkTruth walk;
+    };
+    struct Photo {
+        Camera camera;
+        ImageF target;
+        std::map<Footprint, Truth> truths = {};
+    };
+
+    const Truth& truth_of(Photo& photo) {
+        const auto found = photo.truths.find(model_.footprint);
+        if (found != photo.truths.end()) return found->second;
+        Image<double> wanted(photo.target.width, photo.target.height, 3), shown = wanted;
+        std::copy(photo.target.data.begin(), photo.target.data.end(), wanted.data.begin());
+        shown.data = check::walk_in_double(model_, photo.camera, {}, exact_).image;
+        Truth truth{reference::loss(shown, wanted, {lambda_dssim_}).d_image, {}};
+        truth.walk = check::walk_in_double(model_, photo.camera, truth.d_image, exact_);
+        return photo.truths.emplace(model_.footprint, std::move(truth)).first->second;
+    }
+
+    /// |g - g*| / |g*|, mean over the kinds of parameters that have a gradient.
+    template <class Gradients, class Others>
+    static double distance(const Gradients& truth, const Others& got) {
+        double off = 0;
+        int attributes = 0;
+        for (int a = 0; a < kAttributeCount; ++a) {
+            double difference = 0, size = 0;
+            for (size_t i = 0; i < truth[a].size(); ++i) {
+                const double e = truth[a][i] - got[a][i];
+                difference += e * e;
+                size += truth[a][i] * truth[a][i];
+            }
+            if (!(size > 0)) continue;
+            off += std::sqrt(difference / size);
+            ++attributes;
+        }
+        return off / std::max(attributes, 1);
+    }
+
+    Device& device_;
+    SplatModel model_;
+    check::WalkSettings exact_;
+    float lambda_dssim_ = 0;
+    std::vector<Photo> photos_;
+};
 
 }  // namespace
 
@@ -210,6 +246,7 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
     for (const TrainedRun& run : runs[0]) ends.push_back(run.curve.back().second);
     for (const double below : kBelow) result.targets.push_back(spread_of(ends).median - below);
 
+    GradientErrors gradients(device, runs[0][0].model, dataset, photos, options);
     for (size_t r = 0; r < result.rows.size(); ++r) {
         TrainCostRow& row = result.rows[r];
         std::vector<double> ms, psnr;
@@ -227,9 +264,7 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
             row.seconds_to.push_back(spread_of(std::move(seconds)));
         }
         row.curve = runs[r][0].curve;
-        if (!row.change)
-            row.gradient_error =
-                gradient_errors(device, runs[0][0].model, dataset, photos, row.accuracy, options);
+        if (!row.change) row.gradient_error = gradients.of(row.accuracy);
     }
     result.seeds = plan.seeds;
     result.iterations = options.iterations;

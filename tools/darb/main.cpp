@@ -18,7 +18,7 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
     std::vector<std::string> arguments(argv + 1, argv + argc);
     for (std::string& argument : arguments) {
         if (argument.rfind("--", 0) != 0) continue;
-        const size_t end = std::min(argument.find('='), argument.size());
+        const size_t end = std::min(argument.find_first_of("= "), argument.size());
         for (size_t i = 2; i < end; ++i)
             if (argument[i] == '_') argument[i] = '-';
     }
