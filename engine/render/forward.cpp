@@ -129,7 +129,7 @@ Forward::Forward(Device& device, const ForwardOptions& options)
 
 void Forward::make_blend(std::uint32_t segments) {
     SpecConstants blend = kernel_constants(options_);
-    blend["MIN_TRANSMITTANCE"] = options_.transmittance_stop;
+    blend["MIN_TRANSMITTANCE"] = least_transmittance(options_.transmittance_stop);
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
     blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);

@@ -55,6 +55,11 @@ struct FrameSize {
 /// Tiles of an image.
 std::uint32_t image_tiles(int width, int height);
 
+/// What the transmittance of a pixel stays at or above: the stop less its slack for rounding.
+constexpr float least_transmittance(float stop) {
+    return static_cast<float>(stop * (1 - TRANSMITTANCE_SLACK));
+}
+
 /// Device memory, by what it grows with.
 struct FrameBytes {
     std::uint64_t splats = 0, pairs = 0, images = 0;  // images: pixels, tiles and what is fixed

@@ -11,6 +11,9 @@
 #define DETERMINANT_MAX 1e30       // px^4; beyond it float32 overflows in the next steps
 #define ALPHA_MAX 0.99             // bounds 1 - alpha, the divisor of the backward pass, by 0.01
 #define TRANSMITTANCE_STOP 1e-4    // a pixel ends before the splat that would bring it below
+// Relative, and taken off any stop: 0.01 of each clamped layer is left, so that T meets 1e-2, 1e-4 and 1e-6
+// exactly, which float32 misses by 1e-6 to 3e-6 of it downwards. Such a T counts as not below the stop.
+#define TRANSMITTANCE_SLACK 1e-5
 #define ALPHA_CUTOFF_DEFAULT (1.0 / 255.0)
 #define LOW_PASS_DEFAULT 0.3  // px^2
 #define NEAR_DEFAULT 0.2      // world units

@@ -23,6 +23,7 @@ struct BlendScene {
     Footprint footprint = Footprint::psi;
     int evaluation = EVALUATION_POLYNOMIAL;
     float cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
+    float stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};
     std::uint32_t segment = 0;  // pairs of a list a dispatch; 0: all
     std::uint32_t threads = 0;  // of a workgroup of blend.comp; 0: a subgroup a block
@@ -66,6 +67,7 @@ struct BlendScene {
     reference::RenderSettings settings() const {
         reference::RenderSettings s;
         s.alpha_cutoff = cutoff;
+        s.transmittance_stop = stop;
         for (int c = 0; c < 3; ++c) s.background[c] = background[c];
         return s;
     }
@@ -186,6 +188,7 @@ struct BlendPipelines {
         constants["PIXELS"] = static_cast<std::int32_t>(256 / threads);
         constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
         constants["CHECKPOINTS"] = scene.buckets ? 1 : 0;
+        constants["MIN_TRANSMITTANCE"] = least_transmittance(scene.stop);
         blend = Pipeline(device, "blend", constants, true, subgroup);
         constants["THREADS"] = SPLAT_GROUP;
         bucket_tiles = Pipeline(device, "bucket_tiles", constants);
