@@ -23,7 +23,8 @@ BufferList<BlendBackward> BlendBackward::segment_buffers(const FrameSize& size) 
 }
 
 BufferList<BlendBackward> BlendBackward::bucket_buffers(std::uint64_t records) {
-    return {{&BlendBackward::bucket_tile_, "bucket tile", records * 4}};
+    return {{&BlendBackward::bucket_tile_, "bucket tile", records * 4},
+            {&BlendBackward::bucket_rest_, "behind buckets", records * TILE_SIZE * TILE_SIZE * 4}};
 }
 
 FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
@@ -101,16 +102,17 @@ void BlendBackward::record_buckets(Commands& commands, const Forward& forward,
     commands.dispatch(bucket_tiles_, buckets, {forward.tile_range(), bucket_tile_}, args.tiles_x,
                       tiles_y);
     for (args.segment = args.segments; args.segment-- > 0;)
-        commands.dispatch(
-            bucket_behind_, args,
-            {forward.tile_range(), d_image, forward.last_pair(), forward.checkpoints(), behind_},
-            args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
+        commands.dispatch(bucket_behind_, args,
+                          {forward.tile_range(), d_image, forward.last_pair(),
+                           forward.checkpoints(), behind_, bucket_rest_},
+                          args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
     const Groups g = groups_for(records, 1);
-    commands.dispatch(blend_, buckets,
-                      {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
-                       forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
-                       forward.last_pair(), bucket_tile_, forward.checkpoints(), partials_, rest_},
-                      g.x, g.y);
+    commands.dispatch(
+        blend_, buckets,
+        {forward.tile_range(), forward.pair_order(), forward.pair_splat(), forward.splat_shape(),
+         forward.splat_light(), forward.splat_bound(), d_image, forward.last_pair(), bucket_tile_,
+         forward.checkpoints(), bucket_rest_, partials_, rest_},
+        g.x, g.y);
 }
 
 }  // namespace darb

@@ -223,7 +223,9 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         partials(device, "partials", std::vector<float>(pairs * 8, 0.0f)),
         rest(device, "partial rest", std::vector<float>(pairs, 0.0f)),
         checkpoints(device, "checkpoints", unwritten),
-        bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0));
+        bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0)),
+        bucket_rest(device, "behind buckets",
+                    std::vector<float>(scene.buckets ? records * 256 : 1, NAN));
     std::uint32_t longest = 0;
     for (const glm::uvec2& r : shuffled.ranges) longest = std::max(longest, r.y - r.x);
     gpu::BlendArgs args{static_cast<std::uint32_t>(scene.width),
@@ -255,7 +257,8 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     while (args.segment-- > 0 && !d_image.empty())
         if (scene.buckets)
             commands.dispatch(pipelines.bucket_behind, args,
-                              {ranges, d_images, last, checkpoints, behind}, groups_x, groups_y, 4);
+                              {ranges, d_images, last, checkpoints, behind, bucket_rest}, groups_x,
+                              groups_y, 4);
         else
             commands.dispatch(pipelines.backward, args,
                               {ranges, order, splats, shapes, lights, bounds, d_images, final_t,
@@ -264,12 +267,12 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     if (scene.buckets && !d_image.empty())
         commands.dispatch(pipelines.backward, bucket_args,
                           {ranges, order, splats, shapes, lights, bounds, d_images, last,
-                           bucket_tile, checkpoints, partials, rest},
+                           bucket_tile, checkpoints, bucket_rest, partials, rest},
                           static_cast<std::uint32_t>(records));
     commands.submit_and_wait();
     for (const GuardedBuffer* buffer :
          {&ranges, &order, &splats, &shapes, &lights, &bounds, &image, &final_t, &last, &partials,
-          &rest, &behind, &checkpoints, &bucket_tile})
+          &rest, &behind, &checkpoints, &bucket_tile, &bucket_rest})
         EXPECT_TRUE(buffer->intact());
     const auto sums = partials.read<float>(), rests = rest.read<float>();
     for (size_t j = 0; j < pairs; ++j) {
