@@ -24,7 +24,7 @@ Exposure::Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels)
       map_(device, "exposure", {{"THREADS", SPLAT_GROUP}}),
       backward_(device, "exposure_backward", {}, false),
       update_(device, "exposure_update", {}, false) {
-    make_buffers(device, *this, buffers(photos, pixels));
+    make_buffers(device, *this, buffers(photos, pixels), "exposure");
     std::vector<float> start;
     for (std::uint32_t p = 0; p < photos; ++p)
         start.insert(start.end(), kIdentityColours.begin(), kIdentityColours.end());

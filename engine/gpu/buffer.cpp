@@ -8,6 +8,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/gpu/barriers.h"
 #include "engine/gpu/device_state.h"
 
 namespace darb {
@@ -76,10 +77,12 @@ void check_limits(const Device::State& state, const std::string& name, std::uint
 
 }  // namespace
 
-Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kind)
+Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kind,
+               std::string_view pass)
     : device_(&device), name_(std::move(name)), bytes_(bytes == 0 ? 16 : bytes) {
     Device::State& state = device.state();
-    const std::string what = describe(name_, bytes_);
+    const std::string what =
+        (pass.empty() ? "" : fmt::format("pass {}, ", pass)) + describe(name_, bytes_);
     // Copies and fills work on words.
     const std::uint64_t whole_words = charged_bytes(bytes);
     check_limits(state, name_, whole_words, what);
@@ -204,6 +207,7 @@ void Device::State::copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer 
     begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     check_vulkan(vkBeginCommandBuffer(copy_commands, &begin), what);
+    record_full_barrier(copy_commands);  // having waited makes writes available, not visible
     const VkBufferCopy region{from_offset, to_offset, bytes};
     vkCmdCopyBuffer(copy_commands, from, to, 1, &region);
     VkMemoryBarrier2 barrier{};

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/gpu/device.h"
@@ -21,9 +22,11 @@ enum class Memory {
 class Buffer {
   public:
     Buffer() = default;
-    /// Throws Error naming the buffer and its size when memory or the device's limits do not allow
-    /// it. A size of 0 is made 16 bytes, so that every binding is valid. Content is undefined.
-    Buffer(Device& device, std::string name, std::uint64_t bytes, Memory memory = Memory::device);
+    /// Throws Error naming the buffer, its size and the pass that it is for, where one is given,
+    /// when memory or the device's limits do not allow it. A size of 0 is made 16 bytes, so that
+    /// every binding is valid. Content is undefined.
+    Buffer(Device& device, std::string name, std::uint64_t bytes, Memory memory = Memory::device,
+           std::string_view pass = {});
     ~Buffer();
     Buffer(Buffer&&) noexcept;
     Buffer& operator=(Buffer&&) noexcept;

@@ -29,12 +29,13 @@ std::uint64_t charged_bytes(const BufferList<Owner>& list) {
 }
 
 /// Makes the buffers of a list, content undefined. All that they replace goes first: there is never
-/// an old and a new one at a time. Where one cannot be had those behind it are empty.
+/// an old and a new one at a time. Where one cannot be had those behind it are empty, and the error
+/// names the pass: the first that needs them.
 template <class Owner>
-void make_buffers(Device& device, Owner& owner, const BufferList<Owner>& list) {
+void make_buffers(Device& device, Owner& owner, const BufferList<Owner>& list, const char* pass) {
     for (const BufferRow<Owner>& row : list) owner.*row.buffer = Buffer();
     for (const BufferRow<Owner>& row : list)
-        owner.*row.buffer = Buffer(device, row.name, row.bytes);
+        owner.*row.buffer = Buffer(device, row.name, row.bytes, Memory::device, pass);
 }
 
 }  // namespace darb

@@ -265,6 +265,9 @@ void Device::forget_peak() {
 void Device::set_memory_budget(std::uint64_t bytes) {
     state_->budget = bytes;
 }
+std::uint64_t Device::memory_budget() const {
+    return state_->budget;
+}
 std::uint64_t Device::validation_message_count() const {
     return state_->instance.message_count();
 }

@@ -32,9 +32,10 @@ struct DeviceInfo {
     std::uint32_t shared_memory_bytes = 0;
     std::uint32_t max_groups_x = 0;
     std::uint32_t subgroup_size = 0, min_subgroup_size = 0, max_subgroup_size = 0;
-    double timestamp_period_ns = 0;  // 0 where the queue has no timestamps
-    bool unified_memory = false;     // every heap is host-visible (CPU and integrated devices)
-    bool float_atomics = false;      // float32 atomic add on buffers
+    bool requires_subgroup_size = false;  // compute shaders may ask for one of several sizes
+    double timestamp_period_ns = 0;       // 0 where the queue has no timestamps
+    bool unified_memory = false;          // every heap is host-visible (CPU and integrated devices)
+    bool float_atomics = false;           // float32 atomic add on buffers
     bool usable = false;
     std::string reason;  // why it was rejected, or why it ranks where it does
 };
@@ -42,6 +43,10 @@ struct DeviceInfo {
 /// Which of several equal ways a pass takes: name of the choice -> name of the way. What they mean,
 /// and what a missing one means, is known to engine/render/tuning.h.
 using Variants = std::map<std::string, std::string, std::less<>>;
+
+/// Why the blend passes cannot run in the subgroups of a device, or "". They want 4 to 64 lanes,
+/// and to name their number where there are several.
+std::string subgroup_trouble(const DeviceInfo& info);
 
 /// Every physical device, best first; never throws for want of a device (then: empty).
 std::vector<DeviceInfo> list_devices();
@@ -95,6 +100,7 @@ class Device {
     void forget_peak();  // peak_bytes counts from now on
     /// A budget for all Buffers together; 0 = none. Exceeding it throws as out of memory does.
     void set_memory_budget(std::uint64_t bytes);
+    std::uint64_t memory_budget() const;
 
     /// Messages of the validation layers since the start (0 where validation is off).
     std::uint64_t validation_message_count() const;

@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::uint32_t kMinSharedBytes = 16 * 1024;
 constexpr std::uint32_t kMinStorageBuffers = 8;
+constexpr std::uint32_t kMinSubgroup = 4, kMaxSubgroup = 64;  // lanes, of the blend passes
 
 std::string type_name(VkPhysicalDeviceType type) {
     switch (type) {
@@ -79,6 +80,7 @@ std::string missing_part(VkPhysicalDevice device, const DeviceInfo& info) {
     if ((subgroup.supportedOperations & kNeeded) != kNeeded ||
         (subgroup.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT) == 0)
         return "subgroup operations missing";
+    if (const std::string trouble = subgroup_trouble(info); !trouble.empty()) return trouble;
     if (info.shared_memory_bytes < kMinSharedBytes) return "less than 16 KiB of shared memory";
     if (info.max_storage_buffers < kMinStorageBuffers) return "too few storage buffers per shader";
     return {};
@@ -143,6 +145,8 @@ DeviceInfo describe(VkPhysicalDevice device) {
     info.subgroup_size = subgroup.subgroupSize;
     info.min_subgroup_size = sizes.minSubgroupSize;
     info.max_subgroup_size = sizes.maxSubgroupSize;
+    info.requires_subgroup_size =
+        (sizes.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT) != 0;
     describe_memory(device, info);
     info.float_atomics = float_atomics(device);
     const int family = compute_queue_family(device);
@@ -178,6 +182,16 @@ std::string hex(std::span<const std::uint8_t> bytes) {
     std::string text;
     for (const std::uint8_t byte : bytes) text += fmt::format("{:02x}", byte);
     return text;
+}
+
+std::string subgroup_trouble(const DeviceInfo& info) {
+    if (info.max_subgroup_size < kMinSubgroup || info.min_subgroup_size > kMaxSubgroup)
+        return fmt::format("subgroups of {} to {} lanes, needs {} to {}", info.min_subgroup_size,
+                           info.max_subgroup_size, kMinSubgroup, kMaxSubgroup);
+    if (info.min_subgroup_size != info.max_subgroup_size && !info.requires_subgroup_size)
+        return fmt::format("subgroups of {} to {} lanes, and compute shaders cannot require a size",
+                           info.min_subgroup_size, info.max_subgroup_size);
+    return {};
 }
 
 int compute_queue_family(VkPhysicalDevice device) {

@@ -6,10 +6,6 @@
 namespace darb::reference {
 namespace {
 
-// As the shaders know it. Two clamped layers leave a transmittance of 1 - 2e-6 of the stop in
-// float32, and of 1 + 2e-15 of it with 0.99 in double: the same constant stops both.
-constexpr double kAlphaMax = static_cast<float>(ALPHA_MAX);
-
 // One splat as a pixel meets it.
 template <class T>
 struct Sample {
@@ -37,8 +33,8 @@ bool sample_splat(const ProjectedSplat<T>& s, T x, T y, const KernelTable& kerne
     }
     sample.weight = static_cast<T>(kernel.value(static_cast<double>(sample.q)));
     const T unclamped = s.opacity * sample.weight;
-    sample.clamped = unclamped > T(kAlphaMax);
-    sample.alpha = sample.clamped ? T(kAlphaMax) : unclamped;
+    sample.clamped = unclamped > T(ALPHA_MAX);
+    sample.alpha = sample.clamped ? T(ALPHA_MAX) : unclamped;
     return sample.alpha >= cutoff && sample.alpha > 0;
 }
 
@@ -69,7 +65,8 @@ void for_each_pixel(const TileLists& lists, size_t tile, int width, int height,
 template <class T, class Blend>
 T walk_pixel(std::span<const ProjectedSplat<T>> list, int x, int y, const KernelTable& kernel,
              const RenderSettings& settings, const Blend& blend) {
-    const T cutoff = T(settings.alpha_cutoff), stop = T(settings.transmittance_stop);
+    const T cutoff = T(settings.alpha_cutoff);
+    const T stop = T(settings.transmittance_stop * (1 - TRANSMITTANCE_SLACK));
     T transmittance = 1;
     const auto goes_on = [&](const Sample<T>& sample) {
         const T next = transmittance * (1 - sample.alpha);

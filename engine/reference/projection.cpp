@@ -100,12 +100,15 @@ RowGradients<T> row_gradients(const Splats<T>& splats, const CovarianceTerms<T>&
     RowGradients<T> d;
     if (splats.antialias && terms.det_sharp > 0) {
         // opacity = sigmoid |n| / sqrt(det), n = r1 x r2; det = A C - B^2.
-        const Vec3<T> n = glm::cross(terms.r1, terms.r2);
+        // With the rows shrunk, as the determinants are.
+        const T shrink = terms.shrink, area = shrink * shrink;
+        const Vec3<T> r1 = terms.r1 * shrink, r2 = terms.r2 * shrink, n = glm::cross(r1, r2);
         const Vec3<T> d_n = gradient.d_opacity * splat.opacity / terms.det_sharp * n;
-        d.d_r1 = glm::cross(terms.r2, d_n);
-        d.d_r2 = glm::cross(d_n, terms.r1);
+        d.d_r1 = shrink * glm::cross(r2, d_n);
+        d.d_r2 = shrink * glm::cross(d_n, r1);
         const T d_det = T(-0.5) * gradient.d_opacity * splat.opacity / terms.det;
-        d_cov += d_det * Vec3<T>(splat.cov_yy, -2 * splat.cov_xy, splat.cov_xx);
+        const Vec3<T> adjugate(splat.cov_yy, -2 * splat.cov_xy, splat.cov_xx);
+        d_cov += d_det * area * (area * adjugate);
     }
     d.d_r1 += 2 * d_cov[0] * terms.r1 + d_cov[1] * terms.r2;
     d.d_r2 += 2 * d_cov[2] * terms.r2 + d_cov[1] * terms.r1;
@@ -249,7 +252,8 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
         p.cull = Cull::opacity;
         return p;
     }
-    if (!(terms.det > T(DETERMINANT_MIN)) || !(terms.det < T(DETERMINANT_MAX))) {
+    const T area = terms.shrink * terms.shrink;  // of a shrunk px^2
+    if (!(terms.det > T(DETERMINANT_MIN) * area * area)) {
         p.cull = Cull::covariance;
         return p;
     }
@@ -268,8 +272,9 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
     p.cov_xy = glm::dot(terms.r1, terms.r2);
     p.cov_yy = glm::dot(terms.r2, terms.r2) + T(settings.low_pass);
-    p.l11 = std::sqrt(p.cov_yy / terms.det);
-    p.l21 = -p.cov_xy / (std::sqrt(p.cov_yy) * std::sqrt(terms.det));
+    const T xy = p.cov_xy * area, yy = p.cov_yy * area;
+    p.l11 = terms.shrink * std::sqrt(yy / terms.det);
+    p.l21 = -terms.shrink * xy / (std::sqrt(yy) * std::sqrt(terms.det));
     p.l22 = 1 / std::sqrt(p.cov_yy);
     const Vec3<T> r3 =
         terms.root * (Vec3<T>(0, 0, 1) * view_rotation<T>(camera) * rotation.matrix) * terms.scale;

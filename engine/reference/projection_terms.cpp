@@ -75,6 +75,14 @@ Vec3<T> mean_in_camera(const T* position, const Camera& camera) {
            Vec3<T>(camera.translation);
 }
 
+/// So that fourth powers of the rows stay within float where they leave it; in double it is exact.
+template <class T>
+T row_shrink(const Vec3<T>& r1, const Vec3<T>& r2) {
+    T longest = 0;
+    for (int k = 0; k < 3; ++k) longest = std::max({longest, std::abs(r1[k]), std::abs(r2[k])});
+    return longest > T(ROW_LIMIT) ? std::ldexp(T(1), -std::ilogb(longest)) : T(1);
+}
+
 template <class T>
 CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
                                     const T* log_scale, T filter, const Camera& camera,
@@ -98,11 +106,12 @@ CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTe
     c.root = T(std::sqrt(covariance_scale));
     c.r1 = c.root * (c.k1 * rotation.matrix) * c.scale;
     c.r2 = c.root * (c.k2 * rotation.matrix) * c.scale;
-    const Vec3<T> cross = glm::cross(c.r1, c.r2);
-    const T h = T(low_pass);
+    c.shrink = row_shrink(c.r1, c.r2);
+    const Vec3<T> r1 = c.r1 * c.shrink, r2 = c.r2 * c.shrink, cross = glm::cross(r1, r2);
+    const T h = T(low_pass) * c.shrink * c.shrink;
     c.det_sharp = glm::dot(cross, cross);
     // det(M M^T + h I) without the cancellation of A C - B^2 (Lagrange's identity).
-    c.det = c.det_sharp + h * (glm::dot(c.r1, c.r1) + glm::dot(c.r2, c.r2)) + h * h;
+    c.det = c.det_sharp + h * (glm::dot(r1, r1) + glm::dot(r2, r2)) + h * h;
     return c;
 }
 

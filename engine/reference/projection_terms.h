@@ -53,8 +53,9 @@ struct CovarianceTerms {
     Vec3<T> scale{0};      // standard deviations, filter included, world units
     T root = 1;            // sqrt of the footprint's covariance scale
     Vec3<T> r1{0}, r2{0};  // rows of M = root J W R diag(scale), px
-    T det_sharp = 0;       // |r1 x r2|^2: determinant before the low-pass, px^4
-    T det = 0;             // of S', px^4
+    T shrink = 1;          // power of two that brings rows beyond ROW_LIMIT below 2 px
+    T det_sharp = 0;       // |r1 x r2|^2: determinant before the low-pass, px^4 times shrink^4
+    T det = 0;             // of S', px^4 times shrink^4
 };
 
 template <class T>

@@ -55,7 +55,7 @@ Pipeline& Backward::project_pipeline(int sh_degree) {
 void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
     if (splats > splat_capacity_ || splat_capacity_ == 0) {
         splat_capacity_ = std::max(splats, 1024u);
-        make_buffers(*device_, *this, splat_buffers(splat_capacity_));
+        make_buffers(*device_, *this, splat_buffers(splat_capacity_), "project backward");
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
     blend_.reserve(pairs);

@@ -10,7 +10,7 @@ namespace darb {
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options), way_(tuning_of(device).backward) {
     make_pipelines(false);
-    make_buffers(device, *this, segment_buffers({}));
+    make_buffers(device, *this, segment_buffers({}), "blend backward");
 }
 
 BufferList<BlendBackward> BlendBackward::pair_buffers(std::uint64_t pairs) {
@@ -23,7 +23,8 @@ BufferList<BlendBackward> BlendBackward::segment_buffers(const FrameSize& size) 
 }
 
 BufferList<BlendBackward> BlendBackward::bucket_buffers(std::uint64_t records) {
-    return {{&BlendBackward::bucket_tile_, "bucket tile", records * 4}};
+    return {{&BlendBackward::bucket_tile_, "bucket tile", records * 4},
+            {&BlendBackward::bucket_rest_, "behind buckets", records * TILE_SIZE * TILE_SIZE * 4}};
 }
 
 FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
@@ -55,7 +56,7 @@ void BlendBackward::make_pipelines(bool segmented) {
 void BlendBackward::reserve(std::uint32_t pairs) {
     if (pairs <= pair_capacity_ && pair_capacity_ > 0) return;
     pair_capacity_ = std::max(pairs, 1024u);
-    make_buffers(*device_, *this, pair_buffers(pair_capacity_));
+    make_buffers(*device_, *this, pair_buffers(pair_capacity_), "blend backward");
 }
 
 void BlendBackward::record(Commands& commands, const Forward& forward, const Buffer& d_image,
@@ -65,7 +66,7 @@ void BlendBackward::record(Commands& commands, const Forward& forward, const Buf
                pair_capacity_);
     if (segments > 1 && !segmented_) make_pipelines(true);
     if (segments > 1 && behind_.bytes() < forward.size().pixels * 4)
-        make_buffers(*device_, *this, segment_buffers(forward.size()));
+        make_buffers(*device_, *this, segment_buffers(forward.size()), "blend backward");
     commands.fill(partials_, 0);
     commands.fill(rest_, 0);
     const gpu::BlendArgs args{data.width,   data.height, data.tiles_x, background.r, background.g,
@@ -94,23 +95,24 @@ void BlendBackward::record_buckets(Commands& commands, const Forward& forward,
     const std::uint32_t records = forward.checkpoint_records();
     DARB_CHECK(records > 0, "the forward pass stores no checkpoints");
     if (bucket_tile_.bytes() < std::uint64_t{records} * 4)
-        make_buffers(*device_, *this, bucket_buffers(records));
+        make_buffers(*device_, *this, bucket_buffers(records), "blend backward");
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     const gpu::BucketArgs buckets{args.width, args.height, args.tiles_x, records};
     commands.fill(bucket_tile_, 0);
     commands.dispatch(bucket_tiles_, buckets, {forward.tile_range(), bucket_tile_}, args.tiles_x,
                       tiles_y);
     for (args.segment = args.segments; args.segment-- > 0;)
-        commands.dispatch(
-            bucket_behind_, args,
-            {forward.tile_range(), d_image, forward.last_pair(), forward.checkpoints(), behind_},
-            args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
+        commands.dispatch(bucket_behind_, args,
+                          {forward.tile_range(), d_image, forward.last_pair(),
+                           forward.checkpoints(), behind_, bucket_rest_},
+                          args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
     const Groups g = groups_for(records, 1);
-    commands.dispatch(blend_, buckets,
-                      {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
-                       forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
-                       forward.last_pair(), bucket_tile_, forward.checkpoints(), partials_, rest_},
-                      g.x, g.y);
+    commands.dispatch(
+        blend_, buckets,
+        {forward.tile_range(), forward.pair_order(), forward.pair_splat(), forward.splat_shape(),
+         forward.splat_light(), forward.splat_bound(), d_image, forward.last_pair(), bucket_tile_,
+         forward.checkpoints(), bucket_rest_, partials_, rest_},
+        g.x, g.y);
 }
 
 }  // namespace darb

@@ -43,7 +43,7 @@ class BlendBackward {
     Pipeline bucket_tiles_, bucket_behind_;  // of buckets
     bool segmented_ = false;                 // whether the pipelines take segments
     Buffer behind_;                          // pixels' state between their dispatches
-    Buffer bucket_tile_;                     // of buckets
+    Buffer bucket_tile_, bucket_rest_;       // of buckets
     std::uint32_t pair_capacity_ = 0;
     Buffer partials_, rest_;
 };

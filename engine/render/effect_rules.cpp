@@ -13,7 +13,9 @@ namespace darb {
 namespace {
 
 constexpr double kColourStep = 1.0 / 512;  // half of an 8-bit step
-constexpr double kCentreStep_px = 0.01;    // a shift by it changes no 8-bit picture
+// A shift by it moves a value of a step from 0 to 1, the steepest there is, by 1/40 of an 8-bit
+// step.
+constexpr double kCentreStep_px = 1e-4;
 // Largest pixel footprint of a point over its smallest. Captures at one distance and size stay
 // below it and lose by anti-aliasing, those that vary both lie above and gain: docs/effects.md.
 constexpr double kFootprintRatio = 2.5;
@@ -78,7 +80,7 @@ EffectRow centre_rule(const std::vector<View>& views) {
     row.on = row.measured > kCentreStep_px;
     row.reason = views.empty()
                      ? "no cameras are named"
-                     : fmt::format("the principal point is off by {:.2f} px at most", row.measured);
+                     : fmt::format("the principal point is off by {:.4f} px at most", row.measured);
     return row;
 }
 

@@ -45,10 +45,13 @@ Ball ball_of(const SplatModel& model, std::size_t i) {
 }
 
 // One axis: whether [-extent, extent] around the projected centre meets the picture. The row of the
-// Jacobian is f/z (1, 0, -ratio), its length bounds what the covariance becomes.
-bool meets(double focal, double centre, double z, double ratio, int pixels, const Ball& ball) {
+// Jacobian is f/z (1, 0, -ratio), its length bounds what the covariance becomes. The clamped ratio
+// is the larger one where the picture lies far off the axis, so that it counts too.
+bool meets(double focal, double centre, double z, double ratio, double low, double high, int pixels,
+           const Ball& ball) {
     const double along = ball.deviation * focal / z;
-    const double variance = along * along * (1 + ratio * ratio) + LOW_PASS_DEFAULT;
+    const double steepest = std::max(std::abs(ratio), std::abs(std::clamp(ratio, low, high)));
+    const double variance = along * along * (1 + steepest * steepest) + LOW_PASS_DEFAULT;
     const double extent = kSlack * std::sqrt(ball.reach2 * variance) + kSlack_px;
     const double at = focal * ratio + centre;
     return at + extent >= 0 && at - extent <= pixels + TILE_SIZE;
@@ -67,8 +70,9 @@ bool needs_care(const Camera& camera, const gpu::CameraData& data, const Ball& b
         inside(y, data.ratio_min.y, data.ratio_max.y))
         return false;
     if (camera.lens.active) return true;  // its Jacobian has no such bound
-    return meets(camera.fx, camera.cx, p.z, x, camera.width, ball) &&
-           meets(camera.fy, camera.cy, p.z, y, camera.height, ball);
+    const glm::vec2 low = data.ratio_min, high = data.ratio_max;
+    return meets(camera.fx, camera.cx, p.z, x, low.x, high.x, camera.width, ball) &&
+           meets(camera.fy, camera.cy, p.z, y, low.y, high.y, camera.height, ball);
 }
 
 }  // namespace

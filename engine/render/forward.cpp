@@ -6,6 +6,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/render/blend_backward.h"
 #include "engine/render/groups.h"
 #include "engine/render/kernel_constants.h"
 #include "engine/render/tuning.h"
@@ -16,6 +17,7 @@ namespace darb {
 namespace {
 
 constexpr std::uint32_t kMinCapacity = 1024;
+constexpr std::uint64_t kPartialBytes = 32;  // of a pair in the backward pass, its widest entry
 
 std::uint32_t tiles(std::uint32_t pixels) {
     return (pixels + TILE_SIZE - 1) / TILE_SIZE;
@@ -26,11 +28,14 @@ int bits_for(std::uint32_t count) {
 }
 
 // A frame without a backward pass holds a word for a pair, not eight.
+std::uint64_t most_pairs(const Device& device, std::uint64_t bytes_of_pair) {
+    return std::min({device.info().max_storage_buffer_bytes / bytes_of_pair, std::uint64_t{1} << 30,
+                     RadixSort::max_capacity(device)});
+}
+
 std::uint32_t most_pairs(const Device& device, const ForwardOptions& options) {
-    const std::uint64_t words = device.info().max_storage_buffer_bytes / 4;
-    return options.store_for_backward
-               ? Forward::max_pairs(device)
-               : static_cast<std::uint32_t>(std::min<std::uint64_t>(words, 1u << 30));
+    return options.store_for_backward ? Forward::max_pairs(device)
+                                      : static_cast<std::uint32_t>(most_pairs(device, 4));
 }
 
 }  // namespace
@@ -122,14 +127,14 @@ Forward::Forward(Device& device, const ForwardOptions& options)
     cooperates_ = options.crowds == Crowds::always;
     if (cooperates_) make_cooperation();
     make_blend(options.crowds == Crowds::always ? 2 : 1);
-    make_buffers(device, *this, fixed_buffers());
-    make_buffers(device, *this, checkpoint_buffers(0));
+    make_buffers(device, *this, fixed_buffers(), "project");
+    make_buffers(device, *this, checkpoint_buffers(0), "blend");
     clear_status();
 }
 
 void Forward::make_blend(std::uint32_t segments) {
     SpecConstants blend = kernel_constants(options_);
-    blend["MIN_TRANSMITTANCE"] = options_.transmittance_stop;
+    blend["MIN_TRANSMITTANCE"] = least_transmittance(options_.transmittance_stop);
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
     blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);
@@ -152,7 +157,7 @@ void Forward::make_cooperation() {
     }
     const BufferList<Forward> buffers = huge_buffers(size_.pairs);
     if (!huge_rank_ || huge_rank_.bytes() < buffers.front().bytes)
-        make_buffers(*device_, *this, buffers);
+        make_buffers(*device_, *this, buffers, "emit");
     size_.cooperates = true;
 }
 
@@ -162,25 +167,59 @@ void Forward::note_crowds(const gpu::FrameStatus& status) {
     if (cooperates_ && !emit_huge_) make_cooperation();
 }
 
+// Whether the budget holds so many pairs, with a backward pass of them where there is to be one.
+bool Forward::within_budget(std::uint32_t pairs) const {
+    const std::uint64_t budget = device_->memory_budget();
+    const auto bytes = [&](std::uint32_t of) {
+        FrameSize size = size_;
+        size.pairs = of;
+        const std::uint64_t own = device_bytes(*device_, options_, size).pairs;
+        return options_.store_for_backward ? own + BlendBackward::device_bytes(size).pairs : own;
+    };
+    return budget == 0 || device_->allocated_bytes() + bytes(pairs) <= budget + bytes(size_.pairs);
+}
+
+// Half as many again, so that fuller frames need no further round; where memory does not allow it,
+// just those.
+void Forward::make_room_for(std::uint32_t wanted, std::uint32_t most) {
+    const auto ample =
+        static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted + wanted / 2ull, most));
+    if (ample > wanted && within_budget(ample)) {
+        try {
+            reserve(size_.splats, ample, 1, 1);
+            return;
+        } catch (const Error&) {  // the device refuses what the budget allows
+            size_.pairs = 0;
+        }
+    }
+    reserve(size_.splats, wanted, 1, 1);
+}
+
 bool Forward::make_room(const gpu::FrameStatus& status) {
     note_crowds(status);
     if (status.overflow == 0) return false;
     const std::uint32_t most = most_pairs(*device_, options_);
     const std::uint32_t wanted =
         (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.pairs;
-    if (wanted > most)
+    if (wanted > most) {
+        const std::uint64_t other_way = most_pairs(*device_, kPartialBytes);
+        const std::string instead =
+            size_.bucket > 0 && wanted <= other_way
+                ? fmt::format("Run with --tune backward=subgroup, which holds {}, or lower",
+                              other_way)
+                : "Lower";
         throw Error("splat-tile pairs",
                     fmt::format("a frame needs {}{} pairs, this device's buffers hold {}",
                                 wanted == 0xFFFFFFFFu ? "more than " : "", wanted, most),
-                    "Lower the resolution (-r) or the number of splats (--cap-max).");
-    if ((status.overflow & OVERFLOW_PAIRS) != 0)
-        reserve(size_.splats, std::min(wanted + wanted / 2, most), 1, 1);
+                    instead + " the resolution (-r) or the number of splats (--cap-max).");
+    }
+    if ((status.overflow & OVERFLOW_PAIRS) != 0) make_room_for(wanted, most);
     const std::uint32_t segments = (status.longest_list + LIST_SEGMENT - 1) / LIST_SEGMENT;
     if (segments > size_.list_segments) {
         make_blend(segments + segments / 4);
         if (!options_.store_for_backward)  // the pixels' state is kept between dispatches
             make_buffers(*device_, *this,
-                         pixel_buffers(options_, size_.pixels, size_.list_segments));
+                         pixel_buffers(options_, size_.pixels, size_.list_segments), "blend");
     }
     clear_status();
     return true;
@@ -203,12 +242,11 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
 }
 
 std::uint32_t Forward::max_pairs(const Device& device) {
-    // The widest entry per pair is the backward pass's: eight floats. Of the checkpoints' records
-    // half are left for the tiles, whose last buckets are not full.
-    const std::uint64_t binding = device.info().max_storage_buffer_bytes;
-    std::uint64_t most = std::min<std::uint64_t>(binding / 32, 1u << 30);
+    // Of the checkpoints' records half are left for the tiles, whose last buckets are not full.
+    std::uint64_t most = most_pairs(device, kPartialBytes);
     if (tuning_of(device).backward == BackwardBlend::buckets)
-        most = std::min(most, binding / CHECKPOINT_BYTES / 2 * bucket_pairs(device));
+        most = std::min(most, device.info().max_storage_buffer_bytes / CHECKPOINT_BYTES / 2 *
+                                  bucket_pairs(device));
     return static_cast<std::uint32_t>(most);
 }
 
@@ -227,7 +265,7 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         scan_.reset();
         depth_sort_.reset();
         splats = std::max(splats, kMinCapacity);
-        make_buffers(d, *this, splat_buffers(options_, splats));
+        make_buffers(d, *this, splat_buffers(options_, splats), "project");
         scan_.emplace(d, splats);
         depth_sort_.emplace(d, splats);
         size_.splats = splats;
@@ -237,23 +275,23 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         size_.pairs = 0;
         tile_sort_.reset();
         pairs = std::max(pairs, kMinCapacity);
-        make_buffers(d, *this, pair_buffers(pairs));
+        make_buffers(d, *this, pair_buffers(pairs), "emit");
         tile_sort_.emplace(d, pairs);
         size_.pairs = pairs;
         if (emit_huge_) make_cooperation();
     }
     if (const std::uint32_t tiled = image_tiles(width, height); tiled > size_.tiles) {
         size_.tiles = 0;
-        make_buffers(d, *this, tile_buffers(tiled));
+        make_buffers(d, *this, tile_buffers(tiled), "tile ranges");
         size_.tiles = tiled;
     }
     if (pixels > size_.pixels) {
         size_.pixels = 0;
-        make_buffers(d, *this, pixel_buffers(options_, pixels, size_.list_segments));
+        make_buffers(d, *this, pixel_buffers(options_, pixels, size_.list_segments), "blend");
         size_.pixels = pixels;
     }
     if (size_.checkpoint_records() > checkpoint_records())
-        make_buffers(d, *this, checkpoint_buffers(size_.checkpoint_records()));
+        make_buffers(d, *this, checkpoint_buffers(size_.checkpoint_records()), "blend");
 }
 
 void Forward::record(Commands& commands, const GpuSplats& splats, const Buffer& cameras,

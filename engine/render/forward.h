@@ -55,6 +55,11 @@ struct FrameSize {
 /// Tiles of an image.
 std::uint32_t image_tiles(int width, int height);
 
+/// What the transmittance of a pixel stays at or above: the stop less its slack for rounding.
+constexpr float least_transmittance(float stop) {
+    return static_cast<float>(stop * (1 - TRANSMITTANCE_SLACK));
+}
+
 /// Device memory, by what it grows with.
 struct FrameBytes {
     std::uint64_t splats = 0, pairs = 0, images = 0;  // images: pixels, tiles and what is fixed
@@ -98,8 +103,8 @@ class Forward {
     /// How many dispatches the blend passes take, LIST_SEGMENT pairs of every tile's list each.
     std::uint32_t list_segments() const { return size_.list_segments; }
     /// After a frame whose status is given: false where it is whole. Else makes room for what it
-    /// wanted and clears the status; the frame must then be recorded again. Throws Error where it
-    /// can never fit. The queue must be idle.
+    /// wanted, half as many pairs again where memory allows it, and clears the status; the frame
+    /// must then be recorded again. Throws Error where it can never fit. The queue must be idle.
     bool make_room(const gpu::FrameStatus& status);
     /// Whether the next frame is emitted with a workgroup for each huge splat. note_crowds: the
     /// counters of a frame decide on the next, where the options leave it to them; make_room calls
@@ -169,6 +174,8 @@ class Forward {
     void record_blend(Commands& commands, const gpu::CameraData& data, const glm::vec3& background);
     void make_blend(std::uint32_t segments);
     void make_cooperation();
+    bool within_budget(std::uint32_t pairs) const;
+    void make_room_for(std::uint32_t wanted, std::uint32_t most);
 
     Device* device_;
     ForwardOptions options_;

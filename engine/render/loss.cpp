@@ -74,7 +74,7 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
                                      {"USE_ALPHA", options.use_alpha ? 1 : 0}};
     loss_ = Pipeline(device, "loss", constants);
     sum_ = Pipeline(device, "loss_sum", {}, false);
-    make_buffers(device, *this, buffers(device, max_width, max_height, options));
+    make_buffers(device, *this, buffers(device, max_width, max_height, options), "loss");
 }
 
 // The most strips that any size up to the largest can be cut into.

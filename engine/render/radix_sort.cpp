@@ -72,8 +72,16 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, Strategy strategy,
     scatter_ = Pipeline(device, scatter_name(strategy_), plain, true, subgroup_size);
     scatter_iota_ = Pipeline(device, scatter_name(strategy_), iota, true, subgroup_size);
 
-    make_buffers(device, *this, buffers(capacity, shape_));
+    make_buffers(device, *this, buffers(capacity, shape_), "sort");
     scan_.emplace(device, static_cast<std::uint32_t>(counters(capacity, shape_)));
+}
+
+// One workgroup a block, and a scan over the counters of all blocks.
+std::uint64_t RadixSort::max_capacity(const Device& device) {
+    const std::uint64_t counters = Scan::max_capacity(device, Scan::best_strategy(device));
+    const std::uint64_t blocks =
+        std::min<std::uint64_t>(device.info().max_groups_x, counters / RADIX_MAX_DIGITS);
+    return blocks * choose_shape(device, resolve(device, Strategy::automatic), 0).block();
 }
 
 std::uint64_t RadixSort::counters(std::uint32_t capacity, const Shape& shape) {

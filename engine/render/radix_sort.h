@@ -28,6 +28,8 @@ class RadixSort {
               std::uint32_t subgroup_size = 0);
 
     std::uint32_t capacity() const { return capacity_; }
+    /// What the device's groups of workgroups allow an automatic sort; more is an Error.
+    static std::uint64_t max_capacity(const Device& device);
     /// Device memory of an automatic sort of this capacity.
     static std::uint64_t device_bytes(const Device& device, std::uint32_t capacity);
     Strategy strategy() const { return strategy_; }

@@ -26,6 +26,7 @@ constexpr double kTilePixels = 256;
 // Multiply-adds, counted in the shaders.
 constexpr double kProjectFma = 250, kProjectBackwardFma = 600, kShFma = 3;
 constexpr double kBlendFma = 20, kBlendBackwardFma = 50;
+constexpr double kExposureFma = 9 + 12 + 9;
 constexpr double kLossFma = 3 * 2 * 2 * 11 * 5;  // channels, ways, axes, taps, moments
 
 double best_ms(Commands& commands, const auto& record) {
@@ -75,6 +76,8 @@ std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     if (pass == "tile ranges") return PassWork{c.pairs * 4, 0};
     if (pass == "blend") return PassWork{c.pairs * kPairBytes + c.pixels * 20, samples * kBlendFma};
     if (pass == "loss") return PassWork{c.pixels * (12 + 4 + 12), c.pixels * kLossFma};
+    if (pass == "exposure")  // the map, and its gradient and that of the picture before it
+        return PassWork{c.pixels * (24 + 36), c.pixels * kExposureFma};
     if (pass == "blend backward")
         return PassWork{c.pairs * (kPairBytes + 2 * kPartialBytes) + c.pixels * 20,
                         samples * kBlendBackwardFma};

@@ -29,7 +29,7 @@ struct PassWork {
     double fma = 0;
 };
 
-/// By the name that Forward, Loss and Backward give a pass; nothing for others.
+/// By the name that Forward, Loss, Exposure and Backward give a pass; nothing for others.
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& counts);
 
 /// The time that the slower of the two rates needs for the work, over the time taken.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/render/tuning.h"
 #include "shaders/shared/scan_args.h"
 
@@ -21,9 +22,16 @@ std::uint32_t team_threads(const Device& device, const Scan::Strategy& strategy)
     return strategy.subgroup_size != 0 ? strategy.subgroup_size : device.info().subgroup_size;
 }
 
+std::uint32_t group_threads(const Device& device) {
+    return device.is_lavapipe() ? kThreadsLavapipe : kThreads;
+}
+
+std::uint32_t teams_per_group(const Device& device, const Scan::Strategy& strategy) {
+    return std::max(group_threads(device) / team_threads(device, strategy), 1U);
+}
+
 SpecConstants constants(const Device& device, const Scan::Strategy& strategy) {
-    const bool lavapipe = device.is_lavapipe();
-    return {{"THREADS", static_cast<std::int32_t>(lavapipe ? kThreadsLavapipe : kThreads)},
+    return {{"THREADS", static_cast<std::int32_t>(group_threads(device))},
             {"CHUNK", static_cast<std::int32_t>(kChunk)},
             {"TEAM_IS_THREAD", strategy.team_is_thread ? 1 : 0}};
 }
@@ -49,10 +57,17 @@ Scan::Scan(Device& device, std::uint32_t capacity, const Strategy& strategy)
       top_(device, "scan_top", top_constants(device), true, strategy.subgroup_size),
       apply_(device, "scan_apply", constants(device, strategy), true, strategy.subgroup_size) {
     DARB_CHECK(capacity > 0);
-    make_buffers(device, *this, buffers(capacity));
-    teams_per_group_ = std::max(reduce_.threads_x() / team_threads(device, strategy), 1U);
-    const std::uint64_t elements_per_group = std::uint64_t{kChunk} * teams_per_group_;
-    DARB_CHECK(capacity / elements_per_group < device.info().max_groups_x, "capacity {}", capacity);
+    if (capacity > max_capacity(device, strategy))
+        throw Error(
+            "scan",
+            fmt::format("{} elements are more than {} allows", capacity, device.info().name),
+            "Use smaller images or fewer splats, or choose another device (darb devices).");
+    make_buffers(device, *this, buffers(capacity), "scan");
+    teams_per_group_ = teams_per_group(device, strategy);
+}
+
+std::uint64_t Scan::max_capacity(const Device& device, const Strategy& strategy) {
+    return std::uint64_t{kChunk} * teams_per_group(device, strategy) * device.info().max_groups_x;
 }
 
 BufferList<Scan> Scan::buffers(std::uint32_t capacity) {

@@ -19,7 +19,10 @@ class Scan {
     };
     static Strategy best_strategy(const Device& device);
 
+    /// What the device's groups of workgroups allow.
+    static std::uint64_t max_capacity(const Device& device, const Strategy& strategy);
     /// capacity: the most elements, > 0. Owns one word of scratch memory per chunk of elements.
+    /// Throws Error beyond max_capacity.
     Scan(Device& device, std::uint32_t capacity);
     Scan(Device& device, std::uint32_t capacity, const Strategy& strategy);
 

@@ -30,8 +30,9 @@ layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; }
 layout(set = 0, binding = 7, scalar) readonly buffer LastPair { uint last_pair[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer BucketTile { uint bucket_tile[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer Checkpoints { float checkpoints[]; };
-layout(set = 0, binding = 10, scalar) writeonly buffer Partials { vec4 partials[]; };  // [K][2]
-layout(set = 0, binding = 11, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 10, scalar) readonly buffer BucketBehind { float bucket_behind[]; };  // [records][TILE_PIXELS]
+layout(set = 0, binding = 11, scalar) writeonly buffer Partials { vec4 partials[]; };  // [K][2]
+layout(set = 0, binding = 12, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K]
 
 #define SHAPE_BINDING 3
 #define LIGHT_BINDING 4
@@ -74,7 +75,7 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
             const uint i = count + subgroupBallotExclusiveBitCount(ballot);
             pixel_word[i] = slot | seen << SLOT_BITS;
             pixel_transmittance[i] = checkpoints[checkpoint_at(record, TRANSMITTANCE_PLANE, slot)];
-            pixel_behind[i] = checkpoints[checkpoint_at(record, BEHIND_PLANE, slot)];
+            pixel_behind[i] = bucket_behind[bucket_behind_at(record, slot)];
             pixel_d_red[i] = d_image[o];
             pixel_d_green[i] = d_image[plane + o];
             pixel_d_blue[i] = d_image[2u * plane + o];

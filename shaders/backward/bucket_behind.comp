@@ -2,7 +2,7 @@
 // behind it, last bucket to first, so that only convex combinations are made and nothing cancels (final colour less
 // the colour so far does, by 3 % after 10,000 layers). Place: between bucket_tiles and blend_backward_buckets.
 // Work: one thread a pixel, one workgroup a block of a tile. Shared memory: none. Reads what the forward pass
-// stored; writes plane BEHIND_PLANE of the records that a pixel sees. Long lists take several dispatches as in
+// stored; writes bucket_behind of the records that a pixel sees. Long lists take several dispatches as in
 // blend_backward.comp; behind holds the pixels' state in between.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -19,8 +19,9 @@ layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
 layout(set = 0, binding = 2, scalar) readonly buffer LastPair { uint last_pair[]; };
-layout(set = 0, binding = 3, scalar) buffer Checkpoints { float checkpoints[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Checkpoints { float checkpoints[]; };
 layout(set = 0, binding = 4, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
+layout(set = 0, binding = 5, scalar) writeonly buffer BucketBehind { float bucket_behind[]; };  // [records][TILE_PIXELS]
 
 #include "lib/pixel_slot.glsl"
 #include "lib/list_part.glsl"
@@ -49,7 +50,7 @@ void main() {
     for (;; --bucket, --record) {
         vec3 light;
         for (int c = 0; c < 3; ++c) light[c] = checkpoints[checkpoint_at(record, uint(c), slot)];
-        checkpoints[checkpoint_at(record, BEHIND_PLANE, slot)] = rest;
+        bucket_behind[bucket_behind_at(record, slot)] = rest;
         float before = 1.0;
         if (bucket > 0u) before = checkpoints[checkpoint_at(record - 1u, TRANSMITTANCE_PLANE, slot)];
         rest = before > LEAST_TRANSMITTANCE ? (dot(light, d_colour) + after * rest) / before : 0.0;

@@ -3,7 +3,7 @@
 // Place: last pass of an iteration. Source: KERNELS section 4; Adam as in TRAINING section 1.
 // Work: one thread a splat, all N of them: Adam is dense, an unseen splat's moments decay and move it.
 // Shared memory: none. Does nothing when the frame overflowed its pair buffers: the host repeats it.
-// A splat whose gradient is not finite is counted and left as it is for this step.
+// A splat whose gradient is not finite, or whose square is not, is counted and left as it is for this step.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -71,7 +71,7 @@ Partial sum_partials(uint i) {
 bool finite(SplatGradient g) {
     const vec3 all_parts = abs(g.position) + abs(g.log_scale) + abs(g.rotation.xyz) + abs(g.colour) +
                            vec3(abs(g.rotation.w) + abs(g.opacity_logit) + abs(g.mean.x) + abs(g.mean.y));
-    return all_parts.x + all_parts.y + all_parts.z < 1e30;
+    return all_parts.x + all_parts.y + all_parts.z < GRADIENT_LIMIT;
 }
 
 void update_rest(uint i, SplatGradient g) {

@@ -19,10 +19,14 @@ struct Partial {
 
 // The rows of N = L M, L the factor [[l11, l21], [0, l22]], M with the rows r1 and r2: (x, y) = L d, so a change
 // of M moves q by -2 (x, y) L dM N^T (x, y)^T. Entries are at most 1 whatever the splat's shape.
-// l11 r1 + l21 r2 cancels on needles; the same by r2 x (r1 x r2) = |r2|^2 r1 - (r1 r2) r2 does not.
+// l11 r1 + l21 r2 cancels on needles; the same by r2 x (r1 x r2) = |r2|^2 r1 - (r1 r2) r2 does not. l11 / c of the
+// shrunk rows is 1 / sqrt(c determinant).
 void whitened_rows(Factor f, vec3 r1, vec3 r2, out vec3 n1, out vec3 n2) {
-    n1 = (cross(r2, cross(r1, r2)) + args.low_pass * r1) * (f.l11 / f.c);
-    n2 = f.l22 * r2;
+    r1 *= f.shrink;
+    r2 *= f.shrink;
+    const float h = args.low_pass * f.shrink * f.shrink, l22 = inversesqrt(dot(r2, r2) + h);
+    n1 = (cross(r2, cross(r1, r2)) + h * r1) * l22 * inversesqrt(f.determinant);
+    n2 = l22 * r2;
 }
 
 // dL/d(r1), dL/d(r2), the rows of M; dL/d(log scale), which is d_r1 r1 + d_r2 r2 without its cancellation; dL/dmean.

@@ -1,5 +1,6 @@
 // Blends each tile's splats front to back. alpha = min(0.99, opacity * w(q)); below the cut-off nothing; a pixel
-// ends before the splat that would bring its transmittance below 1e-4. Place: last pass of the forward walk.
+// ends before the splat that would bring its transmittance below 1e-4, less the slack of limits.h. Place: last pass
+// of the forward walk.
 // Source: 3DGS section 4; kernels of DARB-Splatting.
 // Work: one workgroup a tile, one subgroup an area of it, PIXELS pixels a thread in registers. Each lane loads one
 // pair of the tile's list; those whose ellipse touches the area are broadcast in turn. Shared memory: a subgroup's
@@ -18,7 +19,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 32;       // TILE_PIXELS / PIXELS
 layout(constant_id = 1) const int STORE_FOR_BACKWARD = 0;
-layout(constant_id = 2) const float MIN_TRANSMITTANCE = TRANSMITTANCE_STOP;
+layout(constant_id = 2) const float MIN_TRANSMITTANCE = TRANSMITTANCE_STOP * (1.0 - TRANSMITTANCE_SLACK);
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 4) const uint SEGMENT = 0;  // pairs of a list a dispatch; 0: all of them
 layout(constant_id = 8) const int CHECKPOINTS = 0;  // 1: a record a bucket for the backward pass

@@ -47,9 +47,10 @@ void main() {
     }
     if (slot >= args.pair_capacity) return;  // the frame is repeated
     if (next > slot && next - slot > HUGE_PAIRS) {
-        const uint at = atomicAdd(status.huge_splats, 1u);  // less than pair_capacity / HUGE_PAIRS + 1
+        // Less than pair_capacity / HUGE_PAIRS + 1, unless the sum of the counts left 32 bits.
+        const uint at = atomicAdd(status.huge_splats, 1u);
         if (COOPERATE == 1) {
-            huge_rank[at] = rank;
+            if (at <= args.pair_capacity / HUGE_PAIRS) huge_rank[at] = rank;
             return;
         }
     }

@@ -39,7 +39,8 @@ uint cell_tiles(TileCover c, uint cell) {
 
 void main() {
     const uint mine = gl_LocalInvocationID.x;
-    for (uint k = gl_WorkGroupID.x; k < status.huge_splats; k += EMIT_HUGE_GROUPS) {
+    const uint listed = min(status.huge_splats, args.pair_capacity / HUGE_PAIRS + 1u);
+    for (uint k = gl_WorkGroupID.x; k < listed; k += EMIT_HUGE_GROUPS) {
         const uint rank = huge_rank[k];
         const uint splat = depth_order[rank];
         const TileCover c = unpack_cover(cover[splat]);

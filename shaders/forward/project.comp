@@ -135,8 +135,8 @@ uint project(uint i, out int reason) {
     const vec3 r1 = (to_world(camera, j0) * axes) * s;
     const vec3 r2 = (to_world(camera, j1) * axes) * s;
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
-    if (!(f.determinant > DETERMINANT_MIN && f.determinant < DETERMINANT_MAX) ||
-        any(isnan(raw_scale)))
+    const float unit_area = f.shrink * f.shrink;
+    if (!(f.determinant > DETERMINANT_MIN * unit_area * unit_area) || any(isnan(raw_scale)))
         return 0u;
 
     if (FILTERED) {

@@ -1,12 +1,12 @@
 // Checkpoints of the forward blend for a backward blend that works off buckets of a tile's list side by side: a
 // record of four planes of the tile's pixels for each bucket. The forward pass leaves the light that the bucket's
 // splats add to the pixel, three planes, and the transmittance behind them; bucket_behind.comp puts what is behind
-// the bucket, dotted with dL/dcolour, in the place of the first plane.
+// the bucket, dotted with dL/dcolour, into a plane of its own, so that a frame can be walked back more than once.
 #include "lib/pixel_slot.glsl"
 
 layout(constant_id = 7) const uint BUCKET = BUCKET_PAIRS;  // a multiple of SUBGROUP_SIZE; divides SEGMENT
 
-const uint BEHIND_PLANE = 0u, TRANSMITTANCE_PLANE = 3u, CHECKPOINT_PLANES = 4u;
+const uint TRANSMITTANCE_PLANE = 3u, CHECKPOINT_PLANES = 4u;
 
 // Records of all tiles are apart, and at most pairs / BUCKET + tiles. list_begin: of the tile's whole list.
 uint bucket_record(uint tile, uint list_begin, uint bucket) {
@@ -14,4 +14,7 @@ uint bucket_record(uint tile, uint list_begin, uint bucket) {
 }
 uint checkpoint_at(uint record, uint plane, uint slot) {
     return (record * CHECKPOINT_PLANES + plane) * TILE_PIXELS + slot;
+}
+uint bucket_behind_at(uint record, uint slot) {
+    return record * TILE_PIXELS + slot;
 }

@@ -32,9 +32,23 @@ vec3 to_world(CameraData camera, vec3 v) {
 
 struct Factor {
     float l11, l21, l22;
-    float a, c;           // the diagonal of S'
-    float determinant;
+    float a, c;         // the diagonal of S'
+    float shrink;       // a power of two that brings the rows of M below 2 px; 1 up to ROW_LIMIT
+    float determinant;  // of S', times shrink^4
 };
+
+// 2^-k, 2^k the leading bit of the longest entry, where that is beyond ROW_LIMIT.
+float row_shrink(vec3 r1, vec3 r2) {
+    const vec3 most = max(abs(r1), abs(r2));
+    const float longest = max(most.x, max(most.y, most.z));
+    return longest > ROW_LIMIT
+               ? uintBitsToFloat((254u << 23) - (floatBitsToUint(longest) & 0x7F800000u))
+               : 1.0;
+}
+
+float inverse_of_power(float power) {  // of two, exactly
+    return uintBitsToFloat((254u << 23) - floatBitsToUint(power));
+}
 
 // The factor as it is stored in half precision, and the diagonal of the covariance that belongs to it. Splats wider
 // than 16,000 px end there.
@@ -46,17 +60,23 @@ void round_factor(inout Factor f) {
     f.a = (f.l21 * f.l21 + f.l22 * f.l22) * f.c / (f.l11 * f.l11);
 }
 
-// r1, r2: rows of M. The determinant in product form has no cancellation.
+// r1, r2: rows of M. The determinant in product form has no cancellation. Its fourth powers leave float32 for splats
+// beyond 1e9 px, so that long rows are factored shrunk, which is exact.
 Factor cholesky_factor(vec3 r1, vec3 r2, float low_pass) {
     Factor f;
+    f.shrink = row_shrink(r1, r2);
+    r1 *= f.shrink;
+    r2 *= f.shrink;
+    const float h = low_pass * f.shrink * f.shrink, grow = inverse_of_power(f.shrink);
     const float n1 = dot(r1, r1), n2 = dot(r2, r2), b = dot(r1, r2);
     const vec3 across = cross(r1, r2);
-    f.a = n1 + low_pass;
-    f.c = n2 + low_pass;
-    f.determinant = dot(across, across) + low_pass * (n1 + n2) + low_pass * low_pass;
-    f.l11 = sqrt(f.c / f.determinant);
-    f.l22 = inversesqrt(f.c);
-    f.l21 = -b * f.l22 * inversesqrt(f.determinant);
+    const float c = n2 + h, l22 = inversesqrt(c);
+    f.a = (n1 + h) * grow * grow;
+    f.c = c * grow * grow;
+    f.determinant = dot(across, across) + h * (n1 + n2) + h * h;
+    f.l11 = sqrt(c / f.determinant) * f.shrink;
+    f.l22 = l22 * f.shrink;
+    f.l21 = -b * l22 * inversesqrt(f.determinant) * f.shrink;
     if (STORAGE == STORAGE_FLOAT16) round_factor(f);
     return f;
 }

@@ -1,12 +1,13 @@
 // One Adam step of one photo's exposure, after which the mean of all maps is the identity again: a change common to
 // all photos is the scene's own. Place: after exposure_backward. Source: Kingma and Ba 2015.
 // Work: one group, a thread a term of the map. Shared memory: none. Does nothing when the frame overflowed its pair
-// buffers, as the step of the splats, or when the gradient is not finite. Reads partial sums; writes maps, moments.
+// buffers, as the step of the splats, or when the gradient or its square is not finite. Reads partial sums; writes maps, moments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shared/effect_args.h"
+#include "shared/limits.h"
 #include "shared/render_args.h"
 
 layout(local_size_x = EXPOSURE_TERMS) in;
@@ -25,7 +26,7 @@ void main() {
     const uint k = gl_LocalInvocationID.x, at = args.view * EXPOSURE_TERMS + k;
     float gradient = 0.0;
     for (uint g = 0u; g < args.groups; ++g) gradient += partials[g * EXPOSURE_TERMS + k];
-    if (!(abs(gradient) < 1e30)) return;
+    if (!(abs(gradient) < GRADIENT_LIMIT)) return;
     vec2 moment = moments[at];
     const float change = adam_step(0.0, moment, gradient, args.rate);
     moments[at] = moment;

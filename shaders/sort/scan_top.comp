@@ -19,7 +19,9 @@ shared uint subgroup_sums[THREADS];  // as many as there can be subgroups
 void main() {
     const uint chunks = plan.chunks;
     const uint run = (chunks + THREADS - 1) / THREADS;
-    const uint begin = min(gl_LocalInvocationID.x * run, chunks);
+    // Not by gl_LocalInvocationID: its order need not be that of the subgroups.
+    const uint thread = gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
+    const uint begin = min(thread * run, chunks);
     const uint end = min(begin + run, chunks);
     uint sum = 0;
     for (uint i = begin; i < end; ++i) sum += chunk_sums[i];
@@ -28,7 +30,7 @@ void main() {
     barrier();
     uint prefix = inclusive - sum;
     for (uint s = 0; s < gl_SubgroupID; ++s) prefix += subgroup_sums[s];
-    if (gl_LocalInvocationID.x == THREADS - 1) total_out[args.total_word] = prefix + sum;
+    if (thread == THREADS - 1) total_out[args.total_word] = prefix + sum;
     for (uint i = begin; i < end; ++i) {
         const uint value = chunk_sums[i];
         chunk_sums[i] = prefix;

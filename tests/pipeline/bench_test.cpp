@@ -65,7 +65,7 @@ BlendFrame frame_of(std::uint32_t splats, float opacity) {
     }
     f.polynomial = {1, 0.693147004f, 0.240222424f, 0.0555073395f, 0.00967151299f, 0.00132647017f};
     f.alpha_cutoff = 1 / 255.0f;
-    f.transmittance_stop = 1e-4f;
+    f.least_transmittance = least_transmittance(1e-4f);
     return f;
 }
 
@@ -81,7 +81,7 @@ std::uint64_t contributions(const BlendFrame& f) {
             const double alpha =
                 std::min(double{f.light[i].w} * std::exp(-0.5 * (x * x + y * y)), 0.99);
             if (alpha < double{f.alpha_cutoff}) continue;
-            if (transmittance * (1 - alpha) < double{f.transmittance_stop}) break;
+            if (transmittance * (1 - alpha) < double{f.least_transmittance}) break;
             transmittance *= 1 - alpha;
             ++count;
         }

@@ -29,6 +29,7 @@ const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
 TEST(Command, bad_usage_is_exit_code_2) {
     const std::string out = " -o " + (scratch() / "unused").string() + " ";
     const std::string train = "train " + kScene + out;
+    const std::string halved = "render a.ply --cameras b --render-scale 1/2" + out;
     expect_refused({{"", "subcommand"},
                     {"no_such", "no_such"},
                     {"train --no-such-option", "--no-such-option"},
@@ -51,6 +52,7 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"eval", "scene"},
                     {"eval a.ply b --split no_such", "--split"},
                     {"render a.ply -o b", "--cameras"},
+                    {halved + "--depth png", "Add --render-scale 1."},
                     {"info", "path"},
                     {"plan " + kScene + " --depth", "this is a data set"},
                     {"plan " + kScene + " --cameras a", "this is a data set"},

@@ -5,9 +5,12 @@
 #include <numeric>
 
 #include "engine/check/walk_truth.h"
+#include "engine/core/error.h"
 #include "engine/core/rng.h"
+#include "engine/render/blend_backward.h"
 #include "tests/support/device_walk.h"
 #include "tests/support/projected_frame.h"
+#include "tests/support/scoped_variants.h"
 
 namespace darb::test {
 namespace {
@@ -234,6 +237,72 @@ TEST(Frame, renderer_grows_and_repeats_until_everything_fits) {
     EXPECT_EQ(renderer.status().overflow, 0U);
     EXPECT_EQ(renderer.status().pairs, full.status.pairs);
     EXPECT_EQ(image.data, planes_to_image(full.image, 300, 200).data);
+}
+
+// A frame that wanted more pairs gets half as many again, or just those where the budget ends.
+TEST(Frame, a_budget_without_ample_room_gets_the_room_it_needs) {
+    const TestScene s = random_scene({.count = 500, .width = 300, .height = 200, .sh_degree = 0});
+    Device& device = shared_device();
+    for (const bool store : {false, true}) {
+        ForwardOptions options = forward_options(s.model, {});
+        options.store_for_backward = store;
+        gpu::FrameStatus status{};
+        status.overflow = OVERFLOW_PAIRS;
+        status.pairs = 300'000;
+        const auto grown = [&](std::uint32_t budget_pairs) {
+            Forward forward(device, options);
+            forward.reserve(500, 1024, 300, 200);
+            BlendBackward backward(device, options);
+            if (store) backward.reserve(forward.pair_capacity());
+            const auto bytes = [&](std::uint32_t pairs) {
+                FrameSize size = forward.size();
+                size.pairs = pairs;
+                const std::uint64_t own = Forward::device_bytes(device, options, size).pairs;
+                return store ? own + BlendBackward::device_bytes(size).pairs : own;
+            };
+            device.set_memory_budget(budget_pairs == 0 ? 0
+                                                       : device.allocated_bytes() +
+                                                             bytes(budget_pairs) - bytes(1024));
+            forward.make_room(status);
+            if (store) backward.reserve(forward.pair_capacity());
+            return forward.pair_capacity();
+        };
+        EXPECT_EQ(grown(0), 450'000U);
+        EXPECT_EQ(grown(460'000), 450'000U);
+        EXPECT_EQ(grown(330'000), 300'000U);
+        EXPECT_THROW(grown(290'000), Error);
+        device.set_memory_budget(0);
+    }
+}
+
+TEST(Frame, pairs_beyond_the_buckets_name_the_way_that_holds_them) {
+    const TestScene s = random_scene({.count = 5, .width = 30, .height = 20, .sh_degree = 0});
+    Device& device = shared_device();
+    ForwardOptions options = forward_options(s.model, {});
+    options.store_for_backward = true;
+    std::uint32_t most = 0;
+    {
+        const ScopedVariants variants(device, "backward=subgroup");
+        most = Forward::max_pairs(device);
+    }
+    const ScopedVariants variants(device, "backward=buckets");
+    ASSERT_LT(Forward::max_pairs(device), most);
+    Forward forward(device, options);
+    forward.reserve(5, 1024, 30, 20);
+    const auto hint = [&](std::uint32_t pairs) -> std::string {
+        gpu::FrameStatus status{};
+        status.overflow = OVERFLOW_PAIRS;
+        status.pairs = pairs;
+        try {
+            forward.make_room(status);
+        } catch (const Error& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_NE(hint(most).find("--tune backward=subgroup"), std::string::npos) << hint(most);
+    EXPECT_EQ(hint(most + 1).find("--tune"), std::string::npos) << hint(most + 1);
+    EXPECT_NE(hint(most + 1).find("--cap-max"), std::string::npos) << hint(most + 1);
 }
 
 // The second round takes the list in parts, with and without the state for the backward pass.

@@ -207,6 +207,14 @@ TEST_P(BothWays, alpha_at_its_limit_moves_only_the_colour) {
     EXPECT_NE(p.d_colour, glm::vec3(0));
 }
 
+TEST_P(BothWays, the_second_of_two_clamped_layers_gets_its_gradient) {
+    BlendScene scene = empty_scene();
+    for (int i = 0; i < 3; ++i) scene.add({8, 8}, {1e6, 0, 1e6}, 0.9999, {1, 0.5, 0.2});
+    const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+    EXPECT_NE(r.out.pairs[1].d_colour, glm::vec3(0));
+    EXPECT_EQ(r.out.pairs[2].d_colour, glm::vec3(0));
+}
+
 bool same_bits(const BlendOutput& a, const BlendOutput& b) {
     return a.pairs.size() == b.pairs.size() && a.image == b.image &&
            std::memcmp(a.pairs.data(), b.pairs.data(), a.pairs.size() * sizeof(PairSums)) == 0;

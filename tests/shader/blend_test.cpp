@@ -68,11 +68,25 @@ TEST_P(Blend, pixels_at_the_edge_of_the_support_match_double) {
 TEST_P(Blend, opaque_stack_stops_before_the_transmittance_limit) {
     BlendScene scene = GetParam().scene();
     for (int i = 0; i < 40; ++i)
-        scene.add({8.5 + i % 3, 8.5}, {200, 0, 200}, 1, {i % 2 * 1.0, 1 - i % 2, 0.5});
+        scene.add({8.5 + i / 2 % 3, 8.5}, {200, 0, 200}, 1, {i % 2 * 1.0, 1 - i % 2, 0.5});
     const Blended b = expect_blend_matches(scene);
     for (const double t : b.truth.transmittance.data) ASSERT_LT(t, 0.02);
-    EXPECT_NEAR(b.got.transmittance[8 * 16 + 8], 0.01, 1e-7);
-    EXPECT_EQ(b.got.last[8 * 16 + 8], 1U);
+    // 0.01 of each clamped layer is left: two of them meet the stop and do not cross it.
+    EXPECT_NEAR(b.pixel(8, 8, 0), 0.01 * 0.99 + 1e-4 * 0.1, 2e-8);
+    EXPECT_NEAR(b.got.transmittance[8 * 16 + 8], 1e-4, 1e-9);
+    EXPECT_EQ(b.got.last[8 * 16 + 8], 2U);
+}
+
+TEST_P(Blend, clamped_layers_down_to_any_stop_are_shown) {
+    for (int layers = 1; layers <= 3; ++layers) {
+        SCOPED_TRACE(layers);
+        BlendScene scene = GetParam().scene();
+        scene.stop = std::array{1e-2f, 1e-4f, 1e-6f}[static_cast<size_t>(layers - 1)];
+        for (int i = 0; i < 5; ++i) scene.add({8.5, 8.5}, {200, 0, 200}, 1, {0.5, i % 2 * 1.0, 1});
+        const Blended b = expect_blend_matches(scene);
+        EXPECT_EQ(b.truth.contributions.at(8, 8, 0), layers);
+        EXPECT_EQ(b.got.last[8 * 16 + 8], static_cast<std::uint32_t>(layers));
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(every_kernel, Blend, testing::ValuesIn(every_blend_variant()),

@@ -8,6 +8,7 @@
 #include "tests/support/compare.h"
 #include "tests/support/device_walk.h"
 #include "tests/support/random_scene.h"
+#include "tests/support/scoped_variants.h"
 #include "tests/support/shared_device.h"
 #include "trainer/densify/density_control.h"
 #include "trainer/resolution_ramp.h"
@@ -125,6 +126,60 @@ TEST(ErrorScore, unseen_splats_have_no_share) {
     scene.model.opacity[4] = -20;
     const Shares shares = shares_on_device(scene, random_photo(32, 32, 1), {}, glm::vec3(0), 1);
     EXPECT_EQ(shares.got[4], glm::vec2(0));
+}
+
+/// Gradients of all parameters, in the place of the first moments.
+std::array<std::vector<float>, kAttributeCount> gradients(const TestScene& scene, bool scored) {
+    Device& d = shared_device();
+    ForwardOptions options = forward_options(scene.model, {});
+    options.store_for_backward = true;
+    Forward forward(d, options);
+    Backward backward(d, options, BackwardResult::store_gradient);
+    GpuSplats splats(d, scene.model, true);
+    const auto n = splats.count();
+    const int width = scene.camera.width, height = scene.camera.height;
+    const gpu::CameraData data = camera_data(scene.camera, scene.model.origin);
+    const Buffer cameras = upload_cameras(d, {data});
+    forward.reserve(n, 200'000, width, height);
+    backward.reserve(n, forward.pair_capacity());
+    const auto photo = random_photo(width, height, 4);
+    Buffer ground(d, "photo", photo.size() * 4), scratch(d, "scratch", photo.size() * 12),
+        d_image(d, "d_image", photo.size() * 12);
+    ground.upload(photo);
+    std::vector<float> weights;
+    Pcg32 rng(8);
+    for (size_t i = 0; i < photo.size() * 3; ++i)
+        weights.push_back(static_cast<float>(rng.uniform(-1, 1)));
+    d_image.upload(weights);
+    ErrorScore score(d, {});
+    score.reset(n);
+    Commands commands(d);
+    commands.begin();
+    forward.record(commands, splats, cameras, 0, data, scene.model.sh_degree, glm::vec3(0.3f));
+    if (scored)
+        score.record(commands, forward, backward, forward.image(), ground, scratch, n, data,
+                     glm::vec3(0.3f));
+    backward.record(commands, forward, splats, d_image, cameras, 0, data, scene.model.sh_degree,
+                    glm::vec3(0.3f), {});
+    commands.submit_and_wait();
+    EXPECT_EQ(forward.read_status().overflow, 0U);
+    std::array<std::vector<float>, kAttributeCount> result;
+    for (int a = 0; a < kAttributeCount; ++a)
+        result[static_cast<size_t>(a)] =
+            splats.moments(a).download<float>(splats.moments(a).bytes() / 4);
+    return result;
+}
+
+TEST(ErrorScore, a_score_before_changes_no_bit_of_the_gradients) {
+    const TestScene scene =
+        random_scene({.count = 300, .width = 70, .height = 45, .sh_degree = 1, .seed = 12});
+    for (const char* way : {"backward=subgroup", "backward=buckets"}) {
+        SCOPED_TRACE(way);
+        const ScopedVariants variants(shared_device(), way);
+        const auto plain = gradients(scene, false);
+        EXPECT_NE(plain[kPosition][0], 0);
+        EXPECT_EQ(gradients(scene, true), plain);
+    }
 }
 
 TEST(DecayOpacity, matches_double_and_leaves_the_rest) {

@@ -252,6 +252,16 @@ TEST(Emit, a_total_beyond_32_bits_is_noted) {
     }
 }
 
+// Sums that left 32 bits: every other splat looks huge, and there are more of them than the list
+// has room for.
+TEST(Emit, a_total_beyond_32_bits_lists_no_more_huge_splats_than_fit) {
+    EmitInput in(kEmitScene);
+    for (size_t rank = 0; rank < in.offset.size(); ++rank) in.offset[rank] = rank % 2 ? 400 : 10;
+    const Emitted out = emit(in, 1000, true);  // guard words stand behind the list
+    EXPECT_EQ(out.status.overflow, OVERFLOW_TOTAL);
+    EXPECT_GT(out.status.huge_splats, 2 * (1000 / HUGE_PAIRS + 1));
+}
+
 // Against every pixel: a block that the bits leave out holds no pixel above the cut-off, and one
 // that they name is within the ellipse and its slack.
 TEST(Emit, block_bits_name_the_blocks_that_are_touched) {

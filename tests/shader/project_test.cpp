@@ -179,8 +179,9 @@ TestScene one_splat() {
 }
 
 /// The reason of a single splat; -1: visible.
-int cull_reason(const TestScene& s) {
-    const ProjectedFrame frame = project_on_device(s.model, s.camera);
+int cull_reason(const TestScene& s, double low_pass = LOW_PASS_DEFAULT) {
+    const ProjectedFrame frame =
+        project_on_device(s.model, s.camera, 3, EVALUATION_POLYNOMIAL, {}, {0.0f}, low_pass);
     std::uint32_t sum = 0;
     int reason = -1;
     for (int r = 0; r < CULL_REASONS; ++r) {
@@ -190,6 +191,19 @@ int cull_reason(const TestScene& s) {
     EXPECT_EQ(sum + frame.visible[0], 1U);
     EXPECT_EQ(frame.pair_count[0] > 0, reason < 0);
     return reason;
+}
+
+// Clamped to e^20, a splat has a determinant of 1e49 px^4, which float32 does not hold.
+TEST(Project, the_largest_scales_are_clamped_and_cover_the_image) {
+    for (const auto& scale :
+         std::vector<std::vector<float>>{{50, 50, 50}, {50, 50, -3}, {14, 13, 15}, {50, 18, 2}}) {
+        SCOPED_TRACE(fmt::format("log scale {} {} {}", scale[0], scale[1], scale[2]));
+        TestScene s = one_splat();
+        s.model.log_scale = scale;
+        EXPECT_EQ(expect_outputs_match(s.model, s.camera), 1U);
+        const auto tiles = static_cast<std::uint32_t>(image_tiles(s.camera.width, s.camera.height));
+        EXPECT_EQ(project_on_device(s.model, s.camera).pair_count[0], tiles);
+    }
 }
 
 TEST(Project, each_cull_reason_is_counted) {
@@ -216,8 +230,11 @@ TEST(Project, each_cull_reason_is_counted) {
     expect(CULL_OPACITY, "faint", [](TestScene& s) { s.model.opacity[0] = -5.6f; });
     expect(-1, "just visible", [](TestScene& s) { s.model.opacity[0] = -5.5f; });
     expect(CULL_OPACITY, "-1e4", [](TestScene& s) { s.model.opacity[0] = -1e4f; });
-    expect(CULL_COVARIANCE, "scale exp(50)",
-           [](TestScene& s) { s.model.log_scale.assign(3, 50.0f); });
+    expect(-1, "scale exp(50)", [](TestScene& s) { s.model.log_scale.assign(3, 50.0f); });
+    TestScene point = one_splat();
+    point.model.log_scale.assign(3, -20.0f);
+    EXPECT_EQ(cull_reason(point), -1) << "a point, with the low-pass";
+    EXPECT_EQ(cull_reason(point, 0), CULL_COVARIANCE) << "a point without area";
     expect(CULL_OUTSIDE, "beside the image", [](TestScene& s) { s.camera.cx += 200; });
     expect(CULL_OUTSIDE, "above the image", [](TestScene& s) { s.camera.cy -= 200; });
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "engine/core/error.h"
 #include "engine/core/rng.h"
 
 namespace darb {
@@ -158,6 +159,17 @@ TEST_P(ScanTeams, several_runs_after_one_prepare_match) {
 INSTANTIATE_TEST_SUITE_P(All, ScanTeams, ::testing::Bool(), [](const auto& param) {
     return param.param ? "team_is_thread" : "team_is_subgroup";
 });
+
+TEST(Scan, more_than_the_groups_of_the_device_is_an_error) {
+    Device device;
+    for (const bool by_thread : {false, true}) {
+        const Scan::Strategy strategy{by_thread, 0};
+        const std::uint64_t most = Scan::max_capacity(device, strategy);
+        EXPECT_GT(most, 1'000'000U);
+        if (most >= 0xffffffffU) continue;
+        EXPECT_THROW(Scan(device, static_cast<std::uint32_t>(most + 1), strategy), Error);
+    }
+}
 
 TEST(Scan, validation_is_silent) {
     DeviceOptions options;

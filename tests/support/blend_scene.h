@@ -23,6 +23,7 @@ struct BlendScene {
     Footprint footprint = Footprint::psi;
     int evaluation = EVALUATION_POLYNOMIAL;
     float cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
+    float stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};
     std::uint32_t segment = 0;  // pairs of a list a dispatch; 0: all
     std::uint32_t threads = 0;  // of a workgroup of blend.comp; 0: a subgroup a block
@@ -66,6 +67,7 @@ struct BlendScene {
     reference::RenderSettings settings() const {
         reference::RenderSettings s;
         s.alpha_cutoff = cutoff;
+        s.transmittance_stop = stop;
         for (int c = 0; c < 3; ++c) s.background[c] = background[c];
         return s;
     }
@@ -186,6 +188,7 @@ struct BlendPipelines {
         constants["PIXELS"] = static_cast<std::int32_t>(256 / threads);
         constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
         constants["CHECKPOINTS"] = scene.buckets ? 1 : 0;
+        constants["MIN_TRANSMITTANCE"] = least_transmittance(scene.stop);
         blend = Pipeline(device, "blend", constants, true, subgroup);
         constants["THREADS"] = SPLAT_GROUP;
         bucket_tiles = Pipeline(device, "bucket_tiles", constants);
@@ -220,7 +223,9 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         partials(device, "partials", std::vector<float>(pairs * 8, 0.0f)),
         rest(device, "partial rest", std::vector<float>(pairs, 0.0f)),
         checkpoints(device, "checkpoints", unwritten),
-        bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0));
+        bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0)),
+        bucket_rest(device, "behind buckets",
+                    std::vector<float>(scene.buckets ? records * 256 : 1, NAN));
     std::uint32_t longest = 0;
     for (const glm::uvec2& r : shuffled.ranges) longest = std::max(longest, r.y - r.x);
     gpu::BlendArgs args{static_cast<std::uint32_t>(scene.width),
@@ -252,7 +257,8 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     while (args.segment-- > 0 && !d_image.empty())
         if (scene.buckets)
             commands.dispatch(pipelines.bucket_behind, args,
-                              {ranges, d_images, last, checkpoints, behind}, groups_x, groups_y, 4);
+                              {ranges, d_images, last, checkpoints, behind, bucket_rest}, groups_x,
+                              groups_y, 4);
         else
             commands.dispatch(pipelines.backward, args,
                               {ranges, order, splats, shapes, lights, bounds, d_images, final_t,
@@ -261,12 +267,12 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     if (scene.buckets && !d_image.empty())
         commands.dispatch(pipelines.backward, bucket_args,
                           {ranges, order, splats, shapes, lights, bounds, d_images, last,
-                           bucket_tile, checkpoints, partials, rest},
+                           bucket_tile, checkpoints, bucket_rest, partials, rest},
                           static_cast<std::uint32_t>(records));
     commands.submit_and_wait();
     for (const GuardedBuffer* buffer :
          {&ranges, &order, &splats, &shapes, &lights, &bounds, &image, &final_t, &last, &partials,
-          &rest, &behind, &checkpoints, &bucket_tile})
+          &rest, &behind, &checkpoints, &bucket_tile, &bucket_rest})
         EXPECT_TRUE(buffer->intact());
     const auto sums = partials.read<float>(), rests = rest.read<float>();
     for (size_t j = 0; j < pairs; ++j) {

@@ -23,7 +23,8 @@ struct ProjectedFrame {
 inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& camera,
                                         int sh_degree = 3, int evaluation = EVALUATION_POLYNOMIAL,
                                         const ProjectionEffects& effects = {},
-                                        const std::vector<float>& filters = {0.0f}) {
+                                        const std::vector<float>& filters = {0.0f},
+                                        double low_pass = LOW_PASS_DEFAULT) {
     Device& device = shared_device();
     const auto n = static_cast<std::uint32_t>(model.size());
     SpecConstants constants = kernel_constants(model.kernel, model.footprint, evaluation, 5,
@@ -46,7 +47,7 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);
-    commands.dispatch(pipeline, gpu::ProjectArgs{0, n, 0, static_cast<float>(LOW_PASS_DEFAULT)},
+    commands.dispatch(pipeline, gpu::ProjectArgs{0, n, 0, static_cast<float>(low_pass)},
                       {cameras, position, log_scale, rotation, opacity, sh_dc, sh_rest, shape,
                        light, bound, cover, pair_count, visible, status, smoothing},
                       g.x, g.y);

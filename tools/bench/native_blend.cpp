@@ -136,7 +136,7 @@ BlendFrame download_frame(const Forward& forward, const gpu::CameraData& data, s
     f.bound = forward.splat_bound().download<glm::vec4>(splats);
     f.background = background;
     f.alpha_cutoff = options.alpha_cutoff;
-    f.transmittance_stop = options.transmittance_stop;
+    f.least_transmittance = least_transmittance(options.transmittance_stop);
     return f;
 }
 

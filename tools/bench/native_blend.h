@@ -23,7 +23,8 @@ struct BlendFrame {
     std::vector<glm::vec4> shape, light, bound;  // [N] as project.comp leaves them
     glm::vec3 background{0.0f};
     std::array<float, 6> polynomial{};  // of 2^f, rising powers
-    float alpha_cutoff = 0, transmittance_stop = 0;
+    float alpha_cutoff = 0;
+    float least_transmittance = 0;  // the stop less its slack
 };
 
 /// Of the last frame that forward recorded; the queue must be idle. Throws Error where the frame

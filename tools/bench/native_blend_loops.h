@@ -96,7 +96,7 @@ inline void forward_block(const BlendFrame& f, std::uint32_t tile, std::uint32_t
                     alpha = alpha >= f.alpha_cutoff ? alpha : F{};
                     F wanted = alpha * transmittance[v];
                     const F next = transmittance[v] - wanted;
-                    const I goes_on = next >= f.transmittance_stop;
+                    const I goes_on = next >= f.least_transmittance;
                     if (kCount) counted -= goes_on & (alpha > 0.0f);
                     wanted = goes_on ? wanted : F{};
                     red[v] += wanted * light.x;

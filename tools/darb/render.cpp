@@ -61,6 +61,9 @@ int render(const RenderFlags& flags) {
     if (!flags.depth.empty() && accuracy.value(kStorage) != STORAGE_FLOAT32)
         throw Error("--depth", "depths do not fit the float16 storage that was chosen",
                     "Add --storage float32.");
+    if (!flags.depth.empty() && accuracy.value(kRenderScale) != 1)
+        throw Error("--depth", "depths would be of the render scale, half the size of the frames",
+                    "Add --render-scale 1.");
     SplatModel model = load_scene(flags.scene);
     std::vector<View> views = load_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();

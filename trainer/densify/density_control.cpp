@@ -60,7 +60,7 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
     DensityResult result{n, n, 0, 0};
     if (n == 0) return result;
     RoundBuffers buffers;
-    make_buffers(*device_, buffers, RoundBuffers::list(n));
+    make_buffers(*device_, buffers, RoundBuffers::list(n), "densify");
     auto& [keep, grow, action, keep_offset, grow_offset, count, keep_total, grow_total, sources] =
         buffers;
     Scan scan(*device_, n);

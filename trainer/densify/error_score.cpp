@@ -41,7 +41,8 @@ std::vector<float> ErrorScore::state(std::uint32_t splats) const {
 
 void ErrorScore::restore(const std::vector<float>& state) {
     const std::uint64_t bytes = state.size() * sizeof(float);
-    if (shares_.bytes() != bytes) make_buffers(*device_, *this, share_buffers(state.size() / 2));
+    if (shares_.bytes() != bytes)
+        make_buffers(*device_, *this, share_buffers(state.size() / 2), "error share");
     shares_.upload(state);
 }
 
@@ -57,7 +58,7 @@ void ErrorScore::record(Commands& commands, const Forward& forward, Backward& ba
     const Buffer& transmittance = forward.final_transmittance();
     const bool several = forward.list_segments() > 1;
     if (several && transmittance_.bytes() < transmittance.bytes())
-        make_buffers(*device_, *this, segment_buffers(forward.size().pixels));
+        make_buffers(*device_, *this, segment_buffers(forward.size().pixels), "error share");
     commands.pass("error share");
     commands.dispatch(
         image_,

@@ -70,6 +70,23 @@ TEST(ChooseDevice, no_device_is_an_error_that_says_what_to_install) {
     EXPECT_NE(text.find("mesa-vulkan-drivers"), std::string::npos) << text;
 }
 
+TEST(ListDevices, subgroups_that_the_blend_cannot_use_are_a_reason) {
+    const auto trouble = [](std::uint32_t least, std::uint32_t most, bool required) {
+        DeviceInfo info;
+        info.min_subgroup_size = least;
+        info.max_subgroup_size = most;
+        info.requires_subgroup_size = required;
+        return subgroup_trouble(info);
+    };
+    for (const std::uint32_t size : {4u, 8u, 32u, 64u})
+        EXPECT_EQ(trouble(size, size, false), "") << "the only size needs no asking";
+    EXPECT_EQ(trouble(8, 32, true), "");
+    EXPECT_EQ(trouble(1, 128, true), "");
+    EXPECT_NE(trouble(8, 32, false).find("cannot require"), std::string::npos);
+    EXPECT_NE(trouble(1, 1, true).find("needs 4 to 64"), std::string::npos);
+    EXPECT_NE(trouble(128, 128, true).find("needs 4 to 64"), std::string::npos);
+}
+
 TEST(ListDevices, every_usable_device_has_its_limits) {
     const std::vector<DeviceInfo> devices = list_devices();
     ASSERT_FALSE(devices.empty());

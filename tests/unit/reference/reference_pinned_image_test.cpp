@@ -160,8 +160,25 @@ TEST(PinnedImage, NoSplats_IsTheBackground) {
 
 TEST(PinnedImage, OpaqueSplat_IsClampedAtAlphaMax) {
     const RenderResult result = reference::render(splats_of({{.logit = 20}}), small_camera(), {});
-    EXPECT_NEAR(result.images.colour.at(4, 3, 0), 0.99f, 1e-14);
-    EXPECT_NEAR(result.images.transmittance.at(4, 3, 0), 1 - static_cast<double>(0.99f), 1e-14);
+    EXPECT_NEAR(result.images.colour.at(4, 3, 0), 0.99, 1e-14);
+    EXPECT_NEAR(result.images.transmittance.at(4, 3, 0), 0.01, 1e-14);
+}
+
+// T meets the stop: 0.01, 1e-4, and the third would bring it to 1e-6.
+TEST(PinnedImage, TwoOpaqueSplats_AreBothBlended) {
+    const auto splats = splats_of({{.position = {0, 0, 2}, .logit = 20},
+                                   {.position = {0, 0, 3}, .logit = 20},
+                                   {.position = {0, 0, 4}, .logit = 20}});
+    RenderSettings settings;
+    const int expected[] = {1, 2, 3};
+    const double stops[] = {1e-2, 1e-4, 1e-6};
+    for (int i = 0; i < 3; ++i) {
+        settings.transmittance_stop = stops[i];
+        const RenderResult result = reference::render(splats, small_camera(), settings);
+        EXPECT_EQ(result.images.contributions.at(4, 3, 0), expected[i]) << stops[i];
+        EXPECT_NEAR(result.images.transmittance.at(4, 3, 0), stops[i], 1e-12) << stops[i];
+        EXPECT_NEAR(result.images.colour.at(4, 3, 0), 1 - stops[i], 1e-12) << stops[i];
+    }
 }
 
 TEST(PinnedImage, StopComesBeforeTheSplatThatWouldCrossIt) {

@@ -35,7 +35,7 @@ TEST(ProjectionCull, EachReason_IsNamedAndCounted) {
     EXPECT_EQ(cull_of({.rotation = {kNan, 0, 0, 0}}), Cull::rotation);
     EXPECT_EQ(cull_of({.logit = -5.6}), Cull::opacity);
     EXPECT_EQ(cull_of({.logit = -5.5}), Cull::none);
-    EXPECT_EQ(cull_of({.log_scale = glm::dvec3(50)}), Cull::covariance);
+    EXPECT_EQ(cull_of({.log_scale = glm::dvec3(50)}), Cull::none);
     EXPECT_EQ(cull_of({.log_scale = glm::dvec3(-20)}, {.low_pass = 0}), Cull::covariance);
     EXPECT_EQ(cull_of({.logit = kNan}), Cull::opacity);
     EXPECT_EQ(cull_of({.log_scale = {0, kNan, 0}}), Cull::covariance);
@@ -47,6 +47,33 @@ TEST(ProjectionCull, EachReason_IsNamedAndCounted) {
     EXPECT_EQ(result.culled[static_cast<int>(Cull::opacity)], 2U);
     EXPECT_EQ(cull_name(Cull::opacity), "opacity");
     EXPECT_EQ(cull_name(Cull::outside), "outside");
+}
+
+TEST(ProjectionLimits, ScaleOfFifty_CoversTheImageWithItsOpacity) {
+    const auto splats = splats_of({{.log_scale = glm::dvec3(50), .colour = {1, 0.5, 0}}});
+    const auto result = render(splats, small_camera(), {});
+    Splats<float> floats;
+    const auto copy = [](const auto& from, auto& to) { to.assign(from.begin(), from.end()); };
+    copy(splats.position, floats.position);
+    copy(splats.log_scale, floats.log_scale);
+    copy(splats.rotation, floats.rotation);
+    copy(splats.opacity, floats.opacity);
+    copy(splats.sh_dc, floats.sh_dc);
+    const auto in_float = render(floats, small_camera(), {});
+    for (int y = 0; y < small_camera().height; ++y)
+        for (int x = 0; x < small_camera().width; ++x) {
+            EXPECT_NEAR(result.images.colour.at(x, y, 0), 0.5, 1e-14);
+            EXPECT_NEAR(result.images.colour.at(x, y, 1), 0.25, 1e-14);
+            EXPECT_NEAR(in_float.images.colour.at(x, y, 1), 0.25f, 1e-6f);
+        }
+    const auto d =
+        backward(splats, small_camera(), {}, result, test::random_weights(small_camera(), 3, 1));
+    EXPECT_NE(d.splats.opacity[0], 0);
+    for (size_t a = 0; a < 3; ++a) {
+        EXPECT_EQ(d.splats.log_scale[a], 0);
+        EXPECT_TRUE(std::isfinite(d.splats.position[a]));
+        EXPECT_TRUE(std::isfinite(d.splats.rotation[a]));
+    }
 }
 
 TEST(ProjectionCull, CulledSplats_HaveZeroGradients) {

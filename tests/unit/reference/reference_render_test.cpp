@@ -43,11 +43,11 @@ Image<double> plain_render(const Splats<double>& splats, const Camera& camera,
                 const double q =
                     (p.cov_yy * dx * dx - 2 * p.cov_xy * dx * dy + p.cov_xx * dy * dy) / det;
                 const double w = kernel_value(splats.kernel, splats.footprint, q);
-                const double alpha = std::min<double>(0.99f, p.opacity * w);
+                const double alpha = std::min(0.99, p.opacity * w);
                 if (alpha < settings.alpha_cutoff) {
                     continue;
                 }
-                if (left * (1 - alpha) < settings.transmittance_stop) {
+                if (left * (1 - alpha) < settings.transmittance_stop * (1 - 1e-5)) {
                     break;
                 }
                 for (int c = 0; c < 3; ++c) {

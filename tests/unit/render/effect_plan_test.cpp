@@ -50,7 +50,7 @@ TEST(EffectPlanOfScene, one_need_switches_on_one_effect_and_none_none) {
     const std::pair<int, Change> cases[] = {
         {EFFECT_VIEW_COLOUR, [](Scene& s) { s.model.sh_rest[2] = 0.1f; }},
         {EFFECT_ANTIALIAS, [](Scene& s) { s.model.antialias = true; }},
-        {EFFECT_OFF_CENTRE, [](Scene& s) { s.views[0].camera.cx += 0.02; }},
+        {EFFECT_OFF_CENTRE, [](Scene& s) { s.views[0].camera.cx += 0.0002; }},
         {EFFECT_LENS,
          [](Scene& s) {
              LensTerms& lens = s.views[0].camera.lens;
@@ -121,9 +121,31 @@ TEST(EffectPlanOfScene, near_plane_care_counts_what_lies_beside_a_camera) {
     EXPECT_EQ(put({1, 0, -0.25}, 2), 0) << "behind";
 }
 
+// The clamped Jacobian is that of the picture's edge, and there steeper than at the splat: its
+// footprint is twice as wide as the splat's own.
+TEST(EffectPlanOfScene, near_plane_care_counts_what_the_clamp_itself_widens) {
+    Scene s;
+    Camera& c = s.views[0].camera;
+    c.width = c.height = 1000;
+    c.fx = c.fy = 1000;
+    c.cx = -2000;  // the picture lies at x/z of 2 to 3
+    c.cy = 500;
+    const auto count = [&](float log_scale) {
+        const glm::dvec3 at = glm::transpose(c.rotation) * (glm::dvec3(0, 0, 1) - c.translation);
+        for (int k = 0; k < 3; ++k) {
+            s.model.position[k] = static_cast<float>(at[k]);
+            s.model.log_scale[k] = log_scale;
+        }
+        s.model.opacity[0] = 3;
+        return plan_rendering(s.model, s.views, {}).row(EFFECT_NEAR).measured;
+    };
+    EXPECT_EQ(count(-4), 0);
+    EXPECT_EQ(count(-0.9f), 1) << "reaches 1,500 px by its own Jacobian, 3,100 px by the clamped";
+}
+
 TEST(EffectPlanOfScene, what_changes_less_than_the_limit_is_off) {
     Scene s;
-    s.views[0].camera.cy += 0.005;
+    s.views[0].camera.cy += 0.00005;
     s.model.sh_rest[0] = 0.003f;  // times sqrt(3 / 4 pi) = 0.0015, under 1/512
     EXPECT_EQ(s.on(), On{});
     s.model.sh_rest[0] = 0.0042f;  // 0.00205
