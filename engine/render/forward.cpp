@@ -28,7 +28,7 @@ int bits_for(std::uint32_t count) {
 // A frame without a backward pass holds a word for a pair, not eight.
 std::uint32_t most_pairs(const Device& device, const ForwardOptions& options) {
     const std::uint64_t words = device.info().max_storage_buffer_bytes / 4;
-    return options.store_for_backward
+    return options.store_for_backward && options.backward_follows
                ? Forward::max_pairs(device)
                : static_cast<std::uint32_t>(std::min<std::uint64_t>(words, 1u << 30));
 }
@@ -214,7 +214,8 @@ std::uint32_t Forward::max_pairs(const Device& device) {
 
 std::uint32_t Forward::bucket(const Device& device, const ForwardOptions& options) {
     const bool buckets = tuning_of(device).backward == BackwardBlend::buckets;
-    return options.store_for_backward && buckets ? bucket_pairs(device) : 0;
+    return options.store_for_backward && options.backward_follows && buckets ? bucket_pairs(device)
+                                                                             : 0;
 }
 
 void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height) {
