@@ -67,6 +67,10 @@ void Progress::note(const std::string& line) {
     fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K\n" : "{}\n"), line);
 }
 
+void Progress::leave_out(double seconds) {
+    start_ += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
 void Progress::finish() {
     if (!quiet_ && terminal_ && any_) fmt::print(stderr, "\n");
 }

@@ -180,10 +180,12 @@ void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(true);
 }
 
-// The stopwatch counts what the view draws: it shares the device.
+// The stopwatch counts what the view draws, which shares the device, and no pause.
 void Run::show_step() {
-    run_.on_step({trainer_.splats(), trainer_.iteration(), options_.iterations, latest_,
-                  summary_.evaluations});
+    const double paused_s = run_.on_step({trainer_.splats(), trainer_.iteration(),
+                                          options_.iterations, latest_, summary_.evaluations});
+    seconds_ -= paused_s;
+    progress_.leave_out(paused_s);
 }
 
 // Whether metrics.json is that of a whole run, which nothing is to be added to.

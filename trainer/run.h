@@ -36,9 +36,11 @@ struct RunOptions {
         1'000;  // of checkpoint.darb, the latest; 0: only at the end and Ctrl-C
     std::filesystem::path resume_from;  // empty: start afresh
     bool quiet = false;
-    bool report = true;                            // report.html at the end
-    std::function<void(const LiveStep&)> on_step;  // may be empty
-    std::string effects;                           // the plan in a line, for the log
+    bool report = true;  // report.html at the end
+    /// May be empty. Returns the seconds that it held the run up on purpose (a pause), which are
+    /// no training time.
+    std::function<double(const LiveStep&)> on_step;
+    std::string effects;          // the plan in a line, for the log
     std::string effects_json;     // the same as JSON, for metrics.json; may be empty
     std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
 };

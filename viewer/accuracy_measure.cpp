@@ -5,7 +5,9 @@
 
 namespace darb {
 
-AccuracyMeasure::AccuracyMeasure(const DisplaySettings& display, const DisplaySettings& own) {
+AccuracyMeasure::AccuracyMeasure(const Camera& camera, const DisplaySettings& display,
+                                 const DisplaySettings& own)
+    : camera_(camera) {
     DisplaySettings now = display;
     now.mode = VIEW_COLOUR;
     now.style = SplatStyle::splats;
@@ -30,10 +32,11 @@ AccuracyMeasure::AccuracyMeasure(const DisplaySettings& display, const DisplaySe
     for (const int row : kEffectRows) add(row);
 }
 
-void AccuracyMeasure::step(const std::function<Frame(const DisplaySettings&)>& render) {
+void AccuracyMeasure::step(
+    const std::function<Frame(const Camera&, const DisplaySettings&)>& render) {
     if (done()) return;
     const Picture& picture = pictures_[next_];
-    const Frame frame = render(picture.display);
+    const Frame frame = render(camera_, picture.display);
     if (next_ == 0) exact_ = to_float(frame.picture);
     const double psnr_db = psnr(to_float(frame.picture), exact_);
     for (MeasuredChoice choice : picture.choices) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/check.h"
@@ -13,20 +14,21 @@ namespace darb {
 
 namespace {
 
-// Position, field of view and quaternion as one vector of eight numbers.
+// Position, field of view and quaternion as one vector of eight numbers. The field of view is
+// ln tan(fov / 2): whatever a curve does between two keys, it stays between 0 and 180 degrees.
 using Row = std::array<double, 8>;
 
 Row row_of(const KeyFrame& key, const glm::dquat& near_to) {
     const glm::dquat q =
         glm::dot(key.orientation, near_to) < 0 ? -key.orientation : key.orientation;
-    return {key.eye.x, key.eye.y, key.eye.z, key.fov_y, q.w, q.x, q.y, q.z};
+    return {key.eye.x, key.eye.y, key.eye.z, std::log(std::tan(key.fov_y / 2)), q.w, q.x, q.y, q.z};
 }
 
 KeyFrame key_of(const Row& row, double seconds) {
     KeyFrame key;
     key.seconds = seconds;
     key.eye = {row[0], row[1], row[2]};
-    key.fov_y = row[3];
+    key.fov_y = 2 * std::atan(std::exp(row[3]));
     key.orientation = glm::normalize(glm::dquat(row[4], row[5], row[6], row[7]));
     return key;
 }
@@ -48,7 +50,7 @@ void CameraPath::add(const Navigation& view, double seconds) {
 
 KeyFrame CameraPath::sample(double seconds) const {
     DARB_CHECK(!keys.empty());
-    if (seconds <= keys.front().seconds) return keys.front();
+    if (!(seconds > keys.front().seconds)) return keys.front();
     if (seconds >= keys.back().seconds) return keys.back();
     const auto next = std::upper_bound(keys.begin(), keys.end(), seconds,
                                        [](double t, const KeyFrame& k) { return t < k.seconds; });

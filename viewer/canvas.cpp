@@ -45,8 +45,17 @@ void image_barrier(VkCommandBuffer commands, VkImage image, VkImageLayout from, 
     barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     barrier.image = image;
     barrier.subresourceRange = kWholeColour;
+    // Buffers, too: the image is copied from one, or to one.
+    VkMemoryBarrier2 memory{};
+    memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2;
+    memory.srcStageMask = barrier.srcStageMask;
+    memory.srcAccessMask = barrier.srcAccessMask;
+    memory.dstStageMask = barrier.dstStageMask;
+    memory.dstAccessMask = barrier.dstAccessMask;
     VkDependencyInfo info{};
     info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
+    info.memoryBarrierCount = 1;
+    info.pMemoryBarriers = &memory;
     info.imageMemoryBarrierCount = 1;
     info.pImageMemoryBarriers = &barrier;
     vkCmdPipelineBarrier2(commands, &info);

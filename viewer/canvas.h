@@ -83,7 +83,8 @@ class Canvas {
     DeviceImage image_, small_;
 };
 
-/// One image barrier that also covers all memory before it.
+/// A change of an image's layout, after all before it and before all after it; all other memory is
+/// ordered with it.
 void image_barrier(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to);
 
 }  // namespace darb

@@ -23,6 +23,7 @@ size_t Edit::remove(const SplatModel& model, const Region& region, bool inside) 
     const size_t count = step.size();
     if (count == 0) return 0;
     steps_.resize(done_);
+    if (saved_ && *saved_ > done_) saved_.reset();
     mark(step, 1);
     steps_.push_back(std::move(step));
     done_ = steps_.size();

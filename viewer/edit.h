@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
 #include "engine/scene/splat_model.h"
@@ -33,6 +34,9 @@ class Edit {
 
     const std::vector<std::uint8_t>& removed() const { return removed_; }  // [N] 0 or 1
     size_t removed_count() const { return removed_count_; }
+    /// Some splats are deleted, and not as they were at the last mark_saved().
+    bool unsaved() const { return removed_count_ > 0 && saved_ != done_; }
+    void mark_saved() { saved_ = done_; }
     /// The scene without the deleted splats, in the same order.
     SplatModel apply(const SplatModel& model) const;
 
@@ -42,6 +46,7 @@ class Edit {
     std::vector<std::vector<std::uint32_t>> steps_;  // splats that each step deleted
     size_t done_ = 0;                                // of steps_
     size_t removed_count_ = 0;
+    std::optional<size_t> saved_;  // done_ when it was saved; none once that step is gone
 };
 
 /// Splats of the region that are not deleted yet.

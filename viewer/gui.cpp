@@ -1,5 +1,7 @@
 #include "viewer/gui.h"
 
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_vulkan.h>
 #include <imgui.h>
@@ -30,12 +32,11 @@ Gui::Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* wind
     ImGui::CreateContext();
     ImGuiIO& io = ImGui::GetIO();
     io.IniFilename = nullptr;  // leaves no file in the current folder
-    ImGui::StyleColorsDark();
-    ImGui::GetStyle().WindowRounding = 4;
-    ImGui::GetStyle().ScaleAllSizes(scale);
     ImFontConfig font;
-    font.SizePixels = kFontPx * scale;
+    font_px_ = kFontPx * scale * (windowed_ ? pixels_per_unit(window) : 1);
+    font.SizePixels = font_px_;
     io.Fonts->AddFontDefault(&font);
+    set_scale(scale);
     if (windowed_) ImGui_ImplGlfw_InitForVulkan(window, true);
 
     ImGui_ImplVulkan_InitInfo info{};
@@ -51,6 +52,22 @@ Gui::Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* wind
     info.CheckVkResultFn = check_gui;
     ImGui_ImplVulkan_Init(&info, render_pass);
     upload_fonts(device);
+}
+
+void Gui::set_scale(float scale) {
+    ImGuiStyle& style = ImGui::GetStyle();
+    style = ImGuiStyle();
+    ImGui::StyleColorsDark();
+    style.WindowRounding = 4;
+    style.ScaleAllSizes(scale);
+    ImGui::GetIO().FontGlobalScale = kFontPx * scale / font_px_;
+}
+
+float pixels_per_unit(GLFWwindow* window) {
+    int px = 0, units = 0, unused = 0;
+    glfwGetFramebufferSize(window, &px, &unused);
+    glfwGetWindowSize(window, &units, &unused);
+    return px > 0 && units > 0 ? static_cast<float>(px) / static_cast<float>(units) : 1;
 }
 
 // From 1.90 on the backend uploads them itself.

@@ -11,12 +11,14 @@ namespace darb {
 
 class Gui {
   public:
-    /// scale: 1 on ordinary screens, 2 on high-DPI ones. window: null where there is none.
+    /// scale: of the window's coordinates. window: null where there is none.
     Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* window);
     ~Gui();
     Gui(const Gui&) = delete;
     Gui& operator=(const Gui&) = delete;
 
+    /// Another scale; letters are sharp at the first.
+    void set_scale(float scale);
     /// Starts a frame; with a window its input and size are taken from it, else these.
     void begin(int width, int height);
     /// Ends it: what the panels said is ready for draw().
@@ -32,6 +34,11 @@ class Gui {
     VkDevice device_;
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
     bool windowed_;
+    float font_px_ = 0;
 };
+
+/// Framebuffer px of one unit of a window's coordinates, in which panels and pointer are: 2 on some
+/// high-DPI desktops, 1 on others.
+float pixels_per_unit(GLFWwindow* window);
 
 }  // namespace darb

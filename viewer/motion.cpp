@@ -40,12 +40,17 @@ void MotionControl::start(std::size_t splats, double most) {
 }
 
 // `factor` for what costs more, less of a change for the other; up, where one is whole, all for the
-// other.
-void MotionControl::change(double factor) {
+// other. Between most_ and all splats there is nothing: a step, taken where they fit.
+void MotionControl::change(double factor, double room_ms) {
+    const bool at_most = factor > 1 && splats_ < 1 && splats_ >= most_;
+    if (at_most && best_.splats_ms / splats_ + best_.pixels_ms <= room_ms) {
+        splats_ = 1;
+        return;
+    }
     const double most = std::max({best_.splats_ms, best_.pixels_ms, 1e-9});
     const bool up = factor > 1;
     const double of_splats = up && pixels_ >= 1 ? 1 : best_.splats_ms / most;
-    const double of_pixels = up && splats_ >= 1 ? 1 : best_.pixels_ms / most;
+    const double of_pixels = up && (splats_ >= 1 || at_most) ? 1 : best_.pixels_ms / most;
     splats_ = std::clamp(splats_ * std::pow(factor, of_splats), least_, 1.0);
     if (splats_ < 1) splats_ = std::min(splats_, most_);
     pixels_ = std::clamp(pixels_ * std::pow(factor, of_pixels), kLeastPixels, 1.0);
@@ -64,7 +69,7 @@ void MotionControl::measured(const MotionCost& cost) {
     // Where panels and presentation leave nothing, a fifth of the time all the same.
     const double room_ms = std::max(kAim * target_ms_ - best_.fixed_ms, 0.2 * target_ms_);
     const double factor = room_ms / std::max(best_.splats_ms + best_.pixels_ms, 1e-6);
-    if (slow == (factor < 1)) change(std::clamp(factor, kMostDown, kMostUp));
+    if (slow == (factor < 1)) change(std::clamp(factor, kMostDown, kMostUp), room_ms);
 }
 
 }  // namespace darb

@@ -35,14 +35,15 @@ class MotionControl {
 
     MotionQuality quality() const;
     /// A frame drawn at quality() took this. Two slow frames in a row lower the quality, a dozen
-    /// quick ones raise it; whichever of splats and pixels costs more changes more.
+    /// quick ones raise it; whichever of splats and pixels costs more changes more. From the
+    /// largest share below all the next is all splats, where there is time for them.
     void measured(const MotionCost& cost);
     /// Another scene, of which nothing is known but how many splats it has and the largest share of
     /// them below all. 10,000 splats cost little and are always drawn.
     void start(std::size_t splats, double most);
 
   private:
-    void change(double factor);
+    void change(double factor, double room_ms);
     double target_ms_;
     double most_ = 0.5, least_ = 1.0 / 64;  // shares of the splats; most_ below all
     double pixels_ = 0.25, splats_ = 0.25;  // shares

@@ -47,7 +47,7 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     Scene scene;
     scene.file = file;
     SplatFile facts;
-    if (is_sog_folder(file)) {
+    if (is_sog_folder(file) || file.filename() == "meta.json") {
         if (progress) progress(kReadShare, "decoding");
         scene.model = load_splats(file, &facts);
     } else {

@@ -74,11 +74,20 @@ struct MeasuredChoice {
 
 /// What panels and keys ask for; the viewer does it after the panels of a frame and clears it.
 struct Requests {
+    /// Of unsaved edits, where session.leaving asks.
+    bool save_and_leave = false, leave = false, stay = false;
     bool frame_all = false, take_picture = false, save = false, quit = false;
     bool full_screen = false, leave_full_screen = false, cancel_load = false, load_path = false,
          save_path = false;
-    bool measure = false, follow_plan = false;
+    bool measure = false, follow_plan = false, leave_photo = false;
+    int choose_camera = -1;  // of the data set
     bool export_path = false, cancel_export = false, opacity_changed = false;
+};
+
+/// Quit, or another scene: asked for while edits are not saved.
+struct Leaving {
+    bool quit = false;
+    std::filesystem::path open;  // where it is not quit
 };
 
 struct Session {
@@ -96,8 +105,10 @@ struct Session {
     TrainingCurves training;
     FrameTimes times;
     Requests requests;
-    std::string error;  // shown until dismissed
-    std::string note;   // shown in the status line
+    std::optional<Leaving> leaving;  // waits for an answer
+    std::string title;               // of what is shown, for a window
+    std::string error;               // shown until dismissed
+    std::string note;                // shown in the status line
     std::string device_name;
     double load_share = -1;  // below 0: nothing is being loaded
     std::string load_stage;
@@ -109,8 +120,8 @@ struct Session {
     float gui_scale = 1;
 };
 
-/// The panels of one frame; progress and errors also where session.panels is off. Needs an ImGui
-/// frame.
-void draw_panels(Session& session, int width, int height);
+/// The panels of one frame; progress, errors and questions also where session.panels is off. Needs
+/// an ImGui frame, in whose coordinates they are.
+void draw_panels(Session& session);
 
 }  // namespace darb

@@ -135,6 +135,7 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
     options.effects = key.effects;
     options.crowds = key.crowds;
     options.store_for_backward = key.store;
+    options.backward_follows = false;
     if (key.ellipsoids) options.alpha_cutoff = kEllipsoidCutoff;
     // What the passes of these modes read and write is laid out like this.
     if (key.store) options.depth_order = DEPTH_ORDER_CENTRE;

@@ -75,6 +75,7 @@ void Swapchain::create(int width, int height) {
     extent_ = can.currentExtent;
     if (extent_.width == 0xFFFFFFFFu)
         extent_ = {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
+    stale_ = true;
     if (extent_.width == 0 || extent_.height == 0) return;  // minimised
     VkSwapchainCreateInfoKHR info{};
     info.sType = VK_STRUCTURE_TYPE_SWAPCHAIN_CREATE_INFO_KHR;
@@ -122,7 +123,7 @@ bool Swapchain::acquire(int width, int height, std::uint32_t& index) {
     return true;
 }
 
-void Swapchain::finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t index) {
+bool Swapchain::finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t index) {
     const VkImage target = images_[index];
     image_barrier(commands, target, VK_IMAGE_LAYOUT_UNDEFINED,
                   VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
@@ -155,10 +156,9 @@ void Swapchain::finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t i
     info.pSwapchains = &chain_;
     info.pImageIndices = &index;
     const VkResult result = vkQueuePresentKHR(device_->queue(), &info);
-    if (result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR)
-        stale_ = true;
-    else
-        check_vulkan(result, "window");
+    stale_ = result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR;
+    if (!stale_) check_vulkan(result, "window");
+    return result != VK_ERROR_OUT_OF_DATE_KHR;
 }
 
 }  // namespace darb

@@ -19,19 +19,18 @@ class Swapchain {
     Swapchain& operator=(const Swapchain&) = delete;
 
     /// Copies the composed canvas into the next image and presents it. compose records the canvas
-    /// and is called once there is an image. False where the window changed its size meanwhile:
-    /// the next call makes a new chain.
+    /// and is called once there is an image. False where nothing is shown, as the window changed
+    /// its size meanwhile or has none: the next call makes a new chain.
     template <class Compose>
     bool present(Canvas& canvas, const Compose& compose) {
         std::uint32_t index = 0;
         if (!acquire(canvas.width(), canvas.height(), index)) return false;
-        finish(canvas, compose(), index);
-        return true;
+        return finish(canvas, compose(), index);
     }
 
   private:
     bool acquire(int width, int height, std::uint32_t& index);
-    void finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t index);
+    bool finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t index);
     void choose_format();
     void create(int width, int height);
     void release_images();

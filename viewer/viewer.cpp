@@ -18,6 +18,7 @@ constexpr double kLong_ms = 500;  // for a whole picture
 constexpr double kStep_s = 1.0 / 60;
 constexpr size_t kTimesKept = 60;  // frames in motion that the panel averages over
 constexpr int kRehearsals = 8;     // of motion, after the one that compiles
+constexpr double kLook_s = 0.1;    // between two looks whether ffmpeg has ended
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
 glm::dvec3 start_up(const ViewerOptions& options) {
@@ -78,6 +79,18 @@ void Viewer::choose_camera(int n) {
     session_.photos.failed = false;
     session_.requests.frame_all = false;  // asked for by a load before
     session_.navigation.take(session_.photos.views[static_cast<size_t>(n)].camera);
+    if (!picture_.empty()) set_pivot(picture_.bounds());
+}
+
+// As far as the scene is: orbits turn around it, pans follow the hand.
+void Viewer::set_pivot(const Bounds& bounds) {
+    Navigation& n = session_.navigation;
+    n.distance = std::max(glm::distance(n.eye, bounds.centre), bounds.radius * 0.1);
+}
+
+void Viewer::set_gui_scale(float scale) {
+    session_.gui_scale = scale;
+    gui_.set_scale(scale);
 }
 
 void Viewer::leave_photo() {
@@ -132,8 +145,10 @@ void Viewer::handle_keys(const Input& input) {
             case Key::next_camera:
             case Key::last_camera: {
                 const int count = static_cast<int>(s.photos.views.size());
-                const int step = key == Key::next_camera ? 1 : count - 1;
-                if (count > 0) choose_camera((std::max(s.photos.current, 0) + step) % count);
+                const bool next = key == Key::next_camera;
+                // From the free camera to the first or the last.
+                const int from = s.photos.current >= 0 ? s.photos.current : next ? count - 1 : 0;
+                if (count > 0) choose_camera((from + (next ? 1 : count - 1)) % count);
                 break;
             }
             case Key::add_key:
@@ -172,7 +187,7 @@ void Viewer::handle_keys(const Input& input) {
             case Key::escape:
                 s.path.playing = false;
                 s.requests.cancel_load = s.requests.cancel_export = true;
-                s.requests.leave_full_screen = true;
+                s.requests.leave_full_screen = s.requests.stay = true;
                 s.error.clear();
                 break;
         }
@@ -211,6 +226,7 @@ void Viewer::move(const Input& in, double seconds, int width, int height) {
 
 void Viewer::play_path(double seconds) {
     PathState& p = session_.path;
+    p.playing = p.playing && !p.path.keys.empty();
     if (!p.playing) return;
     p.at_s += seconds;
     leave_photo();
@@ -278,10 +294,13 @@ void Viewer::rehearse_motion(const PictureKey& key) {
     try {
         for (int i = 0; i <= kRehearsals; ++i) {
             const MotionQuality quality = motion_.quality();
+            // The first makes the copy of the important splats, also where all are wanted now.
+            const double splats =
+                i == 0 ? std::min(quality.splats, picture_.most_moving()) : quality.splats;
             const auto start = Clock::now();
             const std::vector<PassTime> passes =
-                picture_.rehearse(scaled(key.camera, quality.scale), key.display, quality.splats);
-            if (picture_.compiled()) continue;
+                picture_.rehearse(scaled(key.camera, quality.scale), key.display, splats);
+            if (picture_.compiled() || splats < quality.splats) continue;
             motion_.measured(motion_cost(besides_ms + milliseconds_since(start), passes));
         }
     } catch (const std::exception& e) {
@@ -311,20 +330,21 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
         continuous_ ? std::chrono::duration<double>(frame_start_ - last_frame_).count() : kStep_s;
     last_frame_ = frame_start_;
     poll_load();
-    for (const auto& path : input.dropped) open(path);
+    for (const auto& path : input.dropped) drop(path);
+    canvas_.resize(width, height);
+    gui_.begin(width, height);  // now it knows whether the pointer is on a panel
     if (!gui_.wants_keys()) handle_keys(input);
     move(input, seconds, width, height);
     play_path(seconds);
-    canvas_.resize(width, height);
-    gui_.begin(width, height);
-    draw_panels(session_, width, height);
+    draw_panels(session_);
     gui_.end();
-    act_on_requests(width, height);
+    const bool works = act_on_requests(width, height);
+    const double look_s = export_ ? kLook_s : kForever;
     load_current_photo();
 
     drew_moving_ = false;
     bool drew = false;
-    if (picture_.empty()) return export_ || session_.path.playing ? 0 : settle_panels(false);
+    if (picture_.empty()) return session_.path.playing ? 0 : std::min(look_s, settle_panels(false));
     PictureKey key{frame_camera(width, height), session_.display, session_.photos.current,
                    session_.photos.compare ? session_.photos.split : 0.0f, version_};
     last_.version = key.version;  // an edit or a training step is no motion
@@ -333,8 +353,8 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     const double rests = std::chrono::duration<double>(frame_start_ - changed_at_).count();
     const bool refine = full || rests >= kRest_s || !drawn_any_;
     const bool whole = drawn_any_ && key == drawn_ && !drawn_moving_;
-    if (export_ || measure_) {
-        // Their pictures are shown as they come.
+    if (works) {
+        // Its pictures are shown as they come.
     } else if (!(key == drawn_) && !refine) {
         drew_moving_ = true;
         draw_picture(key, motion_.quality());
@@ -350,10 +370,10 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     }
     const bool held =
         input.ahead || input.back || input.to_left || input.to_right || input.rise || input.sink;
-    continuous_ = held || session_.path.playing || export_ || measure_;
+    continuous_ = held || session_.path.playing || works;
     if (continuous_) return 0;
-    if (drawn_moving_ && session_.error.empty()) return std::max(0.001, kRest_s - rests);
-    return settle_panels(drew);
+    if (drawn_moving_) return std::min(look_s, std::max(0.001, kRest_s - rests));
+    return std::min(look_s, settle_panels(drew));
 }
 
 double Viewer::settle_panels(bool changed) {

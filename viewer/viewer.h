@@ -26,6 +26,9 @@ struct ViewerOptions {
     EffectChoice effects;     // on top of what a scene calls for
     /// The file that a path means (an output folder names its last scene). Throws Error.
     std::function<std::filesystem::path(const std::filesystem::path&)> resolve;
+    /// Cameras that lie beside a scene, for one that is dropped; where there is no such function,
+    /// views stay. What it throws is a note.
+    std::function<std::vector<View>(const std::filesystem::path&)> find_cameras;
     /// Called from other threads when there is something to show.
     std::function<void()> wake;
 };
@@ -45,6 +48,7 @@ class Viewer {
     /// Follows splats that someone else changes; see TrainingCurves for the rest.
     /// The splats must stay where they are until end_live.
     void show_live(const GpuSplats& splats, const Bounds& bounds);
+    /// A scene that is opened next is shown where the user looked at the run.
     void end_live();
 
     /// Looks through camera n of the data set. Throws Error where there is no such camera.
@@ -65,7 +69,9 @@ class Viewer {
     Session& session() { return session_; }
     const SplatPicture& picture() const { return picture_; }
     Gui& gui() { return gui_; }
-    /// Exports the session's path; blocks. For use without a window.
+    /// Size of the panels, 1 on ordinary screens.
+    void set_gui_scale(float scale);
+    /// Exports the session's path; blocks. For use without a window. Throws Error.
     void export_path_now();
     /// The picture is whole, and one in motion would have nothing to wait for.
     bool at_rest() const;
@@ -85,14 +91,28 @@ class Viewer {
         bool operator==(const PictureKey& other) const;
     };
 
+    void start_load(const std::filesystem::path& path, bool dropped);
     void poll_load();
+    void drop(const std::filesystem::path& path);
     void adopt(Scene scene);
+    void find_own_cameras(Scene& scene);
+    void set_pivot(const Bounds& bounds);
     void show_as_meant(const Scene& scene, bool first);
     void follow_plan();
     void handle_keys(const Input& input);
     void move(const Input& input, double seconds, int width, int height);
     void leave_photo();
-    void act_on_requests(int width, int height);
+    bool act_on_requests(int width, int height);
+    bool attempt(const std::function<void()>& step);
+    void need_scene(const char* what) const;
+    void frame_all(int width, int height);
+    void cancel_load();
+    void apply_edits();
+    void save_scene();
+    void answer_leaving(const Requests& requests, bool saved);
+    void take_picture(int width, int height);
+    void start_export();
+    void stop_work(const char* why);
     void load_current_photo();
     void play_path(double seconds);
     Camera frame_camera(int width, int height) const;
@@ -101,8 +121,8 @@ class Viewer {
     bool preview_pays() const;
     void rehearse_motion(const PictureKey& key);
     double settle_panels(bool changed);
-    void step_export();
-    void step_measure(int width, int height);
+    void step_export(bool wait);
+    void step_measure();
     void report(const std::exception& error);
 
     Device* device_;
@@ -113,6 +133,8 @@ class Viewer {
     SplatPicture picture_;
     MotionControl motion_;
     std::unique_ptr<LoadJob> job_;
+    std::filesystem::path named_;  // what job_ loads, as it was asked for
+    bool dropped_ = false;         // it was dropped
     std::vector<std::unique_ptr<LoadJob>> cancelled_;
     std::optional<PathExport> export_;
     std::optional<AccuracyMeasure> measure_;

@@ -20,6 +20,21 @@ bool any_lens(const std::vector<View>& views) {
 }  // namespace
 
 void Viewer::open(const std::filesystem::path& path) {
+    start_load(path, false);
+}
+
+// What a user drops: not on a run, and not over unsaved edits without a question.
+void Viewer::drop(const std::filesystem::path& path) {
+    Session& s = session_;
+    if (s.training.live && !s.training.finished)
+        s.note = "A run is shown: files can be dropped when it is over.";
+    else if (s.scene && s.edit.unsaved())
+        s.leaving = Leaving{false, path};
+    else
+        start_load(path, true);
+}
+
+void Viewer::start_load(const std::filesystem::path& path, bool dropped) {
     try {
         const std::filesystem::path file = options_.resolve ? options_.resolve(path) : path;
         if (job_) {
@@ -27,6 +42,9 @@ void Viewer::open(const std::filesystem::path& path) {
             cancelled_.push_back(std::move(job_));
         }
         session_.error.clear();
+        if (dropped) session_.note.clear();
+        named_ = path;
+        dropped_ = dropped;
         job_ = std::make_unique<LoadJob>(file, options_.wake);
     } catch (const std::exception& e) {
         report(e);
@@ -66,9 +84,16 @@ void Viewer::poll_load() {
 void Viewer::adopt(Scene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded));
     picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
+    stop_work("another scene was opened");
     motion_.start(picture_.splat_count(), picture_.most_moving());
-    const bool first = session_.scene == nullptr;
+    // The scene of a run that was shown: from where the user looked at the run.
+    const bool of_run = session_.scene == nullptr && session_.training.finished;
+    const bool first = session_.scene == nullptr && !of_run;
+    session_.leaving.reset();
+    if (dropped_) find_own_cameras(*scene);
     session_.scene = std::move(scene);
+    const std::filesystem::path shown = named_.has_filename() ? named_ : named_.parent_path();
+    session_.title = shown.filename().string() + " - darb";
     const Scene& s = *session_.scene;
     session_.sh_degree = s.model.sh_degree;
     session_.edit = Edit(s.model.size());
@@ -77,15 +102,25 @@ void Viewer::adopt(Scene loaded) {
     session_.save_file.replace_filename(s.file.stem().string() + "_edited.ply");
     session_.fly_speed = s.bounds.radius / 2;
     show_as_meant(s, first);
-    session_.note.clear();
     fmt::print("loaded {}: {} splats in {:.2f} s\neffects: {}\n", s.file.string(), s.model.size(),
                s.load_s, plan_line(*session_.plan));
     std::fflush(stdout);
     ++version_;
     if (first) session_.navigation.level();
-    if (session_.photos.current < 0) session_.requests.frame_all = true;
-    session_.navigation.distance =
-        std::max(glm::distance(session_.navigation.eye, s.bounds.centre), s.bounds.radius * 0.1);
+    if (session_.photos.current < 0 && !of_run) session_.requests.frame_all = true;
+    set_pivot(s.bounds);
+}
+
+// Cameras belong to the scene that they were opened with.
+void Viewer::find_own_cameras(Scene& scene) {
+    if (!options_.find_cameras) return;
+    leave_photo();
+    session_.photos = Photos();
+    try {
+        session_.photos.views = options_.find_cameras(named_);
+    } catch (const std::exception& e) {
+        scene.notes.emplace_back(e.what());
+    }
 }
 
 // As the file says, but for what the command line wants otherwise.
@@ -98,6 +133,9 @@ void Viewer::show_as_meant(const Scene& s, bool first) {
     d.effects.antialias = s.model.antialias;
     d.effects.lens = any_lens(session_.photos.views);
     d.crowds = Crowds::by_counters;
+    // That of training, which does not see what is nearer: such splats hang before the training
+    // cameras, and a nearer plane would show them. Less only where a scene is so small that it is
+    // looked at from nearer.
     d.near_plane =
         std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(s.bounds.radius * 0.1));
     session_.own = d;
@@ -143,11 +181,11 @@ void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
     session_.own = session_.display;
     session_.fly_speed = bounds.radius / 2;
     session_.requests.frame_all = session_.photos.current < 0;
-    session_.navigation.distance =
-        std::max(glm::distance(session_.navigation.eye, bounds.centre), bounds.radius * 0.1);
+    set_pivot(bounds);
 }
 
 void Viewer::end_live() {
+    stop_work("the run is over");
     picture_.clear();
     session_.training.finished = true;
 }

@@ -86,10 +86,13 @@ VkSurfaceKHR make_surface(Device& device, GLFWwindow* window) {
     return surface;
 }
 
-float content_scale(GLFWwindow* window) {
+// Of the panels, in the window's coordinates, which some desktops scale by themselves. wanted: on
+// the screen; 0: as the desktop wants it.
+float panel_scale(GLFWwindow* window, float wanted) {
     float x = 1, y = 1;
     glfwGetWindowContentScale(window, &x, &y);
-    return std::clamp(std::max(x, y), 1.0f, 4.0f);
+    const float scale = wanted > 0 ? wanted : std::clamp(std::max(x, y), 1.0f, 4.0f);
+    return scale / pixels_per_unit(window);
 }
 
 }  // namespace
@@ -119,11 +122,13 @@ void WindowSystem::require(DeviceOptions& options) const {
 // The callbacks collect input here; ImGui's, installed later, call these first.
 struct ViewerWindow::State {
     State(Device& device, const ViewerOptions& options, int width, int height)
-        : window(width, height), swapchain(device, make_surface(device, window.handle)) {
+        : window(width, height),
+          swapchain(device, make_surface(device, window.handle)),
+          wanted_scale(options.gui_scale) {
         glfwSetWindowUserPointer(window.handle, this);
         install_callbacks();
         ViewerOptions mine = options;
-        if (!(mine.gui_scale > 0)) mine.gui_scale = content_scale(window.handle);
+        mine.gui_scale = panel_scale(window.handle, wanted_scale);
         mine.wake = [this] {
             woken = true;
             glfwPostEmptyEvent();
@@ -138,12 +143,15 @@ struct ViewerWindow::State {
     void note_buttons();
     bool* held_key(int key);  // its flag in input, or null
     void draw();
+    void close_minimised();
     void toggle_full_screen();
     static State& of(GLFWwindow* w) { return *static_cast<State*>(glfwGetWindowUserPointer(w)); }
 
     GlfwWindow window;
     Swapchain swapchain;
     std::optional<Viewer> viewer;
+    float wanted_scale;  // of the panels; 0: the desktop's
+    std::string title;
     Input input;
     bool dirty = true;
     int settling = 0;
@@ -184,6 +192,17 @@ void ViewerWindow::State::install_callbacks() {
     glfwSetCharCallback(w, [](GLFWwindow* from, unsigned) { of(from).dirty = true; });
     glfwSetWindowRefreshCallback(w, [](GLFWwindow* from) { of(from).dirty = true; });
     glfwSetFramebufferSizeCallback(w, [](GLFWwindow* from, int, int) { of(from).dirty = true; });
+    glfwSetWindowContentScaleCallback(w, [](GLFWwindow* from, float, float) {
+        State& s = of(from);
+        if (s.viewer) s.viewer->set_gui_scale(panel_scale(from, s.wanted_scale));
+        s.dirty = true;
+    });
+    glfwSetWindowCloseCallback(w, [](GLFWwindow* from) {  // the viewer may have a question
+        State& s = of(from);
+        if (s.viewer) s.viewer->session().requests.quit = true;
+        s.dirty = true;
+        glfwSetWindowShouldClose(from, GLFW_FALSE);
+    });
 }
 
 bool* ViewerWindow::State::held_key(int key) {
@@ -261,6 +280,16 @@ void ViewerWindow::State::toggle_full_screen() {
         glfwSetWindowMonitor(w, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
 
+// Without a frame that could ask.
+void ViewerWindow::State::close_minimised() {
+    const Session& session = viewer->session();
+    if (!session.requests.quit) return;
+    if (session.edit.unsaved())
+        glfwRestoreWindow(window.handle);
+    else
+        glfwSetWindowShouldClose(window.handle, GLFW_TRUE);
+}
+
 void ViewerWindow::State::draw() {
     int width = 0, height = 0;
     glfwGetFramebufferSize(window.handle, &width, &height);
@@ -268,6 +297,7 @@ void ViewerWindow::State::draw() {
         next_frame_at = std::numeric_limits<double>::infinity();
         dirty = false;
         settling = 0;
+        close_minimised();
         return;
     }
     collect();
@@ -278,6 +308,10 @@ void ViewerWindow::State::draw() {
     input = Input();
     if (!swapchain.present(viewer->canvas(), [&] { return viewer->compose(); })) dirty = true;
     viewer->presented();
+    if (title != viewer->session().title) {
+        title = viewer->session().title;
+        glfwSetWindowTitle(window.handle, title.c_str());
+    }
     Requests& requests = viewer->session().requests;
     const bool leave = std::exchange(requests.leave_full_screen, false);
     if (std::exchange(requests.full_screen, false) ||
@@ -313,10 +347,9 @@ bool ViewerWindow::pump(double patience_s) {
         glfwWaitEventsTimeout(sleep);
     else
         glfwWaitEvents();
-    if (glfwWindowShouldClose(s.window.handle)) return false;
     const bool woken = s.woken.exchange(false);
     if (woken || due()) s.draw();
-    return true;
+    return glfwWindowShouldClose(s.window.handle) == GLFW_FALSE;
 }
 
 }  // namespace darb

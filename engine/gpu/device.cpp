@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -73,6 +74,16 @@ ListedDevice choose(const Instance& instance, const std::string& select) {
     return all[choose_device(infos, select)];
 }
 
+bool offers_extension(VkPhysicalDevice physical, const std::string& name) {
+    std::uint32_t count = 0;
+    vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, nullptr);
+    std::vector<VkExtensionProperties> offered(count);
+    vkEnumerateDeviceExtensionProperties(physical, nullptr, &count, offered.data());
+    return std::any_of(offered.begin(), offered.end(), [&](const VkExtensionProperties& e) {
+        return name == std::string_view(e.extensionName);
+    });
+}
+
 }  // namespace
 
 Device::State::State(const DeviceOptions& options, bool validation)
@@ -115,7 +126,14 @@ void Device::State::create_device(const DeviceOptions& options) {
     vkGetPhysicalDeviceFeatures2(physical, &offered.core);
     wanted.keep_wanted_of(offered);
     std::vector<const char*> extensions;
-    for (const std::string& name : options.device_extensions) extensions.push_back(name.c_str());
+    for (const std::string& name : options.device_extensions) {
+        if (!offers_extension(physical, name))
+            throw Error(info.name, "does not offer " + name,
+                        "Choose another device with --device (darb devices lists them); without a "
+                        "window: darb view --screenshot, darb render, or darb train without "
+                        "--view.");
+        extensions.push_back(name.c_str());
+    }
     if (info.float_atomics) extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
 
     const float priority = 1;

@@ -34,8 +34,9 @@ std::uint64_t most_pairs(const Device& device, std::uint64_t bytes_of_pair) {
 }
 
 std::uint32_t most_pairs(const Device& device, const ForwardOptions& options) {
-    return options.store_for_backward ? Forward::max_pairs(device)
-                                      : static_cast<std::uint32_t>(most_pairs(device, 4));
+    return options.store_for_backward && options.backward_follows
+               ? Forward::max_pairs(device)
+               : static_cast<std::uint32_t>(most_pairs(device, 4));
 }
 
 }  // namespace
@@ -252,7 +253,8 @@ std::uint32_t Forward::max_pairs(const Device& device) {
 
 std::uint32_t Forward::bucket(const Device& device, const ForwardOptions& options) {
     const bool buckets = tuning_of(device).backward == BackwardBlend::buckets;
-    return options.store_for_backward && buckets ? bucket_pairs(device) : 0;
+    return options.store_for_backward && options.backward_follows && buckets ? bucket_pairs(device)
+                                                                             : 0;
 }
 
 void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int height) {

@@ -36,6 +36,7 @@ struct ForwardOptions {
     int sh_stored = 0;                     // degree of the buffers
     ProjectionEffects effects;
     bool store_for_backward = false;
+    bool backward_follows = true;  // false: what is stored is looked at, without a backward pass
     Crowds crowds = Crowds::by_counters;
 };
 

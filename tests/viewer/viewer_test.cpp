@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "engine/core/error.h"
+#include "tests/support/test_data.h"
 #include "tests/support/viewer_fixture.h"
 
 namespace darb::test {
@@ -78,6 +79,16 @@ TEST_F(ViewerTest, Point_cloud_opens_as_points) {
     for (size_t p = 0; p < image.data.size(); p += 3)
         reddest = std::max(reddest, image.data[p] - image.data[p + 1]);
     EXPECT_GT(reddest, 200);
+}
+
+TEST_F(ViewerTest, A_sog_scene_opens_by_the_name_of_its_meta_json) {
+    const auto data = test_data_folder();
+    if (!data) GTEST_SKIP() << "no test data";
+    const fs::path folder = *data / "splats" / "playbot_sog";
+    if (!fs::exists(folder)) GTEST_SKIP() << "no " << folder;
+    const Scene scene = load_scene_file(folder / "meta.json");
+    EXPECT_GT(scene.model.size(), 0u);
+    EXPECT_EQ(scene.format, load_scene_file(folder).format);
 }
 
 TEST_F(ViewerTest, A_hundred_scenes_opened_and_closed_leave_no_memory_behind) {

@@ -1,8 +1,15 @@
 #include "tools/darb/live_view.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 
+#include "engine/core/error.h"
+#include "tools/darb/live_curves.h"
+#include "tools/darb/scene_file.h"
+#include "tools/darb/view_flags.h"
 #include "viewer/window.h"
 
 namespace darb {
@@ -14,28 +21,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double kShare = 0.1;       // of the time that pictures may take from training
 constexpr double kShortest_s = 0.2;  // between two pictures
 constexpr double kPausedNap_s = 0.1;
-constexpr size_t kLongestCurve = 1000;
-constexpr float kSmoothing = 0.05f;  // of loss and PSNR, which jump from photo to photo
-
-// Where the sparse points are; the cameras where there are none.
-Bounds bounds_of(const Dataset& dataset) {
-    SplatModel points;
-    const std::vector<double>& p = dataset.points.position;
-    points.resize(p.size() / 3);
-    std::transform(p.begin(), p.end(), points.position.begin(),
-                   [](double v) { return static_cast<float>(v); });
-    if (points.size() > 0) return scene_bounds(points);
-    Bounds bounds;
-    for (const View& view : dataset.views)
-        bounds.centre += view.camera.centre() / double(dataset.views.size());
-    bounds.radius = std::max(scene_extent(dataset), 1e-3);
-    return bounds;
-}
-
-void thin(std::vector<float>& values) {
-    for (size_t i = 0; 2 * i < values.size(); ++i) values[i] = values[2 * i];
-    values.resize((values.size() + 1) / 2);
-}
 
 }  // namespace
 
@@ -53,46 +38,38 @@ struct LiveView::State {
         if (!dataset.views.empty()) window->viewer().choose_camera(0);
     }
 
-    void add_to_curves(const LiveStep& step);
     Session& session() { return window->viewer().session(); }
 
     std::unique_ptr<ViewerWindow> window;  // null once closed
     Bounds bounds;
     const std::atomic<bool>& stop;
     Clock::time_point next_picture{};
-    float loss = 0, psnr_db = 0;  // smoothed
-    int stride = 1;               // iterations of one value of a curve
+    LiveCurves curves;
 };
 
 LiveView::LiveView(std::unique_ptr<State> state) : state_(std::move(state)) {}
 LiveView::~LiveView() = default;
 
-void LiveView::State::add_to_curves(const LiveStep& step) {
-    TrainingCurves& t = session().training;
-    t.iteration = step.iteration;
-    t.last_iteration = step.last_iteration;
-    const IterationResult& r = step.result;
-    if (r.iteration == 0) return;
-    const float share = t.loss.empty() ? 1 : kSmoothing;
-    loss += share * (static_cast<float>(r.loss) - loss);
-    psnr_db += share * (static_cast<float>(r.psnr_db) - psnr_db);
-    if (r.iteration % stride != 0 && !t.loss.empty()) return;
-    t.loss.push_back(loss);
-    t.psnr_db.push_back(psnr_db);
-    t.splats.push_back(static_cast<float>(r.splats));
-    if (t.loss.size() > kLongestCurve) {
-        for (std::vector<float>* curve : {&t.loss, &t.psnr_db, &t.splats}) thin(*curve);
-        stride *= 2;
-    }
-    for (size_t e = t.held_out_psnr_db.size(); e < step.evaluations.size(); ++e)
-        t.held_out_psnr_db.push_back(static_cast<float>(step.evaluations[e].psnr_db));
+// The run matters more than its window.
+void LiveView::warn(const std::exception& error) {
+    fmt::print(stderr, "warning: the window is closed: {}\n", error.what());
+    state_->window.reset();
 }
 
-void LiveView::show(const LiveStep& step) {
+double LiveView::show(const LiveStep& step) {
+    if (!state_->window) return 0;
+    try {
+        return pump(step);
+    } catch (const std::exception& e) {
+        warn(e);
+        return 0;
+    }
+}
+
+double LiveView::pump(const LiveStep& step) {
     State& s = *state_;
-    if (!s.window) return;
-    s.add_to_curves(step);
     TrainingCurves& training = s.session().training;
+    s.curves.add(step, training);
     const auto now = Clock::now();
     if (now >= s.next_picture || training.paused) {
         s.window->viewer().show_live(step.splats, s.bounds);
@@ -104,36 +81,52 @@ void LiveView::show(const LiveStep& step) {
     }
     bool open = s.window->pump(0);
     training.steps_to_go = std::max(0, training.steps_to_go - 1);
-    while (open && training.paused && training.steps_to_go == 0 && !s.stop)
+    const auto paused = Clock::now();
+    double paused_s = 0;
+    while (open && training.paused && training.steps_to_go == 0 && !s.stop) {
         open = s.window->pump(kPausedNap_s);
+        paused_s = std::chrono::duration<double>(Clock::now() - paused).count();
+    }
     if (!open) s.window.reset();
+    return paused_s;
 }
 
 void LiveView::finish(const std::filesystem::path& model) {
     State& s = *state_;
     if (!s.window) return;
-    s.window->viewer().end_live();
-    if (!model.empty()) s.window->viewer().open(model);
-    while (!s.stop && s.window->pump(kPausedNap_s)) {
+    try {
+        s.window->viewer().end_live();
+        if (!model.empty()) s.window->viewer().open(model);
+        while (!s.stop && s.window->pump(kPausedNap_s)) {
+        }
+        s.window.reset();
+    } catch (const std::exception& e) {
+        warn(e);
     }
-    s.window.reset();
 }
 
 LiveSystem::LiveSystem(bool on, DeviceOptions& options) {
     if (!on) return;
-    system_ = std::make_unique<System>();
+    try {
+        system_ = std::make_unique<System>();
+    } catch (const Error& e) {
+        throw Error(e.where, e.reason, "Start it inside a desktop session, or leave out --view.");
+    }
     system_->windows.require(options);
 }
 
 LiveSystem::~LiveSystem() = default;
 
 std::unique_ptr<LiveView> LiveSystem::open(Device& device, const Dataset& dataset,
-                                           const std::atomic<bool>& stop) const {
+                                           const std::atomic<bool>& stop, bool white) const {
     if (!system_) return nullptr;
     ViewerOptions options;
     options.views = dataset.views;
-    return std::make_unique<LiveView>(
-        std::make_unique<LiveView::State>(device, std::move(options), dataset, stop));
+    options.resolve = find_scene;
+    options.find_cameras = cameras_beside;
+    auto state = std::make_unique<LiveView::State>(device, std::move(options), dataset, stop);
+    if (white) state->session().display.background = glm::vec3(1.0f);
+    return std::make_unique<LiveView>(std::move(state));
 }
 
 }  // namespace darb

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <exception>
 #include <filesystem>
 #include <memory>
 
@@ -18,13 +19,16 @@ class LiveView {
     explicit LiveView(std::unique_ptr<State> state);
     ~LiveView();
 
-    /// Handles the window's events and, now and then, shows the splats; blocks while paused. Does
-    /// nothing once the window is closed.
-    void show(const LiveStep& step);
+    /// Handles the window's events and, now and then, shows the splats; blocks while paused and
+    /// returns how long that was, in s. Does nothing once the window is closed; it is, with a
+    /// warning, where it fails: the run goes on.
+    double show(const LiveStep& step);
     /// The run is over: shows its scene until the window is closed.
     void finish(const std::filesystem::path& model);
 
   private:
+    double pump(const LiveStep& step);
+    void warn(const std::exception& error);
     std::unique_ptr<State> state_;
 };
 
@@ -34,9 +38,10 @@ class LiveSystem {
   public:
     LiveSystem(bool on, DeviceOptions& options);
     ~LiveSystem();
-    /// Null where it is off. stop: set by Ctrl-C, ends a pause.
+    /// Null where it is off. stop: set by Ctrl-C, ends a pause. white: what is behind the splats;
+    /// else black.
     std::unique_ptr<LiveView> open(Device& device, const Dataset& dataset,
-                                   const std::atomic<bool>& stop) const;
+                                   const std::atomic<bool>& stop, bool white) const;
 
   private:
     struct System;

@@ -9,7 +9,9 @@ struct LiveSystem::System {};
 
 LiveView::LiveView(std::unique_ptr<State> state) : state_(std::move(state)) {}
 LiveView::~LiveView() = default;
-void LiveView::show(const LiveStep&) {}
+double LiveView::show(const LiveStep&) {
+    return 0;
+}
 void LiveView::finish(const std::filesystem::path&) {}
 
 LiveSystem::LiveSystem(bool on, DeviceOptions&) {
@@ -18,8 +20,8 @@ LiveSystem::LiveSystem(bool on, DeviceOptions&) {
                     "Install libglfw3-dev and libimgui-dev (tools/setup.sh) and build again.");
 }
 LiveSystem::~LiveSystem() = default;
-std::unique_ptr<LiveView> LiveSystem::open(Device&, const Dataset&,
-                                           const std::atomic<bool>&) const {
+std::unique_ptr<LiveView> LiveSystem::open(Device&, const Dataset&, const std::atomic<bool>&,
+                                           bool) const {
     return nullptr;
 }
 

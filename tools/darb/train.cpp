@@ -97,8 +97,9 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
         write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
     print_plan(device, dataset, flags);
     std::atomic<bool>& stop = stop_on_signals();
-    const std::unique_ptr<LiveView> view = live.open(device, dataset, stop);
-    if (view) flags.run.on_step = [&](const LiveStep& step) { view->show(step); };
+    const std::unique_ptr<LiveView> view =
+        live.open(device, dataset, stop, flags.train.white_background);
+    if (view) flags.run.on_step = [&](const LiveStep& step) { return view->show(step); };
     const RunSummary summary = run_training(device, dataset, flags.train, flags.run, &stop);
     print_summary(summary, flags);
     if (view) view->finish(summary.model);

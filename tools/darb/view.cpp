@@ -17,13 +17,15 @@ namespace darb {
 
 namespace {
 
-int without_window(const ViewFlags& flags, const ViewerOptions& options, const PixelSize& size) {
+int without_window(const ViewFlags& flags, const ViewerOptions& options, const PixelSize& size,
+                   const std::string& note) {
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
     settle_tuning(device, flags.tune);
     Viewer viewer(device, options);
     apply_flags(viewer, flags, size);
+    viewer.session().note = note;
     if (!flags.scene.empty()) viewer.open(flags.scene);
     viewer.finish_loading();
     viewer.settle(size.width, size.height);
@@ -49,10 +51,13 @@ int view(const ViewFlags& flags) {
     options.accuracy = chosen_accuracy(flags.accuracy);
     options.effects = parse_effects(flags.effects);
     if (!flags.up.empty()) up_from_name(flags.up);
-    options.views = find_views(flags);
+    std::string note;
+    options.views = find_views(flags, note);
+    if (!note.empty()) fmt::print(stderr, "warning: {}\n", note);
     options.resolve = find_scene;
+    if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())
-        return without_window(flags, options, size);
+        return without_window(flags, options, size, note);
     const WindowSystem windows;
     DeviceOptions device_options;
     device_options.select = flags.device;
@@ -61,6 +66,7 @@ int view(const ViewFlags& flags) {
     settle_tuning(device, flags.tune);
     ViewerWindow window(device, options, size.width, size.height);
     apply_flags(window.viewer(), flags, size);
+    window.viewer().session().note = note;
     if (!flags.scene.empty()) {
         window.viewer().open(flags.scene);
         window.set_title(flags.scene.filename().string() + " - darb");

@@ -23,12 +23,8 @@ PixelSize parse_size(const std::string& text) {
     return size;
 }
 
-std::vector<View> find_views(const ViewFlags& flags) {
-    DatasetOptions options = flags.data;
-    options.require_photos = false;
-    if (!flags.cameras.empty()) return load_cameras(flags.cameras, options);
-    if (flags.scene.empty()) return {};
-    for (fs::path folder = fs::absolute(flags.scene); folder.has_relative_path();
+std::vector<View> cameras_beside(const fs::path& scene) {
+    for (fs::path folder = fs::absolute(scene); folder.has_relative_path();
          folder = folder.parent_path()) {
         if (fs::is_regular_file(folder / "cameras.json"))
             return load_cameras(folder / "cameras.json");
@@ -37,6 +33,19 @@ std::vector<View> find_views(const ViewFlags& flags) {
             break;
     }
     return {};
+}
+
+std::vector<View> find_views(const ViewFlags& flags, std::string& note) {
+    DatasetOptions options = flags.data;
+    options.require_photos = false;
+    if (!flags.cameras.empty()) return load_cameras(flags.cameras, options);
+    if (flags.scene.empty()) return {};
+    try {
+        return cameras_beside(flags.scene);
+    } catch (const Error& e) {
+        note = e.what();
+        return {};
+    }
 }
 
 void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) {

@@ -31,8 +31,11 @@ struct PixelSize {
 void add_view_flags(CLI::App& command, ViewFlags& flags);
 /// WIDTHxHEIGHT. Throws Error.
 PixelSize parse_size(const std::string& text);
-/// The data set of --cameras; else the cameras.json that darb train left beside the scene.
-std::vector<View> find_views(const ViewFlags& flags);
+/// The cameras.json that darb train left beside a scene; none where there is none. Throws Error.
+std::vector<View> cameras_beside(const std::filesystem::path& scene);
+/// The data set of --cameras; else cameras_beside the scene, and where those cannot be read none,
+/// and why in `note`. Throws Error.
+std::vector<View> find_views(const ViewFlags& flags, std::string& note);
 /// Display, panels, path and camera. Throws Error.
 void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size);
 

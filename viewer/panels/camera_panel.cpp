@@ -32,11 +32,7 @@ void data_set(Session& s) {
         for (int i = 0; i < static_cast<int>(p.views.size()); ++i) {
             const View& view = p.views[static_cast<size_t>(i)];
             ImGui::PushID(i);
-            if (ImGui::Selectable(view.name.c_str(), i == p.current)) {
-                p.current = i;
-                p.failed = false;
-                s.navigation.take(view.camera);
-            }
+            if (ImGui::Selectable(view.name.c_str(), i == p.current)) s.requests.choose_camera = i;
             ImGui::PopID();
         }
         ImGui::EndCombo();
@@ -46,7 +42,7 @@ void data_set(Session& s) {
         return;
     }
     if (ImGui::Checkbox("photo beside the picture", &p.compare)) p.failed = false;
-    if (p.compare) ImGui::SliderFloat("photo up to", &p.split, 0, 1, "%.2f");
+    if (p.compare) ImGui::SliderFloat("photo up to", &p.split, 0, 1, "%.2f", kClamped);
 }
 
 }  // namespace
@@ -58,16 +54,15 @@ void camera_panel(Session& s) {
     if (ImGui::Button("Picture (P)")) s.requests.take_picture = true;
     if (s.photos.current < 0) {
         float degrees = static_cast<float>(glm::degrees(s.navigation.fov_y));
-        if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f deg"))
+        if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f deg", kClamped))
             s.navigation.fov_y = glm::radians(static_cast<double>(degrees));
         float speed = static_cast<float>(s.fly_speed);
         if (ImGui::DragFloat("fly speed", &speed, 0.01f * std::max(speed, 0.01f), 1e-4f, 1e4f,
-                             "%.3g units/s"))
+                             "%.3g units/s", kClamped))
             s.fly_speed = speed;
         up_axis(s);
     }
-    ImGui::SliderFloat("near", &s.display.near_plane, 0.001f, 10, "%.3f",
-                       ImGuiSliderFlags_Logarithmic);
+    ImGui::SliderFloat("near", &s.display.near_plane, 0.001f, 10, "%.3f", kLogarithmic);
     data_set(s);
 }
 

@@ -2,7 +2,6 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "viewer/panels/panels.h"
@@ -15,20 +14,22 @@ namespace {
 constexpr ImU32 kOutline = IM_COL32(255, 200, 60, 255);
 constexpr int kCircleSteps = 64;
 
+// In double: far from the origin a float has no centimetres left.
 bool edit_vector(const char* label, glm::dvec3& v, float speed, int components) {
-    std::array<float, 3> f{float(v.x), float(v.y), float(v.z)};
-    const bool changed = ImGui::DragScalarN(label, ImGuiDataType_Float, f.data(), components, speed,
-                                            nullptr, nullptr, "%.3f");
-    if (changed)
-        for (int i = 0; i < components; ++i) v[i] = f[static_cast<size_t>(i)];
-    return changed;
+    return ImGui::DragScalarN(label, ImGuiDataType_Double, &v.x, components, speed, nullptr,
+                              nullptr, "%.3f");
 }
 
+// What of it is before the camera.
 void line(const Camera& camera, const glm::dvec3& a, const glm::dvec3& b) {
-    const glm::dvec3 p = camera.rotation * a + camera.translation;
-    const glm::dvec3 q = camera.rotation * b + camera.translation;
+    glm::dvec3 p = camera.rotation * a + camera.translation;
+    glm::dvec3 q = camera.rotation * b + camera.translation;
     constexpr double kNear = 1e-3;
-    if (p.z < kNear || q.z < kNear) return;
+    if (p.z < kNear && q.z < kNear) return;
+    glm::dvec3& behind = p.z < q.z ? p : q;
+    const glm::dvec3& ahead = p.z < q.z ? q : p;
+    if (behind.z < kNear)
+        behind = glm::mix(ahead, behind, (ahead.z - kNear) / (ahead.z - behind.z));
     const auto at = [&](const glm::dvec3& v) {
         return ImVec2(static_cast<float>(camera.fx * v.x / v.z + camera.cx),
                       static_cast<float>(camera.fy * v.y / v.z + camera.cy));

@@ -46,6 +46,22 @@ void error_window(Session& s, float width, float height) {
     ImGui::End();
 }
 
+void leaving_window(Session& s, float width, float height) {
+    if (!s.leaving) return;
+    ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
+    ImGui::Begin("Not saved", nullptr,
+                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
+    ImGui::Text("%zu splats are deleted and not saved.", s.edit.removed_count());
+    path_field("file", s.save_file);
+    const bool quit = s.leaving->quit;
+    if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.requests.save_and_leave = true;
+    ImGui::SameLine();
+    if (ImGui::Button(quit ? "Quit" : "Open")) s.requests.leave = true;
+    ImGui::SameLine();
+    if (ImGui::Button("Stay (Esc)")) s.requests.stay = true;
+    ImGui::End();
+}
+
 void help(const Session& s) {
     if (!ImGui::CollapsingHeader("Keys and mouse")) return;
     ImGui::TextUnformatted(
@@ -108,14 +124,15 @@ void path_field(const char* label, std::filesystem::path& path) {
     if (ImGui::InputText(label, text, sizeof text)) path = text;
 }
 
-void draw_panels(Session& s, int width_px, int height_px) {
-    const float width = static_cast<float>(width_px), height = static_cast<float>(height_px);
+void draw_panels(Session& s) {
+    const auto [width, height] = ImGui::GetIO().DisplaySize;
     empty_hint(s, width, height);
     if (s.panels) {
-        if (s.show_region) draw_region(s, width_px, height_px);
+        if (s.show_region) draw_region(s, static_cast<int>(width), static_cast<int>(height));
         side_panel(s, height);
     }
     progress_window(s, width, height);
+    leaving_window(s, width, height);
     error_window(s, width, height);
 }
 

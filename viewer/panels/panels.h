@@ -1,9 +1,16 @@
 // The sections of the side panel, each one function; and helpers that they share.
 #pragma once
 
+#include <imgui.h>
+
 #include "viewer/session.h"
 
 namespace darb {
+
+/// Ctrl+click types a value into a slider: it, too, is cut to the range.
+inline constexpr ImGuiSliderFlags kClamped = ImGuiSliderFlags_AlwaysClamp;
+inline constexpr ImGuiSliderFlags kLogarithmic =
+    ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp;
 
 void scene_panel(Session& session);
 void display_panel(Session& session);
@@ -15,7 +22,7 @@ void edit_panel(Session& session);
 void path_panel(Session& session);
 void training_panel(Session& session);
 
-/// The region's outline over the picture, in px of the window.
+/// The region's outline over the picture, in ImGui's coordinates.
 void draw_region(const Session& session, int width, int height);
 
 /// A text field for a path.

@@ -19,21 +19,21 @@ void path_panel(Session& s) {
     if (ImGui::Button(p.playing ? "Stop" : "Play")) p.playing = !p.playing;
     float at = static_cast<float>(p.at_s);
     if (ImGui::SliderFloat("time", &at, 0, static_cast<float>(std::max(p.path.duration(), 0.01)),
-                           "%.2f s") &&
+                           "%.2f s", kClamped) &&
         !p.path.keys.empty()) {
         p.at_s = at;
-        s.photos.current = -1;
+        s.requests.leave_photo = true;
         apply(p.path.sample(at), s.navigation);
     }
     ImGui::EndDisabled();
-    ImGui::SliderFloat("s per key", &p.seconds_per_key, 0.2f, 10, "%.1f");
+    ImGui::SliderFloat("s per key", &p.seconds_per_key, 0.2f, 10, "%.1f", kClamped);
     path_field("path file", p.file);
     if (ImGui::Button("Load")) s.requests.load_path = true;
     ImGui::SameLine();
     ImGui::BeginDisabled(p.path.keys.empty());
     if (ImGui::Button("Save path")) s.requests.save_path = true;
     path_field("folder", p.folder);
-    ImGui::SliderInt("frames/s", &p.fps, 1, 120);
+    ImGui::SliderInt("frames/s", &p.fps, 1, 120, "%d", kClamped);
     int size[2] = {p.export_width, p.export_height};
     if (ImGui::InputInt2("size", size)) {
         p.export_width = std::clamp(size[0], 16, 8192);

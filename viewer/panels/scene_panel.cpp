@@ -60,11 +60,9 @@ void display_panel(Session& s) {
         ImGui::EndCombo();
     }
     if (d.mode == VIEW_ERROR)
-        ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f",
-                           ImGuiSliderFlags_Logarithmic);
+        ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f", kLogarithmic);
     if (d.mode == VIEW_COUNT)
-        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f pairs",
-                           ImGuiSliderFlags_Logarithmic);
+        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f pairs", kLogarithmic);
     if (s.scene) {
         int style = static_cast<int>(d.style);
         if (ImGui::Combo("splats as", &style, "splats\0points\0ellipsoids\0"))

@@ -40,6 +40,15 @@ struct Environment {
     ~Environment() { ::unsetenv("DARB_FAULT"); }
 };
 
+TEST(Device, an_extension_that_is_not_offered_is_an_error_with_both_names) {
+    DeviceOptions options;
+    options.device_extensions = {"VK_KHR_none"};
+    const std::string text = error_of([&] { Device device(options); });
+    EXPECT_NE(text.find(Device().info().name), std::string::npos) << text;
+    EXPECT_NE(text.find("VK_KHR_none"), std::string::npos) << text;
+    EXPECT_NE(text.find("--device"), std::string::npos) << text;
+}
+
 TEST(ChooseDevice, nothing_asked_takes_the_first) {
     EXPECT_EQ(choose_device(kFakes, ""), 0U);
 }

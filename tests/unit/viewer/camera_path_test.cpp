@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "engine/core/error.h"
@@ -73,6 +74,25 @@ TEST(CameraPath, Straight_even_keys_give_even_speed) {
     Navigation n;
     for (int i = 0; i < 4; ++i, n.eye.x += 1) path.add(n, 2);
     for (double t = 0; t <= 6; t += 0.25) EXPECT_NEAR(path.sample(t).eye.x, t / 2, 1e-12);
+}
+
+// A cubic through these angles themselves falls below zero between the two small ones.
+TEST(CameraPath, Field_of_view_stays_one_between_keys) {
+    CameraPath path;
+    Navigation n;
+    for (const double fov : {2.5, 0.02, 0.02, 2.5, 3.1, 3.1, 0.5}) {
+        n.fov_y = fov;
+        path.add(n, 2);
+    }
+    for (double t = 0; t <= path.duration(); t += 0.05) {
+        EXPECT_GT(path.sample(t).fov_y, 0) << t;
+        EXPECT_LT(path.sample(t).fov_y, glm::pi<double>()) << t;
+    }
+}
+
+TEST(CameraPath, Sample_at_no_time_is_the_first_key) {
+    const CameraPath path = curved();
+    EXPECT_EQ(path.sample(std::nan("")).eye, path.keys.front().eye);
 }
 
 class CameraPathFile : public ::testing::Test {

@@ -79,6 +79,24 @@ TEST(Edit, A_new_step_drops_what_was_undone) {
     EXPECT_EQ(edit.removed()[9], 1);
 }
 
+TEST(Edit, Unsaved_until_marked_and_again_after_another_step) {
+    const SplatModel m = row(10);
+    Edit edit(10);
+    EXPECT_FALSE(edit.unsaved());
+    edit.remove(m, box(-0.5, 1.5), true);
+    EXPECT_TRUE(edit.unsaved());
+    edit.mark_saved();
+    EXPECT_FALSE(edit.unsaved());
+    edit.remove(m, box(7.5, 9.5), true);
+    EXPECT_TRUE(edit.unsaved());
+    edit.undo();
+    EXPECT_FALSE(edit.unsaved());  // as saved
+    edit.undo();
+    EXPECT_FALSE(edit.unsaved());  // as in the file that was opened
+    edit.remove(m, box(2.5, 3.5), true);
+    EXPECT_TRUE(edit.unsaved());  // as many steps as were saved, but another one
+}
+
 TEST(Edit, Nothing_selected_is_no_step) {
     const SplatModel m = row(3);
     Edit edit(3);

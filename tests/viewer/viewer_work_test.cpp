@@ -1,0 +1,254 @@
+// The viewer without a window: exports, measurements and runs that are shown, and what happens to
+// them when the size, the scene or its edits change; edits that are not saved.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "engine/core/error.h"
+#include "engine/data/camera_list.h"
+#include "engine/scene/splat_file.h"
+#include "tests/support/viewer_fixture.h"
+
+namespace darb::test {
+namespace {
+
+class ViewerWork : public ViewerTest {
+  protected:
+    Session& session() { return viewer_->session(); }
+    void frame(const Input& input = {}) { viewer_->frame(input, kWidth, kHeight, true); }
+    void press(Key key) {
+        Input input;
+        input.pressed = {key};
+        frame(input);
+    }
+    void drop(const fs::path& file) {
+        Input input;
+        input.dropped = {file};
+        frame(input);
+    }
+    void finish_load() {
+        while (viewer_->loading()) frame();
+    }
+    // Two key frames, `frames` pictures in all.
+    void make_path(int frames) {
+        PathState& p = session().path;
+        p.path.keys.clear();
+        p.path.add(session().navigation);
+        p.path.add(session().navigation, 1);
+        p.fps = frames - 1;
+        p.folder = folder_ / "frames";
+        p.export_width = kWidth;
+        p.export_height = kHeight;
+    }
+    bool is_frame(int n) {
+        return fs::exists(session().path.folder / fmt::format("frame_{:05d}.png", n));
+    }
+    void delete_something() {
+        session().region = {Region::Shape::sphere, {0, 0, 0}, glm::dvec3(0.8)};
+        session().show_region = true;
+        press(Key::remove);
+        ASSERT_TRUE(session().edit.unsaved());
+    }
+};
+
+TEST_F(ViewerWork, Without_a_scene_it_says_so) {
+    make_path(2);
+    for (const int what : {0, 1, 2}) {
+        Requests& r = session().requests;
+        (what == 0 ? r.export_path : what == 1 ? r.measure : r.take_picture) = true;
+        session().error.clear();
+        frame();
+        EXPECT_NE(session().error.find("there is no scene"), std::string::npos) << what;
+    }
+    EXPECT_THROW(viewer_->export_path_now(), Error);
+}
+
+TEST_F(ViewerWork, A_measurement_keeps_the_size_that_it_began_with) {
+    load(file_);
+    session().requests.measure = true;
+    frame();
+    ASSERT_GE(session().measure_share, 0);
+    viewer_->frame({}, kWidth / 2, kHeight / 2, true);
+    EXPECT_GE(session().measure_share, 0);
+    EXPECT_TRUE(session().error.empty()) << session().error;
+    delete_something();
+    EXPECT_LT(session().measure_share, 0) << "it goes on, with another scene";
+}
+
+TEST_F(ViewerWork, An_export_keeps_its_size_and_display_and_ends_with_its_scene) {
+    load(file_);
+    make_path(3);
+    frame();
+    session().requests.export_path = true;
+    frame();
+    session().path.export_width = 2 * kWidth;
+    session().display.style = SplatStyle::points;
+    frame();
+    EXPECT_EQ(largest_difference(read_image(session().path.folder / "frame_00000.png"),
+                                 read_image(session().path.folder / "frame_00001.png")),
+              0);
+    load(file_);
+    frame();
+    EXPECT_FALSE(is_frame(2));
+    EXPECT_LT(session().export_share, 0);
+    EXPECT_NE(session().note.find("2 of 3 frames"), std::string::npos) << session().note;
+}
+
+TEST_F(ViewerWork, The_folder_holds_the_frames_of_the_last_export_alone) {
+    load(file_);
+    make_path(3);
+    viewer_->export_path_now();
+    ASSERT_TRUE(is_frame(2));
+    std::ofstream(session().path.folder / "frame_00002_mine.png") << "another's";
+    make_path(2);
+    viewer_->export_path_now();
+    EXPECT_TRUE(is_frame(1));
+    EXPECT_FALSE(is_frame(2));
+    EXPECT_TRUE(fs::exists(session().path.folder / "frame_00002_mine.png"));
+    session().path.fps = 0;
+    EXPECT_THROW(viewer_->export_path_now(), Error);
+}
+
+TEST_F(ViewerWork, A_request_that_fails_leaves_an_export_alone) {
+    load(file_);
+    make_path(3);
+    session().requests.export_path = true;
+    session().requests.load_path = true;
+    session().path.file = folder_ / "none.json";
+    frame();
+    EXPECT_NE(session().error.find("none.json"), std::string::npos);
+    EXPECT_GE(session().export_share, 0);
+}
+
+// Pictures of a run while an export and a measurement of it go on; then its scene.
+TEST_F(ViewerWork, A_run_that_ends_takes_its_work_along_and_keeps_the_view) {
+    const GpuSplats splats(shared_device(), scene_.model, false);
+    viewer_->show_live(splats, {{0, 0, 0}, 2});
+    make_path(3);
+    session().requests.export_path = session().requests.measure = true;
+    frame();
+    EXPECT_GE(session().export_share, 0);
+    drop(file_);
+    EXPECT_FALSE(viewer_->loading()) << "dropped on a run";
+    EXPECT_FALSE(session().note.empty());
+    viewer_->end_live();
+    frame();
+    EXPECT_LT(session().export_share, 0);
+    EXPECT_LT(session().measure_share, 0);
+    EXPECT_TRUE(session().error.empty()) << session().error;
+    session().navigation.orbit(0.3, 0.1);
+    const glm::dvec3 eye = session().navigation.eye;
+    load(file_);
+    frame();
+    EXPECT_EQ(session().navigation.eye, eye);
+}
+
+TEST_F(ViewerWork, Unsaved_edits_are_asked_about_before_another_scene_and_the_end) {
+    load(file_);
+    delete_something();
+    press(Key::quit);
+    EXPECT_FALSE(session().requests.quit);
+    ASSERT_TRUE(session().leaving && session().leaving->quit);
+    press(Key::escape);
+    EXPECT_FALSE(session().leaving);
+    drop(file_);
+    EXPECT_FALSE(viewer_->loading());
+    ASSERT_TRUE(session().leaving);
+    session().save_file = folder_ / "edited.nothing";  // cannot be saved: stays
+    session().requests.save_and_leave = true;
+    frame();
+    EXPECT_FALSE(session().leaving || viewer_->loading());
+    EXPECT_FALSE(session().error.empty());
+    session().save_file = folder_ / "edited.splat";
+    drop(file_);
+    session().requests.save_and_leave = true;
+    frame();
+    finish_load();
+    EXPECT_TRUE(fs::exists(session().save_file.parent_path() / "edited.splat"));
+    EXPECT_EQ(session().edit.removed_count(), 0u) << "the other scene";
+    delete_something();
+    press(Key::quit);
+    session().requests.leave = true;
+    frame();
+    EXPECT_TRUE(session().requests.quit);
+}
+
+TEST_F(ViewerWork, A_save_says_what_the_format_loses_and_is_not_asked_about) {
+    load(file_);
+    delete_something();
+    session().save_file = folder_ / "edited.splat";
+    press(Key::save);
+    const std::vector<std::string> losses =
+        losses_of(SplatFormat::dot_splat, session().scene->model);
+    ASSERT_FALSE(losses.empty());
+    EXPECT_NE(session().note.find(losses[0]), std::string::npos) << session().note;
+    press(Key::quit);
+    EXPECT_TRUE(session().requests.quit);
+}
+
+TEST_F(ViewerWork, A_dropped_scene_brings_its_own_cameras) {
+    const fs::path other = folder_ / "other" / "scene.ply";
+    fs::create_directories(other.parent_path());
+    write_ply(other, scene_.model);
+    options_.find_cameras = [&](const fs::path& scene) -> std::vector<View> {
+        if (scene != other) throw Error("cameras.json", "is broken");
+        return {options_.views[1], options_.views[1], options_.views[1]};
+    };
+    make_viewer(options_);
+    load(file_);
+    viewer_->choose_camera(1);
+    EXPECT_EQ(session().photos.views.size(), 2u) << "named with the first scene";
+    drop(other);
+    finish_load();
+    EXPECT_EQ(session().photos.views.size(), 3u);
+    EXPECT_EQ(session().photos.current, -1);
+    EXPECT_EQ(session().title, "scene.ply - darb");
+    drop(file_);
+    finish_load();
+    EXPECT_TRUE(session().photos.views.empty());
+    ASSERT_FALSE(session().scene->notes.empty());
+    EXPECT_NE(session().scene->notes.back().find("is broken"), std::string::npos);
+    EXPECT_TRUE(session().error.empty()) << session().error;
+}
+
+TEST_F(ViewerWork, From_the_free_camera_to_the_first_or_the_last) {
+    load(file_);
+    press(Key::next_camera);
+    EXPECT_EQ(session().photos.current, 0);
+    EXPECT_NEAR(session().navigation.distance,
+                glm::distance(session().navigation.eye, session().scene->bounds.centre), 1e-9);
+    press(Key::frame_all);
+    EXPECT_EQ(session().photos.current, -1);
+    press(Key::last_camera);
+    EXPECT_EQ(session().photos.current, 1);
+}
+
+// The slider of a path leaves the photo's camera, and with it the error to that photo.
+TEST_F(ViewerWork, Leaving_the_photo_leaves_its_error_map) {
+    load(file_);
+    viewer_->choose_camera(0);
+    session().display.mode = VIEW_ERROR;
+    frame();
+    session().requests.leave_photo = true;
+    frame();
+    EXPECT_EQ(session().display.mode, VIEW_COLOUR);
+    EXPECT_EQ(session().photos.current, -1);
+}
+
+TEST_F(ViewerWork, A_coarse_picture_is_refined_behind_an_error_message) {
+    load(file_);
+    frame();
+    session().error = "something";
+    session().navigation.orbit(0.3, 0);
+    viewer_->frame({}, kWidth, kHeight, false);
+    EXPECT_LT(session().times.quality.splats, 1);
+    double next = 0;
+    for (int i = 0; i < 1'000'000 && !(session().times.quality == MotionQuality()); ++i) {
+        next = viewer_->frame({}, kWidth, kHeight, false);
+        ASSERT_LT(next, 1);  // it asks for the frame that refines
+    }
+    EXPECT_EQ(session().times.quality, MotionQuality());
+}
+
+}  // namespace
+}  // namespace darb::test
