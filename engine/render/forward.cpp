@@ -175,7 +175,8 @@ bool Forward::within_budget(std::uint32_t pairs) const {
         FrameSize size = size_;
         size.pairs = of;
         const std::uint64_t own = device_bytes(*device_, options_, size).pairs;
-        return options_.store_for_backward ? own + BlendBackward::device_bytes(size).pairs : own;
+        const bool backward = options_.store_for_backward && options_.backward_follows;
+        return backward ? own + BlendBackward::device_bytes(size).pairs : own;
     };
     return budget == 0 || device_->allocated_bytes() + bytes(pairs) <= budget + bytes(size_.pairs);
 }

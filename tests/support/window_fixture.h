@@ -11,6 +11,7 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <optional>
 #include <string>
@@ -65,6 +66,13 @@ class Process {
     bool running() {
         if (pid_ > 0 && ::waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
         return pid_ > 0;
+    }
+    // 0 once it has ended.
+    std::uint64_t resident_bytes() const {
+        std::ifstream statm("/proc/" + std::to_string(pid_) + "/statm");
+        std::uint64_t pages = 0;
+        statm >> pages >> pages;
+        return statm ? pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
     }
     void terminate() { ::kill(pid_, SIGTERM); }
     int wait() {

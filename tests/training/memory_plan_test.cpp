@@ -162,6 +162,23 @@ TEST(MemoryPlan, the_log_of_a_run_holds_plan_and_peak) {
     std::filesystem::remove_all(run.output);
 }
 
+// What a view says it paused the run is no training time: here far more than the run took.
+TEST(RunTime, a_pause_is_left_out) {
+    TrainOptions options = options_of(1);
+    RunOptions run;
+    run.output = std::filesystem::temp_directory_path() / fmt::format("darb_pause_{}", ::getpid());
+    run.quiet = true;
+    run.report = false;
+    int steps = 0;
+    run.on_step = [&](const LiveStep&) { return ++steps == 1 ? 1e6 : 0.0; };
+    Device device;
+    const RunSummary summary = run_training(device, small_scene(), options, run);
+    EXPECT_GT(steps, 0);
+    EXPECT_LT(summary.seconds, 0);
+    EXPECT_GT(summary.seconds, -1e6);
+    std::filesystem::remove_all(run.output);
+}
+
 TEST(MemoryPlan, photos_count_only_where_they_are_trained_on) {
     Dataset dataset = small_scene();
     MemoryDemand all, some;

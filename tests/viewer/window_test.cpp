@@ -172,5 +172,29 @@ TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_slow) {
     EXPECT_TRUE(program_->running()) << log("view.log");
 }
 
+// Two scenes in turn on one running viewer.
+TEST_F(WindowTest, A_hundred_dropped_scenes_leave_no_memory_behind_slow) {
+    write_ply(folder_ / "other.ply", model_);
+    start();
+    const auto loads = [&] {
+        const std::string text = log("view.log");
+        size_t count = 0;
+        for (size_t at = text.find("loaded "); at != std::string::npos;
+             at = text.find("loaded ", at + 1))
+            ++count;
+        return count;
+    };
+    std::uint64_t after_some = 0;
+    for (size_t i = 1; i <= 100; ++i) {
+        ASSERT_TRUE(drop_on_window("darb", folder_ / (i % 2 == 0 ? "scene.ply" : "other.ply")));
+        ASSERT_TRUE(eventually([&] { return loads() == i + 1; })) << i << "\n" << log("view.log");
+        if (i == 20) after_some = program_->resident_bytes();
+    }
+    ASSERT_GT(after_some, 0u);
+    // One scene of 300 splats is 71 kB on the host and as much on the device: 80 would be 11 MB.
+    EXPECT_LT(program_->resident_bytes(), after_some + 6'000'000);
+    EXPECT_TRUE(program_->running()) << log("view.log");
+}
+
 }  // namespace
 }  // namespace darb::test
