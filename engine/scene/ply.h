@@ -16,7 +16,8 @@ namespace darb {
 
 /// Reads by property name: any order, any type, SH degree 0 to 3, normals ignored, other elements
 /// skipped; compressed PLY too (compressed_ply.h); ascii and binary of both byte orders. A splat
-/// with a NaN or infinite parameter is dropped; *dropped (where given) is their count. Without
+/// with a NaN or infinite parameter is dropped, but for what infinite_values.h keeps; *dropped
+/// (where given) is their count. Without
 /// comments: gaussian, psi, default. Positions beyond 1e4 from 0 are stored relative to
 /// SplatModel::origin, computed in double. Throws Error naming the file, the record and the reason.
 SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped = nullptr);

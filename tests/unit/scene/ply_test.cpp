@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "shaders/shared/limits.h"
 #include "tests/support/test_data.h"
 
 namespace darb {
@@ -156,6 +157,22 @@ TEST(Ply, splats_with_nan_or_infinity_are_dropped_and_counted) {
     std::size_t none = 9;
     EXPECT_EQ(parse(ascii_file("1", "nan" + kAsciiRow.substr(1)), &none).size(), 0u);
     EXPECT_EQ(none, 1u);
+}
+
+// PLYs expanded from formats with a byte of opacity hold the logit of 255, +inf.
+TEST(Ply, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    SplatModel model = random_model(0, 4);
+    model.opacity = {kInfinity, -kInfinity, 1, std::numeric_limits<float>::quiet_NaN()};
+    model.log_scale[7] = -kInfinity;
+    std::size_t dropped = 0;
+    const SplatModel read = parse_ply(encode_ply(model), "memory", &dropped);
+    EXPECT_EQ(dropped, 1u) << "NaN alone";
+    EXPECT_EQ(read.opacity, (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 1}));
+    ASSERT_EQ(read.log_scale.size(), 9u);
+    EXPECT_EQ(read.log_scale[7], -LOG_SCALE_LIMIT);
+    model.log_scale[7] = kInfinity;
+    EXPECT_EQ(parse_ply(encode_ply(model), "memory", &dropped).size(), 2u);
 }
 
 TEST(Ply, truncated_anywhere_is_an_error_that_names_the_file) {
