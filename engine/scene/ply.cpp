@@ -21,6 +21,8 @@ namespace darb {
 
 namespace {
 
+constexpr std::size_t kRestOfDegree3 = 45, kRestOfDegree4 = 72;
+
 /// Column of every parameter in the vertex element.
 struct Columns {
     std::array<int, 3> position{}, dc{}, scale{};
@@ -49,10 +51,17 @@ Columns find_columns(const PlyElement& vertex, const std::string& where) {
     for (int i = 0; vertex.find(fmt::format("f_rest_{}", i)) >= 0; ++i)
         columns.rest.push_back(need(vertex, fmt::format("f_rest_{}", i), where));
     const std::size_t count = columns.rest.size();
-    if (count != 0 && count != 9 && count != 24 && count != 45)
+    if (count == kRestOfDegree4) {  // the last band of each channel is left out
+        std::vector<int> kept;
+        for (std::size_t i = 0; i < count; ++i)
+            if (i % (kRestOfDegree4 / 3) < kRestOfDegree3 / 3) kept.push_back(columns.rest[i]);
+        columns.rest = std::move(kept);
+    } else if (count != 0 && count != 9 && count != 24 && count != kRestOfDegree3) {
         throw Error(
             where,
-            fmt::format("has {} f_rest properties; SH degree 0, 1, 2, 3 has 0, 9, 24, 45", count));
+            fmt::format("has {} f_rest properties; SH degree 0 to 4 has 0, 9, 24, 45, 72", count),
+            "Export the scene again with whole bands.");
+    }
     return columns;
 }
 
@@ -117,6 +126,11 @@ std::byte* put(std::byte* to, const T* values, std::size_t count) {
 }
 
 }  // namespace
+
+bool has_degree_4(const PlyElement& vertex) {
+    return vertex.find(fmt::format("f_rest_{}", kRestOfDegree4 - 1)) >= 0 &&
+           vertex.find(fmt::format("f_rest_{}", kRestOfDegree4)) < 0;
+}
 
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
                      std::size_t* dropped, const ReadProgress& progress) {

@@ -107,6 +107,38 @@ TEST(Ply, ascii_is_read) {
     EXPECT_FALSE(model.antialias);
 }
 
+TEST(Ply, ascii_numbers_beyond_double_are_infinite_and_those_below_it_0) {
+    std::size_t dropped = 0;
+    const std::string row = " 2 3 .1 .2 .3 1e999 -5 -6 -7 1 0 0 0.5\n";
+    const SplatModel model =
+        parse(ascii_file("3", "1e-999" + row + "-1e999" + row + "1e999" + row), &dropped);
+    EXPECT_EQ(dropped, 2u);
+    ASSERT_EQ(model.size(), 1u);
+    EXPECT_EQ(model.position[0], 0.f);
+    EXPECT_EQ(model.opacity[0], OPACITY_LOGIT_LIMIT);
+}
+
+TEST(Ply, blanks_after_end_header_are_tolerated) {
+    std::string text = ascii_file("1", kAsciiRow);
+    text.insert(text.find("end_header") + 10, " \t\r");
+    EXPECT_EQ(parse(text).size(), 1u);
+}
+
+TEST(Ply, errors_of_the_header_come_with_a_remedy) {
+    const std::string file = ascii_file("1", kAsciiRow);
+    const auto with = [&](const std::string& held, const std::string& wanted) {
+        std::string text = file;
+        const std::string error = error_of(text.replace(text.find(held), held.size(), wanted));
+        EXPECT_NE(error.find("\n  "), std::string::npos) << error;
+    };
+    with("format ascii", "format text");
+    with("property float x", "property half x");
+    with("end_header", "property float f_rest_0\nend_header");
+    for (const char* comment : {"SplatKernel: square", "SplatFootprint: square",
+                                "SplatKernel: sinc\ncomment SplatFootprint: exact"})
+        with("element", std::string("comment ") + comment + "\nelement");
+}
+
 TEST(Ply, windows_line_ends_comments_and_other_elements_are_tolerated) {
     std::string text =
         "ply\nformat ascii 1.0\ncomment SplatRenderMode: mip\nobj_info nothing\n"
