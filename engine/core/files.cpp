@@ -3,6 +3,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 
@@ -46,6 +48,12 @@ Container read_whole(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+bool has_extension(const std::filesystem::path& path, std::string_view extension) {
+    const std::string own = path.extension().string();
+    return std::equal(own.begin(), own.end(), extension.begin(), extension.end(),
+                      [](unsigned char a, unsigned char b) { return std::tolower(a) == b; });
+}
 
 std::vector<std::byte> read_file(const std::filesystem::path& path) {
     return read_whole<std::vector<std::byte>>(path);

@@ -10,6 +10,9 @@
 
 namespace darb {
 
+/// Whether the name ends in `extension` (lower case, with its dot), in capitals or not.
+bool has_extension(const std::filesystem::path& path, std::string_view extension);
+
 /// The whole file. Throws Error naming the file when it cannot be read.
 std::vector<std::byte> read_file(const std::filesystem::path& path);
 std::string read_text_file(const std::filesystem::path& path);

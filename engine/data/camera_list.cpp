@@ -15,32 +15,35 @@ using nlohmann::json;
 
 namespace {
 
+constexpr const char* kExport = "Correct the record, or export cameras.json again.";
+
 double number(const json& record, const char* key, const std::string& where) {
     const auto at = record.find(key);
     if (at == record.end() || !at->is_number())
-        throw Error(where, fmt::format("{} is not a number", key));
+        throw Error(where, fmt::format("{} is not a number", key), kExport);
     return at->get<double>();
 }
 
 int size_px(const json& record, const char* key, const std::string& where) {
     const double size = number(record, key, where);
     if (!(size >= 1 && size <= 1e6))
-        throw Error(where, fmt::format("{} {} is not valid", key, size));
+        throw Error(where, fmt::format("{} {} is not valid", key, size), kExport);
     return static_cast<int>(size);
 }
 
 glm::dvec3 vector3(const json& list, const char* key, const std::string& where) {
     if (!list.is_array() || list.size() != 3 || !list[0].is_number() || !list[1].is_number() ||
         !list[2].is_number())
-        throw Error(where, fmt::format("{} does not hold 3 numbers", key));
+        throw Error(where, fmt::format("{} does not hold 3 numbers", key), kExport);
     return {list[0].get<double>(), list[1].get<double>(), list[2].get<double>()};
 }
 
 View parse_view(const json& record, std::string where) {
     View view;
-    if (!record.is_object()) throw Error(where, "is not an object");
+    if (!record.is_object()) throw Error(where, "is not an object", kExport);
     const auto name = record.find("img_name");
-    if (name == record.end() || !name->is_string()) throw Error(where, "img_name is not a string");
+    if (name == record.end() || !name->is_string())
+        throw Error(where, "img_name is not a string", kExport);
     view.name = name->get<std::string>();
     where += fmt::format(" ({})", view.name);
     Camera& camera = view.camera;
@@ -58,7 +61,7 @@ View parse_view(const json& record, std::string where) {
 
     const json rotation = record.value("rotation", json());
     if (!rotation.is_array() || rotation.size() != 3)
-        throw Error(where, "rotation does not hold 3 rows");
+        throw Error(where, "rotation does not hold 3 rows", kExport);
     glm::dmat3 world_to_camera;  // its columns are the rows of camera to world
     for (int r = 0; r < 3; ++r)
         world_to_camera[r] = vector3(rotation[static_cast<std::size_t>(r)], "rotation", where);
@@ -109,7 +112,8 @@ std::string format_camera_list(const std::vector<View>& views) {
         if (camera.cy != 0.5 * camera.height) record["cy"] = camera.cy;
         list.push_back(std::move(record));
     }
-    return list.dump();
+    // Names may hold any bytes.
+    return list.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 void write_camera_list(const std::filesystem::path& path, const std::vector<View>& views) {
@@ -119,7 +123,7 @@ void write_camera_list(const std::filesystem::path& path, const std::vector<View
 std::vector<View> load_cameras(const std::filesystem::path& path, const DatasetOptions& options) {
     std::filesystem::path list = path;
     if (std::filesystem::is_directory(path)) list = path / "cameras.json";
-    if (std::filesystem::is_regular_file(list) && list.extension() == ".json") {
+    if (std::filesystem::is_regular_file(list) && has_extension(list, ".json")) {
         const std::string text = read_text_file(list);
         const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
         if (first != std::string::npos && text[first] == '[')

@@ -15,19 +15,20 @@ namespace {
 
 /// NAME with another or a further extension, as colmap and its users name masks.
 fs::path find_mask(const fs::path& folder, const std::string& name) {
-    for (const fs::path& candidate :
-         {folder / (name + ".png"), folder / name, (folder / name).replace_extension(".png")})
-        if (fs::is_regular_file(candidate)) return candidate;
+    for (const std::string& one : {name, with_slashes(name)})
+        for (const fs::path& candidate :
+             {folder / (one + ".png"), folder / one, (folder / one).replace_extension(".png")})
+            if (fs::is_regular_file(candidate)) return candidate;
     return {};
 }
 
 /// For a model folder given directly, photos may lie beside it or up to two folders above.
 fs::path find_images_folder(const fs::path& root, const fs::path& model_folder,
                             const DatasetOptions& options) {
-    const fs::path base = fs::absolute(root).lexically_normal();
+    const fs::path base = tidy_path(fs::absolute(root));
     for (const fs::path& parent :
          {base, base.parent_path(), base.parent_path().parent_path(),
-          fs::absolute(model_folder).parent_path().parent_path().lexically_normal()})
+          tidy_path(fs::absolute(model_folder)).parent_path().parent_path()})
         if (fs::is_directory(parent / options.images_folder)) return parent / options.images_folder;
     if (options.require_photos)
         throw Error((root / options.images_folder).string(), "the folder of the photos is missing",
@@ -60,12 +61,15 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     const fs::path images = find_images_folder(root, model_folder, options);
     const fs::path masks = images.parent_path() / "masks";
     const bool has_masks = fs::is_directory(masks);
+    std::size_t without_mask = 0;
     for (const ColmapImage& image : model.images) {
         View view;
         view.name = image.name;
         view.source_id = image.id;
-        view.photo = images / image.name;
+        view.photo = find_photo(images, image.name);
+        if (view.photo.empty()) view.photo = images / image.name;
         if (has_masks) view.mask = find_mask(masks, image.name);
+        without_mask += view.mask.empty() ? 1 : 0;
         view.lens = model.cameras.at(image.camera_id);
         view.camera.rotation = image.rotation;
         view.camera.translation = image.translation;
@@ -78,6 +82,9 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
                                             counted(model.dropped_points, "point")));
     if (dataset.points.size() == 0)
         dataset.notes.push_back("There are no sparse points; training starts from random ones.");
+    if (has_masks && without_mask > 0)
+        dataset.notes.push_back(fmt::format("{}: {} of {} photos have none.", masks.string(),
+                                            without_mask, dataset.views.size()));
     const fs::path second = model_folder.parent_path() / "1";
     if (model_folder.filename() == "0" && is_colmap_model(second))
         dataset.notes.push_back(

@@ -17,11 +17,15 @@ constexpr std::string_view kSpace = " \t\r";
 /// The lines of a text file, by number from 1.
 class Lines {
   public:
-    Lines(std::string_view text, const std::string& where) : text_(text), where_(where) {}
+    Lines(std::string_view text, const std::string& where) : text_(text), where_(where) {
+        constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // editors on Windows add it
+        if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
+    }
 
     bool next() {
         if (at_ >= text_.size()) return false;
         const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+        begin_ = at_;
         line_ = text_.substr(at_, end - at_);
         at_ = end + 1;
         ++number_;
@@ -34,6 +38,11 @@ class Lines {
             if (begin != std::string_view::npos && line_[begin] != '#') return true;
         }
         return false;
+    }
+    /// The next line is read again by next.
+    void back() {
+        at_ = begin_;
+        --number_;
     }
     std::string where() const { return fmt::format("{}, line {}", where_, number_); }
 
@@ -66,9 +75,37 @@ class Lines {
 
   private:
     std::string_view text_, line_;
-    std::size_t at_ = 0, number_ = 0;
+    std::size_t at_ = 0, begin_ = 0, number_ = 0;
     const std::string& where_;
 };
+
+bool is_number(std::string_view text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size();
+}
+
+/// After a pose: its observations, 3 numbers each, or an empty line where it has none. Some writers
+/// leave empty lines out; the line is then the next pose, of 9 numbers and a name.
+void skip_observations(Lines& lines) {
+    constexpr std::size_t kPoseNumbers = 9, kProbed = 12;  // a name may be a number, not three
+    if (!lines.next()) return;
+    if (lines.rest().starts_with('#')) return lines.back();
+    std::size_t words = 0, numbers = 0;  // numbers: of the first words, before any other word
+    for (std::string_view rest = lines.rest(); !rest.empty();) {
+        const std::size_t end = std::min(rest.find_first_of(kSpace), rest.size());
+        if (words < kProbed && numbers == words && is_number(rest.substr(0, end))) ++numbers;
+        ++words;
+        rest.remove_prefix(std::min(rest.find_first_not_of(kSpace, end), rest.size()));
+    }
+    if (words % 3 == 0 && numbers == std::min(words, kProbed)) return;
+    if (words > kPoseNumbers && numbers >= kPoseNumbers) return lines.back();
+    throw Error(lines.where(),
+                fmt::format("is neither observations, 3 numbers each, nor an image: {} words, the "
+                            "first {} of them numbers",
+                            words, numbers),
+                "The file is cut off or damaged: copy or export it again.");
+}
 
 }  // namespace
 
@@ -97,11 +134,12 @@ std::vector<ColmapImage> parse_colmap_images_text(std::string_view file, const s
         for (int k = 0; k < 3; ++k) image.translation[k] = lines.number<double>("translation");
         image.camera_id = lines.number<std::uint32_t>("camera id");
         image.name = lines.rest();
-        if (image.name.empty()) throw Error(lines.where(), "the image has no name");
+        if (image.name.empty())
+            throw Error(lines.where(), "the image has no name", "Export the model again.");
         image.rotation = rotation_from_quaternion(wxyz, lines.where());
         check_position(image.translation, lines.where());
         images.push_back(std::move(image));
-        lines.next();  // its observations, which may be an empty line
+        skip_observations(lines);
     }
     return images;
 }

@@ -44,26 +44,52 @@ void mark_test_list(const fs::path& list, Dataset& dataset) {
                                             list.string(), counted(unknown, "photo")));
 }
 
+Dataset load_model(const fs::path& path, const fs::path& model, const DatasetOptions& options) {
+    Dataset dataset = load_colmap(path, model, options);
+    mark_test_list(path / "test.txt", dataset);
+    if (model != path) mark_test_list(model / "test.txt", dataset);
+    return dataset;
+}
+
+// A COLMAP model with transforms.json beside it, which stands in where the model cannot be used, as
+// when it names photos by another name. Which of the two it is depends on the photos alone, so that
+// cameras without photos (require_photos false) are those that were trained on.
+Dataset load_either(const fs::path& path, const fs::path& model, const DatasetOptions& options) {
+    DatasetOptions strict = options;
+    strict.require_photos = true;
+    std::string reason;
+    try {
+        Dataset dataset = load_model(path, model, strict);
+        dataset.notes.push_back(fmt::format(
+            "{} was read; name the transforms file itself to use that.", model.string()));
+        return dataset;
+    } catch (const Error& error) {
+        reason = fmt::format("{} {}", error.where, error.reason);
+    }
+    try {
+        Dataset dataset = load_transforms(path, strict);
+        dataset.notes.push_back(
+            fmt::format("{} was read in place of {}: {}.", dataset.source, model.string(), reason));
+        return dataset;
+    } catch (const Error&) {
+        return load_model(path, model, options);  // says what is wrong with it
+    }
+}
+
 Dataset load_source(const fs::path& path, const DatasetOptions& options) {
     if (!fs::exists(path)) throw Error(path.string(), "does not exist", "Check the path.");
     if (!fs::is_directory(path)) {
-        if (path.extension() == ".json") return load_transforms(path, options);
+        if (has_extension(path, ".json")) return load_transforms(path, options);
         throw Error(path.string(), "is neither a folder nor a .json file",
                     "Name a COLMAP project, a folder with transforms.json, or that file.");
     }
     const bool transforms =
         fs::exists(path / "transforms.json") || fs::exists(path / "transforms_train.json");
-    for (const fs::path& model :
-         {path / "sparse" / "0", path / "sparse", path, path / "colmap" / "sparse" / "0"}) {
-        if (!is_colmap_model(model)) continue;
-        Dataset dataset = load_colmap(path, model, options);
-        mark_test_list(path / "test.txt", dataset);
-        mark_test_list(model / "test.txt", dataset);
-        if (transforms)
-            dataset.notes.push_back(fmt::format(
-                "{} was read; name the transforms file itself to use that.", model.string()));
-        return dataset;
-    }
+    for (const fs::path& model : {path / "sparse" / "0", path / "sparse", path, path / "0",
+                                  path / "colmap" / "sparse" / "0"})
+        if (is_colmap_model(model))
+            return transforms ? load_either(path, model, options)
+                              : load_model(path, model, options);
     if (transforms) return load_transforms(path, options);
     throw Error(
         path.string(),
@@ -117,9 +143,11 @@ double median_distance(const PointCloud& points, const glm::dvec3& from) {
 
 }  // namespace
 
-Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
+Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) {
+    DatasetOptions options = asked;
+    options.images_folder = tidy_path(asked.images_folder).generic_string();
     size_at_resolution(1, 1, options.resolution);  // a bad option fails before any reading
-    Dataset dataset = load_source(path, options);
+    Dataset dataset = load_source(tidy_path(path), options);
     dataset.options = options;
     std::stable_sort(dataset.views.begin(), dataset.views.end(),
                      [](const View& a, const View& b) { return a.name < b.name; });

@@ -25,7 +25,8 @@ struct LensModel {
 struct View {
     std::string name;             // as the source names it, with folders
     std::filesystem::path photo;  // the file
-    std::filesystem::path mask;   // empty where there is none; 8-bit, 0 = ignore
+    std::filesystem::path mask;   // empty where there is none; 8-bit, 0 = ignore; of the photo as
+                                  // stored or as its EXIF turns it, at any size
     Camera camera;                // of the photo as load_photo returns it
     LensModel lens;               // of the file on disk, turned by orientation; see load_photo
     bool is_test = false;         // held out
@@ -62,13 +63,14 @@ struct Dataset {
     std::vector<View> views;         // by name, ascending
     PointCloud points;               // may be empty
     bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
-    bool alpha_is_mask = false;      // alpha comes from masks or gaps alone: pixels to leave out
+    bool alpha_is_mask = false;      // some of it comes from masks or gaps: pixels to leave out
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
 };
 
-/// DATASET is a COLMAP project folder (sparse/0, sparse, or the model files themselves), a folder
-/// with transforms.json or transforms_train.json, or a .json path. Throws Error naming file and
-/// record.
+/// DATASET is a COLMAP project folder (sparse/0, sparse, 0, colmap/sparse/0, or the model files
+/// themselves), a folder with transforms.json or transforms_train.json, or a .json path. Where both
+/// are there, the COLMAP model is read, unless it cannot be, as where its photos are missing; a
+/// note says which. Throws Error naming file and record.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo, RGBA with straight alpha (255 where the file has none; a mask multiplies alpha),

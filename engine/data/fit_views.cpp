@@ -19,6 +19,7 @@ constexpr int kDefaultWidth = 1600;  // px; wider photos are scaled down unless 
 /// What happened to how many photos, for the notes.
 struct Tally {
     bool own_alpha = false;  // some photo has an alpha channel of its own
+    bool masked = false;     // some photo has a mask, or a gap after it was straightened
     std::size_t resized = 0, unturned = 0, undistorted = 0, too_wide = 0, downscaled = 0;
     std::string resize_example;
 };
@@ -37,11 +38,11 @@ int choose_orientation(const ImageInfo& info, const LensModel& lens) {
     return same_aspect(lens, info.width, info.height) ? 1 : info.orientation;
 }
 
-void fit_lens(View& view, Dataset& dataset, Tally& tally) {
+void fit_lens(View& view, Tally& tally) {
     const ImageInfo info = read_image_info(view.photo);
     const bool own_alpha = info.channels == 2 || info.channels == 4;
     tally.own_alpha |= own_alpha;
-    dataset.has_alpha |= own_alpha || !view.mask.empty();
+    tally.masked |= !view.mask.empty();
     if (view.orientation == 1) view.orientation = choose_orientation(info, view.lens);
     if (view.orientation != info.orientation) ++tally.unturned;
     const bool swap = view.orientation >= 5;
@@ -94,6 +95,10 @@ void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& datas
         dataset.notes.push_back(
             fmt::format("Kept as stored in spite of an EXIF rotation, as calibrated: {}.",
                         counted(tally.unturned, "photo")));
+    if (tally.own_alpha && tally.masked)
+        dataset.notes.push_back(
+            "There are alpha channels beside masks, or beside gaps in straightened photos: "
+            "transparent pixels are left out like masked ones, not taken for background.");
     if (tally.undistorted > 0)
         dataset.notes.push_back(
             fmt::format("Undistorted at load: {}.", counted(tally.undistorted, "photo")));
@@ -135,7 +140,7 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
     std::map<std::pair<std::string, std::vector<double>>, UndistortedFrame> frames;
     for (View& view : dataset.views) {
         if (options.require_photos || std::filesystem::is_regular_file(view.photo))
-            fit_lens(view, dataset, tally);
+            fit_lens(view, tally);
         std::vector<double> key = view.lens.parameters;
         key.insert(key.end(), {double(view.lens.width), double(view.lens.height)});
         const auto [at, is_new] = frames.try_emplace({view.lens.model, std::move(key)});
@@ -145,12 +150,15 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
         if (is_new)
             at->second =
                 original ? original_frame(view.lens) : undistorted_frame(view.lens, view.name);
-        dataset.has_alpha |= at->second.has_gaps;
+        tally.masked |= at->second.has_gaps;
         if (kept_as_wide) ++tally.too_wide;
         if (view.lens.distorted() && !original) ++tally.undistorted;
         set_intrinsics(view, at->second, options.resolution, tally);
     }
-    dataset.alpha_is_mask = dataset.has_alpha && !tally.own_alpha;
+    // A masked pixel must never be trained as background. An alpha channel may be opaque
+    // throughout; where it is not, its transparent pixels are left out beside masked ones.
+    dataset.has_alpha = tally.own_alpha || tally.masked;
+    dataset.alpha_is_mask = tally.masked;
     add_notes(tally, options, dataset);
 }
 

@@ -5,6 +5,7 @@
 #include <stb/stb_image_write.h>
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -33,10 +34,31 @@ int length_of(std::span<const std::byte> bytes, const std::string& where) {
     return static_cast<int>(bytes.size());
 }
 
+/// Whether a PNG has a chunk tRNS, which makes one colour transparent; before the first IDAT.
+bool has_transparent_colour(std::span<const std::byte> file) {
+    constexpr std::size_t kSignature = 8, kChunk = 12;  // length, type, checksum
+    constexpr unsigned char kBegin[kSignature] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+    if (file.size() < kSignature || std::memcmp(file.data(), kBegin, kSignature) != 0) return false;
+    for (std::size_t at = kSignature; at + kChunk <= file.size();) {
+        std::size_t length = 0;
+        for (std::size_t i = 0; i < 4; ++i)
+            length = length << 8 | static_cast<std::size_t>(file[at + i]);
+        const std::string_view type(reinterpret_cast<const char*>(&file[at + 4]), 4);
+        if (type == "tRNS") return true;
+        if (type == "IDAT" || length > file.size()) return false;
+        at += kChunk + length;
+    }
+    return false;
+}
+
 bool parse_info(std::span<const std::byte> head, const std::string& where, ImageInfo& info) {
     info.orientation = exif_orientation(head);
-    return stbi_info_from_memory(raw(head), length_of(head, where), &info.width, &info.height,
-                                 &info.channels) != 0;
+    if (!stbi_info_from_memory(raw(head), length_of(head, where), &info.width, &info.height,
+                               &info.channels))
+        return false;
+    // stb counts the alpha of a palette alone.
+    if (info.channels % 2 == 1 && has_transparent_colour(head)) ++info.channels;
+    return true;
 }
 
 void check_picture(const ImageU8& image) {
@@ -71,6 +93,7 @@ ImageU8 decode_image(std::span<const std::byte> file, const std::string& where, 
     const int length = length_of(file, where);
     if (!stbi_info_from_memory(raw(file), length, &width, &height, &stored))
         throw Error(where, "is no PNG or JPEG, or is damaged", kReplace);
+    if (stored % 2 == 1 && has_transparent_colour(file)) ++stored;
     const int wanted = stored == 2 ? 4 : stored;
     const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
         stbi_load_from_memory(raw(file), length, &width, &height, &stored, wanted),

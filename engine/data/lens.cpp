@@ -18,7 +18,7 @@ struct ModelRow {
     bool one_focal;  // f, cx, cy rather than fx, fy, cx, cy
 };
 
-constexpr ModelRow kModels[kLensModelCount] = {
+constexpr ModelRow kModels[kLensModelCount + 1] = {
     {"SIMPLE_PINHOLE", 3, true},
     {"PINHOLE", 4, false},
     {"SIMPLE_RADIAL", 4, true},
@@ -30,6 +30,7 @@ constexpr ModelRow kModels[kLensModelCount] = {
     {"SIMPLE_RADIAL_FISHEYE", 4, true},
     {"RADIAL_FISHEYE", 5, true},
     {"THIN_PRISM_FISHEYE", 12, false},
+    {kFourRadial, 10, false},  // no id of COLMAP's
 };
 
 constexpr double kHalfPi = 1.5707963267948966;
@@ -40,6 +41,12 @@ const ModelRow* find_model(std::string_view name) {
     for (const ModelRow& row : kModels)
         if (row.name == name) return &row;
     return nullptr;
+}
+
+std::string_view parameter_name(const ModelRow& row, std::size_t i) {
+    constexpr std::string_view kOne[] = {"f", "cx", "cy"}, kTwo[] = {"fx", "fy", "cx", "cy"};
+    if (i >= (row.one_focal ? 3 : 4)) return "of the distortion";
+    return row.one_focal ? kOne[i] : kTwo[i];
 }
 
 }  // namespace
@@ -68,10 +75,16 @@ void check_lens(const LensModel& lens, const std::string& where) {
         throw Error(where, fmt::format("the camera model {} is unknown", lens.model),
                     "Export the cameras with one of COLMAP's models.");
     if (static_cast<int>(lens.parameters.size()) != row->parameters)
-        throw Error(where, fmt::format("{} has {} parameters, not {}", lens.model, row->parameters,
-                                       lens.parameters.size()));
-    for (const double value : lens.parameters)
-        if (!std::isfinite(value)) throw Error(where, "a camera parameter is not finite");
+        throw Error(where,
+                    fmt::format("{} has {} parameters, not {}", lens.model, row->parameters,
+                                lens.parameters.size()),
+                    "Export the cameras again.");
+    for (std::size_t i = 0; i < lens.parameters.size(); ++i)
+        if (!std::isfinite(lens.parameters[i]))
+            throw Error(where,
+                        fmt::format("parameter {} of {} of the camera, {}, is not finite", i + 1,
+                                    lens.parameters.size(), parameter_name(*row, i)),
+                        "Calibrate the cameras again.");
     for (int i = 0; i < (row->one_focal ? 1 : 2); ++i)
         if (!(lens.parameters[static_cast<std::size_t>(i)] > 0))
             throw Error(where,
@@ -79,8 +92,10 @@ void check_lens(const LensModel& lens, const std::string& where) {
                                     lens.parameters[static_cast<std::size_t>(i)]),
                         "Calibrate the cameras again.");
     if (lens.width < 1 || lens.height < 1 || lens.width > kMaxSize || lens.height > kMaxSize)
-        throw Error(where, fmt::format("the photo size {} x {} is not between 1 and {}", lens.width,
-                                       lens.height, kMaxSize));
+        throw Error(where,
+                    fmt::format("the photo size {} x {} is not between 1 and {}", lens.width,
+                                lens.height, kMaxSize),
+                    "Correct the size, or export the cameras again.");
 }
 
 LensModel scale_lens(const LensModel& lens, int width, int height) {
@@ -136,13 +151,16 @@ Lens::Lens(const LensModel& model) {
     } else if (model.model == "FOV") {
         omega_ = p[0];
         if (std::abs(omega_) > kSmallOmega) front_ = Front::fov;
-    } else if (row->parameters >= 8) {  // OPENCV, FULL_OPENCV, THIN_PRISM_FISHEYE
+    } else if (row->parameters >= 8) {  // OPENCV, FULL_OPENCV, THIN_PRISM_FISHEYE, FOUR_RADIAL
         k_ = {p[0], p[1], 0, 0};
         p1_ = p[2];
         p2_ = p[3];
         if (model.model == "FULL_OPENCV") {
             k_[2] = p[4];
             d_ = {p[5], p[6], p[7]};
+        } else if (model.model == kFourRadial) {
+            k_[2] = p[4];
+            k_[3] = p[5];
         } else if (model.model == "THIN_PRISM_FISHEYE") {
             k_[2] = p[4];
             k_[3] = p[5];

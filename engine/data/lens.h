@@ -17,6 +17,9 @@
 namespace darb {
 
 constexpr int kLensModelCount = 11;
+/// nerfstudio's perspective camera, none of COLMAP's: fx fy cx cy k1 k2 p1 p2 k3 k4, of which all
+/// of k stand in the numerator.
+constexpr std::string_view kFourRadial = "FOUR_RADIAL";
 /// COLMAP's name of a model id, 0 to 10; empty for other ids.
 std::string_view lens_model_name(int id);
 /// -1 for an unknown name.

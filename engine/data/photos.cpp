@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <exception>
 #include <thread>
 
@@ -13,6 +14,36 @@
 
 namespace darb {
 
+namespace {
+
+bool same_aspect(const ImageU8& image, int width, int height) {
+    const double wanted = static_cast<double>(image.width) * height / width;
+    return std::abs(image.height - wanted) <= 1.5 + 0.01 * wanted;
+}
+
+/// The mask, turned like the photo: masks are made of the stored pixels or of the photo as viewers
+/// show it, and its shape tells which.
+ImageU8 load_mask(const View& view, const ImageU8& photo) {
+    const bool turned = view.orientation >= 5;
+    const int width = turned ? photo.height : photo.width;  // as stored
+    const int height = turned ? photo.width : photo.height;
+    ImageU8 mask = read_image(view.mask, 1);
+    if (same_aspect(mask, width, height)) return orient_image(mask, view.orientation);
+    if (same_aspect(mask, height, width)) {
+        if (turned) return mask;  // as viewers show the photo, and so it is
+        const int shown = read_image_info(view.photo).orientation;
+        // 6 and 8 undo each other, 5 and 7 themselves.
+        if (shown >= 5) return orient_image(mask, shown == 6 ? 8 : shown == 8 ? 6 : shown);
+    }
+    throw Error(
+        view.mask.string(),
+        fmt::format("is {} x {} px, another aspect ratio than that of its photo {}, {} x {}",
+                    mask.width, mask.height, view.photo.string(), width, height),
+        "Make masks of the same photos, or remove this one.");
+}
+
+}  // namespace
+
 ImageU8 load_photo(const View& view) {
     ImageU8 photo = to_rgba(read_image(view.photo, view.orientation));
     if (photo.width != view.lens.width || photo.height != view.lens.height)
@@ -20,7 +51,7 @@ ImageU8 load_photo(const View& view) {
                     fmt::format("is {} x {} px now, but was {} x {} when the data set was opened",
                                 photo.width, photo.height, view.lens.width, view.lens.height),
                     "Leave the photos alone while they are in use.");
-    if (!view.mask.empty()) apply_mask(photo, read_image(view.mask, view.orientation));
+    if (!view.mask.empty()) apply_mask(photo, load_mask(view, photo));
     if (view.lens.distorted() && !view.camera.lens.active) {
         const Camera full = undistorted_frame(view.lens, view.photo.string()).camera;
         photo = undistort(photo, view.lens, full);

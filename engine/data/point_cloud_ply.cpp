@@ -14,10 +14,14 @@ namespace darb {
 namespace {
 
 constexpr std::uint8_t kMidGrey = 128;
+// Floats are 0 to 1 or, as some writers have it, 0 to 255: any above this says which.
+constexpr double kLargestUnitColour = 1.0 + 1.0 / 255;
 
-std::uint8_t colour_byte(double value, PlyType type) {
-    if (type == PlyType::float32 || type == PlyType::float64) value *= 255;
-    if (type == PlyType::uint16) value /= 257;
+bool is_float(PlyType type) {
+    return type == PlyType::float32 || type == PlyType::float64;
+}
+
+std::uint8_t colour_byte(double value) {
     return static_cast<std::uint8_t>(std::isfinite(value) ? std::clamp(value + 0.5, 0.0, 255.0)
                                                           : kMidGrey);
 }
@@ -35,9 +39,24 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const std::str
         if (position[i] < 0)
             throw Error(where, fmt::format("element vertex lacks the property {}", "xyz"[i]),
                         "A point cloud is needed.");
-        constexpr const char* kNames[3][2] = {{"red", "r"}, {"green", "g"}, {"blue", "b"}};
-        colour[i] = std::max(vertex->find(kNames[i][0]), vertex->find(kNames[i][1]));
+        constexpr const char* kNames[3][3] = {{"red", "r", "diffuse_red"},
+                                              {"green", "g", "diffuse_green"},
+                                              {"blue", "b", "diffuse_blue"}};
+        colour[i] = std::max(
+            {vertex->find(kNames[i][0]), vertex->find(kNames[i][1]), vertex->find(kNames[i][2])});
     }
+    // What a value is multiplied by, to 0 .. 255; floats follow when the largest is known.
+    const auto type_of = [&](int i) {
+        return vertex->properties[static_cast<std::size_t>(colour[i])].type;
+    };
+    bool floats = false;
+    double factor[3] = {1, 1, 1}, largest = 0;
+    for (int i = 0; i < 3; ++i) {
+        if (colour[i] < 0) continue;
+        floats |= is_float(type_of(i));
+        if (type_of(i) == PlyType::uint16) factor[i] = 1.0 / 257;
+    }
+    std::vector<float> raw;  // [P][3], where some colour is a float
     check_ply_size(file, header, *vertex, where);
     PointCloud points;
     points.position.reserve(vertex->count * 3);
@@ -50,13 +69,18 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const std::str
         }
         for (int i = 0; i < 3; ++i) {
             points.position.push_back(values[position[i]]);
-            points.colour.push_back(
-                colour[i] < 0
-                    ? kMidGrey
-                    : colour_byte(values[colour[i]],
-                                  vertex->properties[static_cast<std::size_t>(colour[i])].type));
+            const double value = colour[i] < 0 ? kMidGrey : values[colour[i]] * factor[i];
+            points.colour.push_back(colour_byte(value));
+            if (!floats) continue;
+            raw.push_back(static_cast<float>(value));
+            if (colour[i] >= 0 && is_float(type_of(i)) && std::isfinite(value))
+                largest = std::max(largest, value);
         }
     });
+    if (floats && largest <= kLargestUnitColour)
+        for (std::size_t i = 0; i < raw.size(); ++i)
+            if (const int c = static_cast<int>(i % 3); colour[c] >= 0 && is_float(type_of(c)))
+                points.colour[i] = colour_byte(255.0 * raw[i]);
     return points;
 }
 

@@ -4,9 +4,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
+#include <fstream>
+#include <map>
 #include <memory>
 
 #include "engine/core/error.h"
@@ -63,6 +67,44 @@ void run_command(const std::string& command,
                     "Photos need 60 % overlap and texture; see what colmap says above.");
 }
 
+/// What a command prints, whatever becomes of it.
+std::string output_of(const std::string& command) {
+    std::string text;
+    const auto collect = [&](std::string_view line) { text += std::string(line) + "\n"; };
+    try {
+        run_command("QT_QPA_PLATFORM=offscreen " + command, collect);
+    } catch (const Error&) {  // some versions call their help a failure
+    }
+    return text;
+}
+
+/// Images of a model, from the head of images.bin; none where it cannot be read.
+std::uint64_t image_count(const fs::path& model) {
+    std::uint64_t count = 0;
+    std::ifstream file(model / "images.bin", std::ios::binary);
+    file.read(reinterpret_cast<char*>(&count), sizeof count);
+    return file ? count : 0;
+}
+
+/// Folder name of the model with the most images, which the mapper need not number 0; the first of
+/// equals. Empty where there is none.
+std::string largest_model(const fs::path& sparse,
+                          const std::function<void(std::string_view)>& progress) {
+    std::map<std::string, std::uint64_t> models;
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : fs::directory_iterator(sparse, ignored))
+        if (is_colmap_model(entry.path()))
+            models[entry.path().filename().string()] = image_count(entry.path());
+    if (models.empty()) return {};
+    const auto best =
+        std::max_element(models.begin(), models.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    if (models.size() > 1 && progress)
+        progress(fmt::format("{} models: {}, of {} photos, is the largest and is used",
+                             models.size(), (sparse / best->first).string(), best->second));
+    return best->first;
+}
+
 }  // namespace
 
 bool is_installed(std::string_view program) {
@@ -77,31 +119,37 @@ bool is_installed(std::string_view program) {
     return false;
 }
 
+bool has_new_names(std::string_view help) {
+    return help.find("FeatureExtraction.use_gpu") != std::string_view::npos;
+}
+
 std::vector<std::string> colmap_commands(const ColmapRun& run) {
     const std::string colmap = "QT_QPA_PLATFORM=offscreen colmap ";
     const std::string database = quoted(run.workspace / "database.db");
     const std::string photos = quoted(run.photos);
+    const char* part = run.new_names ? "Feature" : "Sift";
     // OPENCV: phones and consumer cameras; the undistorter turns it into a pinhole.
     return {
         fmt::format("{}feature_extractor --database_path {} --image_path {} "
                     "--ImageReader.single_camera {} --ImageReader.camera_model OPENCV "
-                    "--SiftExtraction.use_gpu 0",
-                    colmap, database, photos, run.single_camera ? 1 : 0),
-        fmt::format("{}{}_matcher --database_path {} --SiftMatching.use_gpu 0", colmap,
-                    run.sequential ? "sequential" : "exhaustive", database),
+                    "--{}Extraction.use_gpu 0",
+                    colmap, database, photos, run.single_camera ? 1 : 0, part),
+        fmt::format("{}{}_matcher --database_path {} --{}Matching.use_gpu 0", colmap,
+                    run.sequential ? "sequential" : "exhaustive", database, part),
         fmt::format("{}mapper --database_path {} --image_path {} --output_path {}", colmap,
                     database, photos, quoted(run.workspace / "sparse")),
         fmt::format("{}image_undistorter --image_path {} --input_path {} --output_path {} "
                     "--output_type COLMAP --max_image_size {}",
-                    colmap, photos, quoted(run.workspace / "sparse" / "0"),
+                    colmap, photos, quoted(run.workspace / "sparse" / run.model),
                     quoted(run.workspace / "dense"), run.max_image_size),
     };
 }
 
-fs::path run_colmap(const ColmapRun& run, const std::function<void(std::string_view)>& progress) {
+fs::path run_colmap(const ColmapRun& asked, const std::function<void(std::string_view)>& progress) {
+    ColmapRun run = asked;
     if (!fs::is_directory(run.photos))
         throw Error(run.photos.string(), "is no folder of photos", "Check the path.");
-    const std::vector<std::string> commands = colmap_commands(run);
+    std::vector<std::string> commands = colmap_commands(run);
     if (!is_installed("colmap"))
         throw Error(
             run.photos.string(), "holds photos without cameras, and colmap is not installed",
@@ -112,12 +160,17 @@ fs::path run_colmap(const ColmapRun& run, const std::function<void(std::string_v
     if (failure)
         throw Error(run.workspace.string(), "cannot be made: " + failure.message(),
                     "Choose another workspace folder.");
+    run.new_names = has_new_names(output_of("colmap feature_extractor -h"));
+    commands = colmap_commands(run);
     for (std::size_t i = 0; i < commands.size(); ++i) {
         if (progress) progress(fmt::format("[{}/{}] {}", i + 1, commands.size(), commands[i]));
         run_command(commands[i], progress);
-        if (i == 2 && !is_colmap_model(run.workspace / "sparse" / "0"))
+        if (i != 2) continue;
+        run.model = largest_model(run.workspace / "sparse", progress);
+        if (run.model.empty())
             throw Error(run.photos.string(), "colmap found no common view of the photos",
                         "Take more photos with more overlap, in good light.");
+        commands = colmap_commands(run);
     }
     return run.workspace / "dense";
 }

@@ -15,12 +15,18 @@ struct ColmapRun {
     bool sequential = false;          // neighbours in name order only: for video frames
     bool single_camera = true;        // all photos by one camera at one zoom
     int max_image_size = 1600;        // px, of the undistorted photos
+    bool new_names = false;           // of the GPU options, in newer versions of COLMAP
+    std::string model = "0";          // of the models that the mapper makes, the one to go on with
 };
 
 /// The shell commands, in order: feature_extractor, matcher, mapper, image_undistorter.
 std::vector<std::string> colmap_commands(const ColmapRun& run);
 
-/// Runs them, passing on what they print line by line. Returns the data set's folder
+/// Whether `colmap feature_extractor -h` printed the new names of the GPU options.
+bool has_new_names(std::string_view help);
+
+/// Runs them, passing on what they print line by line; new_names and model are found out, the model
+/// being the one that holds the most photos. Returns the data set's folder
 /// (workspace/dense, with images and sparse). Throws Error: with the commands in its hint where
 /// colmap is not installed, with the last lines printed where a command fails.
 std::filesystem::path run_colmap(const ColmapRun& run,

@@ -27,6 +27,17 @@ struct PhotoSize {
 };
 PhotoSize size_at_resolution(int width, int height, int resolution);
 
+/// `path` without "." parts and a slash at its end, so that parent_path and filename mean the
+/// folder. "." stays.
+std::filesystem::path tidy_path(const std::filesystem::path& path);
+
+/// Writers on Windows separate folders by backslashes.
+std::string with_slashes(std::string name);
+
+/// folder / name as it is, else with slashes for backslashes, else with another of the usual
+/// extensions in place of its own (or added, where it has none of them); empty where there is none.
+std::filesystem::path find_photo(const std::filesystem::path& folder, const std::string& name);
+
 /// Pluralised count for notes: "1 photo", "3 photos".
 std::string counted(std::size_t count, const char* noun);
 

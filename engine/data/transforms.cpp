@@ -15,8 +15,10 @@ using nlohmann::json;
 
 namespace {
 
+constexpr const char* kExport = "Correct the entry, or export the file again.";
+
 double to_number(const json& value, const char* key, const std::string& where) {
-    if (!value.is_number()) throw Error(where, fmt::format("{} is not a number", key));
+    if (!value.is_number()) throw Error(where, fmt::format("{} is not a number", key), kExport);
     return value.get<double>();
 }
 
@@ -29,14 +31,23 @@ void read_number(const json& object, const char* key, const std::string& where,
 std::string read_string(const json& object, const char* key, const std::string& where) {
     const auto at = object.find(key);
     if (at == object.end() || at->is_null()) return {};
-    if (!at->is_string()) throw Error(where, fmt::format("{} is not a string", key));
+    if (!at->is_string()) throw Error(where, fmt::format("{} is not a string", key), kExport);
     return at->get<std::string>();
 }
 
 /// Keys that are absent leave what is there: the file's values are the frames' defaults.
 void read_intrinsics(const json& object, const std::string& where, TransformsIntrinsics& to) {
-    // A frame's own focal length outranks the file's.
-    if (object.contains("fl_x") && !object.contains("fl_y")) to.fl_y.reset();
+    // A frame's own focal length or angle outranks the file's.
+    const auto own = [&](const char* key) {
+        const auto at = object.find(key);
+        return at != object.end() && !at->is_null();
+    };
+    if (own("fl_x") || own("camera_angle_x")) {
+        to.fl_x.reset();
+        to.fl_y.reset();
+        to.camera_angle_x.reset();
+        to.camera_angle_y.reset();
+    }
     read_number(object, "w", where, to.w);
     read_number(object, "h", where, to.h);
     read_number(object, "fl_x", where, to.fl_x);
@@ -65,13 +76,13 @@ void read_intrinsics(const json& object, const std::string& where, TransformsInt
 void read_pose(const json& object, const std::string& where, TransformsFrame& frame) {
     const auto matrix = object.find("transform_matrix");
     if (matrix == object.end() || !matrix->is_array() || matrix->size() < 3)
-        throw Error(where, "has no transform_matrix of 4 x 4 or 3 x 4 numbers");
+        throw Error(where, "has no transform_matrix of 4 x 4 or 3 x 4 numbers", kExport);
     glm::dmat3 camera_to_world;
     glm::dvec3 centre;
     for (int r = 0; r < 3; ++r) {
         const json& row = (*matrix)[static_cast<std::size_t>(r)];
         if (!row.is_array() || row.size() != 4)
-            throw Error(where, "a row of transform_matrix does not hold 4 numbers");
+            throw Error(where, "a row of transform_matrix does not hold 4 numbers", kExport);
         for (int c = 0; c < 4; ++c) {
             // JSON has no NaN; writers put null or a string in its place.
             const json& value = row[static_cast<std::size_t>(c)];
@@ -108,6 +119,9 @@ std::string model_name(const TransformsIntrinsics& in, const std::string& where)
                                                  "PINHOLE", "SIMPLE_PINHOLE"};
     for (const std::string_view known : kPerspective) {
         if (name != known) continue;
+        // COLMAP's k4 to k6 stand in the denominator; nerfstudio's k4 is the numerator's r^8.
+        const bool rational = name == "FULL_OPENCV" || in.k[4] != 0 || in.k[5] != 0;
+        if (in.k[3] != 0 && !rational) return std::string(kFourRadial);
         if (in.k[2] != 0 || in.k[3] != 0 || in.k[4] != 0 || in.k[5] != 0) return "FULL_OPENCV";
         const bool distorted = in.k[0] != 0 || in.k[1] != 0 || in.p1 != 0 || in.p2 != 0;
         return distorted ? "OPENCV" : "PINHOLE";
@@ -129,17 +143,19 @@ TransformsFile parse_transforms(std::string_view text, const std::string& where)
     TransformsIntrinsics defaults;
     read_intrinsics(root, where, defaults);
     file.ply_file_path = read_string(root, "ply_file_path", where);
-    const auto test = root.find("test_filenames");
-    if (test != root.end() && test->is_array())
+    for (const char* key : {"test_filenames", "val_filenames"}) {
+        const auto test = root.find(key);
+        if (!file.test_filenames.empty() || test == root.end() || !test->is_array()) continue;
         for (const json& name : *test)
             if (name.is_string()) file.test_filenames.push_back(name.get<std::string>());
+    }
     const json& frames = root["frames"];
     for (std::size_t i = 0; i < frames.size(); ++i) {
         TransformsFrame frame;
         std::string record = fmt::format("{}, frame {} of {}", where, i + 1, frames.size());
-        if (!frames[i].is_object()) throw Error(record, "is not an object");
+        if (!frames[i].is_object()) throw Error(record, "is not an object", kExport);
         frame.file_path = read_string(frames[i], "file_path", record);
-        if (frame.file_path.empty()) throw Error(record, "has no file_path");
+        if (frame.file_path.empty()) throw Error(record, "has no file_path", kExport);
         record += fmt::format(" ({})", frame.file_path);
         frame.mask_path = read_string(frames[i], "mask_path", record);
         frame.intrinsics = defaults;
@@ -154,7 +170,8 @@ LensModel lens_from_transforms(const TransformsIntrinsics& in, int width, int he
                                const std::string& where) {
     const double w = in.w.value_or(width), h = in.h.value_or(height);
     if (!(w >= 1 && w <= 1e6 && h >= 1 && h <= 1e6))
-        throw Error(where, fmt::format("the photo size {} x {} is not valid", w, h));
+        throw Error(where, fmt::format("the photo size {} x {} is not valid", w, h),
+                    "Correct w and h.");
     const auto from_angle = [](double size, double angle) {
         return 0.5 * size / std::tan(0.5 * angle);
     };
@@ -186,6 +203,7 @@ LensModel lens_from_transforms(const TransformsIntrinsics& in, int width, int he
         distortion = {in.k[0], in.k[1], in.p1, in.p2};
     if (lens.model == "FULL_OPENCV")
         distortion.insert(distortion.end(), in.k.begin() + 2, in.k.end());
+    if (lens.model == kFourRadial) distortion.insert(distortion.end(), {in.k[2], in.k[3]});
     lens.parameters.insert(lens.parameters.end(), distortion.begin(), distortion.end());
     check_lens(lens, where);
     return lens;

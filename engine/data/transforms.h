@@ -33,8 +33,9 @@ struct TransformsFrame {
 
 struct TransformsFile {
     std::vector<TransformsFrame> frames;
-    std::string ply_file_path;                // may be empty
-    std::vector<std::string> test_filenames;  // nerfstudio's split, may be empty
+    std::string ply_file_path;  // may be empty
+    // nerfstudio's split, may be empty; val_filenames where test_filenames is empty.
+    std::vector<std::string> test_filenames;
 };
 
 /// transform_matrix is camera to world with OpenGL's camera axes (y up, looking down -z).

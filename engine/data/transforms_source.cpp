@@ -1,7 +1,7 @@
 // transforms.json as a data set: photos, masks, the point cloud and the test files.
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <set>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -18,27 +18,18 @@ namespace {
 
 constexpr int kSyntheticSize = 800;  // px, of NeRF synthetic; only where no photo tells
 
-/// As written, or with one of the usual extensions.
-fs::path find_photo(const fs::path& path) {
-    if (fs::is_regular_file(path)) return path;
-    for (const char* extension : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-        fs::path candidate = path;
-        candidate += extension;
-        if (fs::is_regular_file(candidate)) return candidate;
-    }
-    return {};
-}
+constexpr std::string_view kImages = "images/";
 
-/// "./train/r_2" to "train/r_2"; images/ to the folder that the options ask for.
+/// "./train/r_2" and ".\train\r_2" to "train/r_2".
 std::string plain_name(const std::string& file_path) {
-    return fs::path(file_path).lexically_normal().generic_string();
+    return fs::path(with_slashes(file_path)).lexically_normal().generic_string();
 }
 
-fs::path photo_path(const fs::path& root, const std::string& name, const DatasetOptions& options) {
-    constexpr std::string_view kImages = "images/";
+/// With images/ replaced by the folder that the options ask for.
+std::string asked_name(const std::string& name, const DatasetOptions& options) {
     if (options.images_folder != "images" && name.starts_with(kImages))
-        return root / options.images_folder / name.substr(kImages.size());
-    return root / name;
+        return options.images_folder + "/" + name.substr(kImages.size());
+    return name;
 }
 
 /// The lens; a file without a size takes the turned photo's.
@@ -57,6 +48,7 @@ void set_lens(const TransformsFrame& frame, const std::string& where, View& view
 struct Skipped {
     std::size_t count = 0;
     std::string first;
+    std::size_t in_images = 0;  // of all frames, those under images/
 };
 
 void add_frames(const fs::path& json, bool is_test, const DatasetOptions& options, Dataset& dataset,
@@ -64,11 +56,17 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
     const TransformsFile file = parse_transforms(read_text_file(json), json.string());
     if (ply.empty()) ply = file.ply_file_path;
     const fs::path root = json.parent_path();
+    std::set<std::string> test_names;
+    for (const std::string& name : file.test_filenames) test_names.insert(plain_name(name));
     for (const TransformsFrame& frame : file.frames) {
         View view;
         view.name = plain_name(frame.file_path);
-        const fs::path wanted = photo_path(root, view.name, options);
-        view.photo = find_photo(wanted);
+        skipped.in_images += view.name.starts_with(kImages) ? 1 : 0;
+        const std::string name = asked_name(view.name, options);
+        const fs::path wanted = root / name;
+        view.photo = find_photo(root, name);
+        if (view.photo.empty() && name == view.name)  // backslashes that are part of a name
+            view.photo = find_photo(root, frame.file_path);
         if (view.photo.empty()) {
             if (options.require_photos) {
                 if (skipped.count++ == 0) skipped.first = wanted.string();
@@ -77,6 +75,8 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
             view.photo = wanted;
         }
         if (!frame.mask_path.empty()) view.mask = root / frame.mask_path;
+        if (!view.mask.empty() && !fs::is_regular_file(view.mask))
+            view.mask = root / with_slashes(frame.mask_path);
         if (options.require_photos && !view.mask.empty() && !fs::is_regular_file(view.mask))
             throw Error(fmt::format("{} ({})", json.string(), frame.file_path),
                         fmt::format("its mask {} is missing", view.mask.string()),
@@ -84,8 +84,7 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
         set_lens(frame, json.string(), view);
         view.camera.rotation = frame.rotation;
         view.camera.translation = frame.translation;
-        view.is_test = is_test || std::find(file.test_filenames.begin(), file.test_filenames.end(),
-                                            frame.file_path) != file.test_filenames.end();
+        view.is_test = is_test || test_names.contains(view.name);
         dataset.views.push_back(std::move(view));
     }
 }
@@ -143,6 +142,11 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
         dataset.notes.push_back(
             fmt::format("Skipped: {} whose photo is missing, the first being {}.",
                         counted(skipped.count, "frame"), skipped.first));
+    if (options.images_folder != "images" && skipped.in_images == 0)
+        dataset.notes.push_back(
+            fmt::format("--images {} has no effect: no file_path in {} begins with images/. Use "
+                        "-r to scale.",
+                        options.images_folder, json.filename().string()));
     add_points(dataset.root, ply, dataset);
     return dataset;
 }

@@ -6,6 +6,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/scene/infinite_values.h"
 #include "engine/scene/sh_rotation.h"
 
 namespace darb {
@@ -120,6 +121,8 @@ std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel
 }
 
 std::size_t drop_non_finite(SplatModel& model) {
+    for (float& logit : model.opacity) logit = limit_infinite_logit(logit);
+    for (float& scale : model.log_scale) scale = limit_infinite_log_scale(scale);
     const auto rest = static_cast<std::size_t>(model.rest_count());
     return keep_splats(
         [&](std::size_t i) {

@@ -33,7 +33,7 @@ glm::dvec3 position_of(const SplatModel& model, std::size_t splat);
 SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>& splats);
 /// Keeps the splats for which keep(i) is true; returns the count of those that went.
 std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model);
-/// Drops splats with a NaN or infinite parameter.
+/// Drops splats with a NaN or infinite parameter, after the rule of infinite_values.h.
 std::size_t drop_non_finite(SplatModel& model);
 /// Drops splats whose centre is outside the box, world.
 std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model);

@@ -12,6 +12,7 @@
 #include "engine/core/files.h"
 #include "engine/scene/compressed_ply.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/infinite_values.h"
 #include "engine/scene/ply_comments.h"
 #include "engine/scene/ply_table.h"
 #include "engine/scene/splat_shapes.h"
@@ -19,6 +20,8 @@
 namespace darb {
 
 namespace {
+
+constexpr std::size_t kRestOfDegree3 = 45, kRestOfDegree4 = 72;
 
 /// Column of every parameter in the vertex element.
 struct Columns {
@@ -48,20 +51,28 @@ Columns find_columns(const PlyElement& vertex, const std::string& where) {
     for (int i = 0; vertex.find(fmt::format("f_rest_{}", i)) >= 0; ++i)
         columns.rest.push_back(need(vertex, fmt::format("f_rest_{}", i), where));
     const std::size_t count = columns.rest.size();
-    if (count != 0 && count != 9 && count != 24 && count != 45)
+    if (count == kRestOfDegree4) {  // the last band of each channel is left out
+        std::vector<int> kept;
+        for (std::size_t i = 0; i < count; ++i)
+            if (i % (kRestOfDegree4 / 3) < kRestOfDegree3 / 3) kept.push_back(columns.rest[i]);
+        columns.rest = std::move(kept);
+    } else if (count != 0 && count != 9 && count != 24 && count != kRestOfDegree3) {
         throw Error(
             where,
-            fmt::format("has {} f_rest properties; SH degree 0, 1, 2, 3 has 0, 9, 24, 45", count));
+            fmt::format("has {} f_rest properties; SH degree 0 to 4 has 0, 9, 24, 45, 72", count),
+            "Export the scene again with whole bands.");
+    }
     return columns;
 }
 
 bool all_finite(const double* values, const Columns& columns) {
     // float32 range is what the model stores.
-    const auto good = [&](int column) { return std::isfinite(static_cast<float>(values[column])); };
-    bool finite = good(columns.opacity);
+    const auto value = [&](int column) { return static_cast<float>(values[column]); };
+    const auto good = [&](int column) { return std::isfinite(value(column)); };
+    bool finite = std::isfinite(limit_infinite_logit(value(columns.opacity)));
     for (int i = 0; i < 3; ++i)
-        finite =
-            finite && good(columns.position[i]) && good(columns.dc[i]) && good(columns.scale[i]);
+        finite = finite && good(columns.position[i]) && good(columns.dc[i]) &&
+                 std::isfinite(limit_infinite_log_scale(value(columns.scale[i])));
     for (const int column : columns.rotation) finite = finite && good(column);
     for (const int column : columns.rest) finite = finite && good(column);
     return finite;
@@ -70,11 +81,12 @@ bool all_finite(const double* values, const Columns& columns) {
 void store_splat(const double* values, const Columns& columns, std::size_t at, SplatModel& model) {
     for (std::size_t i = 0; i < 3; ++i) {
         model.sh_dc[at * 3 + i] = static_cast<float>(values[columns.dc[i]]);
-        model.log_scale[at * 3 + i] = static_cast<float>(values[columns.scale[i]]);
+        model.log_scale[at * 3 + i] =
+            limit_infinite_log_scale(static_cast<float>(values[columns.scale[i]]));
     }
     for (std::size_t i = 0; i < 4; ++i)
         model.rotation[at * 4 + i] = static_cast<float>(values[columns.rotation[i]]);
-    model.opacity[at] = static_cast<float>(values[columns.opacity]);
+    model.opacity[at] = limit_infinite_logit(static_cast<float>(values[columns.opacity]));
     const std::size_t rest = columns.rest.size(), per_channel = rest / 3;
     for (std::size_t i = 0; i < rest; ++i) {
         const std::size_t channel = i / per_channel, coefficient = i % per_channel;
@@ -114,6 +126,11 @@ std::byte* put(std::byte* to, const T* values, std::size_t count) {
 }
 
 }  // namespace
+
+bool has_degree_4(const PlyElement& vertex) {
+    return vertex.find(fmt::format("f_rest_{}", kRestOfDegree4 - 1)) >= 0 &&
+           vertex.find(fmt::format("f_rest_{}", kRestOfDegree4)) < 0;
+}
 
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
                      std::size_t* dropped, const ReadProgress& progress) {

@@ -14,9 +14,11 @@
 
 namespace darb {
 
-/// Reads by property name: any order, any type, SH degree 0 to 3, normals ignored, other elements
+/// Reads by property name: any order, any type, SH degree 0 to 4 (of which the last band is left
+/// out, see has_degree_4), normals ignored, other elements
 /// skipped; compressed PLY too (compressed_ply.h); ascii and binary of both byte orders. A splat
-/// with a NaN or infinite parameter is dropped; *dropped (where given) is their count. Without
+/// with a NaN or infinite parameter is dropped, but for what infinite_values.h keeps; *dropped
+/// (where given) is their count. Without
 /// comments: gaussian, psi, default. Positions beyond 1e4 from 0 are stored relative to
 /// SplatModel::origin, computed in double. Throws Error naming the file, the record and the reason.
 SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped = nullptr);
@@ -24,6 +26,9 @@ SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped = nu
 /// progress as read_ply_rows takes it.
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
                      std::size_t* dropped = nullptr, const ReadProgress& progress = {});
+
+/// 72 f_rest properties: harmonics of degree 4, one more than a model holds.
+bool has_degree_4(const PlyElement& vertex);
 
 /// Little-endian float32; x y z are double where origin + position is no float32 (scenes at map
 /// coordinates). A file that was read without recentring is written back bit-equal in its values.

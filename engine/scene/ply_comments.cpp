@@ -29,18 +29,23 @@ std::string_view comment_value(const PlyHeader& header, std::string_view key) {
 void read_ply_comments(const PlyHeader& header, const std::string& where, SplatModel& model) {
     if (const std::string_view name = comment_value(header, "SplatKernel"); !name.empty()) {
         const std::optional<int> kernel = kernel_from_name(name);
-        if (!kernel) throw Error(where, fmt::format("names the unknown SplatKernel '{}'", name));
+        if (!kernel)
+            throw Error(where, fmt::format("names the unknown SplatKernel '{}'", name),
+                        "darb render --help lists the kernels; correct or remove the comment.");
         model.kernel = *kernel;
     }
     if (const std::string_view name = comment_value(header, "SplatFootprint"); !name.empty()) {
         const std::optional<Footprint> footprint = footprint_from_name(name);
         if (!footprint)
-            throw Error(where, fmt::format("names the unknown SplatFootprint '{}'", name));
+            throw Error(where, fmt::format("names the unknown SplatFootprint '{}'", name),
+                        "psi and exact are known; correct or remove the comment.");
         model.footprint = *footprint;
     }
     if (model.footprint == Footprint::exact && !has_exact_footprint(model.kernel))
-        throw Error(where, fmt::format("names SplatFootprint exact, which {} has not",
-                                       kernel_name(model.kernel)));
+        throw Error(
+            where,
+            fmt::format("names SplatFootprint exact, which {} has not", kernel_name(model.kernel)),
+            "Correct the comment to psi, or remove it.");
     model.antialias = comment_value(header, "SplatRenderMode") == "mip";
 }
 

@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <charconv>
+#include <cstdlib>
 #include <cstring>
 #include <optional>
 
@@ -102,7 +103,10 @@ std::uint64_t parse_count(std::string_view word, const std::string& where, std::
 
 PlyType parse_type(std::string_view word, const std::string& where) {
     const std::optional<PlyType> type = type_from_name(word);
-    if (!type) throw Error(where, fmt::format("header names the unknown type '{}'", word));
+    if (!type)
+        throw Error(where, fmt::format("header names the unknown type '{}'", word),
+                    "PLY knows char, uchar, short, ushort, int, uint, float and double: export the "
+                    "file again with these.");
     return *type;
 }
 
@@ -116,7 +120,8 @@ void parse_format(const std::vector<std::string_view>& words, PlyHeader& header,
     else if (name == "binary_big_endian")
         header.format = PlyFormat::big_endian;
     else
-        throw Error(where, fmt::format("header has the unknown format '{}'", name));
+        throw Error(where, fmt::format("header has the unknown format '{}'", name),
+                    "Export it as ascii, binary_little_endian or binary_big_endian.");
 }
 
 PlyProperty parse_property(const std::vector<std::string_view>& words, const std::string& where,
@@ -205,8 +210,9 @@ class RowReader {
         if (text[at_] == '+') ++at_;
         double value = 0;
         const auto [end, error] = std::from_chars(text + at_, text + file_.size(), value);
-        // Out of range is a denormal or an overflow: 0 is right for one, the finite test for both.
         if (error == std::errc::invalid_argument) fail(element, row, "not a number");
+        if (error == std::errc::result_out_of_range)  // too small: about 0; too large: infinite
+            value = std::strtod(std::string(text + at_, end).c_str(), nullptr);
         at_ = static_cast<std::size_t>(end - text);
         if (at_ < file_.size() && !is_space(text[at_])) fail(element, row, "not a number");
         return value;
@@ -257,7 +263,8 @@ PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& w
         if (begin == 0 || end == std::string_view::npos)
             throw Error(where, "the header has no end_header line", kCopyAgain);
         std::string_view line = text.substr(begin, end - begin);
-        if (line.ends_with('\r')) line.remove_suffix(1);
+        while (line.ends_with('\r') || line.ends_with(' ') || line.ends_with('\t'))
+            line.remove_suffix(1);
         begin = end + 1;
         if (line == "end_header") {
             header.data_begin = begin;

@@ -52,7 +52,8 @@ struct Scene {
         return image;
     }
 
-    /// Indices beyond its end give NaN, and such splats are dropped.
+    /// Indices beyond its end, and values that are null, give NaN; splats that use them are
+    /// dropped.
     Codebook codebook(const char* group) const {
         Codebook book;
         book.fill(std::numeric_limits<float>::quiet_NaN());
@@ -62,7 +63,8 @@ struct Scene {
                         fmt::format("{}.codebook has {} values; 1 to 256 are allowed", group,
                                     values.size()),
                         kCopyAgain);
-        for (std::size_t i = 0; i < values.size(); ++i) book[i] = values[i].get<float>();
+        for (std::size_t i = 0; i < values.size(); ++i)
+            if (!values[i].is_null()) book[i] = values[i].get<float>();  // JSON has no NaN
         return book;
     }
 };

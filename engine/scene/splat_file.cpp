@@ -51,6 +51,9 @@ SplatModel load_ply(Bytes bytes, const std::string& where, SplatFile& file,
         throw Error(where, "is a point cloud: its vertices have no opacity, scale and rotation",
                     "darb train starts from it where it lies beside the cameras; a viewer shows it "
                     "as points.");
+    const PlyElement* vertex = header.find("vertex");
+    if (vertex && has_degree_4(*vertex))
+        file.notes.push_back("harmonics of degree 4 were left out");
     return parse_ply(bytes, where, &file.dropped, progress);
 }
 
@@ -61,6 +64,8 @@ SplatModel load_spz(Bytes bytes, const std::string& where, SplatFile& file) {
     file.version = facts.version;
     if (facts.sh_degree > model.sh_degree)
         file.notes.push_back(fmt::format("harmonics of degree {} were left out", facts.sh_degree));
+    if (facts.extensions_cut)
+        file.notes.push_back("what follows the splats is no whole extension record: left out");
     if (facts.extensions > 0) file.details = fmt::format("{} extensions", facts.extensions);
     file.dropped = drop_non_finite(model);  // version 1 stores float16
     return model;

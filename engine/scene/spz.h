@@ -28,6 +28,7 @@ struct SpzFacts {
     int version = 0;
     int sh_degree = 0;  // as stored; harmonics of degree 4 are left out of the model
     int extensions = 0;
+    bool extensions_cut = false;  // versions 1 to 3: what follows the attributes is no record
 };
 
 /// Throws Error naming what is wrong; declared counts are checked against the file before

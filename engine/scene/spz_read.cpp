@@ -161,12 +161,20 @@ glm::dmat3 frame_of(std::uint32_t system) {
 
 constexpr std::uint32_t kRightUpBack = 4;
 
-std::uint32_t read_extensions(Bytes records, const std::string& where, int& count) {
+/// In versions 1 to 3 the records are whatever follows the attributes: one that does not fit ends
+/// them (facts.extensions_cut). In version 4 their length is declared, and it is an Error.
+std::uint32_t read_extensions(Bytes records, int version, const std::string& where,
+                              SpzFacts& facts) {
     std::uint32_t system = kRightUpBack;
+    int& count = facts.extensions;
     for (count = 0; records.size() >= 8; ++count) {
         const auto type = load_le<std::uint32_t>(records, 0);
         const auto size = load_le<std::uint32_t>(records, 4);
         records = records.subspan(8);
+        if (size > records.size() && version < 4) {
+            facts.extensions_cut = true;
+            break;
+        }
         if (size > records.size())
             throw Error(where,
                         fmt::format("extension record {} declares {} bytes, {} are left", count,
@@ -252,8 +260,11 @@ SplatModel decode(const Content& content) {
     return model;
 }
 
+/// RFC 1952: the magic, deflate as the method, and no reserved flag; a .splat may begin with the
+/// first two bytes.
 bool is_gzip(Bytes file) {
-    return file.size() >= 2 && file[0] == std::byte{0x1f} && file[1] == std::byte{0x8b};
+    return file.size() >= 4 && file[0] == std::byte{0x1f} && file[1] == std::byte{0x8b} &&
+           file[2] == std::byte{8} && (file[3] & std::byte{0xe0}) == std::byte{0};
 }
 
 }  // namespace
@@ -269,14 +280,15 @@ SplatModel parse_spz(Bytes file, const std::string& where, SpzFacts* facts) {
         read_streams(file, content, where);
     else
         read_old(file, is_gzip(file), content, where);
-    int extensions = 0;
+    SpzFacts found;
+    found.version = static_cast<int>(content.header.version);
+    found.sh_degree = content.header.degree;
     std::uint32_t system = kRightUpBack;
     if (content.header.flags & spz::kFlagExtensions)
-        system = read_extensions(content.extensions, where, extensions);
+        system = read_extensions(content.extensions, found.version, where, found);
     SplatModel model = decode(content);
     transform_splats({1, frame_of(system), glm::dvec3(0.0)}, model);
-    if (facts)
-        *facts = {static_cast<int>(content.header.version), content.header.degree, extensions};
+    if (facts) *facts = found;
     return model;
 }
 

@@ -46,8 +46,9 @@ void append(std::uint64_t value, std::size_t bytes, Stream& to) {
         to.push_back(static_cast<std::byte>(value >> (8 * i) & 255));
 }
 
-std::uint32_t pack_rotation(const float* q) {  // w x y z
-    const SmallestThree three = smallest_three({q[1], q[2], q[3], q[0]});
+std::uint32_t pack_rotation(const float* q) {  // w x y z; the identity where it has no length
+    const bool none = q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0;
+    const SmallestThree three = smallest_three({q[1], q[2], q[3], none ? 1.0 : q[0]});
     auto packed = static_cast<std::uint32_t>(three.largest);
     for (const double part : three.others) {
         const auto size =

@@ -23,7 +23,7 @@ struct InfoFlags {
 bool is_dataset(const std::filesystem::path& path) {
     if (is_sog_folder(path)) return false;
     if (std::filesystem::is_directory(path)) return !std::filesystem::exists(path / "point_cloud");
-    return path.extension() == ".json" && path.filename() != "meta.json";
+    return has_extension(path, ".json") && path.filename() != "meta.json";
 }
 
 int info(const InfoFlags& flags) {

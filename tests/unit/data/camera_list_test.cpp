@@ -44,6 +44,33 @@ TEST(CameraList, written_list_reads_back) {
     EXPECT_EQ(load_cameras(path.parent_path())[0].name, "a");
 }
 
+TEST(CameraList, names_that_are_no_utf_8_are_written) {
+    std::vector<View> views = parse_camera_list(kOne, "cameras.json");
+    views[0].name = "f\xfcr.jpg";
+    EXPECT_EQ(parse_camera_list(format_camera_list(views), "c.json").at(0).name,
+              "f\xef\xbf\xbdr.jpg");
+}
+
+TEST(CameraList, every_error_comes_with_a_remedy) {
+    const std::pair<const char*, const char*> cases[] = {{"60", "\"60\""},
+                                                         {"40", "0"},
+                                                         {"\"a\"", "5"},
+                                                         {"[1, 2, 3]", "[1, 2]"},
+                                                         {"rotation", "turn"}};
+    for (const auto& one : cases) {
+        const std::string error =
+            error_of([&] { parse_camera_list(replaced(kOne, one.first, one.second), "c.json"); });
+        EXPECT_NE(error.find("\n  "), std::string::npos) << error;
+    }
+    EXPECT_NE(error_of([] { parse_camera_list("[1]", "c.json"); }).find("\n  "), std::string::npos);
+}
+
+TEST(CameraList, capitals_of_the_extension_do_not_matter) {
+    const auto path = test_folder() / "CAMERAS.JSON";
+    write_file_atomic(path, kOne);
+    EXPECT_EQ(load_cameras(path).size(), 1u);
+}
+
 TEST(CameraList, bad_records_are_errors_that_name_them) {
     const auto error = [](const std::string& text) {
         return error_of([&] { parse_camera_list(text, "c.json"); });

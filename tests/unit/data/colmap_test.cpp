@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "engine/core/files.h"
 #include "engine/data/colmap_write.h"
 #include "engine/data/image_io.h"
 #include "engine/data/lens.h"
+#include "engine/data/point_cloud_ply.h"
 #include "engine/data/pose.h"
 #include "tests/unit/data/data_files.h"
 
@@ -176,6 +178,68 @@ TEST(ColmapProject, masks_become_alpha) {
         EXPECT_EQ(photo.at(3, 0, 3), 0);
         EXPECT_EQ(photo.at(3, 1, 3), 255);
     }
+}
+
+TEST(ColmapProject, a_mask_beside_alpha_channels_stays_a_mask) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    write_png(folder / "images/a.png", ImageU8(8, 6, 4));
+    EXPECT_FALSE(load_dataset(folder).alpha_is_mask);
+    write_png(folder / "masks/a.png", ImageU8(8, 6, 1));
+    const Dataset dataset = load_dataset(folder);
+    EXPECT_TRUE(dataset.has_alpha);
+    EXPECT_TRUE(dataset.alpha_is_mask);
+    EXPECT_NE(dataset.notes.back().find("alpha channels"), std::string::npos);
+}
+
+TEST(ColmapProject, masks_are_found_beside_a_folder_named_with_a_slash) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    write_png(folder / "images_2/a.png", ImageU8(4, 3, 3));
+    write_png(folder / "masks/a.png", ImageU8(8, 6, 1));
+    DatasetOptions options;
+    options.images_folder = "images_2/";
+    EXPECT_EQ(load_dataset(folder, options).views.at(0).mask, folder / "masks/a.png");
+    std::filesystem::rename(folder / "masks/a.png", folder / "masks/other.png");
+    const std::vector<std::string> notes = load_dataset(folder).notes;
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("1 of 1 photos have none"), std::string::npos) << notes[0];
+}
+
+TEST(ColmapProject, model_folders_are_read_with_and_without_a_slash) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    for (const char* name : {"", "sparse/0", "sparse/0/", "sparse/0/.", "sparse", "sparse/"})
+        EXPECT_EQ(load_dataset(folder / name).views.at(0).photo, folder / "images/a.png") << name;
+}
+
+TEST(ColmapProject, photos_are_found_by_backslashes_and_other_extensions) {
+    const auto folder = test_folder();
+    View view;
+    view.name = "left\\a.JPG";
+    view.camera = {.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
+    write_colmap_binary(folder / "sparse/0", {view}, {});
+    write_png(folder / "images/left/a.png", ImageU8(8, 6, 3));
+    write_png(folder / "masks/left/a.png", ImageU8(8, 6, 1));
+    const Dataset dataset = load_dataset(folder);
+    EXPECT_EQ(dataset.views.at(0).photo, folder / "images/left/a.png");
+    EXPECT_EQ(dataset.views.at(0).mask, folder / "masks/left/a.png");
+}
+
+TEST(PointCloudPly, colours_of_floats_are_up_to_1_or_up_to_255) {
+    const auto colours = [](const std::string& prefix, const std::string& rows) {
+        std::string text = "ply\nformat ascii 1.0\nelement vertex 2\n";
+        for (const char* name : {"x", "y", "z"})
+            text += "property float " + std::string(name) + "\n";
+        for (const char* name : {"red", "green", "blue"})
+            text += "property float " + prefix + name + "\n";
+        text += "end_header\n" + rows;
+        std::size_t dropped = 0;
+        return parse_point_cloud_ply(std::as_bytes(std::span(text.data(), text.size())), "p",
+                                     dropped)
+            .colour;
+    };
+    using Colours = std::vector<std::uint8_t>;
+    EXPECT_EQ(colours("", "0 0 0 0 0.2 1\n0 0 0 1 nan 0\n"), (Colours{0, 51, 255, 255, 128, 0}));
+    EXPECT_EQ(colours("", "0 0 0 0 1 200\n0 0 0 255 2 0\n"), (Colours{0, 1, 200, 255, 2, 0}));
+    EXPECT_EQ(colours("diffuse_", "0 0 0 0 1 1\n0 0 0 0 1 0\n"), (Colours{0, 255, 255, 0, 255, 0}));
 }
 
 TEST(ColmapProject, hold_out_takes_every_eighth_by_name) {

@@ -27,6 +27,29 @@ TEST(ColmapText, names_with_blanks_empty_lines_and_comments_are_read) {
     EXPECT_EQ(images[2].camera_id, 7u);
 }
 
+TEST(ColmapText, lines_of_observations_may_be_left_out_where_they_are_empty) {
+    const auto images = parse_colmap_images_text(
+        "1 1 0 0 0 1 2 3 7 a b.jpg\n2 1 0 0 0 4 5 6 7 b.jpg\n1 2 -1 3 4 5\n"
+        "3 1 0 0 0 0 0 0 7 photo 12 of 30.jpg\n4 1 0 0 0 0 0 0 7 last.jpg",
+        "images.txt");
+    ASSERT_EQ(images.size(), 4u);
+    EXPECT_EQ(images[1].name, "b.jpg");
+    EXPECT_EQ(images[2].name, "photo 12 of 30.jpg");
+    EXPECT_EQ(images[3].name, "last.jpg");
+    const std::string error = error_of(
+        [] { parse_colmap_images_text("1 1 0 0 0 1 2 3 7 a.jpg\n1 2 -1 3\n", "images.txt"); });
+    EXPECT_NE(error.find("line 2"), std::string::npos) << error;
+    EXPECT_NE(error.find("\n  "), std::string::npos) << error;
+}
+
+TEST(ColmapText, a_byte_order_mark_is_skipped) {
+    const std::string mark = "\xef\xbb\xbf";
+    std::size_t dropped = 0;
+    EXPECT_EQ(parse_colmap_cameras_text(mark + "1 PINHOLE 8 6 50 50 4 3\n", "c").size(), 1u);
+    EXPECT_EQ(parse_colmap_images_text(mark + "1 1 0 0 0 1 2 3 7 a\n\n", "i").size(), 1u);
+    EXPECT_EQ(parse_colmap_points_text(mark + "1 0.5 0 0 1 2 3 0.1\n", "p", dropped).size(), 1u);
+}
+
 TEST(ColmapText, bad_lines_are_errors_that_name_them) {
     std::size_t dropped = 0;
     const auto cameras = [](const char* text) {
@@ -46,6 +69,8 @@ TEST(ColmapText, bad_lines_are_errors_that_name_them) {
     EXPECT_NE(error_of([&] {
                   parse_colmap_points_text("1 0 0 0 1 2 300 0\n", "p", dropped);
               }).find("300"),
+              std::string::npos);
+    EXPECT_NE(error_of([&] { parse_colmap_images_text("1 1 0 0 0 1 2 3 7\n", "i"); }).find("\n  "),
               std::string::npos);
 }
 

@@ -34,6 +34,18 @@ std::vector<LensModel> all_models() {
              {300, 305, 321, 239, 0.01, -0.002, 0.001, -0.001, 0.0005, 0.0001, 0.002, -0.002})};
 }
 
+TEST(Lens, four_radial_terms_stand_in_the_numerator) {
+    const LensModel model =
+        make(std::string(kFourRadial), {500, 510, 321, 239, 0.1, 0.05, 0, 0, 0.02, 0.01});
+    EXPECT_NO_THROW(check_lens(model, "test"));
+    EXPECT_TRUE(model.distorted());
+    const glm::dvec2 at = Lens(model).project({0.5, 0}), back = *Lens(model).unproject(at);
+    const double r2 = 0.25;
+    const double factor = 1 + r2 * (0.1 + r2 * (0.05 + r2 * (0.02 + r2 * 0.01)));
+    EXPECT_NEAR(at.x, 500 * 0.5 * factor + 321, 1e-9);
+    EXPECT_NEAR(back.x, 0.5, 1e-9);
+}
+
 TEST(Lens, every_model_of_colmap_is_known_by_id_and_name) {
     const std::vector<LensModel> models = all_models();
     ASSERT_EQ(models.size(), static_cast<std::size_t>(kLensModelCount));
@@ -107,7 +119,13 @@ TEST(Lens, bad_parameters_are_errors) {
     EXPECT_NE(error(make("SPHERE", {1})).find("SPHERE"), std::string::npos);
     EXPECT_NE(error(make("PINHOLE", {1, 2, 3})).find("4 parameters"), std::string::npos);
     EXPECT_NE(error(make("PINHOLE", {500, 0, 1, 1})).find("focal"), std::string::npos);
-    EXPECT_NE(error(make("PINHOLE", {500, 1e300 * 1e300, 1, 1})).find("finite"), std::string::npos);
+    EXPECT_NE(error(make("PINHOLE", {500, 1e300 * 1e300, 1, 1})).find("fy, is not finite"),
+              std::string::npos);
+    EXPECT_NE(error(make("SIMPLE_RADIAL", {500, 1, 1, 1e300 * 1e300})).find("distortion"),
+              std::string::npos);
+    for (const LensModel& bad : {make("PINHOLE", {1, 2, 3}), make("PINHOLE", {1, 1, NAN, 1}),
+                                 LensModel{"PINHOLE", {1, 1, 1, 1}, 0, 8}})
+        EXPECT_NE(error(bad).find("\n  "), std::string::npos) << "no remedy";
 }
 
 TEST(Undistort, frame_of_ordinary_lenses_has_no_gaps_and_keeps_the_focal_length) {

@@ -154,10 +154,13 @@ TEST(ImageIo, png_round_trips_with_each_channel_count) {
     }
 }
 
-TEST(ImageIo, sixteen_bit_png_keeps_its_high_bytes) {
+using Row = std::vector<std::uint8_t>;
+
+/// A PNG by hand: its header, the data of its chunk tRNS (none where empty) and its filtered rows.
+std::vector<std::byte> png_of(const Row& header, const Row& transparent, const Row& rows) {
     Bytes png;
     png.text("\x89PNG\r\n\x1a\n");
-    const auto chunk = [&](const std::string& type, const std::vector<std::byte>& data) {
+    const auto chunk = [&](const std::string& type, std::span<const std::byte> data) {
         const auto big = [&](std::uint32_t value) {
             for (int i = 3; i >= 0; --i) png.put(static_cast<std::uint8_t>(value >> 8 * i));
         };
@@ -169,18 +172,35 @@ TEST(ImageIo, sixteen_bit_png_keeps_its_high_bytes) {
         big(static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(body.data.data()),
                                              static_cast<uInt>(body.data.size()))));
     };
-    const std::uint8_t header[] = {0, 0, 0, 2, 0, 0, 0, 1, 16, 2, 0, 0, 0};  // 2 x 1, 16-bit RGB
-    const std::uint8_t rows[] = {0, 10, 99, 20, 99, 30, 99, 40, 0, 50, 0, 60, 0};
     std::vector<std::byte> packed(100);
     uLongf size = packed.size();
-    compress(reinterpret_cast<Bytef*>(packed.data()), &size, rows, sizeof rows);
+    compress(reinterpret_cast<Bytef*>(packed.data()), &size, rows.data(), rows.size());
     packed.resize(size);
-    const auto* first = reinterpret_cast<const std::byte*>(header);
-    chunk("IHDR", {first, first + sizeof header});
+    chunk("IHDR", std::as_bytes(std::span(header)));
+    if (!transparent.empty()) chunk("tRNS", std::as_bytes(std::span(transparent)));
     chunk("IDAT", packed);
     chunk("IEND", {});
-    EXPECT_EQ(decode_image(png.data, "deep.png").data,
-              (std::vector<std::uint8_t>{10, 20, 30, 40, 50, 60}));
+    return png.data;
+}
+
+TEST(ImageIo, sixteen_bit_png_keeps_its_high_bytes) {
+    const Row header{0, 0, 0, 2, 0, 0, 0, 1, 16, 2, 0, 0, 0};  // 2 x 1, 16-bit RGB
+    const auto file = png_of(header, {}, {0, 10, 99, 20, 99, 30, 99, 40, 0, 50, 0, 60, 0});
+    EXPECT_EQ(decode_image(file, "deep.png").data, (Row{10, 20, 30, 40, 50, 60}));
+}
+
+TEST(ImageIo, a_transparent_colour_is_an_alpha_channel) {
+    const auto path = test_folder() / "a.png";
+    const Row header{0, 0, 0, 2, 0, 0, 0, 1, 8, 2, 0, 0, 0};  // 2 x 1, 8-bit RGB
+    write_file_atomic(path, png_of(header, {0, 40, 0, 50, 0, 60}, {0, 10, 20, 30, 40, 50, 60}));
+    EXPECT_EQ(read_image_info(path).channels, 4);
+    const ImageU8 image = read_image(path);
+    EXPECT_EQ(image.channels, 4);
+    EXPECT_EQ(image.data, (Row{10, 20, 30, 255, 40, 50, 60, 0}));
+    const Row grey_header{0, 0, 0, 2, 0, 0, 0, 1, 8, 0, 0, 0, 0};
+    write_file_atomic(path, png_of(grey_header, {0, 7}, {0, 7, 8}));
+    EXPECT_EQ(read_image_info(path).channels, 2);
+    EXPECT_EQ(read_image(path).data, (Row{7, 7, 7, 0, 8, 8, 8, 255}));
 }
 
 TEST(ImageIo, damaged_files_are_errors_that_name_the_file) {
@@ -240,6 +260,42 @@ TEST(Mask, of_another_size_and_of_zeros_and_ones) {
     apply_mask(image, mask);
     for (int y = 0; y < 2; ++y)
         for (int x = 0; x < 4; ++x) EXPECT_EQ(image.at(x, y, 3), x < 2 ? 0 : 255);
+}
+
+/// Opaque but for one quarter, which is ignored.
+ImageU8 mask_without(int width, int height, bool lower) {
+    ImageU8 mask(width, height, 1);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            mask.at(x, y, 0) = x < width / 2 && (y >= height / 2) == lower ? 0 : 255;
+    return mask;
+}
+
+TEST(Mask, is_turned_like_its_photo_whichever_way_it_was_made) {
+    const auto folder = test_folder();
+    write_file_atomic(folder / "images/a.jpg", with_orientation(jpeg(quarters()), 6, true));
+    std::vector<View> views(1);
+    views[0].name = "a.jpg";
+    for (const bool photo_stored : {true, false})
+        for (const bool mask_stored : {true, false}) {
+            const int width = photo_stored ? 16 : 8;
+            views[0].camera = {
+                .width = width, .height = 24 - width, .fx = 20, .fy = 20, .cx = 8, .cy = 4};
+            write_colmap_binary(folder / "sparse/0", views, {});
+            // Blue is the lower left quarter as stored, the upper left as shown.
+            write_png(folder / "masks/a.png",
+                      mask_stored ? mask_without(16, 8, true) : mask_without(8, 16, false));
+            const ImageU8 photo = load_photo(load_dataset(folder).views[0]);
+            ASSERT_EQ(photo.width, width);
+            for (int y = 1; y < photo.height; y += photo.height / 2 + 1)
+                for (int x = 1; x < photo.width; x += photo.width / 2 + 1)
+                    EXPECT_EQ(photo.at(x, y, 3), colour_at(photo, x, y) == 'b' ? 0 : 255)
+                        << photo_stored << mask_stored << " at " << x << ", " << y;
+        }
+    write_png(folder / "masks/a.png", ImageU8(12, 12, 1));
+    const std::string error = error_of([&] { load_photo(load_dataset(folder).views[0]); });
+    EXPECT_NE(error.find("masks/a.png"), std::string::npos) << error;
+    EXPECT_NE(error.find("images/a.jpg"), std::string::npos) << error;
 }
 
 TEST(LoadPhotos, order_is_kept_and_errors_arrive) {

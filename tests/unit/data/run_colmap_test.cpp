@@ -59,6 +59,44 @@ TEST(RunColmap, steps_run_in_order_and_lines_arrive) {
                          "step mapper offscreen", "step image_undistorter offscreen"}));
 }
 
+TEST(RunColmap, the_largest_model_is_undistorted_with_a_note) {
+    const auto folder = test_folder();
+    // The head of images.bin: 3 images in model 0, 260 in 1, 5 in 2.
+    const auto bin = write_fake(
+        folder,
+        "echo step $*\n"
+        "make() { mkdir -p \"$1\"; touch \"$1/cameras.bin\"; "
+        "printf \"$2\\000\\000\\000\\000\\000\\000\" >\"$1/images.bin\"; }\n"
+        "if [ $1 = mapper ]; then make \"$7/0\" '\\003\\000'; make \"$7/1\" '\\004\\001'; "
+        "make \"$7/2\" '\\005\\000'; fi\n");
+    const PathVariable path(bin.string() + ":" + std::getenv("PATH"));
+    std::string printed;
+    run_colmap({.photos = folder, .workspace = folder / "w"},
+               [&](std::string_view line) { printed += std::string(line) + "\n"; });
+    EXPECT_NE(printed.find("3 models"), std::string::npos) << printed;
+    EXPECT_NE(printed.find("260 photos"), std::string::npos) << printed;
+    EXPECT_NE(printed.find("--input_path " + (folder / "w/sparse/1").string()), std::string::npos)
+        << printed;
+}
+
+TEST(RunColmap, options_have_the_names_that_the_installed_version_has) {
+    for (const bool renamed : {false, true}) {
+        const auto folder = test_folder();
+        const std::string name = renamed ? "Feature" : "Sift";
+        const auto bin =
+            write_fake(folder, "if [ \"$2\" = -h ]; then echo '  --" + name +
+                                   "Extraction.use_gpu arg'; exit 1; fi\n"
+                                   "case \"$*\" in *" +
+                                   (renamed ? "Sift" : "Feature") +
+                                   "*) echo unrecognised option; exit 1;; esac\n"
+                                   "if [ $1 = mapper ]; then mkdir -p \"$7/0\"; "
+                                   "touch \"$7/0/cameras.bin\" \"$7/0/images.bin\"; fi\n");
+        const PathVariable path(bin.string() + ":" + std::getenv("PATH"));
+        EXPECT_EQ(run_colmap({.photos = folder, .workspace = folder / "w"}, {}),
+                  folder / "w" / "dense");
+    }
+}
+
 TEST(RunColmap, failure_shows_the_last_lines) {
     const auto folder = test_folder();
     const auto bin = write_fake(folder, "echo first; echo no good image pair >&2; exit 1\n");

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "engine/core/files.h"
+#include "engine/data/colmap_write.h"
 #include "engine/data/image_io.h"
+#include "engine/data/lens.h"
 #include "tests/unit/data/data_files.h"
 
 namespace darb {
@@ -70,6 +72,44 @@ TEST(Transforms, frames_override_the_file) {
     EXPECT_EQ(lens.model, "PINHOLE");
     EXPECT_EQ(lens.width, 100);
     EXPECT_EQ(lens.parameters, (std::vector<double>{70, 70, 1, 30}));
+}
+
+TEST(Transforms, a_frames_own_angle_outranks_the_files_focal_length) {
+    const LensModel lens = lens_of(R"("fl_x": 50, "fl_y": 51, "camera_angle_y": 1, )",
+                                   R"("camera_angle_x": 1.5707963267948966, )");
+    EXPECT_NEAR(lens.parameters[0], 40, 1e-12);
+    EXPECT_NEAR(lens.parameters[1], 40, 1e-12);
+}
+
+TEST(Transforms, k4_is_the_denominators_where_the_camera_is_full_opencv_alone) {
+    const std::string k = R"("fl_x": 50, "k1": 1, "k2": 2, "k3": 3, "k4": 4, "p1": 5, )";
+    const LensModel nerfstudio = lens_of(k + R"("camera_model": "OPENCV", )");
+    EXPECT_EQ(nerfstudio.model, kFourRadial);
+    EXPECT_EQ(nerfstudio.parameters, (std::vector<double>{50, 50, 40, 30, 1, 2, 5, 0, 3, 4}));
+    const std::vector<double> rational{50, 50, 40, 30, 1, 2, 5, 0, 3, 4, 0, 0};
+    EXPECT_EQ(lens_of(k + R"("camera_model": "FULL_OPENCV", )").parameters, rational);
+    EXPECT_EQ(lens_of(k + R"("k6": 6, )").model, "FULL_OPENCV");
+}
+
+TEST(Transforms, val_filenames_are_the_test_set_where_there_is_no_other) {
+    const auto names = [](const std::string& head) {
+        return parse_transforms(file(head, frame("a")), "t.json").test_filenames;
+    };
+    const std::string val = R"("val_filenames": ["b"], )";
+    EXPECT_EQ(names(val), std::vector<std::string>{"b"});
+    EXPECT_EQ(names(R"("test_filenames": [], )" + val), std::vector<std::string>{"b"});
+    EXPECT_EQ(names(R"("test_filenames": ["c"], )" + val), std::vector<std::string>{"c"});
+}
+
+TEST(Transforms, every_error_comes_with_a_remedy) {
+    for (const std::string& text :
+         {file(R"("fl_x": "50", )", frame("a")), file(R"("camera_model": 5, )", frame("a")),
+          file("", frame("a") + ",5"), file("", frame("a") + ",{}"),
+          file("", R"({"file_path": "a"})"),
+          file("", R"({"file_path": "a", "transform_matrix": [[1],[1],[1]]})")})
+        EXPECT_NE(parse_error(text).find("\n  "), std::string::npos) << parse_error(text);
+    EXPECT_NE(error_of([&] { lens_of(R"("fl_x": 5, "w": 1e300, )"); }).find("\n  "),
+              std::string::npos);
 }
 
 TEST(Transforms, bad_files_are_errors_that_name_the_frame) {
@@ -148,6 +188,68 @@ TEST(TransformsSource, nerfstudio_folder_with_masks_points_and_split) {
     std::filesystem::remove_all(folder / "images");
     EXPECT_NE(error_of([&] { load_dataset(folder); }).find("none of its 3 photos"),
               std::string::npos);
+}
+
+TEST(TransformsSource, names_of_the_split_are_compared_without_dots_and_backslashes) {
+    const auto folder = test_folder();
+    for (const char* name : {"images/a.png", "images/b.png", "images/c.png"})
+        write_png(folder / name, ImageU8(8, 6, 3));
+    write_file_atomic(folder / "transforms.json",
+                      file(R"("fl_x": 10, "test_filenames": ["images/a.png", "./images/b.png"], )",
+                           frame("./images/a.png") + "," + frame("images/b.png") + "," +
+                               frame(R"(images\\c.png)")));
+    const Dataset dataset = load_dataset(folder);
+    ASSERT_EQ(dataset.views.size(), 3u);
+    EXPECT_TRUE(dataset.views[0].is_test);
+    EXPECT_TRUE(dataset.views[1].is_test);
+    EXPECT_FALSE(dataset.views[2].is_test);
+    EXPECT_EQ(dataset.views[2].name, "images/c.png");
+}
+
+TEST(TransformsSource, a_folder_of_photos_without_effect_is_a_note) {
+    const auto folder = test_folder();
+    write_png(folder / "train/r_0.png", ImageU8(8, 8, 3));
+    write_file_atomic(folder / "TRANSFORMS.JSON", file(R"("fl_x": 10, )", frame("train/r_0")));
+    DatasetOptions options;
+    const auto notes = [&] {
+        std::string all;
+        for (const std::string& note : load_dataset(folder / "TRANSFORMS.JSON", options).notes)
+            all += note;
+        return all;
+    };
+    EXPECT_EQ(notes().find("no effect"), std::string::npos);
+    options.images_folder = "images_4";
+    EXPECT_NE(notes().find("images_4 has no effect"), std::string::npos);
+}
+
+TEST(TransformsSource, smaller_photos_may_have_another_extension) {
+    const auto folder = test_folder();
+    write_png(folder / "images_2/a.png", ImageU8(4, 3, 3));
+    write_file_atomic(folder / "transforms.json",
+                      file(R"("w": 8, "h": 6, "fl_x": 10, )", frame("images/a.JPG")));
+    DatasetOptions options;
+    options.images_folder = "images_2/";
+    EXPECT_EQ(load_dataset(folder, options).views.at(0).photo, folder / "images_2/a.png");
+}
+
+TEST(TransformsSource, it_stands_in_for_a_colmap_model_whose_photos_are_missing) {
+    const auto folder = test_folder();
+    write_png(folder / "images/a.png", ImageU8(8, 6, 3));
+    write_file_atomic(folder / "transforms.json", file(R"("fl_x": 10, )", frame("images/a.png")));
+    View view;
+    view.camera = {.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
+    DatasetOptions cameras_only;
+    cameras_only.require_photos = false;
+    for (const bool same_name : {false, true}) {
+        view.name = same_name ? "a.png" : "IMG_1.png";
+        write_colmap_binary(folder / "colmap/sparse/0", {view}, {});
+        const Dataset dataset = load_dataset(folder);
+        EXPECT_EQ(dataset.views.at(0).camera.fx, same_name ? 20 : 10);
+        EXPECT_EQ(load_dataset(folder, cameras_only).views.at(0).camera.fx, same_name ? 20 : 10);
+        EXPECT_NE(dataset.notes.back().find("was read"), std::string::npos);
+    }
+    std::filesystem::remove(folder / "images/a.png");
+    EXPECT_EQ(load_dataset(folder, cameras_only).views.at(0).camera.fx, 20);
 }
 
 TEST(TransformsSource, synthetic_folder_has_train_and_test_and_no_extensions) {

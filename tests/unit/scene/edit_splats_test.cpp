@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "engine/scene/sh_rotation.h"
+#include "shaders/shared/limits.h"
 #include "tests/support/splat_files.h"
 
 namespace darb::test {
@@ -171,9 +172,19 @@ TEST(EditSplats, crop_prune_and_degree) {
 TEST(EditSplats, splats_with_nan_go) {
     SplatModel model = sample_model(1, 4);
     model.sh_rest[9] = std::numeric_limits<float>::quiet_NaN();
-    model.log_scale[9] = -std::numeric_limits<float>::infinity();
+    model.log_scale[9] = std::numeric_limits<float>::infinity();
     EXPECT_EQ(drop_non_finite(model), 2u);
     EXPECT_EQ(model.size(), 2u);
+}
+
+TEST(EditSplats, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    SplatModel model = sample_model(0, 3);
+    model.opacity = {kInfinity, -kInfinity, 2};
+    model.log_scale[7] = -kInfinity;
+    EXPECT_EQ(drop_non_finite(model), 0u);
+    EXPECT_EQ(model.opacity, (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 2}));
+    EXPECT_EQ(model.log_scale[7], -LOG_SCALE_LIMIT);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "shaders/shared/limits.h"
 #include "tests/support/test_data.h"
 
 namespace darb {
@@ -106,6 +107,38 @@ TEST(Ply, ascii_is_read) {
     EXPECT_FALSE(model.antialias);
 }
 
+TEST(Ply, ascii_numbers_beyond_double_are_infinite_and_those_below_it_0) {
+    std::size_t dropped = 0;
+    const std::string row = " 2 3 .1 .2 .3 1e999 -5 -6 -7 1 0 0 0.5\n";
+    const SplatModel model =
+        parse(ascii_file("3", "1e-999" + row + "-1e999" + row + "1e999" + row), &dropped);
+    EXPECT_EQ(dropped, 2u);
+    ASSERT_EQ(model.size(), 1u);
+    EXPECT_EQ(model.position[0], 0.f);
+    EXPECT_EQ(model.opacity[0], OPACITY_LOGIT_LIMIT);
+}
+
+TEST(Ply, blanks_after_end_header_are_tolerated) {
+    std::string text = ascii_file("1", kAsciiRow);
+    text.insert(text.find("end_header") + 10, " \t\r");
+    EXPECT_EQ(parse(text).size(), 1u);
+}
+
+TEST(Ply, errors_of_the_header_come_with_a_remedy) {
+    const std::string file = ascii_file("1", kAsciiRow);
+    const auto with = [&](const std::string& held, const std::string& wanted) {
+        std::string text = file;
+        const std::string error = error_of(text.replace(text.find(held), held.size(), wanted));
+        EXPECT_NE(error.find("\n  "), std::string::npos) << error;
+    };
+    with("format ascii", "format text");
+    with("property float x", "property half x");
+    with("end_header", "property float f_rest_0\nend_header");
+    for (const char* comment : {"SplatKernel: square", "SplatFootprint: square",
+                                "SplatKernel: raised_cosine_2_pulses\ncomment SplatFootprint: exact"})
+        with("element", std::string("comment ") + comment + "\nelement");
+}
+
 TEST(Ply, windows_line_ends_comments_and_other_elements_are_tolerated) {
     std::string text =
         "ply\nformat ascii 1.0\ncomment SplatRenderMode: mip\nobj_info nothing\n"
@@ -156,6 +189,22 @@ TEST(Ply, splats_with_nan_or_infinity_are_dropped_and_counted) {
     std::size_t none = 9;
     EXPECT_EQ(parse(ascii_file("1", "nan" + kAsciiRow.substr(1)), &none).size(), 0u);
     EXPECT_EQ(none, 1u);
+}
+
+// PLYs expanded from formats with a byte of opacity hold the logit of 255, +inf.
+TEST(Ply, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    SplatModel model = random_model(0, 4);
+    model.opacity = {kInfinity, -kInfinity, 1, std::numeric_limits<float>::quiet_NaN()};
+    model.log_scale[7] = -kInfinity;
+    std::size_t dropped = 0;
+    const SplatModel read = parse_ply(encode_ply(model), "memory", &dropped);
+    EXPECT_EQ(dropped, 1u) << "NaN alone";
+    EXPECT_EQ(read.opacity, (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 1}));
+    ASSERT_EQ(read.log_scale.size(), 9u);
+    EXPECT_EQ(read.log_scale[7], -LOG_SCALE_LIMIT);
+    model.log_scale[7] = kInfinity;
+    EXPECT_EQ(parse_ply(encode_ply(model), "memory", &dropped).size(), 2u);
 }
 
 TEST(Ply, truncated_anywhere_is_an_error_that_names_the_file) {

@@ -135,6 +135,29 @@ TEST(Sog, without_harmonics_the_degree_is_0) {
     EXPECT_EQ(kRead(zip_of(sample_parts(meta))).size(), 0u);
 }
 
+TEST(Sog, null_in_a_codebook_drops_the_splats_that_use_it_alone) {
+    json meta = sample_meta();
+    meta["scales"]["codebook"][1] = nullptr;  // the second splat's
+    SogFacts facts;
+    EXPECT_EQ(parse_sog(zip_of(sample_parts(meta)), "test", &facts).size(), 1u);
+    EXPECT_EQ(facts.dropped, 1u);
+    meta["scales"]["codebook"][1] = 0;
+    meta["scales"]["codebook"][200] = nullptr;  // nobody's
+    EXPECT_EQ(kRead(zip_of(sample_parts(meta))).size(), 2u);
+}
+
+TEST(Sog, any_count_of_the_palette_is_bounded_by_its_picture) {
+    json meta = sample_meta();
+    for (const std::uint64_t count :
+         {std::uint64_t{0}, std::uint64_t{1} << 31, std::uint64_t{1} << 63}) {
+        meta["shN"]["count"] = count;
+        SogFacts facts;
+        const SplatModel model = parse_sog(zip_of(sample_parts(meta)), "test", &facts);
+        EXPECT_EQ(model.size(), 2u);
+        EXPECT_EQ(model.sh_rest[1], count == 0 ? 0.f : -4.f);
+    }
+}
+
 std::string error_of_meta(const std::string& pointer, const json& value) {
     json meta = sample_meta();
     meta[json::json_pointer(pointer)] = value;
@@ -145,6 +168,7 @@ TEST(Sog, wrong_meta_json_says_why) {
     EXPECT_NE(error_of_meta("/version", 1).find("version 1"), std::string::npos);
     for (const std::uint64_t count : {std::uint64_t{1} << 31, std::uint64_t{1} << 63})
         EXPECT_NE(error_of_meta("/count", count).find("declares"), std::string::npos);
+    EXPECT_EQ(error_of_meta("/count", 0), "no error");
     EXPECT_NE(error_of_meta("/count", 5).find("too small for 5"), std::string::npos);
     EXPECT_NE(error_of_meta("/count", -1).find("count"), std::string::npos);
     EXPECT_NE(error_of_meta("/count", 1e30).find("count"), std::string::npos);

@@ -58,6 +58,41 @@ TEST(SplatFile, a_point_cloud_is_named_as_one) {
     EXPECT_FALSE(is_point_cloud(encode_splats(SplatFormat::compressed_ply, sample_model(0, 1))));
 }
 
+TEST(SplatFile, a_dot_splat_that_begins_like_gzip_is_read) {
+    FileBytes file = encode_splats(SplatFormat::dot_splat, sample_model(0, 2));
+    const float x = 1.25f;  // its two low bytes do not matter
+    set_value(x, 0, file);
+    file[0] = std::byte{0x1f};
+    file[1] = std::byte{0x8b};
+    SplatFile facts;
+    EXPECT_EQ(parse_splats(file, "no name", &facts).size(), 2u);
+    EXPECT_EQ(facts.format, SplatFormat::dot_splat);
+}
+
+TEST(SplatFile, harmonics_of_degree_4_are_left_out_of_a_ply_with_a_note) {
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 1\n", row;
+    for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0",
+                             "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}) {
+        text += fmt::format("property float {}\n", name);
+        row += "1 ";
+    }
+    for (int i = 0; i < 72; ++i) {
+        text += fmt::format("property float f_rest_{}\n", i);
+        row += fmt::format("{} ", i);
+    }
+    FileBytes bytes;
+    append_text(text + "end_header\n" + row + "\n", bytes);
+    SplatFile file;
+    const SplatModel model = parse_splats(bytes, "test", &file);
+    EXPECT_EQ(model.sh_degree, 3);
+    ASSERT_EQ(model.sh_rest.size(), 45u);
+    for (size_t c = 0; c < 15; ++c)
+        for (size_t k = 0; k < 3; ++k)
+            EXPECT_EQ(model.sh_rest[3 * c + k], static_cast<float>(24 * k + c));
+    ASSERT_EQ(file.notes.size(), 1u);
+    EXPECT_NE(file.notes[0].find("degree 4"), std::string::npos);
+}
+
 TEST(SplatFile, names_choose_what_is_written) {
     EXPECT_EQ(format_to_write("a/b.ply"), SplatFormat::ply);
     EXPECT_EQ(format_to_write("b.Compressed.PLY"), SplatFormat::compressed_ply);

@@ -168,6 +168,47 @@ TEST(Spz, coordinate_systems_are_turned_to_right_down_forward) {
     EXPECT_NE(error_of([] { kRead(with_axes(17)); }).find("coordinate system"), std::string::npos);
 }
 
+TEST(Spz, what_is_no_extension_record_is_an_error_in_version_4_alone) {
+    FileBytes file = one_splat(3, 2);
+    append_value<std::uint32_t>(0x12340001, file);
+    append_value<std::uint32_t>(1000, file);  // of which one byte is there
+    append_bytes({1}, file);
+    SpzFacts facts;
+    EXPECT_EQ(parse_spz(gzip(file), "test", &facts).size(), 1u);
+    EXPECT_TRUE(facts.extensions_cut);
+    EXPECT_EQ(facts.extensions, 0);
+    FileBytes streams = encode_spz(sample_model(0, 1));
+    FileBytes record;
+    append_value<std::uint32_t>(0x12340001, record);
+    append_value<std::uint32_t>(1000, record);
+    streams.insert(streams.begin() + spz::kHeader, record.begin(), record.end());
+    set_value(static_cast<std::uint32_t>(spz::kHeader + record.size()), 16, streams);
+    streams[14] = streams[14] | std::byte{spz::kFlagExtensions};
+    EXPECT_NE(error_of([&] { kRead(streams); }).find("extension record 0"), std::string::npos);
+}
+
+TEST(Spz, gzip_is_told_by_its_method_and_flags_too) {
+    FileBytes file = gzip(one_splat(2));
+    EXPECT_TRUE(looks_like_spz(file));
+    file[2] = std::byte{7};
+    EXPECT_FALSE(looks_like_spz(file));
+    file[2] = std::byte{8};
+    file[3] = std::byte{0x20};
+    EXPECT_FALSE(looks_like_spz(file));
+}
+
+TEST(Spz, a_quaternion_without_length_is_written_as_the_identity) {
+    SplatModel model = sample_model(0, 1);
+    std::fill(model.rotation.begin(), model.rotation.end(), 0.0f);
+    const SplatModel read = kRead(encode_spz(model));
+    // Reading turns the axes of the file; the covariance is that of no turn at all.
+    model.rotation = {1, 0, 0, 0};
+    for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b)
+            EXPECT_NEAR(covariance_of(read, 0)[a][b], covariance_of(model, 0)[a][b],
+                        0.1 * glm::length(covariance_of(model, 0)[a]));
+}
+
 TEST(Spz, truncated_or_damaged_is_an_error) {
     const SplatModel model = sample_model(1, 5);
     expect_truncation_is_refused(encode_spz(model), kRead);
