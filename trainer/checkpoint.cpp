@@ -122,7 +122,8 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
         const auto bytes = std::as_bytes(std::span(values));
         payload.insert(payload.end(), bytes.begin(), bytes.end());
     });
-    const std::string header = header_of(checkpoint).dump();
+    const std::string header =
+        header_of(checkpoint).dump(-1, ' ', false, Json::error_handler_t::replace);
     const std::uint64_t header_bytes = header.size();
     std::vector<std::byte> file(kHeadBytes + header.size() + payload.size());
     std::memcpy(file.data(), kMagic, sizeof kMagic);

@@ -66,18 +66,20 @@ ViewMetrics compare_view(const std::string& name, const ImageF& render, const Im
             if (!counts) shown.data[p * 3 + c] = 0.0f;
         }
     }
+    if (counted == 0) return {name, std::nan(""), std::nan("")};
     const double share = static_cast<double>(counted) / static_cast<double>(pixels);
-    return {name, psnr(shown, truth) + 10.0 * std::log10(std::max(share, 1e-12)),
-            ssim(shown, truth)};
+    return {name, psnr(shown, truth) + 10.0 * std::log10(share), ssim(shown, truth)};
 }
 
 void take_means(Evaluation& evaluation) {
-    double psnr_sum = 0, ssim_sum = 0;
+    double psnr_sum = 0, ssim_sum = 0, count = 0;
     for (const ViewMetrics& v : evaluation.views) {
+        if (std::isnan(v.psnr_db)) continue;
         psnr_sum += v.psnr_db;
         ssim_sum += v.ssim;
+        ++count;
     }
-    const double count = std::max<double>(1.0, static_cast<double>(evaluation.views.size()));
+    if (evaluation.views.empty()) count = 1;
     evaluation.psnr_db = psnr_sum / count;
     evaluation.ssim = ssim_sum / count;
 }

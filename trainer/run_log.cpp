@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <sstream>
 
@@ -18,6 +19,18 @@ namespace darb {
 namespace {
 
 using Json = nlohmann::json;
+
+/// Names and paths may hold any bytes.
+std::string text_of(const Json& json, int indent = -1) {
+    return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+/// JSON writes NaN and infinity as null, which reads as NaN here; 0 where the key is missing.
+double number(const Json& event, const char* key) {
+    const auto at = event.find(key);
+    if (at == event.end()) return 0;
+    return at->is_number() ? at->get<double>() : std::nan("");
+}
 
 constexpr const char* kCullNames[CULL_REASONS] = {"near",    "rotation", "opacity", "covariance",
                                                   "outside", "colour",   "",        ""};
@@ -81,7 +94,7 @@ RunLog::RunLog(const std::filesystem::path& folder, bool append)
 void RunLog::cut_after(int iteration) {
     std::erase_if(events_, [&](const Json& e) { return e.value("iteration", 0) > iteration; });
     std::string text;
-    for (const Json& e : events_) text += e.dump() + "\n";
+    for (const Json& e : events_) text += text_of(e) + "\n";
     const auto path = folder_ / "run.jsonl";
     write_file_atomic(path, text);
     file_.reset(std::fopen(path.c_str(), "ab"));
@@ -90,7 +103,7 @@ void RunLog::cut_after(int iteration) {
 }
 
 void RunLog::write(const Json& event) {
-    const std::string line = event.dump() + "\n";
+    const std::string line = text_of(event) + "\n";
     if (std::fwrite(line.data(), 1, line.size(), file_.get()) != line.size() ||
         std::fflush(file_.get()) != 0)
         throw Error((folder_ / "run.jsonl").string(),
@@ -136,7 +149,7 @@ namespace {
 std::string setting_text(const Json& value) {
     if (value.is_string()) return value.get<std::string>();
     if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
-    if (!value.is_array()) return value.dump();
+    if (!value.is_array()) return text_of(value);
     std::string text;
     for (const Json& item : value) text += (text.empty() ? "" : ", ") + setting_text(item);
     return text;
@@ -189,28 +202,35 @@ void RunLog::evaluation(const Evaluation& evaluation) {
     write(evaluation_json(evaluation));
 }
 
+namespace {
+
+void add_events(const std::vector<Json>& events, ReportData& data) {
+    for (const Json& e : events) {
+        const std::string kind = e.value("event", "");
+        if (kind == "iteration") {
+            ReportSample sample{e.value("iteration", 0), number(e, "seconds"), number(e, "loss"),
+                                number(e, "psnr_db"), e.value("splats", 0u)};
+            const Json passes = e.value("passes_ms", Json::object());
+            if (!passes.empty())
+                for (const ReportPass& pass : data.passes)
+                    sample.pass_ms.push_back(number(passes, pass.name.c_str()));
+            data.samples.push_back(std::move(sample));
+        }
+        if (kind == "evaluation" && e.contains("views") && !e["views"].empty())
+            data.evaluations.push_back({e.value("iteration", 0), number(e, "seconds"),
+                                        number(e, "psnr_db"), number(e, "ssim"),
+                                        e.value("splats", 0u)});
+    }
+}
+
+}  // namespace
+
 ReportData RunLog::report_data(const RunSummary& summary) const {
     ReportData data;
     data.title = start_.value("dataset", "");
     data.device = start_.value("device", "") + ", " + start_.value("driver", "");
     data.passes = summary.passes;
-    for (const Json& e : events_) {
-        const std::string kind = e.value("event", "");
-        if (kind == "iteration") {
-            ReportSample sample{e.value("iteration", 0), e.value("seconds", 0.0),
-                                e.value("loss", 0.0), e.value("psnr_db", 0.0),
-                                e.value("splats", 0u)};
-            const Json passes = e.value("passes_ms", Json::object());
-            if (!passes.empty())
-                for (const ReportPass& pass : data.passes)
-                    sample.pass_ms.push_back(passes.value(pass.name, 0.0));
-            data.samples.push_back(std::move(sample));
-        }
-        if (kind == "evaluation" && !e["views"].empty())
-            data.evaluations.push_back({e.value("iteration", 0), e.value("seconds", 0.0),
-                                        e.value("psnr_db", 0.0), e.value("ssim", 0.0),
-                                        e.value("splats", 0u)});
-    }
+    add_events(events_, data);
     if (rates_.bytes_per_s > 0)
         data.notes.push_back(fmt::format(
             "Roofline: bytes and multiply-adds of a pass, estimated from counts, at the rates "
@@ -289,7 +309,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"sh_probes", probes},
         {"sh_degree", trainer.sh_degree()},
         {"evaluations", evaluations}};
-    write_file_atomic(folder_ / "metrics.json", metrics.dump(2) + "\n");
+    write_file_atomic(folder_ / "metrics.json", text_of(metrics, 2) + "\n");
     if (!with_report) return {};
     const auto report = folder_ / "report.html";
     write_report(report, report_data(summary));

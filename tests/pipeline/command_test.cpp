@@ -79,6 +79,10 @@ TEST(Command, missing_files_are_named) {
                     {"info " + std::string(DARB_SOURCE_DIR) + "/README.md", "no splat file"},
                     {"info " + std::string(DARB_SOURCE_DIR) + "/assets", "holds no cameras"}});
     EXPECT_FALSE(fs::exists(none + "_out"));
+    // What the file system itself refuses.
+    const std::string long_name(300, 'x');
+    expect_refused({{"info " + long_name, long_name + ": File name too long\n  "},
+                    {"train " + long_name + " -o " + none + "_out", "File name too long"}});
 }
 
 TEST(Command, features_that_are_not_there_say_so) {

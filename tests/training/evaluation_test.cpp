@@ -45,5 +45,20 @@ TEST(CompareView, masked_pixels_do_not_count) {
                 1e-3);
 }
 
+TEST(CompareView, a_view_masked_throughout_has_no_part_in_the_mean) {
+    const glm::vec3 white(1.0f);
+    ImageU8 masked = half_photo(0);
+    for (size_t i = 3; i < masked.data.size(); i += 4) masked.data[i] = 0;
+    Evaluation evaluation;
+    evaluation.views.push_back(compare_view("v", render(0.3f, 0.9f), masked, white, true));
+    EXPECT_TRUE(std::isnan(evaluation.views[0].psnr_db));
+    take_means(evaluation);
+    EXPECT_TRUE(std::isnan(evaluation.psnr_db));
+    evaluation.views.push_back(compare_view("w", render(0.3f, 0.9f), half_photo(0), white, true));
+    take_means(evaluation);
+    EXPECT_EQ(evaluation.psnr_db, evaluation.views[1].psnr_db);
+    EXPECT_EQ(evaluation.ssim, evaluation.views[1].ssim);
+}
+
 }  // namespace
 }  // namespace darb

@@ -69,15 +69,14 @@ void Measurement::judge(CostRow& row, Renderer& renderer) {
     row.error = picture_error(pictures, truth_);
     row.error_by_pixel = picture_error(pictures, truth_by_pixel_);
     if (!views_.photos.empty()) {
-        double psnr = 0, ssim = 0;
+        Evaluation evaluation;
         for (size_t v = 0; v < pictures.size(); ++v) {
-            const ViewMetrics m = compare_view(views_.names[v], pictures[v], views_.photos[v],
-                                               background_, views_.alpha_is_mask);
-            psnr += m.psnr_db;
-            ssim += m.ssim;
+            evaluation.views.push_back(compare_view(views_.names[v], pictures[v], views_.photos[v],
+                                                    background_, views_.alpha_is_mask));
         }
-        row.photo_psnr_db = psnr / static_cast<double>(pictures.size());
-        row.photo_ssim = ssim / static_cast<double>(pictures.size());
+        take_means(evaluation);
+        row.photo_psnr_db = evaluation.psnr_db;
+        row.photo_ssim = evaluation.ssim;
     }
     if (balanced_.empty()) balanced_ = pictures;  // the first row of all
     row.same_as_balanced = true;

@@ -95,7 +95,10 @@ int compare(CompareFlags flags) {
             compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, stop));
         for (const ComparedRun& run : comparison.datasets.back().runs)
             failed |= !run.failure.empty();
-        write_file_atomic(flags.json, comparison_json(comparison).dump(1) + "\n");
+        write_file_atomic(flags.json,
+                          comparison_json(comparison)
+                                  .dump(1, ' ', false, nlohmann::json::error_handler_t::replace) +
+                              "\n");
         write_file_atomic(flags.html, comparison_html(comparison));
     }
     fmt::print("{}{}\nreport   {}\n", comparison_table(comparison), comparison.lpips_note,

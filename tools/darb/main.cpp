@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,10 @@ int main(int argc, char** argv) {
         return run(argc, argv);
     } catch (const darb::Error& e) {
         fmt::print(stderr, "error: {}\n", e.what());
+        return 2;
+    } catch (const std::filesystem::filesystem_error& e) {
+        fmt::print(stderr, "error: {}: {}\n  Check the path and its permissions.\n",
+                   e.path1().empty() ? "a path" : e.path1().string(), e.code().message());
         return 2;
     } catch (const std::exception& e) {
         fmt::print(stderr, "internal error: {}\n", e.what());

@@ -21,6 +21,13 @@ namespace darb {
 
 namespace {
 
+constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, of bytes that are no UTF-8
+
+void write_arguments(const std::filesystem::path& path, const std::vector<std::string>& arguments) {
+    write_file_atomic(path, nlohmann::json(arguments).dump(
+                                -1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
 // `darb train --resume -o OUT` alone: the arguments of the run that it goes on with.
 void recall_arguments(TrainFlags& flags, TuneFlags& tune) {
     const auto path = flags.run.output / "command.json";
@@ -29,6 +36,12 @@ void recall_arguments(TrainFlags& flags, TuneFlags& tune) {
         throw Error(path.string(), "is no list of arguments",
                     "Repeat the whole command with --resume.");
     std::vector<std::string> arguments = saved.get<std::vector<std::string>>();
+    for (const std::string& argument : arguments)  // see write_arguments
+        if (argument.find(kReplacement) != std::string::npos)
+            throw Error(
+                path.string(),
+                fmt::format("'{}' is not as it was typed: JSON holds UTF-8 alone", argument),
+                "Repeat the whole command with --resume.");
     TrainFlags recalled;
     TuneFlags recalled_tune;
     CLI::App app;
@@ -94,7 +107,7 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     plan_effects(dataset, flags);
     plan_strategy(dataset, flags);
     if (!recalled)  // only now: a command that fails above leaves that of an earlier run
-        write_file_atomic(flags.run.output / "command.json", nlohmann::json(arguments).dump());
+        write_arguments(flags.run.output / "command.json", arguments);
     print_plan(device, dataset, flags);
     std::atomic<bool>& stop = stop_on_signals();
     const std::unique_ptr<LiveView> view =

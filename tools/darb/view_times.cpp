@@ -121,7 +121,8 @@ void write_view_times(ViewerWindow& window, const Device& device,
                                            {"whole_after_worst_s", quantile(whole_s, 1)}}},
                                          {"peak_memory_bytes", peak_memory_bytes()},
                                          {"device_memory_bytes", device.allocated_bytes()}};
-    write_file_atomic(file, json.dump(2) + "\n");
+    write_file_atomic(file,
+                      json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     fmt::print("{}: {:.1f} frames/s in motion ({:.1f} ms, first {:.1f} ms), at rest {:.1f} ms\n",
                s.scene->file.filename().string(), frames_per_s, quantile(moving_ms, 0.5),
                moving_ms.front(), quantile(rest_ms, 0.5));

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "engine/core/error.h"
@@ -42,15 +43,21 @@ fs::path picture_of(const fs::path& folder, int iteration, const std::string& vi
     return folder / "held_out" / std::to_string(iteration) / (stem + ".png");
 }
 
+// JSON has NaN and infinity as null.
+double number(const Json& record, const char* key) {
+    const Json& value = record.at(key);
+    return value.is_number() ? value.get<double>() : std::nan("");
+}
+
 ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
     ComparedAt at;
     at.iteration = e.at("iteration");
     at.seconds = e.at("seconds");
-    at.psnr_db = e.at("psnr_db");
-    at.ssim = e.at("ssim");
+    at.psnr_db = number(e, "psnr_db");
+    at.ssim = number(e, "ssim");
     at.splats = e.at("splats");
     for (const Json& v : e.at("views"))
-        at.views.push_back({v.at("name"), v.at("psnr_db"), v.at("ssim"), std::nullopt,
+        at.views.push_back({v.at("name"), number(v, "psnr_db"), number(v, "ssim"), std::nullopt,
                             picture_of(folder, at.iteration, v.at("name"))});
     const fs::path model =
         folder / "point_cloud" / fmt::format("iteration_{}", at.iteration) / "point_cloud.ply";
@@ -67,7 +74,7 @@ std::vector<CurvePoint> curve_of(const fs::path& log) {
     for (std::string line; std::getline(lines, line);) {
         const Json e = Json::parse(line, nullptr, false);
         if (!e.is_object() || e.value("event", "") != "iteration") continue;
-        curve.push_back({e.value("iteration", 0), e.value("seconds", 0.0), e.value("loss", 0.0),
+        curve.push_back({e.value("iteration", 0), e.value("seconds", 0.0), number(e, "loss"),
                          e.value("splats", 0.0)});
     }
     return curve;

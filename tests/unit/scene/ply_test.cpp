@@ -134,8 +134,9 @@ TEST(Ply, errors_of_the_header_come_with_a_remedy) {
     with("format ascii", "format text");
     with("property float x", "property half x");
     with("end_header", "property float f_rest_0\nend_header");
-    for (const char* comment : {"SplatKernel: square", "SplatFootprint: square",
-                                "SplatKernel: raised_cosine_2_pulses\ncomment SplatFootprint: exact"})
+    for (const char* comment :
+         {"SplatKernel: square", "SplatFootprint: square",
+          "SplatKernel: raised_cosine_2_pulses\ncomment SplatFootprint: exact"})
         with("element", std::string("comment ") + comment + "\nelement");
 }
 
