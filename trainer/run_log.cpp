@@ -202,8 +202,6 @@ void RunLog::evaluation(const Evaluation& evaluation) {
     write(evaluation_json(evaluation));
 }
 
-namespace {
-
 void add_events(const std::vector<Json>& events, ReportData& data) {
     for (const Json& e : events) {
         const std::string kind = e.value("event", "");
@@ -222,8 +220,6 @@ void add_events(const std::vector<Json>& events, ReportData& data) {
                                         e.value("splats", 0u)});
     }
 }
-
-}  // namespace
 
 ReportData RunLog::report_data(const RunSummary& summary) const {
     ReportData data;
