@@ -43,9 +43,9 @@ while ((killed < kills)); do
     fi
     status=0
     wait $run 2>/dev/null || status=$?
-    if [[ $status == 2 ]]; then
+    if [[ $status != 0 && $status != 137 ]]; then
         cat "$out/log"
-        echo "kill $killed: the run could not go on"
+        echo "kill $killed: the run ended with status $status"
         exit 1
     fi
     # Done before its kill: kill the next one from the start.

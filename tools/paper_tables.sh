@@ -22,7 +22,7 @@ add() { # IMAGES SCENE...
     local images=$1 scene folder
     shift
     for scene in "$@"; do
-        folder=$(find "$root" -maxdepth 3 -type d -iname "$scene" -print -quit)
+        folder=$(find -L "$root" -maxdepth 3 -type d -iname "$scene" -exec test -d '{}/sparse' \; -print -quit)
         if [[ -z $folder ]]; then
             missing+=("$scene")
         elif [[ -d $folder/$images ]]; then

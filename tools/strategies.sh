@@ -26,6 +26,9 @@ done
 darb=${DARB:-$(cd "$(dirname "$0")/.." && pwd)/build/darb}
 [[ -x $darb ]] || fail "$darb is not built; name another with DARB="
 
+names=("${sets[@]%/}")
+[[ $(printf '%s\n' "${names[@]##*/}" | sort -u | wc -l) == "${#sets[@]}" ]] || fail "two data sets of one name"
+
 at=()
 for ((k = 1; k <= evaluations; ++k)); do at+=($((iterations * k / evaluations))); done
 

@@ -15,7 +15,10 @@ trap 'rm -rf "$folder"; [ -z "$xvfb" ] || kill "$xvfb"' EXIT
 if [ -z "${DISPLAY:-}" ]; then
     Xvfb -displayfd 3 -screen 0 1600x900x24 -nolisten tcp 3>"$folder/display" 2>"$folder/xvfb.log" &
     xvfb=$!
-    while [ ! -s "$folder/display" ]; do sleep 0.1; done
+    while [ ! -s "$folder/display" ]; do
+        kill -0 "$xvfb" || { cat "$folder/xvfb.log" >&2; exit 2; }
+        sleep 0.1
+    done
     DISPLAY=:$(cat "$folder/display")
     export DISPLAY
 fi

@@ -12,6 +12,7 @@ namespace darb {
 namespace {
 
 constexpr float kErrorGain = 4.0f;
+constexpr double kEqual_db = 100;  // of a picture that equals its photo
 
 ImageU8 side_by_side(const ImageF& photo, const ImageF& render) {
     ImageF all(photo.width * 3, photo.height, 3);
@@ -54,7 +55,10 @@ ImageU8 to_8bit(const ImageF& image) {
 ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
                          const glm::vec3& background, bool alpha_is_mask) {
     ImageF truth = composite(photo, background);
-    if (!alpha_is_mask) return {name, psnr(render, truth), ssim(render, truth)};
+    const auto finite_psnr = [&](const ImageF& image, double more) {
+        return std::min(psnr(image, truth) + more, kEqual_db);
+    };
+    if (!alpha_is_mask) return {name, finite_psnr(render, 0), ssim(render, truth)};
     ImageF shown = render;
     const size_t pixels = size_t(photo.width) * photo.height;
     size_t counted = 0;
@@ -68,7 +72,7 @@ ViewMetrics compare_view(const std::string& name, const ImageF& render, const Im
     }
     if (counted == 0) return {name, std::nan(""), std::nan("")};
     const double share = static_cast<double>(counted) / static_cast<double>(pixels);
-    return {name, psnr(shown, truth) + 10.0 * std::log10(share), ssim(shown, truth)};
+    return {name, finite_psnr(shown, 10.0 * std::log10(share)), ssim(shown, truth)};
 }
 
 void take_means(Evaluation& evaluation) {

@@ -188,6 +188,15 @@ void Run::show_step() {
     progress_.leave_out(paused_s);
 }
 
+// What an earlier run in the folder would pass on as this one's: to --resume, and to what looks for
+// the folder's scene.
+void set_aside(const std::filesystem::path& output) {
+    for (const char* name : {"checkpoint.darb", "metrics.json"}) {
+        std::error_code none;  // there is no such file
+        std::filesystem::rename(output / name, output / (std::string("earlier.") + name), none);
+    }
+}
+
 // Whether metrics.json is that of a whole run, which nothing is to be added to.
 bool Run::is_finished() const {
     const std::filesystem::path path = run_.output / "metrics.json";
@@ -200,9 +209,13 @@ bool Run::is_finished() const {
 RunSummary Run::execute(const std::atomic<bool>* stop) {
     const std::filesystem::path latest = run_.output / "checkpoint.darb";
     trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
+    if (!run_.resume_from.empty())
+        resume();  // before anything of an earlier run is written over: it may be refused
+    else
+        set_aside(run_.output);
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
-    if (!run_.resume_from.empty()) resume();
+    if (!run_.command.empty()) write_file_atomic(run_.output / "command.json", run_.command);
     if (!run_.resume_from.empty() && is_finished()) {
         progress_.note("the run is finished: nothing is left to do");
         summary_.iteration = trainer_.iteration();

@@ -40,6 +40,7 @@ struct RunOptions {
     /// May be empty. Returns the seconds that it held the run up on purpose (a pause), which are
     /// no training time.
     std::function<double(const LiveStep&)> on_step;
+    std::string command;          // of command.json, for --resume; may be empty
     std::string effects;          // the plan in a line, for the log
     std::string effects_json;     // the same as JSON, for metrics.json; may be empty
     std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty

@@ -47,6 +47,23 @@ Container read_whole(const std::filesystem::path& path) {
                 "Free space or choose another folder; the previous file, if any, is intact.");
 }
 
+bool write_all(int file, std::span<const std::byte> bytes) {
+    for (size_t done = 0; done < bytes.size();) {
+        const ssize_t wrote = ::write(file, bytes.data() + done, bytes.size() - done);
+        if (wrote < 0 && errno == EINTR) continue;
+        if (wrote < 0) return false;
+        done += static_cast<size_t>(wrote);
+    }
+    return true;
+}
+
+void write_to_stream(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    const Descriptor file{::open(path.c_str(), O_WRONLY | O_CLOEXEC)};
+    if (file.fd < 0 || !write_all(file.fd, bytes))
+        throw Error(path.string(), std::string("cannot be written: ") + std::strerror(errno),
+                    "Choose a file.");
+}
+
 }  // namespace
 
 bool has_extension(const std::filesystem::path& path, std::string_view extension) {
@@ -63,19 +80,21 @@ std::string read_text_file(const std::filesystem::path& path) {
     return read_whole<std::string>(path);
 }
 
-void write_file_atomic(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+void write_file_atomic(const std::filesystem::path& name, std::span<const std::byte> bytes) {
+    std::error_code ignored;
+    if (name.has_parent_path()) std::filesystem::create_directories(name.parent_path(), ignored);
+    // A pipe or a device is written to; what a link points to is replaced, not the link.
+    const auto kind = std::filesystem::status(name, ignored).type();
+    using enum std::filesystem::file_type;
+    if (kind == fifo || kind == character || kind == block || kind == socket)
+        return write_to_stream(name, bytes);
+    const bool link = std::filesystem::is_symlink(name, ignored);
+    const std::filesystem::path path = link ? std::filesystem::weakly_canonical(name) : name;
     std::filesystem::path temp = path;
     temp += ".tmp";
-    std::error_code ignored;
-    if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), ignored);
     Descriptor file{::open(temp.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
     if (file.fd < 0) fail_write(path, temp);
-    for (size_t done = 0; done < bytes.size();) {
-        const ssize_t wrote = ::write(file.fd, bytes.data() + done, bytes.size() - done);
-        if (wrote < 0 && errno == EINTR) continue;
-        if (wrote < 0) fail_write(path, temp);
-        done += static_cast<size_t>(wrote);
-    }
+    if (!write_all(file.fd, bytes)) fail_write(path, temp);
     if (::fsync(file.fd) != 0 && errno != EINVAL && errno != EROFS) fail_write(path, temp);
     if (::rename(temp.c_str(), path.c_str()) != 0) fail_write(path, temp);
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 #include <sstream>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -51,27 +52,24 @@ Dataset load_model(const fs::path& path, const fs::path& model, const DatasetOpt
     return dataset;
 }
 
-// A COLMAP model with transforms.json beside it, which stands in where the model cannot be used, as
-// when it names photos by another name. Which of the two it is depends on the photos alone, so that
-// cameras without photos (require_photos false) are those that were trained on.
-Dataset load_either(const fs::path& path, const fs::path& model, const DatasetOptions& options) {
-    DatasetOptions strict = options;
-    strict.require_photos = true;
+// The model that nerfstudio leaves below its transforms.json, which names the photos as COLMAP saw
+// them. Which of the two it is depends on the photos alone, so that cameras without photos
+// (require_photos false) are those that were trained on.
+Dataset load_nerfstudio(const fs::path& path, const fs::path& model, DatasetOptions options) {
+    const bool require_photos = std::exchange(options.require_photos, true);
     std::string reason;
     try {
-        Dataset dataset = load_model(path, model, strict);
-        dataset.notes.push_back(fmt::format(
-            "{} was read; name the transforms file itself to use that.", model.string()));
-        return dataset;
+        return load_model(path, model, options);
     } catch (const Error& error) {
         reason = fmt::format("{} {}", error.where, error.reason);
     }
     try {
-        Dataset dataset = load_transforms(path, strict);
+        Dataset dataset = load_transforms(path, options);
         dataset.notes.push_back(
             fmt::format("{} was read in place of {}: {}.", dataset.source, model.string(), reason));
         return dataset;
     } catch (const Error&) {
+        options.require_photos = require_photos;
         return load_model(path, model, options);  // says what is wrong with it
     }
 }
@@ -85,11 +83,17 @@ Dataset load_source(const fs::path& path, const DatasetOptions& options) {
     }
     const bool transforms =
         fs::exists(path / "transforms.json") || fs::exists(path / "transforms_train.json");
-    for (const fs::path& model : {path / "sparse" / "0", path / "sparse", path, path / "0",
-                                  path / "colmap" / "sparse" / "0"})
-        if (is_colmap_model(model))
-            return transforms ? load_either(path, model, options)
-                              : load_model(path, model, options);
+    const fs::path nerfstudio = path / "colmap" / "sparse" / "0";
+    for (const fs::path& model :
+         {path / "sparse" / "0", path / "sparse", path, path / "0", nerfstudio}) {
+        if (!is_colmap_model(model)) continue;
+        Dataset dataset = transforms && model == nerfstudio ? load_nerfstudio(path, model, options)
+                                                            : load_model(path, model, options);
+        if (transforms && dataset.source.starts_with("COLMAP"))
+            dataset.notes.push_back(fmt::format(
+                "{} was read; name the transforms file itself to use that.", model.string()));
+        return dataset;
+    }
     if (transforms) return load_transforms(path, options);
     throw Error(
         path.string(),

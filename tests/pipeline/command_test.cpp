@@ -269,7 +269,9 @@ TEST_F(PhotosCommand, colmap_runs_once_for_the_same_photos) {
     const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
     const Outcome first = with_path(path, train() + " --sequential");
     ASSERT_EQ(first.code, 0) << first.err;
-    const std::string all = "feature_extractor\nsequential_matcher\nmapper\nimage_undistorter\n";
+    // The first call asks for the names of options.
+    const std::string all =
+        "feature_extractor\nfeature_extractor\nsequential_matcher\nmapper\nimage_undistorter\n";
     EXPECT_EQ(read_text_file(calls()), all);
     EXPECT_EQ(with_path(path, train()).code, 0);
     EXPECT_EQ(

@@ -13,6 +13,9 @@ check() { # NAME PATTERN TEXT
 }
 
 mkdir -p "$fake"/root/360_v2/{bicycle/images_4,room/images_2,garden/images} "$fake"/root/tandt/Truck/images
+mkdir -p "$fake"/root/lego/train/images "$fake"/links/scenes # a folder of photos is no scene
+for scene in 360_v2/bicycle 360_v2/room 360_v2/garden tandt/Truck; do mkdir "$fake/root/$scene/sparse"; done
+ln -s "$fake"/root/360_v2/room "$fake"/links/scenes/room
 printf '#!/bin/sh\necho "$@"\n' >"$fake/darb"
 chmod +x "$fake/darb"
 export DARB=$fake/darb
@@ -23,6 +26,8 @@ check "the paper's schedule" "--train-options=--schedule 3dgs" "$output"
 check "another schedule" "--lpips-as-3dgs --train-options --schedule darb$" \
     "$("$script" "$fake/root" "$fake/out" --train-options "--schedule darb" 2>/dev/null)"
 check "missing scenes are named" "left out, not found: .*garden.*playroom" "$output"
+check "photos that are called train" "left out, not found: .*train" "$output"
+check "links" "room@images_2" "$("$script" "$fake/links" "$fake/out" 2>/dev/null)"
 "$script" "$fake/nowhere" "$fake/out" 2>/dev/null
 check "no folder" '^2$' "$?"
 "$script" 2>/dev/null

@@ -161,5 +161,24 @@ TEST_F(FaultyRun, photos_that_changed_since_are_noticed) {
     expect_resumes_to(whole, scene);
 }
 
+TEST_F(FaultyRun, a_refused_resume_leaves_everything_of_the_run) {
+    start_and_lose_the_device();
+    std::map<fs::path, Bytes> before;
+    for (const char* name : {"command.json", "cameras.json", "cfg_args", "run.jsonl"})
+        before[run_ / name] = read_file(run_ / name);
+    expect_says(darb(training(run_) + " --resume -r 4"), {"was written with", "--resume"});
+    expect_says(darb("train --resume --iterations 90 -o '" + run_.string() + "'"),
+                {"--iterations", "Repeat the whole command"});
+    for (const auto& [path, bytes] : before) EXPECT_EQ(read_file(path), bytes) << path;
+}
+
+TEST_F(FaultyRun, a_fresh_run_is_not_mistaken_for_an_earlier_one) {
+    start_and_lose_the_device();
+    const Fault fault("lost:20");
+    EXPECT_EQ(darb(training(run_) + " --kernel sinc --checkpoint-interval 0").code, 2);
+    EXPECT_FALSE(fs::exists(checkpoint()));
+    EXPECT_TRUE(fs::exists(run_ / "earlier.checkpoint.darb"));
+}
+
 }  // namespace
 }  // namespace darb::test

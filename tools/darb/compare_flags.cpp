@@ -35,10 +35,12 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
         .add_option("--pulses", flags.pulses,
                     "of raised_cosine and sinc, with commas: 1,2,3 tests what rings cost and gain")
         ->delimiter(',')
+        ->allow_extra_args(false)
         ->capture_default_str()
         ->check(CLI::Range(1, KERNEL_MAX_PULSES));
     command.add_option("--iterations", flags.iterations, "evaluate after these, with commas")
         ->delimiter(',')
+        ->allow_extra_args(false)
         ->capture_default_str()
         ->check(CLI::Range(1, 10'000'000));
     command.add_option("--seeds", flags.seeds, "runs of each")
@@ -53,8 +55,11 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     forward(command, flags, "--strategy", "--strategy", "adc, mcmc or budget");
     command.add_option("--train-options", flags.train_options,
                        "more options of darb train, as one word in quotes");
-    command.add_option("--lpips", flags.lpips,
-                       "safetensors with the weights of AlexNet or VGG16 and of LPIPS's layers");
+    command
+        .add_option("--lpips", flags.lpips,
+                    "safetensors with the weights of AlexNet or VGG16 and of LPIPS's layers; once "
+                    "for each file")
+        ->allow_extra_args(false);
     command.add_flag("--lpips-as-3dgs", flags.lpips_as_3dgs,
                      "colours from 0 to 1 into LPIPS, as published numbers of splats have it");
     command.add_option("--blending-views", flags.blending_views, "to count and time; 0: none")

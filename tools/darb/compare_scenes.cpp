@@ -40,7 +40,7 @@ Box inner_box(const SplatModel& model) {
 
 std::vector<View> orbit_views(const SplatModel& model) {
     const Box box = inner_box(model);
-    const glm::dvec3 middle = 0.5 * (box.low + box.high);
+    const glm::dvec3 middle = model.origin + 0.5 * (box.low + box.high);
     const double radius = std::max(0.5 * glm::length(box.high - box.low), 1e-3);
     const double distance = radius / std::sin(kHalfWidth * kHeight / kWidth);
     std::vector<View> views;

@@ -35,6 +35,9 @@ void print_difference(const char* what, const SplatModel& scene, const SplatMode
 }
 
 int convert(const ConvertFlags& flags) {
+    std::error_code none;  // one of the two is not there
+    if (std::filesystem::equivalent(flags.input, flags.output, none))
+        throw Error(flags.output.string(), "is what is read", "Name another file to write.");
     const std::optional<SplatFormat> format = format_to_write(flags.output);
     if (!format)
         throw Error(flags.output.string(), "names no format that can be written",

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <exception>
 #include <filesystem>
 #include <string>
@@ -26,6 +27,22 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
     return arguments;
 }
 
+// The parser takes these for numbers, and lets them through every limit.
+void refuse_no_numbers(const std::vector<std::string>& arguments) {
+    for (const std::string& argument : arguments) {
+        const bool option = argument.starts_with("--");
+        const size_t equals = option ? argument.find('=') : std::string::npos;
+        if (option && equals == std::string::npos) continue;
+        std::string value = equals == std::string::npos ? argument : argument.substr(equals + 1);
+        std::transform(value.begin(), value.end(), value.begin(),
+                       [](unsigned char c) { return std::tolower(c); });
+        if (value.starts_with('-') || value.starts_with('+')) value.erase(0, 1);
+        if (value == "nan" || value == "inf" || value == "infinity")
+            throw darb::Error(argument, "is no number that anything here can take",
+                              "Give a finite number; a file of that name as ./" + value + ".");
+    }
+}
+
 // A value that begins with a minus reads like an option: "--effects -sh" becomes "--effects=-sh".
 void join_effects(std::vector<std::string>& arguments) {
     for (size_t i = 0; i + 1 < arguments.size(); ++i) {
@@ -40,6 +57,7 @@ void join_effects(std::vector<std::string>& arguments) {
 int run(int argc, char** argv) {
     std::vector<std::string> arguments = with_dashes(argc, argv);
     join_effects(arguments);
+    refuse_no_numbers(arguments);
     CLI::App app(
         "Train, render and measure 3D splat scenes with a choice of kernel, on any Vulkan device.",
         "darb");

@@ -128,6 +128,8 @@ void add_plan(CLI::App& app, Action& action) {
     command->add_option("--cameras", flags->cameras,
                         "of a scene: the cameras that it will be rendered through");
     command->add_option("-r,--resolution", flags->data.resolution, "as in training");
+    command->add_option("-i,--images", flags->data.images_folder, "as in training")
+        ->capture_default_str();
     command
         ->add_option("--sh-degree", flags->sh_degree,
                      "of a data set: the highest degree (default 3)")

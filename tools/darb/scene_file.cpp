@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 
 namespace darb {
 
@@ -26,17 +28,30 @@ long iteration_of(const fs::path& folder) {
     return error == std::errc{} && rest == end ? iteration : -1;
 }
 
+// Where the run of an output folder ended, which may be before the end of an earlier one; -1:
+// unknown.
+long last_iteration(const fs::path& output) {
+    std::error_code none;
+    if (!fs::is_regular_file(output / "metrics.json", none)) return -1;
+    const auto metrics =
+        nlohmann::json::parse(read_text_file(output / "metrics.json"), nullptr, false);
+    const auto at = metrics.is_object() ? metrics.find("iteration") : metrics.end();
+    return at != metrics.end() && at->is_number_integer() ? at->get<long>() : -1;
+}
+
 }  // namespace
 
 fs::path find_scene(const fs::path& path) {
     if (!fs::is_directory(path) || is_sog_folder(path)) return path;
     fs::path found;
     long latest = -1;
+    const long own = last_iteration(path);
     std::error_code none;  // no such folder: no entries
     for (const fs::directory_entry& entry : fs::directory_iterator(path / "point_cloud", none)) {
         const long iteration = iteration_of(entry.path());
         const fs::path scene = entry.path() / "point_cloud.ply";
-        if (iteration <= latest || !fs::is_regular_file(scene)) continue;
+        if (iteration < 0 || latest == own || !fs::is_regular_file(scene)) continue;
+        if (iteration < latest && iteration != own) continue;
         latest = iteration;
         found = scene;
     }

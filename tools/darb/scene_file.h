@@ -10,8 +10,9 @@ namespace darb {
 /// A splat file, the output folder of a training run or a SOG scene, rather than a data set.
 bool is_scene(const std::filesystem::path& path);
 
-/// path itself; of a folder with point_cloud/iteration_N/point_cloud.ply the one of the largest N.
-/// Throws Error for a folder without one that is no SOG scene either.
+/// path itself; of a folder with point_cloud/iteration_N/point_cloud.ply the one that its
+/// metrics.json ends with, else of the largest N. Throws Error for a folder without one that is no
+/// SOG scene either.
 std::filesystem::path find_scene(const std::filesystem::path& path);
 
 /// load_splats of find_scene(path), with a warning on stderr for what was dropped or left out.

@@ -37,6 +37,7 @@ std::vector<int> signals_from_list(const std::string& list) {
         if (signals.size() == before)
             throw Error("--signals " + name, "no such signal", "There are " + known + ".");
     }
+    if (signals.empty()) throw Error("--signals", "names none", "Name some, with commas, or all.");
     return signals;
 }
 

@@ -5,58 +5,20 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
-#include "engine/core/files.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/live_view.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
+#include "tools/darb/train_recall.h"
 #include "tools/darb/train_run.h"
 #include "tools/darb/tune_flags.h"
 
 namespace darb {
 
 namespace {
-
-constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, of bytes that are no UTF-8
-
-void write_arguments(const std::filesystem::path& path, const std::vector<std::string>& arguments) {
-    write_file_atomic(path, nlohmann::json(arguments).dump(
-                                -1, ' ', false, nlohmann::json::error_handler_t::replace));
-}
-
-// `darb train --resume -o OUT` alone: the arguments of the run that it goes on with.
-void recall_arguments(TrainFlags& flags, TuneFlags& tune) {
-    const auto path = flags.run.output / "command.json";
-    const auto saved = nlohmann::json::parse(read_text_file(path), nullptr, false);
-    if (!saved.is_array())
-        throw Error(path.string(), "is no list of arguments",
-                    "Repeat the whole command with --resume.");
-    std::vector<std::string> arguments = saved.get<std::vector<std::string>>();
-    for (const std::string& argument : arguments)  // see write_arguments
-        if (argument.find(kReplacement) != std::string::npos)
-            throw Error(
-                path.string(),
-                fmt::format("'{}' is not as it was typed: JSON holds UTF-8 alone", argument),
-                "Repeat the whole command with --resume.");
-    TrainFlags recalled;
-    TuneFlags recalled_tune;
-    CLI::App app;
-    CLI::App* command = app.add_subcommand("train");
-    add_train_flags(*command, recalled);
-    add_tune_flags(*command, recalled_tune);
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-    recalled.resume = true;
-    recalled.run.output = flags.run.output;
-    if (!flags.device.empty()) recalled.device = flags.device;
-    recalled.run.quiet = flags.run.quiet;
-    recalled.view = flags.view;
-    flags = recalled;
-    if (tune.choice.empty()) tune.choice = recalled_tune.choice;
-}
 
 // The dearest first; what takes less than a hundredth of an iteration is not printed.
 void print_passes(std::vector<ReportPass> passes) {
@@ -86,13 +48,13 @@ void print_summary(const RunSummary& summary, const TrainFlags& flags) {
         fmt::print("picture  {}\n", summary.pictures.front().file.string());
     if (!summary.report.empty()) fmt::print("report   {}\n", summary.report.string());
     if (summary.interrupted)
-        fmt::print("interrupted; go on with: darb train --resume -o {}\n",
+        fmt::print("interrupted; go on with: darb train --resume -o '{}'\n",
                    flags.run.output.string());
 }
 
 int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
-    if (recalled) recall_arguments(flags, tune);
+    if (recalled) recall_arguments(arguments, flags, tune);
     finish_train_flags(flags);
     if (flags.dataset.empty())
         throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
@@ -106,8 +68,7 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     Dataset dataset = load_training_data(flags);
     plan_effects(dataset, flags);
     plan_strategy(dataset, flags);
-    if (!recalled)  // only now: a command that fails above leaves that of an earlier run
-        write_arguments(flags.run.output / "command.json", arguments);
+    if (!recalled) flags.run.command = command_text(std::move(arguments), flags.dataset);
     print_plan(device, dataset, flags);
     std::atomic<bool>& stop = stop_on_signals();
     const std::unique_ptr<LiveView> view =

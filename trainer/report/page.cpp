@@ -10,10 +10,12 @@ namespace {
 
 constexpr const char* kStyle = R"css(
 :root{--ink:#1c1f24;--soft:#667080;--line:#dfe3e8;--page:#fff;--card:#f6f7f9;--s0:#2563b0;--s1:#d0571b;
---s2:#2a8a57;--s3:#8650b5;--s4:#b58a00;--s5:#1596a8;--s6:#b23a6b;--s7:#6b7280;--s8:#7a5a3a;--s9:#4a4ac0}
+--s2:#2a8a57;--s3:#8650b5;--s4:#b58a00;--s5:#1596a8;--s6:#b23a6b;--s7:#6b7280;--s8:#7a5a3a;--s9:#4a4ac0;
+--s10:#7fb0e0;--s11:#e8a33d;--s12:#0f5132;--s13:#d88bd0}
 @media screen and (prefers-color-scheme:dark){:root{--ink:#e6e8eb;--soft:#98a2b0;--line:#333a44;
 --page:#14171b;--card:#1d2127;--s0:#6ea8f0;--s1:#f0935a;
---s2:#5cc48d;--s3:#bb8ce6;--s4:#e0bd4a;--s5:#57cbdc;--s6:#ea7aa7;--s7:#a3abb8;--s8:#c49a72;--s9:#9393f5}}
+--s2:#5cc48d;--s3:#bb8ce6;--s4:#e0bd4a;--s5:#57cbdc;--s6:#ea7aa7;--s7:#a3abb8;--s8:#c49a72;--s9:#9393f5;
+--s10:#2f6db3;--s11:#b3701a;--s12:#b7f0cf;--s13:#a04f97}}
 *{box-sizing:border-box}
 body{margin:0 auto;max-width:1080px;padding:2rem 1.25rem 4rem;background:var(--page);color:var(--ink);
 font:15px/1.5 system-ui,sans-serif}
@@ -38,6 +40,10 @@ svg .tick,svg .label{fill:var(--soft);font-size:11px}
 .line.s7{stroke:var(--s7)}circle.s7,.area.s7{fill:var(--s7)}i.s7{background:var(--s7)}
 .line.s8{stroke:var(--s8)}circle.s8,.area.s8{fill:var(--s8)}i.s8{background:var(--s8)}
 .line.s9{stroke:var(--s9)}circle.s9,.area.s9{fill:var(--s9)}i.s9{background:var(--s9)}
+.line.s10{stroke:var(--s10)}circle.s10,.area.s10{fill:var(--s10)}i.s10{background:var(--s10)}
+.line.s11{stroke:var(--s11)}circle.s11,.area.s11{fill:var(--s11)}i.s11{background:var(--s11)}
+.line.s12{stroke:var(--s12)}circle.s12,.area.s12{fill:var(--s12)}i.s12{background:var(--s12)}
+.line.s13{stroke:var(--s13)}circle.s13,.area.s13{fill:var(--s13)}i.s13{background:var(--s13)}
 .area{stroke:var(--card);stroke-width:.6}.whisker{stroke:var(--ink);stroke-width:1.6;fill:none}
 .legend{display:flex;flex-wrap:wrap;gap:.2rem 1rem;margin:.5rem 0;color:var(--soft)}
 .legend i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.35em;

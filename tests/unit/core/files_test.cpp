@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -148,6 +149,27 @@ TEST_F(Files, Write_on_a_read_only_disk_names_file_and_reason) {
     expect_contains(text, path.string());
     expect_contains(text, root ? "Read-only file system" : "Permission denied");
     EXPECT_EQ(file_count(), 0u);
+}
+
+TEST_F(Files, Write_through_a_link_changes_the_file_that_it_points_to) {
+    write_file_atomic(folder / "target", "old");
+    fs::create_symlink("target", folder / "link");
+    write_file_atomic(folder / "link", "new");
+    EXPECT_TRUE(fs::is_symlink(folder / "link"));
+    EXPECT_EQ(read_text_file(folder / "target"), "new");
+}
+
+TEST_F(Files, Write_to_a_pipe_or_a_device_leaves_it_one) {
+    const fs::path pipe = folder / "pipe";
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    std::string got;
+    std::jthread reader([&] { got = read_text_file(pipe); });
+    write_file_atomic(pipe, "text");
+    reader.join();
+    EXPECT_EQ(got, "text");
+    EXPECT_TRUE(fs::is_fifo(pipe));
+    write_file_atomic("/dev/null", "text");
+    EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
 }  // namespace

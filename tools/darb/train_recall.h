@@ -1,0 +1,21 @@
+// `darb train --resume -o OUT` alone: goes on with the command of the run, which OUT/command.json
+// holds.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/darb/train_flags.h"
+#include "tools/darb/tune_flags.h"
+
+namespace darb {
+
+/// The text of command.json. arguments: as typed; the data set becomes an absolute path, so that
+/// the run can be resumed from any folder.
+std::string command_text(std::vector<std::string> arguments, const std::string& dataset);
+
+/// flags and tune as that file has them; of what was typed now, the device, -q, --view and --tune
+/// count. Throws Error for any other option, and for a file that is no list of arguments.
+void recall_arguments(const std::vector<std::string>& typed, TrainFlags& flags, TuneFlags& tune);
+
+}  // namespace darb
