@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <string>
+#include <thread>
 
 #include "engine/core/error.h"
 
