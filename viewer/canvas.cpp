@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "engine/core/error.h"
+#include "engine/gpu/full_barrier.h"
 
 namespace darb {
 
@@ -34,24 +35,18 @@ constexpr VkImageUsageFlags kCopied =
 }  // namespace
 
 void image_barrier(VkCommandBuffer commands, VkImage image, VkImageLayout from, VkImageLayout to) {
+    const VkMemoryBarrier2 memory = full_barrier();  // of buffers that it is copied from or to
     VkImageMemoryBarrier2 barrier{};
     barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2;
-    barrier.srcStageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
-    barrier.srcAccessMask = VK_ACCESS_2_MEMORY_WRITE_BIT;
-    barrier.dstStageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
-    barrier.dstAccessMask = VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT;
+    barrier.srcStageMask = memory.srcStageMask;
+    barrier.srcAccessMask = memory.srcAccessMask;
+    barrier.dstStageMask = memory.dstStageMask;
+    barrier.dstAccessMask = memory.dstAccessMask;
     barrier.oldLayout = from;
     barrier.newLayout = to;
     barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
     barrier.image = image;
     barrier.subresourceRange = kWholeColour;
-    // Buffers, too: the image is copied from one, or to one.
-    VkMemoryBarrier2 memory{};
-    memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2;
-    memory.srcStageMask = barrier.srcStageMask;
-    memory.srcAccessMask = barrier.srcAccessMask;
-    memory.dstStageMask = barrier.dstStageMask;
-    memory.dstAccessMask = barrier.dstAccessMask;
     VkDependencyInfo info{};
     info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
     info.memoryBarrierCount = 1;

@@ -9,10 +9,6 @@
 
 namespace darb {
 
-/// Records a barrier after which everything that earlier submissions to the queue wrote, whoever
-/// recorded them, is visible to what follows.
-void record_full_barrier(VkCommandBuffer commands);
-
 struct BufferUse {
     VkBuffer buffer = VK_NULL_HANDLE;
     VkPipelineStageFlags2 stage = 0;

@@ -8,8 +8,8 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
-#include "engine/gpu/barriers.h"
 #include "engine/gpu/device_state.h"
+#include "engine/gpu/full_barrier.h"
 
 namespace darb {
 

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/gpu/barriers.h"
 #include "engine/gpu/device_state.h"
+#include "engine/gpu/full_barrier.h"
 #include "engine/gpu/timestamps.h"
 
 namespace darb {

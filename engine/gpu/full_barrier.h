@@ -1,0 +1,12 @@
+// The barrier between submissions of whoever recorded them.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+namespace darb {
+
+/// After it everything that was written before it is visible to what follows.
+VkMemoryBarrier2 full_barrier();
+void record_full_barrier(VkCommandBuffer commands);
+
+}  // namespace darb
