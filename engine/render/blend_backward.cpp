@@ -14,7 +14,7 @@ BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
 }
 
 BufferList<BlendBackward> BlendBackward::pair_buffers(std::uint64_t pairs) {
-    return {{&BlendBackward::partials_, "pair partials", pairs * 32},
+    return {{&BlendBackward::partials_, "pair partials", pairs * kPartialBytes},
             {&BlendBackward::rest_, "pair partials, rest", pairs * 4}};
 }
 

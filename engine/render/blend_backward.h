@@ -22,6 +22,7 @@ class BlendBackward {
     void record(Commands& commands, const Forward& forward, const Buffer& d_image,
                 const gpu::CameraData& data, const glm::vec3& background);
 
+    static constexpr std::uint64_t kPartialBytes = 32;  // of a pair, its widest entry anywhere
     /// What shaders/backward/blend_backward.comp says, in the order of the pairs' slots.
     const Buffer& partials() const { return partials_; }  // float [K][8]
     const Buffer& rest() const { return rest_; }          // float [K]

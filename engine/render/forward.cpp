@@ -17,7 +17,6 @@ namespace darb {
 namespace {
 
 constexpr std::uint32_t kMinCapacity = 1024;
-constexpr std::uint64_t kPartialBytes = 32;  // of a pair in the backward pass, its widest entry
 
 std::uint32_t tiles(std::uint32_t pixels) {
     return (pixels + TILE_SIZE - 1) / TILE_SIZE;
@@ -204,7 +203,7 @@ bool Forward::make_room(const gpu::FrameStatus& status) {
     const std::uint32_t wanted =
         (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.pairs;
     if (wanted > most) {
-        const std::uint64_t other_way = most_pairs(*device_, kPartialBytes);
+        const std::uint64_t other_way = most_pairs(*device_, BlendBackward::kPartialBytes);
         const std::string instead =
             size_.bucket > 0 && wanted <= other_way
                 ? fmt::format("Run with --tune backward=subgroup, which holds {}, or lower",
@@ -245,7 +244,7 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
 
 std::uint32_t Forward::max_pairs(const Device& device) {
     // Of the checkpoints' records half are left for the tiles, whose last buckets are not full.
-    std::uint64_t most = most_pairs(device, kPartialBytes);
+    std::uint64_t most = most_pairs(device, BlendBackward::kPartialBytes);
     if (tuning_of(device).backward == BackwardBlend::buckets)
         most = std::min(most, device.info().max_storage_buffer_bytes / CHECKPOINT_BYTES / 2 *
                                   bucket_pairs(device));
