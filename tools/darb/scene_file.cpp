@@ -50,8 +50,8 @@ fs::path find_scene(const fs::path& path) {
     for (const fs::directory_entry& entry : fs::directory_iterator(path / "point_cloud", none)) {
         const long iteration = iteration_of(entry.path());
         const fs::path scene = entry.path() / "point_cloud.ply";
-        if (iteration < 0 || latest == own || !fs::is_regular_file(scene)) continue;
-        if (iteration < latest && iteration != own) continue;
+        if (iteration < 0 || !fs::is_regular_file(scene)) continue;
+        if (iteration != own && (latest == own || iteration < latest) && !found.empty()) continue;
         latest = iteration;
         found = scene;
     }

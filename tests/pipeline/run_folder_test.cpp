@@ -1,0 +1,79 @@
+// The output folder of darb train over several runs: whose scene it is, what --resume goes on with,
+// and what --schedule writes into the settings of a run.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "engine/core/files.h"
+#include "tests/support/run_command.h"
+
+namespace darb::test {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+const std::string kTrain = "train " + std::string(DARB_SOURCE_DIR) + "/assets/scene -r 8 ";
+
+class RunFolder : public testing::Test {
+  protected:
+    void TearDown() override { fs::remove_all(folder_); }
+    Outcome train(const std::string& options) const {
+        return darb(kTrain + "-o " + folder_.string() + " " + options);
+    }
+    json settings() const {
+        std::istringstream lines(read_text_file(folder_ / "run.jsonl"));
+        std::string first;
+        std::getline(lines, first);
+        return json::parse(first)["settings"];
+    }
+    fs::path folder_ = scratch() / "run_folder";
+};
+
+TEST_F(RunFolder, a_shorter_run_after_a_longer_one_is_the_scene) {
+    ASSERT_EQ(train("--iterations 3 -q").code, 0);
+    ASSERT_EQ(train("--iterations 2 -q --kernel sinc").code, 0);
+    const Outcome info = darb("info " + folder_.string());
+    EXPECT_NE(info.out.find("iteration_2"), std::string::npos) << info.out;
+    EXPECT_NE(info.out.find("sinc"), std::string::npos) << info.out;
+    fs::remove(folder_ / "metrics.json");  // as of another program: the last one
+    EXPECT_NE(darb("info " + folder_.string()).out.find("iteration_3"), std::string::npos);
+}
+
+TEST_F(RunFolder, resume_takes_the_runs_own_checkpoint_once_there_is_one) {
+    ASSERT_EQ(train("--iterations 2 -q --checkpoint-iterations 1").code, 0);
+    const std::string first = (folder_ / "chkpnt1.darb").string();
+    ASSERT_TRUE(fs::exists(first));
+    const std::string metrics = read_text_file(folder_ / "metrics.json");
+    const Outcome o = train("--iterations 2 --start-checkpoint " + first + " --resume");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("at iteration 2"), std::string::npos) << o.err;
+    EXPECT_EQ(read_text_file(folder_ / "metrics.json"), metrics) << "the run was finished";
+}
+
+TEST_F(RunFolder, schedule_of_3dgs_is_what_is_trained_and_other_options_count) {
+    ASSERT_EQ(train("--iterations 1 -q --opacity-reg 0.5 --schedule 3dgs").code, 0);
+    const json s = settings();
+    EXPECT_EQ(s["regularisers"], json({0.5f, 0.0f})) << s;
+    EXPECT_NEAR(s["opacity_reset"][1].get<double>(), 0.01, 1e-6) << s;
+    EXPECT_NEAR(s["position_lr"][0].get<double>(), 1.6e-4, 1e-9) << s;
+    EXPECT_NEAR(s["position_lr"][1].get<double>(), 1.6e-6, 1e-11) << s;
+    EXPECT_EQ(s["random_background"], false) << s;
+    ASSERT_EQ(train("--iterations 1 -q").code, 0);
+    EXPECT_NEAR(settings()["opacity_reset"][1].get<double>(), 0.2, 1e-6);
+    const Outcome o = train("--iterations 1 --schedule 3dgs --strategy mcmc");
+    EXPECT_EQ(o.code, 2);
+    EXPECT_NE(o.err.find("--schedule 3dgs"), std::string::npos) << o.err;
+}
+
+TEST_F(RunFolder, an_opacity_reset_leaves_what_can_be_seen) {
+    ASSERT_EQ(train("--iterations 1 -q --prune-opacity 0").code, 0);
+    EXPECT_NEAR(settings()["opacity_reset"][1].get<double>(), 0.01, 1e-6);
+    ASSERT_EQ(train("--iterations 1 -q --prune-opacity 0 --accuracy fast").code, 0);
+    EXPECT_NEAR(settings()["opacity_reset"][1].get<double>(), 2.0 / 64, 1e-6);
+}
+
+}  // namespace
+}  // namespace darb::test
