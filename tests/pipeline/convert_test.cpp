@@ -53,6 +53,20 @@ TEST(Convert, every_format_to_every_other) {
     EXPECT_EQ(read_file(out("to_all.ply")).size(), read_file(ply).size());
 }
 
+// Cameras around a scene look at it wherever it is. (.splat keeps positions as they are.)
+TEST(Convert, a_comparison_sees_a_scene_far_from_the_origin) {
+    const std::string near = scene_file("near.ply", sample_model(0, 200)), far = out("far.ply");
+    ASSERT_EQ(darb("convert " + near + " " + far + " --translate 10000,0,0").code, 0);
+    std::map<std::string, std::string> said;
+    for (const std::string& ply : {near, far})
+        said[ply] = darb("convert " + ply + " " + out("seen.splat") + " --compare").out;
+    const auto psnr_of = [&](const std::string& ply) {
+        return std::stod(said[ply].substr(said[ply].find("scene: ") + 7));
+    };
+    EXPECT_LT(psnr_of(near), 90) << said[near];
+    EXPECT_NEAR(psnr_of(far), psnr_of(near), 3) << said[far];
+}
+
 TEST(Convert, edits_are_made_in_the_stated_order) {
     const SplatModel before = sample_model(3, 50);
     const std::string ply = scene_file("edit.ply", before);

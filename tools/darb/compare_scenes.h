@@ -1,5 +1,4 @@
-// How far two scenes differ in pictures: cameras around a scene, and PSNR of the one against the
-// other.
+// How far two scenes differ in pictures.
 #pragma once
 
 #include <string>
@@ -9,10 +8,6 @@
 #include "engine/scene/splat_model.h"
 
 namespace darb {
-
-/// Eight views, 480 x 360 px and 50 degrees wide, that look from 20 degrees above at the middle of
-/// the splats, near enough for 98 % of them to fill the frame.
-std::vector<View> orbit_views(const SplatModel& model);
 
 struct SceneDifference {
     double mean_psnr_db = 0, worst_psnr_db = 0;

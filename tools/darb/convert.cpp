@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
 #include "engine/scene/gaussian_scene.h"
+#include "tools/cost/views.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/compare_scenes.h"
 #include "tools/darb/scene_edits.h"
@@ -23,10 +24,22 @@ struct ConvertFlags {
     bool compare = false;
 };
 
+std::vector<View> views_around(const SplatModel& scene) {
+    if (scene.size() == 0)
+        throw Error("--compare", "there are no splats to look at", "Leave it out.");
+    const CostViews around = orbit_views(scene, 8, 480, 360);
+    std::vector<View> views(around.cameras.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].name = around.names[i];
+        views[i].camera = around.cameras[i];
+    }
+    return views;
+}
+
 void print_difference(const char* what, const SplatModel& scene, const SplatModel& other,
                       const ConvertFlags& flags) {
     const std::vector<View> views =
-        flags.cameras.empty() ? orbit_views(scene) : load_cameras(flags.cameras);
+        flags.cameras.empty() ? views_around(scene) : load_cameras(flags.cameras);
     if (views.empty())
         throw Error(flags.cameras.string(), "holds no cameras", "Name another list or data set.");
     const SceneDifference d = compare_scenes(scene, other, views, flags.device);
