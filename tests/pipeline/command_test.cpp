@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -29,6 +30,8 @@ const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
 TEST(Command, bad_usage_is_exit_code_2) {
     const std::string out = " -o " + (scratch() / "unused").string() + " ";
     const std::string train = "train " + kScene + out;
+    const std::string ply = (scratch() / "itself.ply").string();
+    std::ofstream{ply};
     const std::string halved = "render a.ply --cameras b --render-scale 1/2" + out;
     expect_refused({{"", "subcommand"},
                     {"no_such", "no_such"},
@@ -65,7 +68,11 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"check --json a --scene a.ply --cameras b --dump c", "--json"},
                     {"check --device no_such_device", "no_such_device"},
                     {"check --tune backward=no_such", "backward=subgroup|buckets"},
-                    {"devices --device no_such_device", "no_such_device"}});
+                    {"devices --device no_such_device", "no_such_device"},
+                    {"train " + kScene + " -o unused --lambda-dssim nan", "finite number"},
+                    {"train " + kScene + " -o unused --opacity-reg=inf", "finite number"},
+                    {"sim1d --signals ''", "--signals"},
+                    {"convert " + ply + " " + ply, "is what is read"}});
 }
 
 TEST(Command, missing_files_are_named) {

@@ -11,6 +11,7 @@
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/devices.h"
+#include "tools/darb/pixel_size.h"
 #include "tools/darb/scene_file.h"
 
 namespace darb {
@@ -30,18 +31,11 @@ Extent extent_of(const CostFlags& flags) {
     return extent;
 }
 
-void orbit_size(const std::string& text, int& width, int& height) {
-    char rest = 0;
-    if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 16 ||
-        height < 16 || width > 16'384 || height > 16'384)
-        throw Error("--size " + text, "is no size in pixels", "Write it as 640x480, 16 or more.");
-}
-
 CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most) {
     if (flags.dataset.empty()) {
-        int width = 0, height = 0;
-        orbit_size(flags.size, width, height);
-        return orbit_views(model, static_cast<int>(std::min<size_t>(most, 8)), width, height);
+        const PixelSize size = parse_size(flags.size);
+        return orbit_views(model, static_cast<int>(std::min<size_t>(most, 8)), size.width,
+                           size.height);
     }
     DatasetOptions options = flags.data;
     options.hold_out = true;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/darb/accuracy_flags.h"
+#include "tools/darb/pixel_size.h"
 #include "tools/darb/tune_flags.h"
 #include "viewer/viewer.h"
 
@@ -24,13 +25,7 @@ struct ViewFlags {
     TuneFlags tune;
 };
 
-struct PixelSize {
-    int width = 0, height = 0;
-};
-
 void add_view_flags(CLI::App& command, ViewFlags& flags);
-/// WIDTHxHEIGHT. Throws Error.
-PixelSize parse_size(const std::string& text);
 /// The cameras.json that darb train left beside a scene; none where there is none. Throws Error.
 std::vector<View> cameras_beside(const std::filesystem::path& scene);
 /// The data set of --cameras; else cameras_beside the scene, and where those cannot be read none,
