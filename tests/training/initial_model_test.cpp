@@ -1,7 +1,9 @@
 // What training starts from, for clouds that have no distances to measure.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "trainer/initial_model.h"
 
@@ -53,6 +55,29 @@ TEST(InitialModel, map_coordinates_keep_millimetres) {
     const SplatModel model = initial_model(d, {});
     for (size_t i = 0; i < d.points.position.size(); ++i)
         EXPECT_NEAR(model.origin[int(i % 3)] + model.position[i], d.points.position[i], 1e-6);
+}
+
+TEST(InitialModel, a_cap_draws_from_the_whole_cloud) {
+    Dataset d = looking_at(1000, false);
+    TrainOptions options;
+    options.max_splats = 100;
+    const SplatModel model = initial_model(d, options);
+    ASSERT_EQ(model.size(), 100U);
+    EXPECT_EQ(initial_count(d, options), 100U);
+    double low = 1e9, high = -1e9;
+    std::set<float> places;
+    for (size_t i = 0; i < 100; ++i) {
+        low = std::min(low, double(model.position[3 * i]));
+        high = std::max(high, double(model.position[3 * i]));
+        places.insert(model.position[3 * i]);
+    }
+    EXPECT_LT(low, 10);  // of 0 to 99.9
+    EXPECT_GT(high, 90);
+    EXPECT_EQ(places.size(), 100U) << "a point was drawn twice";
+    // Distances are those of what was drawn: ten times as far apart as all.
+    double mean = 0;
+    for (const float scale : model.log_scale) mean += std::exp(scale) / 300;
+    EXPECT_GT(mean, 5 * std::exp(double(initial_model(d, {}).log_scale[3 * 500])));
 }
 
 TEST(InitialModel, no_points_become_random_ones) {
