@@ -9,4 +9,14 @@ function(darb_library name)
   list(TRANSFORM ARGN PREPEND darb_ OUTPUT_VARIABLE depends)
   add_library(darb_${name} STATIC ${sources})
   target_link_libraries(darb_${name} PUBLIC darb_options ${depends})
+  target_precompile_headers(darb_${name} REUSE_FROM darb_precompiled)
 endfunction()
+
+# What most files parse and is slow to parse, parsed once. The release build does without, so that a
+# forgotten include is an error there (CMAKE_DISABLE_PRECOMPILE_HEADERS in CMakePresets.json).
+set(darb_slow_headers <algorithm> <cmath> <filesystem> <functional> <optional> <string> <vector>
+  <fmt/format.h> <glm/glm.hpp> <nlohmann/json.hpp>)
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/precompiled.cpp CONTENT "")
+add_library(darb_precompiled STATIC ${CMAKE_BINARY_DIR}/generated/precompiled.cpp)
+target_link_libraries(darb_precompiled PRIVATE darb_options nlohmann_json::nlohmann_json)
+target_precompile_headers(darb_precompiled PRIVATE ${darb_slow_headers})
