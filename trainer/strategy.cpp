@@ -61,6 +61,12 @@ bool refines_after(const TrainOptions& options, int iteration) {
            iteration % options.densify_interval == 0;
 }
 
+int last_refined_before(const TrainOptions& options, int iteration) {
+    int i = std::min(iteration, options.densify_end()) - 1;
+    while (i > 0 && !refines_after(options, i)) --i;
+    return std::max(i, 0);
+}
+
 std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uint32_t count,
                             std::uint32_t limit) {
     if (options.strategy == Strategy::mcmc) {

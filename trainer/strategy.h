@@ -34,6 +34,8 @@ std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uin
 
 /// Whether density control has a round after this iteration.
 bool refines_after(const TrainOptions& options, int iteration);
+/// The last such iteration before this one; 0: none.
+int last_refined_before(const TrainOptions& options, int iteration);
 
 /// What growth_target makes of `start` splats up to an iteration, for forecasts: budget at most
 /// doubles in a round. mean: the mean count over the run.

@@ -19,6 +19,9 @@ namespace {
 // While a probe runs, times the rate of the view-dependent part: what it trains is thrown away, so
 // that it may look far ahead.
 constexpr float kProbeRestRate = 8;
+// Frames for which the regularisers make up at one that shows a splat, so that what a third of the
+// photos show is regularised as if all did, and what a hundredth shows is not taken away.
+constexpr float kMostFrames = 8;
 constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
 // More splats than this share with a gradient that is not finite: something is broken.
@@ -164,7 +167,9 @@ AdamStep Trainer::rates(int iteration) const {
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight = options_.scale_weight / static_cast<float>(extent_);
-    step.regularise_unseen = options_.strategy == Strategy::mcmc;  // as its authors do
+    step.frames = static_cast<float>(iteration - last_refined_before(options_, iteration));
+    step.most_frames =
+        options_.strategy == Strategy::mcmc ? 0.0f : kMostFrames;  // as its authors do
     return step;
 }
 

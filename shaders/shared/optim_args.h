@@ -16,10 +16,11 @@ struct ProjectBackwardArgs {
     // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
     float rate_position, rate_scale, rate_rotation, rate_opacity, rate_dc, rate_rest;
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
-    // Regularisers (UPDATE = 1): weights of the sum of opacities and of the sum of scales, over the
-    // splats that the frame shows, or with regularise_unseen = 1 over all.
+    // Regularisers (UPDATE = 1): weights of the sum of opacities and of the sum of scales. Each
+    // frame that shows a splat counts for frames / (how many of them did), most_frames at most;
+    // with most_frames = 0 every frame counts once for every splat.
     float opacity_weight, scale_weight;
-    uint regularise_unseen;
+    float frames, most_frames;
 };
 
 // What density control does with a splat; see densify_decide.comp.
@@ -53,7 +54,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 56);
+static_assert(sizeof(ProjectBackwardArgs) == 60);
 }  // namespace darb::gpu
 #endif
 #endif

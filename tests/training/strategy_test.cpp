@@ -138,6 +138,17 @@ TEST(Strategy, budget_ends_at_its_budget) {
     EXPECT_EQ(trainer.splat_count(), 90U);
 }
 
+TEST(Rounds, the_last_before_an_iteration) {
+    TrainOptions options;
+    options.iterations = 400;
+    options.densify_from = 50;
+    options.densify_until = 200;
+    options.densify_interval = 40;
+    for (const auto& [iteration, last] :
+         {std::pair{1, 0}, {80, 0}, {81, 80}, {120, 80}, {121, 120}, {200, 160}, {400, 160}})
+        EXPECT_EQ(last_refined_before(options, iteration), last) << iteration;
+}
+
 TEST(GrowthTarget, follows_its_rule_to_the_limit) {
     TrainOptions options;
     use_strategy(Strategy::mcmc, options);
