@@ -19,9 +19,10 @@ namespace {
 // While a probe runs, times the rate of the view-dependent part: what it trains is thrown away, so
 // that it may look far ahead.
 constexpr float kProbeRestRate = 8;
-// Frames for which the regularisers make up at one that shows a splat, so that what a third of the
-// photos show is regularised as if all did, and what a hundredth shows is not taken away.
-constexpr float kMostFrames = 8;
+// The regularisers make up, where a frame shows a splat, for the frames that did not: what n photos
+// show is regularised as if all did, times 50 / n in larger sets. So few photos bear a splat less
+// than many, but what ten of a thousand show is not taken away.
+constexpr double kPhotosThatBear = 50;
 constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
 // More splats than this share with a gradient that is not finite: something is broken.
@@ -167,9 +168,10 @@ AdamStep Trainer::rates(int iteration) const {
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight = options_.scale_weight / static_cast<float>(extent_);
-    step.frames = static_cast<float>(iteration - last_refined_before(options_, iteration));
-    step.most_frames =
-        options_.strategy == Strategy::mcmc ? 0.0f : kMostFrames;  // as its authors do
+    const double share = std::min(1.0, kPhotosThatBear / double(train_views_.size()));
+    const int since = iteration - last_refined_before(options_, iteration);
+    // mcmc: at every frame, as its authors do.
+    step.frames = options_.strategy == Strategy::mcmc ? 0 : float(since * share);
     return step;
 }
 

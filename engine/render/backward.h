@@ -15,10 +15,10 @@ struct AdamStep {
     float position = 0, scale = 0, rotation = 0, opacity = 0, sh_dc = 0, sh_rest = 0;
     float inverse_sqrt_correction2 = 1;
     // Weights of the mean opacity and the mean scale in the loss. A frame that shows a splat counts
-    // for frames (since the gradient sum was cleared) / those that did, at most most_frames; with
-    // most_frames = 0 every frame counts once for every splat.
+    // for frames / (how many showed it since the gradient sum was cleared), at least once; with
+    // frames = 0 every frame counts once for every splat.
     float opacity_weight = 0, scale_weight = 0;
-    float frames = 1, most_frames = 1;
+    float frames = 1;
 };
 /// rates: plain learning rates; t: the number of this step, from 1.
 AdamStep adam_step(const AdamStep& rates, int t);

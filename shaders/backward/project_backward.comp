@@ -133,7 +133,7 @@ void main() {
     g.rotation = vec4(0.0);
     g.opacity_logit = 0.0;
     g.mean = vec2(0.0);
-    float frames = args.most_frames == 0.0 ? 1.0 : 0.0;
+    float frames = args.frames == 0.0 ? 1.0 : 0.0;
     if (pair_count[i] > 0u) {
         const CameraData camera = cameras[args.camera_index];
         g = project_gradient(camera, i, sum_partials(i));
@@ -143,7 +143,7 @@ void main() {
         }
         const vec2 ndc = g.mean * 0.5 * vec2(camera.width, camera.height);
         gradient_sum[i] += vec2(length(ndc), 1.0);
-        frames = clamp(args.frames / gradient_sum[i].y, 1.0, max(args.most_frames, 1.0));
+        frames = max(args.frames / gradient_sum[i].y, 1.0);
     }
     if (UPDATE == 1) regularise(i, frames, g);
     update_splat(i, g);

@@ -17,10 +17,10 @@ struct ProjectBackwardArgs {
     float rate_position, rate_scale, rate_rotation, rate_opacity, rate_dc, rate_rest;
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
     // Regularisers (UPDATE = 1): weights of the sum of opacities and of the sum of scales. Each
-    // frame that shows a splat counts for frames / (how many of them did), most_frames at most;
-    // with most_frames = 0 every frame counts once for every splat.
+    // frame that shows a splat counts for frames / (how many showed it since the gradient sum was
+    // cleared), at least once; with frames = 0 every frame counts once for every splat.
     float opacity_weight, scale_weight;
-    float frames, most_frames;
+    float frames;
 };
 
 // What density control does with a splat; see densify_decide.comp.
@@ -54,7 +54,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 60);
+static_assert(sizeof(ProjectBackwardArgs) == 56);
 }  // namespace darb::gpu
 #endif
 #endif

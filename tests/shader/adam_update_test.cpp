@@ -125,7 +125,7 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     AdamStep step = adam_step(kRates, 1);
     step.opacity_weight = 0.3f;
     step.scale_weight = 0.7f;
-    step.most_frames = 0;
+    step.frames = 0;
     const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
                                               state, training.partials, step);
     for (size_t i = 0; i < 20; ++i) {
@@ -147,21 +147,20 @@ TEST(AdamUpdate, regularisers_come_with_the_photos) {
     Training training(20);
     PassState state = start_state(training.scene.model);
     for (size_t i = 0; i < 20; ++i) state.gradient_sum[i].y = i < 10 ? 1.0f : 3.0f;
-    const auto moments_at = [&](float weight, float most_frames) {
+    const auto moments_at = [&](float weight, float frames) {
         AdamStep step = adam_step(kRates, 1);
         step.opacity_weight = step.scale_weight = weight;
-        step.frames = 12;
-        step.most_frames = most_frames;
+        step.frames = frames;
         return run_backward_pass(training.scene.model, training.scene.camera, 3, true, state,
                                  training.partials, step)
             .moments;
     };
-    const auto plain = moments_at(0, 1), once = moments_at(0.5f, 1), often = moments_at(0.5f, 5);
+    const auto plain = moments_at(0, 1), once = moments_at(0.5f, 1), often = moments_at(0.5f, 12);
     int seen = 0;
     for (size_t i = 0; i < 20; ++i) {
         const bool shown = training.partials.count[i] > 0;
         seen += shown;
-        const float frames = i < 10 ? 5.0f : 3.0f;  // of 12 / 2, at most 5, and 12 / 4
+        const float frames = i < 10 ? 6.0f : 3.0f;  // 12 / 2 and 12 / 4
         const auto ratio = [&](int a, size_t at) {
             const float one = once[a][2 * at] - plain[a][2 * at];
             EXPECT_EQ(one != 0, shown) << i;
@@ -185,7 +184,7 @@ TEST(AdamUpdate, regularisers_leave_scales_beyond_their_limit) {
     state.parameters[kLogScale] = std::vector<float>(60, 100.0f);
     AdamStep step = adam_step(kRates, 1);
     step.scale_weight = 0.7f;
-    step.most_frames = 0;
+    step.frames = 0;
     const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
                                               state, training.partials, step);
     EXPECT_EQ(after.parameters[kLogScale], state.parameters[kLogScale]);

@@ -112,8 +112,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
                                         step.inverse_sqrt_correction2,
                                         step.opacity_weight,
                                         step.scale_weight,
-                                        step.frames,
-                                        step.most_frames};
+                                        step.frames};
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);
