@@ -12,6 +12,7 @@ constexpr std::pair<Strategy, std::string_view> kNames[] = {
     {Strategy::adc, "adc"}, {Strategy::mcmc, "mcmc"}, {Strategy::budget, "budget"}};
 
 constexpr double kGrowth = 1.05;  // of mcmc, a round
+constexpr std::size_t kPhotosThatBear = 50;
 
 }  // namespace
 
@@ -61,10 +62,9 @@ bool refines_after(const TrainOptions& options, int iteration) {
            iteration % options.densify_interval == 0;
 }
 
-int last_refined_before(const TrainOptions& options, int iteration) {
-    int i = std::min(iteration, options.densify_end()) - 1;
-    while (i > 0 && !refines_after(options, i)) --i;
-    return std::max(i, 0);
+bool regularises_unseen(const TrainOptions& options, std::size_t photos, int iteration) {
+    const auto interval = static_cast<int>((photos + kPhotosThatBear - 1) / kPhotosThatBear);
+    return options.strategy == Strategy::mcmc || iteration % std::max(interval, 1) == 0;
 }
 
 std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uint32_t count,

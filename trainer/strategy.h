@@ -34,8 +34,12 @@ std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uin
 
 /// Whether density control has a round after this iteration.
 bool refines_after(const TrainOptions& options, int iteration);
-/// The last such iteration before this one; 0: none.
-int last_refined_before(const TrainOptions& options, int iteration);
+
+/// Whether the regularisers act at this iteration on what its frame does not show too. A splat that
+/// few photos show is worth less than one that many show: in sets of up to 50 photos at each, in
+/// larger ones at 50 in a round of the photos, so that what ten of a thousand show stays; with mcmc
+/// at each, as its authors do.
+bool regularises_unseen(const TrainOptions& options, std::size_t photos, int iteration);
 
 /// What growth_target makes of `start` splats up to an iteration, for forecasts: budget at most
 /// doubles in a round. mean: the mean count over the run.

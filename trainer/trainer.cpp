@@ -19,10 +19,6 @@ namespace {
 // While a probe runs, times the rate of the view-dependent part: what it trains is thrown away, so
 // that it may look far ahead.
 constexpr float kProbeRestRate = 8;
-// The regularisers make up, where a frame shows a splat, for the frames that did not: what n photos
-// show is regularised as if all did, times 50 / n in larger sets. So few photos bear a splat less
-// than many, but what ten of a thousand show is not taken away.
-constexpr double kPhotosThatBear = 50;
 constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
 // More splats than this share with a gradient that is not finite: something is broken.
@@ -168,10 +164,7 @@ AdamStep Trainer::rates(int iteration) const {
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight = options_.scale_weight / static_cast<float>(extent_);
-    const double share = std::min(1.0, kPhotosThatBear / double(train_views_.size()));
-    const int since = iteration - last_refined_before(options_, iteration);
-    // mcmc: at every frame, as its authors do.
-    step.frames = options_.strategy == Strategy::mcmc ? 0 : float(since * share);
+    step.regularise_unseen = regularises_unseen(options_, train_views_.size(), iteration);
     return step;
 }
 

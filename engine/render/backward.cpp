@@ -91,7 +91,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                             step.inverse_sqrt_correction2,
                                             step.opacity_weight / n,
                                             step.scale_weight / (3.0f * n),
-                                            step.frames};
+                                            step.regularise_unseen ? 1u : 0u};
         const Groups g = groups_for(range.count);
         commands.dispatch(project_pipeline(sh_degree), args,
                           {cameras,

@@ -14,11 +14,10 @@ namespace darb {
 struct AdamStep {
     float position = 0, scale = 0, rotation = 0, opacity = 0, sh_dc = 0, sh_rest = 0;
     float inverse_sqrt_correction2 = 1;
-    // Weights of the mean opacity and the mean scale in the loss. A frame that shows a splat counts
-    // for frames / (how many showed it since the gradient sum was cleared), at least once; with
-    // frames = 0 every frame counts once for every splat.
+    // Weights of the mean opacity and the mean scale in the loss; of the splats that the frame
+    // shows, or of all.
     float opacity_weight = 0, scale_weight = 0;
-    float frames = 1;
+    bool regularise_unseen = false;
 };
 /// rates: plain learning rates; t: the number of this step, from 1.
 AdamStep adam_step(const AdamStep& rates, int t);

@@ -113,18 +113,6 @@ void update_splat(uint i, SplatGradient g) {
     if (SH_DEGREE > 0) update_rest(i, g);
 }
 
-// Adds the gradients of the regularisers: at the frames that show a splat, for all the frames from one to the next.
-// Adam makes a step of full length of whatever comes alone: if they came at each frame, splats that few photos show
-// would lose, after an opacity reset, what the photos never get to hold up.
-void regularise(const uint i, const float frames, inout SplatGradient g) {
-    const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
-    g.opacity_logit += frames * args.opacity_weight * o * (1.0 - o);
-    for (uint c = 0u; c < 3u; ++c) {
-        const float raw = log_scale[3u * i + c];
-        if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c] += frames * args.scale_weight * exp(raw);
-    }
-}
-
 void main() {
     const uint i = args.first_splat + linear_id();
     if (i >= args.splat_end || status.overflow != 0u) return;
@@ -133,7 +121,6 @@ void main() {
     g.rotation = vec4(0.0);
     g.opacity_logit = 0.0;
     g.mean = vec2(0.0);
-    float frames = args.frames == 0.0 ? 1.0 : 0.0;
     if (pair_count[i] > 0u) {
         const CameraData camera = cameras[args.camera_index];
         g = project_gradient(camera, i, sum_partials(i));
@@ -143,8 +130,16 @@ void main() {
         }
         const vec2 ndc = g.mean * 0.5 * vec2(camera.width, camera.height);
         gradient_sum[i] += vec2(length(ndc), 1.0);
-        frames = max(args.frames / gradient_sum[i].y, 1.0);
     }
-    if (UPDATE == 1) regularise(i, frames, g);
+    // The regularisers. Adam makes a step of full length of any gradient that comes alone: at all frames that do not
+    // show a splat they would take, in a large set, what a few of its photos never get to hold up.
+    if (UPDATE == 1 && (pair_count[i] > 0u || args.regularise_unseen == 1u)) {
+        const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
+        g.opacity_logit += args.opacity_weight * o * (1.0 - o);
+        for (uint c = 0u; c < 3u; ++c) {
+            const float raw = log_scale[3u * i + c];
+            if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c] += args.scale_weight * exp(raw);
+        }
+    }
     update_splat(i, g);
 }

@@ -16,11 +16,10 @@ struct ProjectBackwardArgs {
     // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
     float rate_position, rate_scale, rate_rotation, rate_opacity, rate_dc, rate_rest;
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
-    // Regularisers (UPDATE = 1): weights of the sum of opacities and of the sum of scales. Each
-    // frame that shows a splat counts for frames / (how many showed it since the gradient sum was
-    // cleared), at least once; with frames = 0 every frame counts once for every splat.
+    // Regularisers (UPDATE = 1): weights of the sum of opacities and of the sum of scales, over the
+    // splats that the frame shows, or with regularise_unseen = 1 over all.
     float opacity_weight, scale_weight;
-    float frames;
+    uint regularise_unseen;
 };
 
 // What density control does with a splat; see densify_decide.comp.

@@ -112,7 +112,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
                                         step.inverse_sqrt_correction2,
                                         step.opacity_weight,
                                         step.scale_weight,
-                                        step.frames};
+                                        step.regularise_unseen ? 1u : 0u};
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);

@@ -138,15 +138,20 @@ TEST(Strategy, budget_ends_at_its_budget) {
     EXPECT_EQ(trainer.splat_count(), 90U);
 }
 
-TEST(Rounds, the_last_before_an_iteration) {
-    TrainOptions options;
-    options.iterations = 400;
-    options.densify_from = 50;
-    options.densify_until = 200;
-    options.densify_interval = 40;
-    for (const auto& [iteration, last] :
-         {std::pair{1, 0}, {80, 0}, {81, 80}, {120, 80}, {121, 120}, {200, 160}, {400, 160}})
-        EXPECT_EQ(last_refined_before(options, iteration), last) << iteration;
+// At 50 frames in a round of the photos at most, but for mcmc.
+TEST(Regularisers, act_on_the_unseen_by_the_number_of_photos) {
+    TrainOptions adc, mcmc;
+    use_strategy(Strategy::mcmc, mcmc);
+    for (const auto& [photos, expected] :
+         {std::pair<std::size_t, int>{1, 600}, {50, 600}, {51, 300}, {100, 300}, {1000, 30}}) {
+        int at_adc = 0, at_mcmc = 0;
+        for (int i = 1; i <= 600; ++i) {
+            at_adc += regularises_unseen(adc, photos, i);
+            at_mcmc += regularises_unseen(mcmc, photos, i);
+        }
+        EXPECT_EQ(at_adc, expected) << photos;
+        EXPECT_EQ(at_mcmc, 600) << photos;
+    }
 }
 
 TEST(GrowthTarget, follows_its_rule_to_the_limit) {
