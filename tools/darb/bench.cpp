@@ -92,7 +92,7 @@ int bench(BenchFlags flags) {
     options.program = std::filesystem::read_symlink("/proc/self/exe");
     options.plan_training = [](Dataset& dataset, const std::vector<ImageU8>& photos,
                                TrainOptions& train) {
-        const EffectPlan plan = plan_training(dataset, photos, train.sh_degree);
+        const EffectPlan plan = plan_training(dataset, photos, train.sh_degree, {}, train.kernel);
         apply_plan(plan, train);
         apply_plan(plan, dataset.views);
     };

@@ -25,6 +25,7 @@ struct PlanFlags {
     std::string device, effects = "auto";
     bool as_json = false, no_price = false, compare = false, depth = false;
     std::optional<int> sh_degree;
+    std::optional<std::string> kernel;
     DatasetOptions data;
 };
 
@@ -35,6 +36,15 @@ struct Subject {
     Dataset dataset;
     std::vector<ImageU8> photos;
 };
+
+int kernel_of(const PlanFlags& flags) {
+    if (!flags.kernel) return TrainOptions{}.kernel;
+    const auto kernel = kernel_from_name(*flags.kernel);
+    if (!kernel)
+        throw Error("--kernel " + *flags.kernel, "no such kernel",
+                    "See `darb train --help` for their names.");
+    return *kernel;
+}
 
 Subject open(const PlanFlags& flags) {
     Subject s;
@@ -55,6 +65,7 @@ Subject open(const PlanFlags& flags) {
         return s;
     }
     refuse(flags.sh_degree.has_value(), "--sh-degree");
+    refuse(flags.kernel.has_value(), "--kernel");
     s.model = load_scene(flags.what);
     if (!flags.cameras.empty()) s.views = load_cameras(flags.cameras, flags.data);
     return s;
@@ -65,14 +76,19 @@ int degree_of(const Subject& s, const PlanFlags& flags) {
 }
 
 EffectPlan plan_of(const Subject& s, const PlanFlags& flags, const EffectChoice& choice) {
-    return s.training ? plan_training(s.dataset, s.photos, degree_of(s, flags), choice)
-                      : plan_rendering(s.model, s.views, {.depth = flags.depth}, choice);
+    return s.training
+               ? plan_training(s.dataset, s.photos, degree_of(s, flags), choice, kernel_of(flags))
+               : plan_rendering(s.model, s.views, {.depth = flags.depth}, choice);
 }
 
 Measured measure(const Subject& s, const PlanFlags& flags, const EffectPlan& plan) {
     DeviceOptions device;
     device.select = flags.device;
-    if (s.training) return measure_training(device, s.dataset, TrainOptions{}, plan);
+    if (s.training) {
+        TrainOptions train;
+        train.kernel = kernel_of(flags);
+        return measure_training(device, s.dataset, train, plan);
+    }
     std::vector<View> views = s.views;
     if (views.empty())
         for (const Camera& camera : orbit_views(s.model, 4, 640, 480).cameras)
@@ -96,6 +112,7 @@ json compare_choices(const Subject& s, const PlanFlags& flags) {
 
 int run_plan(const PlanFlags& flags) {
     const EffectChoice choice = parse_effects(flags.effects);
+    kernel_of(flags);  // a bad name fails before any reading
     const Subject s = open(flags);
     EffectPlan plan = plan_of(s, flags, choice);
     const bool empty = !s.training && s.model.size() == 0;
@@ -134,6 +151,8 @@ void add_plan(CLI::App& app, Action& action) {
         ->add_option("--sh-degree", flags->sh_degree,
                      "of a data set: the highest degree (default 3)")
         ->check(CLI::Range(0, 3));
+    command->add_option("--kernel", flags->kernel,
+                        "of a data set: the kernel to train with (default gaussian)");
     command->add_flag("--depth", flags->depth, "of a scene: depth images are wanted too");
     add_effects_flag(*command, flags->effects);
     add_lens_flag(*command, flags->data);

@@ -221,6 +221,16 @@ TEST(EffectPlanOfDataset, footprints_that_differ_call_for_antialiasing) {
     EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
 }
 
+TEST(EffectPlanOfDataset, kernels_but_the_gaussian_call_for_antialiasing) {
+    const Capture c;
+    for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel) {
+        const EffectPlan plan = plan_training(c.dataset, c.photos, 0, {}, kernel);
+        EXPECT_EQ(plan.on(EFFECT_ANTIALIAS), kernel != KERNEL_GAUSSIAN) << kernel;
+        EXPECT_FALSE(plan_training(c.dataset, c.photos, 0, parse_effects("-antialias"), kernel)
+                         .on(EFFECT_ANTIALIAS));
+    }
+}
+
 TEST(EffectPlanOfDataset, gains_that_differ_call_for_exposure_where_tracks_say_so) {
     Capture c;
     for (size_t v = 0; v < c.photos.size(); ++v)
