@@ -4,15 +4,10 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 
-#include "engine/core/error.h"
-#include "engine/data/camera_list.h"
-#include "tools/cost/views.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/effect_flags.h"
-#include "tools/darb/plan_price.h"
-#include "tools/darb/scene_file.h"
+#include "tools/darb/plan_subject.h"
 
 namespace darb {
 
@@ -20,87 +15,11 @@ namespace {
 
 using nlohmann::json;
 
-struct PlanFlags {
-    std::filesystem::path what, cameras;
-    std::string device, effects = "auto";
-    bool as_json = false, no_price = false, compare = false, depth = false;
-    std::optional<int> sh_degree;
-    std::optional<std::string> kernel;
-    DatasetOptions data;
-};
-
-struct Subject {
-    bool training = false;
-    SplatModel model;
-    std::vector<View> views;
-    Dataset dataset;
-    std::vector<ImageU8> photos;
-};
-
-int kernel_of(const PlanFlags& flags) {
-    if (!flags.kernel) return TrainOptions{}.kernel;
-    const auto kernel = kernel_from_name(*flags.kernel);
-    if (!kernel)
-        throw Error("--kernel " + *flags.kernel, "no such kernel",
-                    "See `darb train --help` for their names.");
-    return *kernel;
-}
-
-Subject open(const PlanFlags& flags) {
-    Subject s;
-    s.training = !is_scene(flags.what);
-    const auto refuse = [&](bool given, const char* flag) {
-        if (given)
-            throw Error(fmt::format("darb plan {} {}", flags.what.string(), flag),
-                        s.training ? "is for a scene, and this is a data set"
-                                   : "is for a data set, and this is a scene",
-                        "Leave it out.");
-    };
-    if (s.training) {
-        refuse(flags.depth, "--depth");
-        refuse(!flags.cameras.empty(), "--cameras");
-        s.dataset = load_dataset(flags.what, flags.data);
-        if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
-            s.photos = load_photos(s.dataset.views);
-        return s;
-    }
-    refuse(flags.sh_degree.has_value(), "--sh-degree");
-    refuse(flags.kernel.has_value(), "--kernel");
-    s.model = load_scene(flags.what);
-    if (!flags.cameras.empty()) s.views = load_cameras(flags.cameras, flags.data);
-    return s;
-}
-
-int degree_of(const Subject& s, const PlanFlags& flags) {
-    return s.training ? flags.sh_degree.value_or(TrainOptions{}.sh_degree) : s.model.sh_degree;
-}
-
-EffectPlan plan_of(const Subject& s, const PlanFlags& flags, const EffectChoice& choice) {
-    return s.training
-               ? plan_training(s.dataset, s.photos, degree_of(s, flags), choice, kernel_of(flags))
-               : plan_rendering(s.model, s.views, {.depth = flags.depth}, choice);
-}
-
-Measured measure(const Subject& s, const PlanFlags& flags, const EffectPlan& plan) {
-    DeviceOptions device;
-    device.select = flags.device;
-    if (s.training) {
-        TrainOptions train;
-        train.kernel = kernel_of(flags);
-        return measure_training(device, s.dataset, train, plan);
-    }
-    std::vector<View> views = s.views;
-    if (views.empty())
-        for (const Camera& camera : orbit_views(s.model, 4, 640, 480).cameras)
-            views.emplace_back().camera = camera;
-    return measure_rendering(device, s.model, views, plan);
-}
-
 // none, auto and all as wholes.
-json compare_choices(const Subject& s, const PlanFlags& flags) {
+json compare_choices(const PlanSubject& s, const PlanFlags& flags) {
     json list = json::array();
     for (const char* name : {"none", "auto", "all"}) {
-        const Measured m = measure(s, flags, plan_of(s, flags, parse_effects(name)));
+        const Measured m = measure_subject(s, flags, plan_of(s, flags, parse_effects(name)));
         list.push_back(
             {{"effects", name}, {"ms", m.ms}, {"spread_ms", m.spread_ms}, {"peak_bytes", m.bytes}});
         if (flags.as_json) continue;
@@ -112,17 +31,17 @@ json compare_choices(const Subject& s, const PlanFlags& flags) {
 
 int run_plan(const PlanFlags& flags) {
     const EffectChoice choice = parse_effects(flags.effects);
-    kernel_of(flags);  // a bad name fails before any reading
-    const Subject s = open(flags);
+    const PlanSubject s = open_subject(flags);
     EffectPlan plan = plan_of(s, flags, choice);
     const bool empty = !s.training && s.model.size() == 0;
     EffectPrices prices;
     if (!empty && (!flags.no_price || flags.compare)) {
-        const Measured base = measure(s, flags, plan);
+        const Measured base = measure_subject(s, flags, plan);
         plan.note_frame(base.huge_splats, base.longest_list);
         if (!flags.no_price)
-            prices = price_effects(plan, base, s.training, degree_of(s, flags),
-                                   [&](const EffectPlan& p) { return measure(s, flags, p); });
+            prices =
+                price_effects(plan, base, s.training, degree_of(s, flags),
+                              [&](const EffectPlan& p) { return measure_subject(s, flags, p); });
     }
     if (!flags.as_json) print_priced(plan, prices, s.training);
     const char* kind = s.training ? "data set" : "scene";

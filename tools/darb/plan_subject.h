@@ -1,0 +1,41 @@
+// What darb plan looks at: a data set to train on or a scene to render, with its plan and what
+// frames or iterations of it cost.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/render/effect_plan.h"
+#include "engine/scene/splat_model.h"
+#include "tools/darb/plan_price.h"
+
+namespace darb {
+
+struct PlanFlags {
+    std::filesystem::path what, cameras;
+    std::string device, effects = "auto";
+    bool as_json = false, no_price = false, compare = false, depth = false;
+    std::optional<int> sh_degree;
+    std::optional<std::string> kernel;
+    DatasetOptions data;
+};
+
+struct PlanSubject {
+    bool training = false;
+    SplatModel model;  // of a scene, as are the views of --cameras
+    std::vector<View> views;
+    Dataset dataset;  // of training
+    std::vector<ImageU8> photos;
+};
+
+/// Throws Error where the path cannot be read or a flag is for the other kind.
+PlanSubject open_subject(const PlanFlags& flags);
+int degree_of(const PlanSubject& s, const PlanFlags& flags);
+EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectChoice& choice);
+/// On the device that the flags name; a scene without cameras is looked at from around it.
+Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan);
+
+}  // namespace darb
