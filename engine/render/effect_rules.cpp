@@ -118,10 +118,8 @@ std::optional<double> footprint(const Camera& camera, const double* point) {
     return p.z / std::max(camera.fx, camera.fy);
 }
 
-// The pixel filter that every splat's covariance is widened by is a convolution where the kernel is
-// a Gaussian. Where it is not, splats near the size of a pixel come out too bright, and the
-// compensation of anti-aliasing gains in training (raised cosine at 200 px: 0.3 dB on fox, 0.7 dB
-// on miku plush).
+// Raised cosine and half-cosine squared gained in training where the footprints did not call for
+// it, the Gaussian did not (docs/effects.md); the other kernels follow those two.
 EffectRow antialias_rule(const Dataset& dataset, int kernel) {
     EffectRow row;
     std::size_t wide = 0;
@@ -153,8 +151,8 @@ EffectRow antialias_rule(const Dataset& dataset, int kernel) {
                            100 * row.measured, kFootprintRatio, 100 * kFootprintShare);
     if (!row.on && kernel != KERNEL_GAUSSIAN) {
         row.on = true;
-        row.reason = fmt::format("{}: the pixel filter is exact for the Gaussian alone",
-                                 kernel_name(kernel));
+        row.reason =
+            fmt::format("{}: kernels but the Gaussian train with it", kernel_name(kernel));
     }
     return row;
 }

@@ -68,6 +68,17 @@ TEST_F(RunFolder, schedule_of_3dgs_is_what_is_trained_and_other_options_count) {
     EXPECT_NE(o.err.find("--schedule 3dgs"), std::string::npos) << o.err;
 }
 
+TEST_F(RunFolder, the_plan_knows_the_kernel) {
+    const auto antialias = [&](const char* options) {
+        EXPECT_EQ(train(std::string("--iterations 1 -q ") + options).code, 0);
+        return settings()["effects"]["antialias"].get<bool>();
+    };
+    EXPECT_FALSE(antialias("--kernel gaussian"));
+    EXPECT_TRUE(antialias("--kernel sinc"));
+    EXPECT_FALSE(antialias("--kernel sinc --effects=-antialias"));
+    EXPECT_FALSE(antialias("--kernel sinc --schedule 3dgs"));
+}
+
 TEST_F(RunFolder, an_opacity_reset_leaves_what_can_be_seen) {
     ASSERT_EQ(train("--iterations 1 -q --prune-opacity 0").code, 0);
     EXPECT_NEAR(settings()["opacity_reset"][1].get<double>(), 0.01, 1e-6);
