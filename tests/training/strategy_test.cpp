@@ -154,6 +154,24 @@ TEST(Regularisers, act_on_the_unseen_by_the_number_of_photos) {
     }
 }
 
+TEST(Regularisers, fade_what_no_photo_shows) {
+    for (const int views : {6, 60}) {
+        const TinyTraining t = tiny_training({.views = views});
+        SplatModel start = t.start();
+        start.position[1] = 1000;
+        Trainer trainer(shared_device(), t.dataset, t.photos, start, t.options);
+        run_to(trainer, 1);
+        const float first = trainer.model().opacity[0];
+        run_to(trainer, 2);
+        const float second = trainer.model().opacity[0];
+        if (views == 6)
+            EXPECT_LT(first, start.opacity[0]);
+        else
+            EXPECT_EQ(first, start.opacity[0]);
+        EXPECT_LT(second, first);
+    }
+}
+
 TEST(GrowthTarget, follows_its_rule_to_the_limit) {
     TrainOptions options;
     use_strategy(Strategy::mcmc, options);
