@@ -151,8 +151,7 @@ EffectRow antialias_rule(const Dataset& dataset, int kernel) {
                            100 * row.measured, kFootprintRatio, 100 * kFootprintShare);
     if (!row.on && kernel != KERNEL_GAUSSIAN) {
         row.on = true;
-        row.reason =
-            fmt::format("{}: kernels but the Gaussian train with it", kernel_name(kernel));
+        row.reason = fmt::format("{}: kernels but the Gaussian train with it", kernel_name(kernel));
     }
     return row;
 }
