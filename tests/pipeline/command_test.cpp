@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -198,6 +199,29 @@ TEST(Command, effects_begin_with_a_minus_or_a_base) {
     const json plan = json::parse(o.out);
     for (const json& row : plan["effects"])
         EXPECT_EQ(row["on"].get<bool>(), row["effect"] == "lens") << row.dump();
+}
+
+TEST(Command, the_plan_prices_the_lens_where_photos_are_distorted) {
+    const auto lens_row = [](const fs::path& dataset, const char* option) {
+        const Outcome o = darb("plan " + dataset.string() + " -r 8 --json" + option);
+        EXPECT_EQ(o.code, 0) << o.err;
+        const json plan = json::parse(o.out);
+        for (const json& row : plan["effects"])
+            if (row["effect"] == "lens") return row;
+        return json::object();
+    };
+    json cameras = json::parse(read_text_file(kScene + "/transforms_train.json"));
+    for (json& frame : cameras["frames"])
+        frame["file_path"] = kScene + "/" + frame["file_path"].get<std::string>();
+    const fs::path straight = scratch() / "straight.json", distorted = scratch() / "distorted.json";
+    std::ofstream(straight) << cameras.dump();
+    cameras["k1"] = 0.05;
+    std::ofstream(distorted) << cameras.dump();
+    EXPECT_FALSE(lens_row(straight, "").contains("price"));
+    const json row = lens_row(distorted, " --lens original");
+    EXPECT_EQ(row["on"], true) << row.dump();
+    ASSERT_TRUE(row.contains("price")) << row.dump();
+    EXPECT_TRUE(std::isfinite(row["price"]["ms"].get<double>()));
 }
 
 TEST(Command, train_without_a_report_writes_none) {

@@ -40,7 +40,7 @@ int run_plan(const PlanFlags& flags) {
         plan.note_frame(base.huge_splats, base.longest_list);
         if (!flags.no_price)
             prices =
-                price_effects(plan, base, s.training, degree_of(s, flags),
+                price_effects(plan, base, switchable_effects(s, flags), degree_of(s, flags),
                               [&](const EffectPlan& p) { return measure_subject(s, flags, p); });
     }
     if (!flags.as_json) print_priced(plan, prices, s.training);

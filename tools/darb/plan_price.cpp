@@ -93,14 +93,11 @@ Measured measure_training(const DeviceOptions& device_options, const Dataset& da
                    trainer.counters().longest_list);
 }
 
-EffectPrices price_effects(const EffectPlan& plan, const Measured& base, bool training,
-                           int most_degree,
+EffectPrices price_effects(const EffectPlan& plan, const Measured& base,
+                           const std::vector<int>& effects, int most_degree,
                            const std::function<Measured(const EffectPlan&)>& with) {
     EffectPrices prices(EFFECT_COUNT);
-    for (int e = 0; e < EFFECT_COUNT; ++e) {
-        const bool has = training ? e != EFFECT_DEPTH && e != EFFECT_LENS
-                                  : e != EFFECT_EXPOSURE && e != EFFECT_ALPHA;
-        if (!has || (e == EFFECT_VIEW_COLOUR && most_degree == 0)) continue;
+    for (const int e : effects) {
         EffectPlan other = plan;
         EffectRow& row = other.row(e);
         row.on = !row.on;

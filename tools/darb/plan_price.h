@@ -31,10 +31,11 @@ Measured measure_rendering(const DeviceOptions& device, const SplatModel& model,
 Measured measure_training(const DeviceOptions& device, const Dataset& dataset,
                           const TrainOptions& options, const EffectPlan& plan);
 
-/// with(plan) measures; base: what it said of the plan itself. Every effect that can be switched
-/// is, one at a time. No value for those that this work does not have.
-EffectPrices price_effects(const EffectPlan& plan, const Measured& base, bool training,
-                           int most_degree, const std::function<Measured(const EffectPlan&)>& with);
+/// Switches each of `effects` in turn. with(plan) measures; base: what it said of the plan itself.
+/// No value for the other effects.
+EffectPrices price_effects(const EffectPlan& plan, const Measured& base,
+                           const std::vector<int>& effects, int most_degree,
+                           const std::function<Measured(const EffectPlan&)>& with);
 
 /// A row an effect, with its price where there is one.
 void print_priced(const EffectPlan& plan, const EffectPrices& prices, bool training);

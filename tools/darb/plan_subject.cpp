@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
 #include "engine/kernels/kernel_family.h"
@@ -19,6 +21,10 @@ int kernel_of(const PlanFlags& flags) {
         throw Error("--kernel " + *flags.kernel, "no such kernel",
                     "See `darb train --help` for their names.");
     return *kernel;
+}
+
+bool keeps_lens(const Dataset& dataset) {
+    return std::ranges::any_of(dataset.views, [](const View& v) { return v.camera.lens.active; });
 }
 
 }  // namespace
@@ -40,6 +46,13 @@ PlanSubject open_subject(const PlanFlags& flags) {
         s.dataset = load_dataset(flags.what, flags.data);
         if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
             s.photos = load_photos(s.dataset.views);
+        if (std::ranges::any_of(s.dataset.views,
+                                [](const View& v) { return v.lens.distorted(); })) {
+            DatasetOptions other = flags.data;
+            other.original_where_wide = false;
+            other.original_lens = !keeps_lens(s.dataset);
+            s.other_lens = load_dataset(flags.what, other);
+        }
         return s;
     }
     refuse(flags.sh_degree.has_value(), "--sh-degree");
@@ -59,13 +72,27 @@ EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectCho
                : plan_rendering(s.model, s.views, {.depth = flags.depth}, choice);
 }
 
+std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags) {
+    std::vector<int> effects;
+    for (int e = 0; e < EFFECT_COUNT; ++e) {
+        const bool has = e == EFFECT_VIEW_COLOUR ? degree_of(s, flags) > 0
+                         : e == EFFECT_LENS      ? !s.training || s.other_lens.has_value()
+                         : e == EFFECT_DEPTH
+                             ? !s.training
+                             : s.training || (e != EFFECT_EXPOSURE && e != EFFECT_ALPHA);
+        if (has) effects.push_back(e);
+    }
+    return effects;
+}
+
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {
     DeviceOptions device;
     device.select = flags.device;
     if (s.training) {
         TrainOptions train;
         train.kernel = kernel_of(flags);
-        return measure_training(device, s.dataset, train, plan);
+        const bool other = s.other_lens && plan.on(EFFECT_LENS) != keeps_lens(s.dataset);
+        return measure_training(device, other ? *s.other_lens : s.dataset, train, plan);
     }
     std::vector<View> views = s.views;
     if (views.empty())

@@ -29,12 +29,16 @@ struct PlanSubject {
     std::vector<View> views;
     Dataset dataset;  // of training
     std::vector<ImageU8> photos;
+    std::optional<Dataset> other_lens;  // where photos are distorted: with lens, where dataset is
+                                        // without, and the other way round
 };
 
 /// Throws Error where the path cannot be read or a flag is for the other kind.
 PlanSubject open_subject(const PlanFlags& flags);
 int degree_of(const PlanSubject& s, const PlanFlags& flags);
 EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectChoice& choice);
+/// Those of EFFECT_COUNT that can be on or off for this subject.
+std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags);
 /// On the device that the flags name; a scene without cameras is looked at from around it.
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan);
 
