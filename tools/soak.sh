@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Trains ITERATIONS (default 10,000) on the shipped scene without density control, samples the process's memory
-# every second, and fails unless the last fifth of the run holds at most 2 % more than the fifth before it.
+# Trains ITERATIONS (default 10,000) on the shipped scene, with density control to the end under a cap of splats, and an
+# evaluation, a checkpoint and a scene every tenth; samples the process's memory every second, and fails unless the last
+# fifth of the run holds at most 2 % more than the fifth before it.
 #   tools/soak.sh [ITERATIONS]
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -9,8 +10,10 @@ darb=${DARB:-build/darb} # the command under test
 iterations=${1:-10000}
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-"$darb" train assets/scene -o "$out" -r 4 --iterations "$iterations" --densify-until-iter 0 \
-    --test-iterations "$iterations" --save-iterations "$iterations" -q &
+tenths=$(seq $((iterations / 10)) $((iterations / 10)) "$iterations")
+# shellcheck disable=SC2086 # a word each
+"$darb" train assets/scene -o "$out" -r 4 --eval --iterations "$iterations" --densify-until-iter "$iterations" \
+    --max-splats 6000 --test-iterations $tenths --save-iterations $tenths --checkpoint-iterations $tenths -q &
 run=$!
 while kill -0 $run 2>/dev/null; do
     awk '/VmRSS/ { print $2 }' "/proc/$run/status" 2>/dev/null || true

@@ -71,8 +71,8 @@ std::string footprints(const PsiResult& r, const DerivedKernel& kernel) {
     const double end = shown_radius(kernel) * std::sqrt(std::max({1.0, r.exact, r.best}));
     const std::string x = "distance d (standard deviations)";
     Plot both{"Projection and splats", x, "", {}};
-    both.series = {curve("projection", end, truth), curve("psi", end, splat(r.exact)),
-                   curve("least squares", end, splat(r.best))};
+    both.series = {curve("psi", end, splat(r.exact)), curve("least squares", end, splat(r.best)),
+                   curve("as it is", end, splat(1)), curve("projection", end, truth)};
     Plot rest{"Splat less projection", x, "", {}};
     const auto error = [&](double scale) {
         return [&, scale](double q) { return splat(scale)(q) - truth(q); };
