@@ -122,7 +122,7 @@ std::string train_cost_html(const TrainCostResult& result) {
     }
     return html_page(
         result.dataset,
-        fmt::format("What accuracy costs in training: {} seeds of {} iterations; {}, {}",
+        fmt::format("What accuracy costs in training: seeds {}, iterations {}; {}, {}",
                     result.seeds, result.iterations, result.device, result.driver),
         "<div class='plots'>" + svg_plot(ends) + svg_plot(gradients) + svg_plot(curves) +
             "</div>\n" + numbers(result) +

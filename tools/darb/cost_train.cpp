@@ -44,7 +44,7 @@ int train_cost(const CostFlags& flags) {
         measure_train_cost(device, dataset, run.train, plan, [&](const std::string& line) {
             if (!flags.quiet) fmt::print(stderr, "{}\n", line);
         });
-    fmt::print("{}: {} iterations, {} seeds, {}\n\n{}", flags.train, result.iterations,
+    fmt::print("{}: iterations {}, seeds {}, {}\n\n{}", flags.train, result.iterations,
                result.seeds, result.device, train_cost_table(result));
     write_json(flags.json, train_cost_json(result));
     if (!flags.html.empty()) write_file_atomic(flags.html, train_cost_html(result));
