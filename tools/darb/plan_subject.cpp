@@ -23,8 +23,15 @@ int kernel_of(const PlanFlags& flags) {
     return *kernel;
 }
 
-bool keeps_lens(const Dataset& dataset) {
-    return std::ranges::any_of(dataset.views, [](const View& v) { return v.camera.lens.active; });
+bool distorted(const Dataset& dataset) {
+    return std::ranges::any_of(dataset.views, [](const View& v) { return v.lens.distorted(); });
+}
+
+// As loaded, photos may have been straightened.
+Dataset through_the_lens(const PlanFlags& flags) {
+    DatasetOptions original = flags.data;
+    original.original_lens = true;
+    return load_dataset(flags.what, original);
 }
 
 }  // namespace
@@ -46,13 +53,6 @@ PlanSubject open_subject(const PlanFlags& flags) {
         s.dataset = load_dataset(flags.what, flags.data);
         if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
             s.photos = load_photos(s.dataset.views);
-        if (std::ranges::any_of(s.dataset.views,
-                                [](const View& v) { return v.lens.distorted(); })) {
-            DatasetOptions other = flags.data;
-            other.original_where_wide = false;
-            other.original_lens = !keeps_lens(s.dataset);
-            s.other_lens = load_dataset(flags.what, other);
-        }
         return s;
     }
     refuse(flags.sh_degree.has_value(), "--sh-degree");
@@ -73,15 +73,24 @@ EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectCho
 }
 
 std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags) {
+    const auto has = [&](int effect) {
+        switch (effect) {
+            case EFFECT_VIEW_COLOUR:
+                return degree_of(s, flags) > 0;
+            case EFFECT_LENS:
+                return !s.training || distorted(s.dataset);
+            case EFFECT_DEPTH:
+                return !s.training;
+            case EFFECT_EXPOSURE:
+            case EFFECT_ALPHA:
+                return s.training;
+            default:
+                return true;
+        }
+    };
     std::vector<int> effects;
-    for (int e = 0; e < EFFECT_COUNT; ++e) {
-        const bool has = e == EFFECT_VIEW_COLOUR ? degree_of(s, flags) > 0
-                         : e == EFFECT_LENS      ? !s.training || s.other_lens.has_value()
-                         : e == EFFECT_DEPTH
-                             ? !s.training
-                             : s.training || (e != EFFECT_EXPOSURE && e != EFFECT_ALPHA);
-        if (has) effects.push_back(e);
-    }
+    for (int e = 0; e < EFFECT_COUNT; ++e)
+        if (has(e)) effects.push_back(e);
     return effects;
 }
 
@@ -91,8 +100,9 @@ Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const Eff
     if (s.training) {
         TrainOptions train;
         train.kernel = kernel_of(flags);
-        const bool other = s.other_lens && plan.on(EFFECT_LENS) != keeps_lens(s.dataset);
-        return measure_training(device, other ? *s.other_lens : s.dataset, train, plan);
+        if (plan.on(EFFECT_LENS) && distorted(s.dataset))
+            return measure_training(device, through_the_lens(flags), train, plan);
+        return measure_training(device, s.dataset, train, plan);
     }
     std::vector<View> views = s.views;
     if (views.empty())

@@ -29,8 +29,6 @@ struct PlanSubject {
     std::vector<View> views;
     Dataset dataset;  // of training
     std::vector<ImageU8> photos;
-    std::optional<Dataset> other_lens;  // where photos are distorted: with lens, where dataset is
-                                        // without, and the other way round
 };
 
 /// Throws Error where the path cannot be read or a flag is for the other kind.
