@@ -214,7 +214,7 @@ std::string settings_text(const TrainOptions& o) {
                   {"random_background", o.random_background},
                   {"lambda_dssim", o.lambda_dssim},
                   {"position_lr", {o.position_lr_start(), o.position_lr_end()}},
-                  {"scale_lr", o.scale_lr},
+                  {"scale_lr", o.scale_rate()},
                   {"rotation_lr", o.rotation_lr},
                   {"opacity_lr", o.opacity_lr},
                   {"sh_lr", {o.sh_dc_lr, o.sh_rest_lr}},
@@ -226,16 +226,18 @@ std::string settings_text(const TrainOptions& o) {
                   {"clone_split_extent", o.clone_split_extent},
                   {"prune_opacity", o.prune_opacity},
                   {"prune_extent", o.prune_extent},
+                  {"largest_scale", o.largest_scale},
                   {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
                   {"max_splats", o.max_splats},
                   {"regularisers", {o.opacity_weight, o.scale_weight}},
                   {"initial_opacity", o.initial_opacity},
                   {"random_points", o.random_points}};
-    // What adc has not stands only where it is: its text is that of earlier versions.
+    // What adc of a Gaussian has not stands only where it is: its text is that of earlier versions.
     if (o.strategy != Strategy::adc) {
         settings["strategy"] = strategy_name(o.strategy);
         settings["initial_scale"] = o.initial_scale;
     }
+    if (o.length_scale() != 1) settings["length_scale"] = o.length_scale();
     if (o.strategy == Strategy::mcmc) settings["noise_lr"] = o.noise_lr;
     if (o.strategy == Strategy::budget) settings["opacity_decay"] = o.opacity_decay;
     if (o.resolution_ramp) settings["resolution_ramp"] = true;

@@ -125,14 +125,15 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     // A hair above: the default is what is pruned, too, and a point that no frame has shown stays.
     const double opacity = std::min(1.001 * options.initial_opacity, 0.999);
     const auto logit = static_cast<float>(std::log(opacity / (1 - opacity)));
+    const double initial_scale = options.initial_scale * options.length_scale();
     for (size_t i = 0; i < model.size(); ++i) {
         model.rotation[4 * i] = 1.0f;
         model.opacity[i] = logit;
         for (int a = 0; a < 3; ++a) {
             const size_t at = 3 * i + a;
             model.position[at] = static_cast<float>(points.position[at] - model.origin[a]);
-            model.log_scale[at] = static_cast<float>(0.5 * std::log(distance2[i]) +
-                                                     std::log(double{options.initial_scale}));
+            model.log_scale[at] =
+                static_cast<float>(0.5 * std::log(distance2[i]) + std::log(initial_scale));
             model.sh_dc[at] = static_cast<float>((points.colour[at] / 255.0 - 0.5) / kShC0);
         }
     }

@@ -75,10 +75,19 @@ struct TrainOptions {
     // The first iterations see smaller photos; see trainer/resolution_ramp.h.
     bool resolution_ramp = false;
 
+    // Share of the scene extent beyond which no scale grows; 0: no limit. A splat that outgrows the
+    // scene is a veil before cameras that no photo was taken from.
+    float largest_scale = 1;
+
     // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
     // extents) in the loss. They take from splats what no photo holds up: a quarter fewer on
     // monstree at 200 px, at equal quality.
     float opacity_weight = 0.01f, scale_weight = 0.01f;
+
+    // The lengths above and below are a Gaussian's. A kernel that covers less of the picture at the
+    // same scale has them longer and learns its scales faster; one that covers more keeps them
+    // (ARCHITECTURE has both measured). false: as they are, for every kernel.
+    bool lengths_by_area = true;
 
     // Start.
     float initial_opacity = 0.1f;
@@ -91,6 +100,11 @@ struct TrainOptions {
         const auto seen = static_cast<float>(2 * accuracy.value(kAlphaCutoff));
         return std::clamp(2.0f * prune_opacity, std::max(0.01f, seen), 0.9f);
     }
+    /// What multiplies every length.
+    double length_scale() const {
+        return lengths_by_area ? std::max(1.0, equal_area_scale(kernel, footprint)) : 1;
+    }
+    float scale_rate() const { return length_scale() > 1 ? 1.5f * scale_lr : scale_lr; }
     float position_lr_scale() const {
         return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(iterations, 1))));
     }

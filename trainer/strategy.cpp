@@ -55,6 +55,8 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.prune_opacity = 0.005f;
     options.opacity_weight = options.scale_weight = 0;
     options.random_background = false;
+    options.lengths_by_area = false;
+    options.largest_scale = 0;
 }
 
 bool refines_after(const TrainOptions& options, int iteration) {

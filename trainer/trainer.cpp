@@ -156,14 +156,18 @@ AdamStep Trainer::rates(int iteration) const {
         static_cast<float>(std::pow(options_.final_lr_share, std::max(0.0, 2 * t - 1)));
     AdamStep step;
     step.position = static_cast<float>(position_rate(iteration) * extent_);
-    step.scale = options_.scale_lr * late;
+    step.scale = options_.scale_rate() * late;
     step.rotation = options_.rotation_lr * late;
     step.opacity = options_.opacity_lr * late;
     step.sh_dc = options_.sh_dc_lr * late;
     step.sh_rest = options_.sh_rest_lr * late * (probe_views_.empty() ? 1.0f : kProbeRestRate);
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
-    step.scale_weight = options_.scale_weight / static_cast<float>(extent_);
+    step.scale_weight =
+        options_.scale_weight / static_cast<float>(options_.length_scale() * extent_);
+    if (options_.largest_scale > 0)
+        step.largest_log_scale = static_cast<float>(
+            std::log(options_.largest_scale * options_.length_scale() * extent_));
     step.regularise_unseen = regularises_unseen(options_, train_views_.size(), iteration);
     return step;
 }
@@ -319,10 +323,11 @@ void Trainer::density_control(int iteration) {
             std::min({options_.max_splats, within_memory, GpuSplats::max_count(*device_, true),
                       pairs_are_near ? splats_.count() : 0xFFFFFFFFu});
         args.gradient_threshold = options_.densify_grad_threshold;
-        args.clone_split_scale = static_cast<float>(options_.clone_split_extent * extent_);
+        const double length = options_.length_scale() * extent_;
+        args.clone_split_scale = static_cast<float>(options_.clone_split_extent * length);
         args.prune_opacity = options_.prune_opacity;
         args.prune_scale = iteration > options_.opacity_reset_interval
-                               ? static_cast<float>(options_.prune_extent * extent_)
+                               ? static_cast<float>(options_.prune_extent * length)
                                : 0.0f;
         args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
         const DensityResult result = refine(iteration, args, limit);

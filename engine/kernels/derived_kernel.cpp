@@ -172,6 +172,16 @@ double DerivedKernel::covariance_scale(Footprint footprint) const {
     return footprint == Footprint::psi ? scale_ : 1;
 }
 
+double DerivedKernel::equal_area_scale(Footprint footprint) const {
+    if (row_.form == KERNEL_FORM_GAUSSIAN) return 1;
+    // The area element is pi dq, a Gaussian's integral 2 pi; q = end (1 - s^2) makes half powers at
+    // the edge analytic.
+    const double end = pulses_.front().end;
+    const double integral =
+        integrate_unit([&](double s) { return 2 * end * s * value(footprint, end * (1 - s * s)); });
+    return std::sqrt(2 / (covariance_scale(footprint) * integral));
+}
+
 double DerivedKernel::radius_quantile(double u) const {
     DARB_CHECK(u >= 0 && u < 1, "u = {}", u);
     const double target = u * radial_mass_;

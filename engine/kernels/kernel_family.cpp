@@ -78,6 +78,10 @@ double covariance_scale(int kernel, Footprint footprint) {
     return derived_kernel(kernel).covariance_scale(footprint);
 }
 
+double equal_area_scale(int kernel, Footprint footprint) {
+    return derived_kernel(kernel).equal_area_scale(footprint);
+}
+
 double kernel_radius_quantile(int kernel, double u) {
     return derived_kernel(kernel).radius_quantile(u);
 }

@@ -47,6 +47,10 @@ double kernel_psi(int kernel);
 /// exact. Rings leave it, so that the limit is all that they change.
 double covariance_scale(int kernel, Footprint footprint);
 
+/// The scale of a splat over that of the Gaussian that covers as much of the picture: the profiles
+/// of both have the same integral over the plane. With rings: of the first pulse.
+double equal_area_scale(int kernel, Footprint footprint);
+
 /// Inverse of the cumulative radial density r^2 w(r^2) of the 3D kernel: u in [0,1) -> r (in units
 /// of the standard deviation parameter). Splits draw children's offsets from it; gaussian: chi_3;
 /// with rings: of the first pulse.

@@ -67,11 +67,12 @@ class DerivedKernel {
     const std::vector<Pulse>& pulses() const { return pulses_; }
     /// Integral of r^power w(r^2) from 0 to radius.
     double radial_moment(double radius, int power) const;
-    /// See kernel_family.h for the five below.
+    /// See kernel_family.h for the six below.
     double value(Footprint footprint, double q) const;
     double slope(Footprint footprint, double q) const;
     double reach(Footprint footprint, double opacity, double cutoff) const;
     double covariance_scale(Footprint footprint) const;
+    double equal_area_scale(Footprint footprint) const;
     double radius_quantile(double u) const;
 
   private:

@@ -91,7 +91,8 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                             step.inverse_sqrt_correction2,
                                             step.opacity_weight / n,
                                             step.scale_weight / (3.0f * n),
-                                            step.regularise_unseen ? 1u : 0u};
+                                            step.regularise_unseen ? 1u : 0u,
+                                            step.largest_log_scale};
         const Groups g = groups_for(range.count);
         commands.dispatch(project_pipeline(sh_degree), args,
                           {cameras,

@@ -2,6 +2,7 @@
 // frame. blend_backward -> project_backward, which ends in the Adam step or in stored gradients.
 #pragma once
 
+#include <limits>
 #include <map>
 
 #include "engine/render/blend_backward.h"
@@ -18,6 +19,7 @@ struct AdamStep {
     // shows, or of all.
     float opacity_weight = 0, scale_weight = 0;
     bool regularise_unseen = false;
+    float largest_log_scale = std::numeric_limits<float>::max();  // none grows beyond it
 };
 /// rates: plain learning rates; t: the number of this step, from 1.
 AdamStep adam_step(const AdamStep& rates, int t);

@@ -94,7 +94,8 @@ void update_splat(uint i, SplatGradient g) {
         position[at] = adam_step(position[at], m, g.position[c], args.rate_position);
         m_position[at] = m;
         m = m_scale[at];
-        log_scale[at] = adam_step(log_scale[at], m, g.log_scale[c], args.rate_scale);
+        const float before = log_scale[at];
+        log_scale[at] = min(adam_step(before, m, g.log_scale[c], args.rate_scale), max(before, args.largest_log_scale));
         m_scale[at] = m;
         m = m_dc[at];
         sh_dc[at] = adam_step(sh_dc[at], m, SH_C0 * g.colour[c], args.rate_dc);

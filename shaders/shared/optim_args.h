@@ -20,6 +20,7 @@ struct ProjectBackwardArgs {
     // splats that the frame shows, or with regularise_unseen = 1 over all.
     float opacity_weight, scale_weight;
     uint regularise_unseen;
+    float largest_log_scale;  // no scale grows beyond it (UPDATE = 1)
 };
 
 // What density control does with a splat; see densify_decide.comp.
@@ -53,7 +54,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 56);
+static_assert(sizeof(ProjectBackwardArgs) == 60);
 }  // namespace darb::gpu
 #endif
 #endif

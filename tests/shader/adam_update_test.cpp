@@ -1,5 +1,8 @@
 // The Adam step inside project_backward.comp against Adam in double, and what it must leave alone.
 #include "engine/reference/adam.h"
+
+#include <algorithm>
+
 #include "tests/support/backward_pass.h"
 #include "tests/support/compare.h"
 #include "tests/support/random_scene.h"
@@ -177,6 +180,30 @@ TEST(AdamUpdate, regularisers_leave_scales_beyond_their_limit) {
     const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
                                               state, training.partials, step);
     EXPECT_EQ(after.parameters[kLogScale], state.parameters[kLogScale]);
+}
+
+TEST(AdamUpdate, no_scale_grows_beyond_the_largest) {
+    Training training(20);
+    const PassState state = start_state(training.scene.model);
+    AdamStep step = adam_step(kRates, 1);
+    const auto updated = [&] {
+        return run_backward_pass(training.scene.model, training.scene.camera, 3, true, state,
+                                 training.partials, step);
+    };
+    const PassState free = updated();
+    std::vector<float> sorted = state.parameters[kLogScale];
+    std::sort(sorted.begin(), sorted.end());
+    step.largest_log_scale = sorted[30];  // half of them are larger already
+    const PassState limited = updated();
+    int held = 0;
+    for (size_t i = 0; i < 60; ++i) {
+        const float before = state.parameters[kLogScale][i];
+        const float limit = std::max(before, step.largest_log_scale);
+        EXPECT_EQ(limited.parameters[kLogScale][i], std::min(free.parameters[kLogScale][i], limit));
+        held += free.parameters[kLogScale][i] > limit;
+    }
+    EXPECT_GT(held, 3);
+    EXPECT_EQ(limited.moments, free.moments);
 }
 
 TEST(AdamUpdate, an_overflowed_frame_changes_nothing) {

@@ -80,6 +80,20 @@ TEST(InitialModel, a_cap_draws_from_the_whole_cloud) {
     EXPECT_GT(mean, 5 * std::exp(double(initial_model(d, {}).log_scale[3 * 500])));
 }
 
+TEST(InitialModel, a_splat_that_shows_less_than_a_gaussian_starts_wider) {
+    const Dataset d = looking_at(20, false);
+    const auto scale = [&](int kernel, bool lengths_by_area) {
+        TrainOptions options;
+        options.kernel = kernel;
+        options.lengths_by_area = lengths_by_area;
+        return std::exp(initial_model(d, options).log_scale[0]);
+    };
+    const float gaussian = scale(KERNEL_GAUSSIAN, true);
+    EXPECT_NEAR(scale(KERNEL_RAISED_COSINE, true), 1.281634f * gaussian, 1e-6f);
+    EXPECT_EQ(scale(KERNEL_RAISED_COSINE, false), gaussian);
+    EXPECT_EQ(scale(KERNEL_HALF_COSINE_SQUARED, true), gaussian);  // shows more
+}
+
 TEST(InitialModel, no_points_become_random_ones) {
     TrainOptions options;
     options.random_points = 50;

@@ -269,6 +269,31 @@ TEST(Training, opacities_are_reset_when_the_next_iteration_begins) {
     EXPECT_LT(largest(), before - 1);
 }
 
+TEST(Training, a_kernel_that_covers_less_has_longer_lengths) {
+    TinyTraining t = tiny_training();
+    t.options.kernel = KERNEL_RAISED_COSINE;
+    const double length = equal_area_scale(t.options.kernel, t.options.footprint);
+    const auto trained = [&](bool by_area, double times) {
+        TinyTraining own = t;
+        own.options.lengths_by_area = by_area;
+        own.options.initial_scale *= static_cast<float>(times);
+        own.options.clone_split_extent *= static_cast<float>(times);
+        own.options.prune_extent *= static_cast<float>(times);
+        own.options.scale_weight /= static_cast<float>(times);
+        if (times > 1) own.options.scale_lr *= 1.5f;
+        Trainer trainer = own.trainer();
+        run_to(trainer, 40);
+        EXPECT_GT(trainer.counters().cloned_or_split, 5U);
+        return trainer.model();
+    };
+    const SplatModel by_area = trained(true, 1), by_hand = trained(false, length);
+    const SplatModel plain = trained(false, 1);
+    ASSERT_EQ(by_area.size(), by_hand.size());
+    for (size_t i = 0; i < by_area.log_scale.size(); ++i)
+        ASSERT_NEAR(by_area.log_scale[i], by_hand.log_scale[i], 1e-3) << i;
+    EXPECT_NE(by_area.size(), plain.size());
+}
+
 TEST(Training, splats_stop_growing_at_the_limit) {
     TinyTraining t = tiny_training();
     t.options.max_splats = 70;

@@ -86,6 +86,11 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
     command
+        .add_option("--largest-scale", t.largest_scale,
+                    "in scene extents: no splat grows beyond it; 0: no limit")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    command
         .add_option("--max-memory", t.max_memory_bytes,
                     "budget of device memory, as 2GB or 800MB: growth stops before it")
         ->transform(CLI::AsSizeValue(true));

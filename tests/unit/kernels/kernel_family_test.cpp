@@ -92,6 +92,37 @@ TEST(KernelFamily, FiveKernels_differPairwise) {
             }
 }
 
+TEST(KernelFamily, EqualAreaScale_isTheClosedForm) {
+    const double p2 = pi * pi;
+    const auto expect = [](int k, double half_integral) {  // of w dq: 1 for a Gaussian
+        EXPECT_NEAR(equal_area_scale(k, Footprint::psi),
+                    1 / std::sqrt(kernel_psi(k) * half_integral), 1e-13)
+            << kernel_name(k);
+    };
+    expect(KERNEL_GAUSSIAN, 1);
+    expect(KERNEL_RAISED_COSINE, 6.25 * (1.0 / 4 - 1 / p2));
+    expect(KERNEL_HALF_COSINE_SQUARED, 9 / pi);
+    expect(KERNEL_SINC, 18 / p2);
+    expect(KERNEL_INVERSE_QUADRATIC, std::log(10) / 2);
+    expect(KERNEL_PARABOLIC, 9.0 / 4);
+    EXPECT_NEAR(equal_area_scale(KERNEL_RAISED_COSINE, Footprint::psi), 1.281634, 1e-6);
+}
+
+TEST(KernelFamily, EqualAreaScale_ofTheExactFootprintIsThatOfItsIntegral) {
+    for (int k = 1; k < KERNEL_COUNT; ++k) {
+        const double integral = integrate(
+            [&](double q) { return kernel_value(k, Footprint::exact, q); }, 0, kernel_support(k));
+        EXPECT_NEAR(equal_area_scale(k, Footprint::exact), std::sqrt(2 / integral), 1e-10)
+            << kernel_name(k);
+    }
+}
+
+TEST(KernelFamily, EqualAreaScale_leavesRingsOut) {
+    for (const int k : {KERNEL_RAISED_COSINE, KERNEL_SINC})
+        EXPECT_NEAR(equal_area_scale(*kernel_with_pulses(k, 3), Footprint::psi),
+                    equal_area_scale(k, Footprint::psi), 1e-13);
+}
+
 TEST(KernelFamily, Psi_isThePrintedNumber) {
     EXPECT_NEAR(kernel_psi(KERNEL_RAISED_COSINE), 0.655153, 5e-7);
     EXPECT_NEAR(kernel_psi(KERNEL_HALF_COSINE_SQUARED), 1.363209, 5e-7);
