@@ -232,7 +232,7 @@ std::string settings_text(const TrainOptions& o) {
                   {"regularisers", {o.opacity_weight, o.scale_weight}},
                   {"initial_opacity", o.initial_opacity},
                   {"random_points", o.random_points}};
-    // What adc of a Gaussian has not stands only where it is: its text is that of earlier versions.
+    // What the defaults do not have stands only where it is.
     if (o.strategy != Strategy::adc) {
         settings["strategy"] = strategy_name(o.strategy);
         settings["initial_scale"] = o.initial_scale;

@@ -50,6 +50,7 @@ Training training_of(const check::HardCase& c) {
     o.position_lr_init = o.position_lr_final = 1e-3f;
     o.final_lr_share = 1;
     o.opacity_weight = o.scale_weight = 0;
+    o.largest_scale = 0;
     o.densify_from = kSteps;
     o.densify_until = kIterations + 1;
     o.densify_interval = 2;
@@ -88,7 +89,7 @@ std::vector<double> losses_in_double(const Training& t, const check::HardCase& c
     SplatModel model = c.scene.model;
     const TrainOptions& o = t.options;
     const double rates[] = {o.position_lr_init * extent,
-                            o.scale_lr,
+                            o.scale_rate(),
                             o.rotation_lr,
                             o.opacity_lr,
                             o.sh_dc_lr,
