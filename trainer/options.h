@@ -75,7 +75,7 @@ struct TrainOptions {
     // The first iterations see smaller photos; see trainer/resolution_ramp.h.
     bool resolution_ramp = false;
 
-    // Share of the scene extent beyond which no scale grows; 0: no limit. A splat that outgrows the
+    // Share of scene_reach beyond which no scale grows; 0: no limit. A splat that outgrows the
     // scene is a veil before cameras that no photo was taken from.
     float largest_scale = 1;
 

@@ -67,6 +67,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       options_(options),
       background_(options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset)),
+      reach_(scene_reach(dataset)),
       next_probe_(std::max(options.sh_interval, 1)),
       splats_(device, start_model(start, options), true),
       forward_(device, forward_options(options)),
@@ -166,8 +167,8 @@ AdamStep Trainer::rates(int iteration) const {
     step.scale_weight =
         options_.scale_weight / static_cast<float>(options_.length_scale() * extent_);
     if (options_.largest_scale > 0)
-        step.largest_log_scale = static_cast<float>(
-            std::log(options_.largest_scale * options_.length_scale() * extent_));
+        step.largest_log_scale =
+            static_cast<float>(std::log(options_.largest_scale * options_.length_scale() * reach_));
     step.regularise_unseen = regularises_unseen(options_, train_views_.size(), iteration);
     return step;
 }

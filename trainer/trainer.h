@@ -168,7 +168,7 @@ class Trainer {
     Device* device_;
     TrainOptions options_;
     glm::vec3 background_;
-    double extent_;
+    double extent_, reach_;           // of the scene
     std::vector<std::string> names_;  // of all views
     std::vector<int> train_views_;    // ascending
     std::vector<int> order_;          // of train_views_ in this epoch

@@ -145,6 +145,18 @@ double median_distance(const PointCloud& points, const glm::dvec3& from) {
     return *middle;
 }
 
+std::vector<glm::dvec3> training_centres(const Dataset& dataset) {
+    std::vector<glm::dvec3> centres;
+    for (const View& view : dataset.views)
+        if (!view.is_test) centres.push_back(view.camera.centre());
+    return centres;
+}
+
+glm::dvec3 mean_of(const std::vector<glm::dvec3>& centres) {
+    return std::accumulate(centres.begin(), centres.end(), glm::dvec3(0.0)) /
+           double(centres.size());
+}
+
 }  // namespace
 
 Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) {
@@ -162,12 +174,9 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) {
 }
 
 double scene_extent(const Dataset& dataset) {
-    std::vector<glm::dvec3> centres;
-    for (const View& view : dataset.views)
-        if (!view.is_test) centres.push_back(view.camera.centre());
+    const std::vector<glm::dvec3> centres = training_centres(dataset);
     if (centres.empty()) return 1;
-    const glm::dvec3 mean =
-        std::accumulate(centres.begin(), centres.end(), glm::dvec3(0.0)) / double(centres.size());
+    const glm::dvec3 mean = mean_of(centres);
     double largest = 0;
     for (const glm::dvec3& centre : centres)
         largest = std::max(largest, glm::distance(mean, centre));
@@ -175,6 +184,13 @@ double scene_extent(const Dataset& dataset) {
     if (dataset.points.size() == 0) return extent > kLeastExtent ? extent : 1;
     const double depth = median_distance(dataset.points, mean);
     return extent > kLeastShareOfDepth * depth ? extent : std::max(depth, kLeastExtent);
+}
+
+double scene_reach(const Dataset& dataset) {
+    const double extent = scene_extent(dataset);
+    const std::vector<glm::dvec3> centres = training_centres(dataset);
+    if (centres.empty() || dataset.points.size() == 0) return extent;
+    return std::max(extent, median_distance(dataset.points, mean_of(centres)) / 2);
 }
 
 }  // namespace darb

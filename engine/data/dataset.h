@@ -91,5 +91,8 @@ std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads = 0
 /// Where that says nothing, as one camera or several in one place stand there: the median distance
 /// to the points, and 1 where there are none.
 double scene_extent(const Dataset& dataset);
+/// What no splat need be larger than: the extent or, where photos are from nearly one place and it
+/// is small, half the median distance to the points.
+double scene_reach(const Dataset& dataset);
 
 }  // namespace darb

@@ -94,8 +94,9 @@ void update_splat(uint i, SplatGradient g) {
         position[at] = adam_step(position[at], m, g.position[c], args.rate_position);
         m_position[at] = m;
         m = m_scale[at];
-        const float before = log_scale[at];
-        log_scale[at] = min(adam_step(before, m, g.log_scale[c], args.rate_scale), max(before, args.largest_log_scale));
+        const float before = log_scale[at], largest = max(before, args.largest_log_scale);
+        const float after = adam_step(before, m, g.log_scale[c], args.rate_scale);
+        log_scale[at] = after > largest ? largest : after;  // not min: what is no number stays none
         m_scale[at] = m;
         m = m_dc[at];
         sh_dc[at] = adam_step(sh_dc[at], m, SH_C0 * g.colour[c], args.rate_dc);

@@ -86,8 +86,10 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
     command
-        .add_option("--largest-scale", t.largest_scale,
-                    "in scene extents: no splat grows beyond it; 0: no limit")
+        .add_option(
+            "--largest-scale", t.largest_scale,
+            "in scene extents, or in half distances to the points where these are more: no splat "
+            "grows beyond it; 0: no limit")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
     command

@@ -26,6 +26,7 @@ TEST(SceneExtent, is_that_of_the_training_cameras) {
     add_camera(dataset, {100, 0, 0}, true);
     add_point(dataset, {0, 0, 5});
     EXPECT_NEAR(scene_extent(dataset), 1.1, 1e-12);
+    EXPECT_NEAR(scene_reach(dataset), 2.5, 1e-6) << "half of the way to the points";
 }
 
 TEST(SceneExtent, of_cameras_in_one_place_is_the_middle_distance_of_the_points) {
