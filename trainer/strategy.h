@@ -22,7 +22,7 @@ void use_strategy(Strategy strategy, TrainOptions& options);
 
 /// What 3DGS does where the defaults depart from it (ARCHITECTURE says why they do): constant rates
 /// but the position's, those of its paper, pruning below 0.005, no regularisers, one background,
-/// the same lengths for every kernel.
+/// the same lengths for every kernel, no largest scale.
 /// Effects are not part of it: 3DGS has harmonics by the iteration, +sh, and neither anti-aliasing
 /// nor exposure.
 void use_3dgs_schedule(TrainOptions& options);

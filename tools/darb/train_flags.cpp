@@ -90,9 +90,13 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::PositiveNumber);
     command.add_option("--position-lr-final", t.position_lr_final, "default 1.6e-6, likewise")
         ->check(CLI::PositiveNumber);
-    for (auto [name, rate] : {std::pair{"--scaling-lr", &t.scale_lr},
-                              {"--rotation-lr", &t.rotation_lr},
-                              {"--opacity-lr", &t.opacity_lr}})
+    command
+        .add_option("--scaling-lr", t.scale_lr,
+                    "1.5 times with a kernel that covers less than a Gaussian, as raised_cosine")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    for (auto [name, rate] :
+         {std::pair{"--rotation-lr", &t.rotation_lr}, {"--opacity-lr", &t.opacity_lr}})
         command.add_option(name, *rate)->capture_default_str()->check(CLI::NonNegativeNumber);
     command
         .add_option("--final-lr-share", t.final_lr_share,
