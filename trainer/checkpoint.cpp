@@ -226,7 +226,7 @@ std::string settings_text(const TrainOptions& o) {
                   {"clone_split_extent", o.clone_split_extent},
                   {"prune_opacity", o.prune_opacity},
                   {"prune_extent", o.prune_extent},
-                  {"largest_scale", o.largest_scale},
+                  {"largest_scale", o.scale_limit()},
                   {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
                   {"max_splats", o.max_splats},
                   {"regularisers", {o.opacity_weight, o.scale_weight}},

@@ -77,7 +77,8 @@ struct TrainOptions {
 
     // Share of scene_reach beyond which no scale grows; 0: no limit. A splat that outgrows the
     // scene is a veil before cameras that no photo was taken from.
-    float largest_scale = 1;
+    // < 0: see scale_limit.
+    float largest_scale = -1;
 
     // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
     // extents) in the loss. They take from splats what no photo holds up: a quarter fewer on
@@ -103,6 +104,11 @@ struct TrainOptions {
     /// What multiplies every length.
     double length_scale() const {
         return lengths_by_area ? std::max(1.0, equal_area_scale(kernel, footprint)) : 1;
+    }
+    /// Unless given, 1 for kernels that cover less than a Gaussian: the others seldom pass it.
+    float scale_limit() const {
+        if (largest_scale >= 0) return largest_scale;
+        return length_scale() > 1 ? 1.0f : 0.0f;
     }
     float scale_rate() const { return length_scale() > 1 ? 1.5f * scale_lr : scale_lr; }
     float position_lr_scale() const {

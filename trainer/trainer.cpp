@@ -166,9 +166,9 @@ AdamStep Trainer::rates(int iteration) const {
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight =
         options_.scale_weight / static_cast<float>(options_.length_scale() * extent_);
-    if (options_.largest_scale > 0)
+    if (options_.scale_limit() > 0)
         step.largest_log_scale =
-            static_cast<float>(std::log(options_.largest_scale * options_.length_scale() * reach_));
+            static_cast<float>(std::log(options_.scale_limit() * options_.length_scale() * reach_));
     step.regularise_unseen = regularises_unseen(options_, train_views_.size(), iteration);
     return step;
 }

@@ -279,7 +279,7 @@ TEST(Training, a_kernel_that_covers_less_has_longer_lengths) {
         own.options.initial_scale *= static_cast<float>(times);
         own.options.clone_split_extent *= static_cast<float>(times);
         own.options.prune_extent *= static_cast<float>(times);
-        own.options.largest_scale *= static_cast<float>(times);
+        own.options.largest_scale = static_cast<float>(times);
         own.options.scale_weight /= static_cast<float>(times);
         if (times > 1) own.options.scale_lr *= 1.5f;
         Trainer trainer = own.trainer();

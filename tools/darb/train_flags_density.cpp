@@ -90,8 +90,7 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
         .add_option(
             "--largest-scale", t.largest_scale,
             "in scene extents, or in half distances to the points where these are more: no splat "
-            "grows beyond it; 0: no limit")
-        ->capture_default_str()
+            "grows beyond it; 0: no limit (default 1 with raised_cosine, else 0)")
         ->check(CLI::NonNegativeNumber);
     command
         .add_option("--max-memory", t.max_memory_bytes,
