@@ -76,8 +76,7 @@ struct TrainOptions {
     bool resolution_ramp = false;
 
     // Share of scene_reach beyond which no scale grows; 0: no limit. A splat that outgrows the
-    // scene is a veil before cameras that no photo was taken from.
-    // < 0: see scale_limit.
+    // scene is a veil before cameras that no photo was taken from. Below 0: as scale_limit says.
     float largest_scale = -1;
 
     // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
@@ -105,7 +104,8 @@ struct TrainOptions {
     double length_scale() const {
         return lengths_by_area ? std::max(1.0, equal_area_scale(kernel, footprint)) : 1;
     }
-    /// Unless given, 1 for kernels that cover less than a Gaussian: the others seldom pass it.
+    /// Unless given, 1 for kernels that cover less than a Gaussian, which gain from a limit, and
+    /// none for the others: a Gaussian loses with one.
     float scale_limit() const {
         if (largest_scale >= 0) return largest_scale;
         return length_scale() > 1 ? 1.0f : 0.0f;

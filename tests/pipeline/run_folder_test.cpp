@@ -61,18 +61,30 @@ TEST_F(RunFolder, schedule_of_3dgs_is_what_is_trained_and_other_options_count) {
     EXPECT_NEAR(s["position_lr"][0].get<double>(), 1.6e-4, 1e-9) << s;
     EXPECT_NEAR(s["position_lr"][1].get<double>(), 1.6e-6, 1e-11) << s;
     EXPECT_EQ(s["random_background"], false) << s;
-    EXPECT_EQ(s["largest_scale"], 0) << s;
-    ASSERT_EQ(train("--iterations 1 -q --kernel raised_cosine --schedule 3dgs").code, 0);
-    EXPECT_FALSE(settings().contains("length_scale"));
-    EXPECT_NEAR(settings()["scale_lr"].get<double>(), 0.005, 1e-6);
-    ASSERT_EQ(train("--iterations 1 -q --kernel raised_cosine").code, 0);
-    EXPECT_NEAR(settings()["length_scale"].get<double>(), 1.2816, 1e-4);
-    EXPECT_NEAR(settings()["scale_lr"].get<double>(), 0.0075, 1e-6);
     ASSERT_EQ(train("--iterations 1 -q").code, 0);
     EXPECT_NEAR(settings()["opacity_reset"][1].get<double>(), 0.2, 1e-6);
     const Outcome o = train("--iterations 1 --schedule 3dgs --strategy mcmc");
     EXPECT_EQ(o.code, 2);
     EXPECT_NE(o.err.find("--schedule 3dgs"), std::string::npos) << o.err;
+}
+
+TEST_F(RunFolder, schedule_of_3dgs_has_the_lengths_of_a_gaussian_for_every_kernel) {
+    const std::string raised_cosine = "--iterations 1 -q --kernel raised_cosine ";
+    ASSERT_EQ(train(raised_cosine + "--schedule 3dgs").code, 0);
+    EXPECT_FALSE(settings().contains("length_scale"));
+    EXPECT_NEAR(settings()["scale_lr"].get<double>(), 0.005, 1e-6);
+    EXPECT_EQ(settings()["largest_scale"], 0);
+    ASSERT_EQ(train(raised_cosine).code, 0);
+    EXPECT_NEAR(settings()["length_scale"].get<double>(), 1.2816, 1e-4);
+    EXPECT_NEAR(settings()["scale_lr"].get<double>(), 0.0075, 1e-6);
+    EXPECT_EQ(settings()["largest_scale"], 1);
+    ASSERT_EQ(train("--iterations 1 -q").code, 0);
+    EXPECT_EQ(settings()["largest_scale"], 0) << "a Gaussian has none";
+    for (const std::string own : {"--largest-scale 2", "--largest-scale 2 --schedule 3dgs",
+                                  "--schedule 3dgs --largest-scale 2"}) {
+        ASSERT_EQ(train("--iterations 1 -q " + own).code, 0) << own;
+        EXPECT_EQ(settings()["largest_scale"], 2) << own;
+    }
 }
 
 TEST_F(RunFolder, the_plan_knows_the_kernel) {

@@ -297,6 +297,22 @@ TEST(Training, a_kernel_that_covers_less_has_longer_lengths) {
     EXPECT_NE(by_area.size(), plain.size());
 }
 
+TEST(Training, no_scale_grows_beyond_the_largest) {
+    const auto largest = [](float limit) {
+        TinyTraining t = tiny_training();
+        t.options.largest_scale = limit;
+        t.options.initial_scale = 0.01f;
+        t.options.scale_lr = 0.5f;
+        Trainer trainer = t.trainer();
+        run_to(trainer, 40);
+        const SplatModel model = trainer.model();
+        const double log_scale = *std::max_element(model.log_scale.begin(), model.log_scale.end());
+        return std::exp(log_scale) / (scene_reach(t.dataset) * t.options.length_scale());
+    };
+    EXPECT_GT(largest(0), 0.11) << "0: no limit";
+    EXPECT_LE(largest(0.1f), 0.1 * (1 + 1e-6));
+}
+
 TEST(Training, splats_stop_growing_at_the_limit) {
     TinyTraining t = tiny_training();
     t.options.max_splats = 70;
