@@ -92,8 +92,7 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::PositiveNumber);
     command
         .add_option("--scaling-lr", t.scale_lr,
-                    "1.5 times with a kernel that covers less than a Gaussian (raised_cosine, "
-                    "squared_raised_cosine with psi)")
+                    "1.5 times with a kernel that covers less than a Gaussian, as raised_cosine")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
     for (auto [name, rate] :
