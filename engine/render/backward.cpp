@@ -47,6 +47,7 @@ Pipeline& Backward::project_pipeline(int sh_degree) {
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = options_.sh_stored;
     add_constants(options_.effects, constants);
+    constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(blend_.window_pairs());
     constants["UPDATE"] = result_ == BackwardResult::update ? 1 : 0;
     return project_.emplace(sh_degree, Pipeline(*device_, "project_backward", constants))
         .first->second;
@@ -58,7 +59,9 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
         make_buffers(*device_, *this, splat_buffers(splat_capacity_), "project backward");
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
+    const std::uint32_t window_pairs = blend_.window_pairs();
     blend_.reserve(pairs);
+    if (blend_.window_pairs() != window_pairs) project_.clear();
 }
 
 void Backward::record_shares(Commands& commands, const Forward& forward, const Buffer& image,
@@ -110,7 +113,11 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                            splats.rows(splats.moments(kShRest), range),
                            forward.pair_count(),
                            forward.pair_begin(),
-                           blend_.partials(),
+                           blend_.partials(0),
+                           blend_.partials(1),
+                           blend_.partials(2),
+                           blend_.partials(3),
+                           blend_.partials(4),
                            blend_.rest(),
                            gradient_sum_,
                            forward.status(),

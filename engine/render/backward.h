@@ -50,8 +50,8 @@ class Backward {
     /// record(); where lists take several dispatches it leaves another final transmittance.
     void record_shares(Commands& commands, const Forward& forward, const Buffer& image,
                        const gpu::CameraData& data);
-    /// [K][8] of each pair; the last three are those of the colour.
-    const Buffer& partials() const { return blend_.partials(); }
+    /// Its partials, [K][8] of each pair; the last three are those of the colour.
+    const BlendBackward& blend() const { return blend_; }
 
     /// After the splats' colour buffers changed their degree.
     void set_sh_stored(int degree);

@@ -7,6 +7,20 @@
 
 namespace darb {
 
+namespace {
+
+constexpr std::uint64_t kPartialBytes = PARTIALS * sizeof(float);
+
+std::uint64_t pairs_of_a_binding(const Device& device) {
+    return device.info().max_storage_buffer_bytes / kPartialBytes / 8 * 8;  // windows: 256 bytes
+}
+
+}  // namespace
+
+std::uint64_t BlendBackward::max_pairs(const Device& device) {
+    return pairs_of_a_binding(device) * PARTIAL_WINDOWS;
+}
+
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options), way_(tuning_of(device).backward) {
     make_pipelines(false);
@@ -42,6 +56,7 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["THREADS"] = static_cast<std::int32_t>(subgroup);
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_pairs(*device_));
+    constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(window_pairs_);
     segmented_ = segmented;
     if (way_ == BackwardBlend::subgroup) {
         blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
@@ -57,6 +72,17 @@ void BlendBackward::reserve(std::uint32_t pairs) {
     if (pairs <= pair_capacity_ && pair_capacity_ > 0) return;
     pair_capacity_ = std::max(pairs, 1024u);
     make_buffers(*device_, *this, pair_buffers(pair_capacity_), "blend backward");
+    const std::uint64_t most = pairs_of_a_binding(*device_);
+    if (window_pairs_ > 0 || pair_capacity_ <= most) return;
+    window_pairs_ = static_cast<std::uint32_t>(most);
+    make_pipelines(segmented_);
+}
+
+BufferRange BlendBackward::partials(std::uint32_t window) const {
+    if (window_pairs_ == 0) return partials_;
+    const std::uint64_t bytes = window_pairs_ * kPartialBytes;
+    const std::uint64_t first = window * bytes < partials_.bytes() ? window * bytes : 0;
+    return {partials_, first, std::min(bytes, partials_.bytes() - first)};
 }
 
 void BlendBackward::record(Commands& commands, const Forward& forward, const Buffer& d_image,
@@ -82,12 +108,12 @@ void BlendBackward::record_subgroup(Commands& commands, const Forward& forward,
                                     const Buffer& d_image, gpu::BlendArgs args) {
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     for (args.segment = args.segments; args.segment-- > 0;)
-        commands.dispatch(
-            blend_, args,
-            {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
-             forward.splat_shape(), forward.splat_light(), forward.splat_bound(), d_image,
-             forward.final_transmittance(), forward.last_pair(), partials_, rest_, behind_},
-            args.tiles_x, tiles_y);
+        commands.dispatch(blend_, args,
+                          {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
+                           forward.splat_shape(), forward.splat_light(), forward.splat_bound(),
+                           d_image, forward.final_transmittance(), forward.last_pair(), partials(0),
+                           partials(1), partials(2), partials(3), partials(4), rest_, behind_},
+                          args.tiles_x, tiles_y);
 }
 
 void BlendBackward::record_buckets(Commands& commands, const Forward& forward,

@@ -22,10 +22,15 @@ class BlendBackward {
     void record(Commands& commands, const Forward& forward, const Buffer& d_image,
                 const gpu::CameraData& data, const glm::vec3& background);
 
-    static constexpr std::uint64_t kPartialBytes = 32;  // of a pair, its widest entry anywhere
-    /// What shaders/backward/blend_backward.comp says, in the order of the pairs' slots.
-    const Buffer& partials() const { return partials_; }  // float [K][8]
-    const Buffer& rest() const { return rest_; }          // float [K]
+    /// Pairs that the buffers below can have.
+    static std::uint64_t max_pairs(const Device& device);
+
+    /// What shaders/backward/blend_backward.comp says, in the order of the pairs' slots: float
+    /// [K][8]. Shaders bind PARTIAL_WINDOWS windows of it, as lib/partials.glsl says.
+    const Buffer& partials() const { return partials_; }
+    BufferRange partials(std::uint32_t window) const;
+    std::uint32_t window_pairs() const { return window_pairs_; }
+    const Buffer& rest() const { return rest_; }  // float [K]
 
   private:
     static BufferList<BlendBackward> pair_buffers(std::uint64_t pairs);
@@ -45,7 +50,7 @@ class BlendBackward {
     bool segmented_ = false;                 // whether the pipelines take segments
     Buffer behind_;                          // pixels' state between their dispatches
     Buffer bucket_tile_, bucket_rest_;       // of buckets
-    std::uint32_t pair_capacity_ = 0;
+    std::uint32_t pair_capacity_ = 0, window_pairs_ = 0;
     Buffer partials_, rest_;
 };
 

@@ -26,16 +26,20 @@ int bits_for(std::uint32_t count) {
     return std::max(1, static_cast<int>(std::bit_width(count > 0 ? count - 1 : 0)));
 }
 
-// A frame without a backward pass holds a word for a pair, not eight.
-std::uint64_t most_pairs(const Device& device, std::uint64_t bytes_of_pair) {
-    return std::min({device.info().max_storage_buffer_bytes / bytes_of_pair, std::uint64_t{1} << 30,
+// The widest entry of a pair is a word, but for the sums of the backward blend.
+std::uint64_t most_pairs(const Device& device) {
+    return std::min({device.info().max_storage_buffer_bytes / 4, std::uint64_t{1} << 30,
                      RadixSort::max_capacity(device)});
+}
+
+std::uint64_t most_trained_pairs(const Device& device) {
+    return std::min(most_pairs(device), BlendBackward::max_pairs(device));
 }
 
 std::uint32_t most_pairs(const Device& device, const ForwardOptions& options) {
     return options.store_for_backward && options.backward_follows
                ? Forward::max_pairs(device)
-               : static_cast<std::uint32_t>(most_pairs(device, 4));
+               : static_cast<std::uint32_t>(most_pairs(device));
 }
 
 }  // namespace
@@ -203,7 +207,7 @@ bool Forward::make_room(const gpu::FrameStatus& status) {
     const std::uint32_t wanted =
         (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.pairs;
     if (wanted > most) {
-        const std::uint64_t other_way = most_pairs(*device_, BlendBackward::kPartialBytes);
+        const std::uint64_t other_way = most_trained_pairs(*device_);
         const std::string instead =
             size_.bucket > 0 && wanted <= other_way
                 ? fmt::format("Run with --tune backward=subgroup, which holds {}, or lower",
@@ -244,7 +248,7 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
 
 std::uint32_t Forward::max_pairs(const Device& device) {
     // Of the checkpoints' records half are left for the tiles, whose last buckets are not full.
-    std::uint64_t most = most_pairs(device, BlendBackward::kPartialBytes);
+    std::uint64_t most = most_trained_pairs(device);
     if (tuning_of(device).backward == BackwardBlend::buckets)
         most = std::min(most, device.info().max_storage_buffer_bytes / CHECKPOINT_BYTES / 2 *
                                   bucket_pairs(device));

@@ -29,9 +29,8 @@ layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat
 layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer LastPair { uint last_pair[]; };
-layout(set = 0, binding = 9, scalar) buffer Partials { float partials[]; };      // [K][PARTIALS]
-layout(set = 0, binding = 10, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
-layout(set = 0, binding = 11, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
+layout(set = 0, binding = 14, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
 
 #define SHAPE_BINDING 3
 #define LIGHT_BINDING 4
@@ -41,6 +40,9 @@ layout(set = 0, binding = 11, scalar) buffer Behind { float behind[]; };  // [H]
 #include "lib/list_part.glsl"
 const uint CHUNK = 128u;
 #include "lib/hits.glsl"
+#define PARTIALS_BINDING 9
+#define PARTIALS_ADD
+#include "lib/partials.glsl"
 #include "lib/reduce.glsl"
 #include "backward/splat_sums.glsl"
 

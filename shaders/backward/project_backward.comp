@@ -34,21 +34,22 @@ layout(set = 0, binding = 11, scalar) buffer MShDc { vec2 m_dc[]; };
 layout(set = 0, binding = 12, scalar) buffer MShRest { vec2 m_rest[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer PairCount { uint pair_count[]; };
 layout(set = 0, binding = 14, scalar) readonly buffer PairBegin { uint pair_begin[]; };
-layout(set = 0, binding = 15, scalar) readonly buffer Partials { vec4 partials[]; };  // [K][2]
-layout(set = 0, binding = 16, scalar) readonly buffer PartialRest { float partial_rest[]; };
-layout(set = 0, binding = 17, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
-layout(set = 0, binding = 18, scalar) buffer Status { FrameStatus status; };
-layout(set = 0, binding = 19, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
+layout(set = 0, binding = 20, scalar) readonly buffer PartialRest { float partial_rest[]; };
+layout(set = 0, binding = 21, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
+layout(set = 0, binding = 22, scalar) buffer Status { FrameStatus status; };
+layout(set = 0, binding = 23, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
 
 const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
 const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 
+#define PARTIALS_BINDING 15
 #include "effects/constants.glsl"
 #include "kernels/kernel.glsl"
 #include "lib/covariance.glsl"
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
 #include "lib/linear_id.glsl"
+#include "lib/partials.glsl"
 #include "lib/sh.glsl"
 #include "optim/adam.glsl"
 #include "backward/project_gradient.glsl"
@@ -58,8 +59,8 @@ Partial sum_partials(uint i) {
     const uint begin = pair_begin[i], end = begin + pair_count[i];
     for (uint block = begin; block < end; block += 32768u) {  // some drivers end loops at 65,535
         for (uint e = block; e < min(block + 32768u, end); ++e) {
-            const vec4 light = partials[2u * e + 1u];
-            sums.a += partials[2u * e];
+            const vec4 light = load_partial(e, 1u);
+            sums.a += load_partial(e, 0u);
             sums.b += partial_rest[e];
             sums.d_opacity += light.x;
             sums.d_colour += light.yzw;

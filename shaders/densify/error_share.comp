@@ -16,9 +16,11 @@ layout(constant_id = 0) const uint THREADS = 64;
 layout(push_constant, scalar) uniform Push { ErrorShareArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer PairCount { uint pair_count[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer PairBegin { uint pair_begin[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer Partials { vec4 partials[]; };  // [K][2]: .., opacity and colour
-layout(set = 0, binding = 3, scalar) readonly buffer Status { FrameStatus status; };
-layout(set = 0, binding = 4, scalar) buffer Share { vec2 share[]; };  // of the mean errors; 1: seen at all
+layout(set = 0, binding = 7, scalar) readonly buffer Status { FrameStatus status; };
+layout(set = 0, binding = 8, scalar) buffer Share { vec2 share[]; };  // of the mean errors; 1: seen at all
+
+#define PARTIALS_BINDING 2
+#include "lib/partials.glsl"
 
 void main() {
     const uint i = linear_id();
@@ -26,6 +28,6 @@ void main() {
     const uint begin = pair_begin[i], end = begin + pair_count[i];
     float sum = 0.0;
     for (uint block = begin; block < end; block += 32768u)  // some drivers end loops at 65,535
-        for (uint e = block; e < min(block + 32768u, end); ++e) sum += partials[2u * e + 1u].y;
+        for (uint e = block; e < min(block + 32768u, end); ++e) sum += load_partial(e, 1u).y;
     share[i] = vec2(share[i].x + args.scale * sum, 1.0);
 }

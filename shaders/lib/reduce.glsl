@@ -1,7 +1,5 @@
 // Sums nine values over a subgroup and adds them to a slot of the partials, each value by one lane.
-// Needs SUBGROUP_SIZE, the buffers partials [K][PARTIALS] and partial_rest [K].
-
-const uint PARTIALS = 8;
+// Needs SUBGROUP_SIZE, lib/partials.glsl and the buffer partial_rest [K].
 
 // Halves the number of values: lanes with the bit keep the upper ones, the others the lower ones.
 float keep_half(float low, float high, uint bit) {
@@ -22,12 +20,12 @@ void add_to_slot(uint slot, float v[PARTIALS], float rest) {
         rest += subgroupShuffleXor(rest, 4u);
         rest += subgroupShuffleXor(rest, 2u);
         rest += subgroupShuffleXor(rest, 1u);
-        partials[slot * PARTIALS + gl_SubgroupInvocationID] += mine;
+        add_partial(slot, gl_SubgroupInvocationID, mine);
     } else {
         rest = subgroupAdd(rest);
         for (uint i = 0u; i < PARTIALS; ++i) {
             const float total = subgroupAdd(v[i]);
-            if (gl_SubgroupInvocationID == i % SUBGROUP_SIZE) partials[slot * PARTIALS + i] += total;
+            if (gl_SubgroupInvocationID == i % SUBGROUP_SIZE) add_partial(slot, i, total);
         }
     }
     if (gl_SubgroupInvocationID == 0u) partial_rest[slot] += rest;

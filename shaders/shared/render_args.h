@@ -28,6 +28,11 @@
 #define BUCKET_PAIRS 32u
 #define CHECKPOINT_BYTES (TILE_SIZE * TILE_SIZE * 16u)
 
+// Sums that the backward blend leaves for a pair, beside one more in a buffer of its own, and the
+// windows in which their buffer is bound where one binding does not hold it.
+#define PARTIALS 8u
+#define PARTIAL_WINDOWS 5u
+
 // A splat of more pairs than this is huge: one thread would write them long after all others are
 // done. With COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one cell of the
 // cover a thread.

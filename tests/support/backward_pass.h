@@ -117,10 +117,11 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);
-    commands.dispatch(pipeline, args,
-                      {cameras, p[0], p[1], p[2],  p[3],  p[4], p[5],  m[0],     m[1],   m[2],
-                       m[3],    m[4], m[5], count, begin, sum,  rests, gradient, status, smoothing},
-                      g.x, g.y);
+    commands.dispatch(
+        pipeline, args,
+        {cameras, p[0],  p[1],  p[2], p[3], p[4], p[5], m[0], m[1],  m[2],     m[3],   m[4],
+         m[5],    count, begin, sum,  sum,  sum,  sum,  sum,  rests, gradient, status, smoothing},
+        g.x, g.y);
     commands.submit_and_wait();
     PassState after;
     for (int a = 0; a < kAttributeCount; ++a) {

@@ -260,10 +260,11 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
                               {ranges, d_images, last, checkpoints, behind, bucket_rest}, groups_x,
                               groups_y, 4);
         else
-            commands.dispatch(pipelines.backward, args,
-                              {ranges, order, splats, shapes, lights, bounds, d_images, final_t,
-                               last, partials, rest, behind},
-                              groups_x, groups_y);
+            commands.dispatch(
+                pipelines.backward, args,
+                {ranges, order, splats, shapes, lights, bounds, d_images, final_t, last, partials,
+                 partials, partials, partials, partials, rest, behind},
+                groups_x, groups_y);
     if (scene.buckets && !d_image.empty())
         commands.dispatch(pipelines.backward, bucket_args,
                           {ranges, order, splats, shapes, lights, bounds, d_images, last,

@@ -251,6 +251,27 @@ TEST(Training, a_device_of_small_bindings_trains_the_same_bits) {
     EXPECT_TRUE(same_state(whole, parts));
 }
 
+// So are the sums of pairs, window by window.
+TEST(Training, a_device_whose_bindings_hold_few_pairs_trains_the_same_bits) {
+    for (const Strategy strategy : {Strategy::adc, Strategy::budget}) {
+        TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 330});
+        t.options.strategy = strategy;
+        t.options.max_splats = 600;
+        const bool grows = strategy == Strategy::budget;
+        if (!grows) t.options.densify_until = 0;
+        t.options.initial_scale = grows ? 2 : 5;
+        Trainer whole = t.trainer();
+        ::setenv("DARB_FAULT", "binding:20480", 1);  // 640 pairs a window
+        Device narrow;
+        ::unsetenv("DARB_FAULT");
+        Trainer windows(narrow, t.dataset, t.photos, t.start(), t.options);
+        run_to(whole, 45);
+        run_to(windows, 45);
+        EXPECT_GT(windows.counters().most_pairs, (grows ? 1 : 4) * 640U);
+        EXPECT_TRUE(same_state(whole, windows));
+    }
+}
+
 // An evaluation at the iteration of a reset shows the scene that was trained.
 TEST(Training, opacities_are_reset_when_the_next_iteration_begins) {
     TinyTraining t = tiny_training();
@@ -352,13 +373,14 @@ TEST(Training, growth_stops_before_the_memory_budget) {
     device.set_memory_budget(0);
 }
 
-TEST(Training, growth_stops_before_the_pairs_that_a_binding_holds) {
-    TinyTraining t = tiny_training({.splats = 300});
+TEST(Training, growth_stops_before_the_pairs_that_the_bindings_hold) {
+    TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 300});
+    t.options.initial_scale = 3;
     t.options.prune_opacity = 0;
     t.options.prune_extent = 100;
     t.options.densify_grad_threshold = 1e-7f;
     t.options.opacity_reset_interval = 1000;
-    ::setenv("DARB_FAULT", "binding:102400", 1);  // 3,200 pairs
+    ::setenv("DARB_FAULT", "binding:20480", 1);  // 3,200 pairs, in windows
     Device narrow;
     ::unsetenv("DARB_FAULT");
     Trainer trainer(narrow, t.dataset, t.photos, t.start(), t.options);

@@ -6,13 +6,23 @@
 
 namespace darb {
 
+namespace {
+
+Pipeline share_pipeline(Device& device, std::uint32_t window_pairs) {
+    return Pipeline(
+        device, "error_share",
+        {{"THREADS", SPLAT_GROUP}, {"WINDOW_PAIRS", static_cast<std::int32_t>(window_pairs)}});
+}
+
+}  // namespace
+
 ErrorScore::ErrorScore(Device& device, const LossOptions& photos)
     : device_(&device),
       image_(device, "error_image",
              {{"THREADS", SPLAT_GROUP},
               {"USE_MASK", photos.use_mask ? 1 : 0},
               {"USE_ALPHA", photos.use_alpha ? 1 : 0}}),
-      share_(device, "error_share", {{"THREADS", SPLAT_GROUP}}) {
+      share_(share_pipeline(device, 0)) {
     reset(0);
 }
 
@@ -67,10 +77,16 @@ void ErrorScore::record(Commands& commands, const Forward& forward, Backward& ba
     if (several) commands.copy(transmittance, transmittance_, std::uint64_t{pixels} * 4);
     backward.record_shares(commands, forward, d_image, data);
     if (several) commands.copy(transmittance_, transmittance, std::uint64_t{pixels} * 4);
-    commands.dispatch(share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
-                      {forward.pair_count(), forward.pair_begin(), backward.partials(),
-                       forward.status(), shares_},
-                      each_splat.x, each_splat.y);
+    const BlendBackward& sums = backward.blend();
+    if (sums.window_pairs() != window_pairs_) {
+        window_pairs_ = sums.window_pairs();
+        share_ = share_pipeline(*device_, window_pairs_);
+    }
+    commands.dispatch(
+        share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
+        {forward.pair_count(), forward.pair_begin(), sums.partials(0), sums.partials(1),
+         sums.partials(2), sums.partials(3), sums.partials(4), forward.status(), shares_},
+        each_splat.x, each_splat.y);
 }
 
 }  // namespace darb
