@@ -119,7 +119,8 @@ std::optional<double> footprint(const Camera& camera, const double* point) {
 }
 
 // Raised cosine and half-cosine squared gained in training where the footprints did not call for
-// it, the Gaussian did not (docs/effects.md); the other kernels follow those two.
+// it, the Gaussian did not; without points they lost (docs/effects.md). The other kernels follow
+// those two.
 EffectRow antialias_rule(const Dataset& dataset, int kernel) {
     EffectRow row;
     std::size_t wide = 0;
@@ -149,7 +150,7 @@ EffectRow antialias_rule(const Dataset& dataset, int kernel) {
                            "{:.1f} % of the points are seen at pixel footprints that "
                            "differ by more than {}x, limit {:.0f} %",
                            100 * row.measured, kFootprintRatio, 100 * kFootprintShare);
-    if (!row.on && kernel != KERNEL_GAUSSIAN) {
+    if (!row.on && kernel != KERNEL_GAUSSIAN && points.size() > 0) {
         row.on = true;
         row.reason = fmt::format("{}: kernels but the Gaussian train with it", kernel_name(kernel));
     }

@@ -20,7 +20,7 @@ namespace {
 // 128 MiB holds.
 constexpr int kShDegree = 0;
 constexpr std::uint32_t kFrameSplats = 100'000, kIterationSplats = 30'000;  // where pixels vary
-constexpr int kFrameWidth = 1280, kIterationWidth = 640;                    // where splats vary
+constexpr int kWidth = 1280;                                                // where splats vary
 
 int height_of(int width) {
     return width * 9 / 16;
@@ -97,13 +97,13 @@ std::vector<GrowthCurve> measure_growth(Device& device, const GrowthPlan& plan,
             progress(fmt::format("{} is left out: {}", what, e.reason));
         }
     };
-    for (const auto& [name, measure, splats, width] :
-         {std::tuple{"frame", Measure{frame}, kFrameSplats, kFrameWidth},
-          std::tuple{"iteration", Measure{iteration}, kIterationSplats, kIterationWidth}}) {
+    for (const auto& [name, measure, splats] :
+         {std::tuple{"frame", Measure{frame}, kFrameSplats},
+          std::tuple{"iteration", Measure{iteration}, kIterationSplats}}) {
         GrowthCurve by_splats{name, "splats", {}};
         for (std::uint32_t decade = 1'000; decade <= plan.most_splats; decade *= 10)
             for (const std::uint32_t n : {decade, 3 * decade})
-                if (n <= plan.most_splats) add(by_splats, measure, n, width);
+                if (n <= plan.most_splats) add(by_splats, measure, n, kWidth);
         curves.push_back(by_splats);
         GrowthCurve by_pixels{name, "pixels", {}};
         for (const int w : {160, 320, 640, 960, 1280, 1920, 2560})

@@ -221,9 +221,12 @@ TEST(EffectPlanOfDataset, footprints_that_differ_call_for_antialiasing) {
     EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
 }
 
-TEST(EffectPlanOfDataset, kernels_but_the_gaussian_call_for_antialiasing) {
+TEST(EffectPlanOfDataset, kernels_but_the_gaussian_call_for_antialiasing_where_there_are_points) {
     const Capture c;
+    Dataset without = c.dataset;
+    without.points = {};
     for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel) {
+        EXPECT_FALSE(plan_training(without, c.photos, 0, {}, kernel).on(EFFECT_ANTIALIAS));
         const EffectPlan plan = plan_training(c.dataset, c.photos, 0, {}, kernel);
         EXPECT_EQ(plan.on(EFFECT_ANTIALIAS), kernel != KERNEL_GAUSSIAN) << kernel;
         EXPECT_FALSE(plan_training(c.dataset, c.photos, 0, parse_effects("-antialias"), kernel)
