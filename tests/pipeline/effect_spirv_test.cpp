@@ -116,7 +116,7 @@ class EffectSpirv : public testing::TestWithParam<const char*> {
 };
 
 TEST_P(EffectSpirv, what_is_off_leaves_no_instruction_and_no_read) {
-    const int rest = 6, smoothing = backward ? 19 : 14;
+    const int rest = 6, smoothing = backward ? 23 : 14;
     EXPECT_EQ(none.atan, 0u);
     EXPECT_FALSE(reads_lens(none));
     EXPECT_FALSE(none.bindings.count(smoothing));
@@ -184,6 +184,16 @@ TEST_F(PassSpirv, frames_without_crowds_know_no_list_of_huge_splats_and_no_segme
     EXPECT_FALSE(whole.bindings.count(7)) << "the pixels' transmittance between dispatches";
     EXPECT_TRUE(parts.bindings.count(7));
     EXPECT_GT(parts.instructions, whole.instructions);
+}
+
+// Constant 9 of these is WINDOW_PAIRS.
+TEST_F(PassSpirv, sums_that_one_binding_holds_know_no_windows) {
+    for (const auto& [shader, first] : {std::pair{"blend_backward", 9}, {"project_backward", 15}}) {
+        const Left whole = left_in(shader, "9:0"), windows = left_in(shader, "9:640");
+        EXPECT_TRUE(whole.bindings.count(first)) << shader;
+        EXPECT_FALSE(whole.bindings.count(first + 1)) << shader;
+        EXPECT_TRUE(windows.bindings.count(first + 4)) << shader;
+    }
 }
 
 }  // namespace
