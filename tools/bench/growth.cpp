@@ -16,8 +16,7 @@ namespace darb {
 
 namespace {
 
-// No view-dependent colour: a million splats of the highest degree are more than one binding of
-// 128 MiB holds.
+// No view-dependent colour: of 3 million splats it would be most of the memory.
 constexpr int kShDegree = 0;
 constexpr std::uint32_t kFrameSplats = 100'000, kIterationSplats = 30'000;  // where pixels vary
 constexpr int kWidth = 1280;                                                // where splats vary

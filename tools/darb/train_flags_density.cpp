@@ -68,9 +68,8 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
     only_with("adc budget",
               command.add_option(
                   "--percent-dense", t.clone_split_extent,
-                  "share of the scene extent above which a splat splits rather than clones; with a "
-                  "kernel that covers less than a Gaussian times what covers as much (1.28 with "
-                  "raised_cosine)"),
+                  "share of the scene extent above which a splat splits rather than clones; longer "
+                  "with a kernel that covers less than a Gaussian (1.28 times with raised_cosine)"),
               f)
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
@@ -92,8 +91,7 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
             "--largest-scale", t.largest_scale,
             "in scene extents, or in half distances to the points where these are more: no splat "
             "grows beyond it; 0: no limit (default 1 with a kernel that covers less than a "
-            "Gaussian, "
-            "as raised_cosine, else 0)")
+            "Gaussian, as raised_cosine, else 0)")
         ->check(CLI::NonNegativeNumber);
     command
         .add_option("--max-memory", t.max_memory_bytes,
