@@ -82,9 +82,10 @@ Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint
     return s;
 }
 
-// The collected splats of an area, last to first.
+// The collected splats of an area, at least one, last to first.
 void blend_hits(inout Pixels px, vec2 centre, uint count) {
-    for (uint rest = count; rest > 0u;) {
+    uint rest = count;
+    do {  // ends at its bottom, as the one within: see emit_cells
         const uint size = min(rest, SUBGROUP_SIZE);
         rest -= size;
         vec4 shape = vec4(0.0), light = vec4(0.0);
@@ -99,7 +100,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
             light = load_light(splat);
         }
         uint lane = size;
-        do {  // not a for: some drivers run the body once more behind a mask
+        do {
             --lane;
             const vec4 s = subgroupBroadcast(shape, lane);
             const vec4 c = subgroupBroadcast(light, lane);
@@ -110,7 +111,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
                         sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
             add_to_slot(subgroupBroadcast(slot, lane), parts, sums.gdydy * c.w);
         } while (lane > 0u);
-    }
+    } while (rest > 0u);
 }
 
 // What is behind the pairs of this dispatch, from and for the other dispatches.
@@ -148,5 +149,7 @@ void main() {
     const uvec2 tile = gl_WorkGroupID.xy;
     const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
     if (range.x >= range.y) return;
-    for (uint area = 0u; area < AREAS; ++area) blend_area(area, tile, range);
+    uint area = 0u;
+    do blend_area(area, tile, range);
+    while (++area < AREAS);
 }

@@ -56,16 +56,19 @@ const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 
 Partial sum_partials(uint i) {
     Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
-    const uint begin = pair_begin[i], end = begin + pair_count[i];
-    for (uint block = begin; block < end; block += 32768u) {  // some drivers end loops at 65,535
-        for (uint e = block; e < min(block + 32768u, end); ++e) {
+    uint e = pair_begin[i];
+    const uint end = e + pair_count[i];
+    if (e == end) return sums;
+    do {  // loops end at their bottoms: see emit_cells
+        const uint stop = min(e + 32768u, end);  // some drivers end loops at 65,535
+        do {
             const vec4 light = load_partial(e, 1u);
             sums.a += load_partial(e, 0u);
             sums.b += partial_rest[e];
             sums.d_opacity += light.x;
             sums.d_colour += light.yzw;
-        }
-    }
+        } while (++e < stop);
+    } while (e < end);
     return sums;
 }
 

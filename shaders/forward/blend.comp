@@ -88,10 +88,11 @@ void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uin
     }
 }
 
-// All collected splats in order; false when every pixel has ended.
+// All collected splats in order, at least one; false when every pixel has ended.
 bool blend_hits(inout Pixels px, vec2 centre, uint count) {
     float alive = 1.0;
-    for (uint batch = 0u; batch < count; batch += SUBGROUP_SIZE) {
+    uint batch = 0u;
+    do {  // ends at its bottom, as the one within: see emit_cells
         const uint mine = batch + gl_SubgroupInvocationID;
         vec4 shape = vec4(0.0), light = vec4(0.0);
         vec3 depth = vec3(0.0);
@@ -106,7 +107,7 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
         }
         const uint end = min(SUBGROUP_SIZE, count - batch);
         uint lane = 0u;
-        do {  // not a for: some drivers run the body once more behind a mask
+        do {
             const vec4 s = subgroupBroadcast(shape, lane);
             vec3 z = vec3(0.0);
             if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) z = subgroupBroadcast(depth, lane);
@@ -115,8 +116,8 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
         } while (++lane < end);
         alive = px.transmittance[0];
         for (uint k = 1u; k < PIXELS; ++k) alive = max(alive, px.transmittance[k]);
-        if (subgroupAll(alive < 0.0)) break;
-    }
+        batch += SUBGROUP_SIZE;
+    } while (batch < count && subgroupAny(alive >= 0.0));
     return subgroupAny(alive > 0.0);
 }
 
@@ -182,12 +183,16 @@ void main() {
         if (CHECKPOINTS == 1) bucket_colour[k] = vec3(0.0);
     }
     if (SEGMENT > 0u && args.segment > 0u) load(px, first);
-    for (uint chunk = range.x; chunk < range.y; chunk += CHUNK) {
-        const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bits);
-        const bool alive = blend_hits(px, centre, count);
-        if (CHECKPOINTS == 1)
-            store_checkpoint(px, bucket_record(tile_index, whole.x, (chunk - whole.x) / BUCKET));
-        if (!alive) break;
+    if (range.x < range.y) {
+        uint chunk = range.x;
+        bool alive = true;
+        do {
+            const uint count = collect_hits(chunk, min(chunk + CHUNK, range.y), bits);
+            if (count > 0u) alive = blend_hits(px, centre, count);
+            if (CHECKPOINTS == 1)
+                store_checkpoint(px, bucket_record(tile_index, whole.x, (chunk - whole.x) / BUCKET));
+            chunk += CHUNK;
+        } while (alive && chunk < range.y);
     }
     if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) {
         for (uint k = 0u; k < PIXELS; ++k)

@@ -34,9 +34,9 @@ void main() {
     if (rank >= status.visible) return;
     const uint splat = depth_order[rank];
     const TileCover c = unpack_cover(cover[splat]);
-    Ellipse e;
-    e.shape = load_shape(splat, e.bound.x);
-    e.bound.y = splat_bound[splat].y;
+    float l22;
+    const vec4 shape = load_shape(splat, l22);  // mean, l11, l21
+    const EllipseRows e = ellipse_rows(shape.xy, shape.z, shape.w, l22, splat_bound[splat].y);
     uint slot = pair_offset[rank];
     pair_begin[splat] = slot;
     // Offsets only grow, unless their sum left 32 bits.
@@ -54,8 +54,5 @@ void main() {
             return;
         }
     }
-    for (uint bits = c.bits.x; bits != 0u; bits &= bits - 1u)
-        slot = emit_cell(c, uint(findLSB(bits)), splat, e, slot);
-    for (uint bits = c.bits.y; bits != 0u; bits &= bits - 1u)
-        slot = emit_cell(c, uint(findLSB(bits)) + 32u, splat, e, slot);
+    if (any(notEqual(c.bits, uvec2(0)))) emit_cells(c, c.bits, splat, e, slot);
 }

@@ -1,35 +1,38 @@
-// The pairs of one cell of a splat's cover, for emit.comp and emit_huge.comp, which declare args, pair_tile and
+// The pairs of cells of a splat's cover, for emit.comp and emit_huge.comp, which declare args, pair_tile and
 // pair_splat. Needs tile.glsl.
 
-struct Ellipse {
-    vec4 shape;  // mean, l11, l21
-    vec2 bound;  // l22, reach
-};
-
-uint touched_blocks(Ellipse e, uvec2 tile) {
+uint touched_blocks(EllipseRows e, uvec2 tile) {
+    const vec2 corner = vec2(tile * TILE_SIZE) + 0.5;
     uint bits = 0u;
-    for (uint block = 0u; block < 4u; ++block) {
-        const vec2 low = vec2(tile * TILE_SIZE + uvec2(block & 1u, block >> 1) * 8u) + 0.5;
-        const float q = smallest_q(e.shape.xy, e.shape.z, e.shape.w, e.bound.x, low, low + 7.0);
-        if (reaches(q, e.bound.y)) bits |= 1u << block;
+    for (uint row = 0u; row < 2u; ++row) {
+        const float low = corner.y + float(row) * 8.0;
+        const vec2 x = columns_between(e, low, low + 7.0) - corner.x;
+        if (x.x <= x.y && x.x <= 7.0 && x.y >= 0.0) bits |= 1u << (2u * row);
+        if (x.x <= x.y && x.x <= 15.0 && x.y >= 8.0) bits |= 2u << (2u * row);
     }
     return bits << PAIR_BLOCK_SHIFT;
 }
 
-// Returns the slot after the cell's last pair.
-uint emit_cell(TileCover c, uint cell, uint splat, Ellipse e, uint slot) {
+// A pair for each tile of the cells in `bits`, which are not empty, from `slot` on. One loop that ends at its bottom:
+// lavapipe goes through the body of one that ends at its top once more, behind a mask.
+void emit_cells(TileCover c, uvec2 bits, uint splat, EllipseRows e, uint slot) {
     const uvec2 size = cell_size(c.extent);
-    const uvec2 first = uvec2(cell & 7u, cell >> 3) * size;
-    const uvec2 last = min(first + size, c.extent);
-    for (uint y = first.y; y < last.y; ++y) {
-        for (uint x = first.x; x < last.x; ++x) {
-            if (slot < args.pair_capacity) {
-                const uvec2 tile = c.origin + uvec2(x, y);
-                pair_tile[slot] = tile.y * args.tiles_x + tile.x;
-                pair_splat[slot] = splat | touched_blocks(e, tile);
-            }
-            ++slot;
+    uvec2 tile = uvec2(0), first = uvec2(0), last = uvec2(0);  // of the cell; none yet
+    do {
+        if (tile.y == last.y) {
+            const uint cell = bits.x != 0u ? uint(findLSB(bits.x)) : uint(findLSB(bits.y)) + 32u;
+            if (bits.x != 0u) bits.x &= bits.x - 1u; else bits.y &= bits.y - 1u;
+            first = uvec2(cell & 7u, cell >> 3) * size;
+            last = min(first + size, c.extent);
+            tile = first;
         }
-    }
-    return slot;
+        if (slot < args.pair_capacity) {
+            const uvec2 at = c.origin + tile;
+            pair_tile[slot] = at.y * args.tiles_x + at.x;
+            pair_splat[slot] = splat | touched_blocks(e, at);
+        }
+        ++slot;
+        ++tile.x;
+        if (tile.x == last.x) tile = uvec2(first.x, tile.y + 1u);
+    } while (tile.y != last.y || (bits.x | bits.y) != 0u);
 }

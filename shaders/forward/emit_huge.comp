@@ -26,8 +26,12 @@ layout(set = 0, binding = 6, scalar) readonly buffer HugeRank { uint huge_rank[]
 #include "lib/projected.glsl"
 #include "forward/emit_cell.glsl"
 
+uvec2 cell_bit(uint cell) {
+    return cell < 32u ? uvec2(1u << cell, 0u) : uvec2(0u, 1u << (cell - 32u));
+}
+
 bool has_cell(TileCover c, uint cell) {
-    return ((cell < 32u ? c.bits.x >> cell : c.bits.y >> (cell - 32u)) & 1u) != 0u;
+    return any(notEqual(c.bits & cell_bit(cell), uvec2(0)));
 }
 
 uint cell_tiles(TileCover c, uint cell) {
@@ -48,9 +52,9 @@ void main() {
         uint slot = pair_offset[rank];
         for (uint cell = 0u; cell < mine; ++cell)
             if (has_cell(c, cell)) slot += cell_tiles(c, cell);
-        Ellipse e;
-        e.shape = load_shape(splat, e.bound.x);
-        e.bound.y = splat_bound[splat].y;
-        emit_cell(c, mine, splat, e, slot);
+        float l22;
+        const vec4 shape = load_shape(splat, l22);  // mean, l11, l21
+        const EllipseRows e = ellipse_rows(shape.xy, shape.z, shape.w, l22, splat_bound[splat].y);
+        emit_cells(c, cell_bit(mine), splat, e, slot);
     }
 }

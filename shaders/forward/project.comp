@@ -85,21 +85,25 @@ uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCov
     const vec2 high = clamp(floor((mean + half_extent) / float(TILE_SIZE)) + 1.0, vec2(0.0), tiles);
     c = TileCover(uvec2(low), uvec2(max(high - low, 0.0)), uvec2(0));
     if (c.extent.x == 0u || c.extent.y == 0u) return 0u;
-    const uvec2 size = cell_size(c.extent);
-    const vec2 image = vec2(camera.width, camera.height);
-    uint count = 0u;
-    for (uint y = 0u; y * size.y < c.extent.y; ++y) {
-        for (uint x = 0u; x * size.x < c.extent.x; ++x) {
-            const uvec2 first = uvec2(x, y) * size;
-            const uvec2 last = min(first + size, c.extent);
-            const vec2 corner_low = vec2((c.origin + first) * TILE_SIZE) + 0.5;
-            const vec2 corner_high = min(vec2((c.origin + last) * TILE_SIZE), image) - 0.5;
-            if (!reaches(smallest_q(mean, f.l11, f.l21, f.l22, corner_low, corner_high), reach)) continue;
-            const uint bit = y * 8u + x;
-            if (bit < 32u) c.bits.x |= 1u << bit; else c.bits.y |= 1u << (bit - 32u);
-            count += (last.x - first.x) * (last.y - first.y);
+    const uvec2 size = cell_size(c.extent), cells = (c.extent + size - 1u) / size;
+    const vec2 cell = vec2(size * TILE_SIZE), corner = vec2(c.origin * TILE_SIZE) + 0.5;
+    const vec2 last = min(vec2((c.origin + c.extent) * TILE_SIZE), vec2(camera.width, camera.height)) - 0.5;
+    const EllipseRows e = ellipse_rows(mean, f.l11, f.l21, f.l22, reach);
+    uint count = 0u, y = 0u;
+    do {  // ends at its bottom: see emit_cells
+        const float low_y = corner.y + float(y) * cell.y;
+        const vec2 x = columns_between(e, low_y, min(low_y + cell.y - 1.0, last.y));
+        // Between the last pixel of a cell and the first of the next there is no centre.
+        const vec2 k = (x - corner.x + vec2(1.0, 0.0)) / cell.x;
+        const uint from = uint(clamp(ceil(k.x) - 1.0, 0.0, float(cells.x - 1u)));
+        const uint to = uint(clamp(floor(k.y), 0.0, float(cells.x - 1u)));
+        if (from <= to && x.x <= x.y && x.x <= last.x && x.y >= corner.x) {
+            const uint row = ((2u << to) - (1u << from)) << (8u * (y & 3u));
+            if (y < 4u) c.bits.x |= row; else c.bits.y |= row;
+            count += (min((to + 1u) * size.x, c.extent.x) - from * size.x) *
+                     (min((y + 1u) * size.y, c.extent.y) - y * size.y);
         }
-    }
+    } while (++y < cells.y);
     return count;
 }
 

@@ -10,11 +10,12 @@ uint hits_base() {
     return gl_SubgroupID * CHUNK;
 }
 
-// Fills the subgroup's lists from pairs [begin, end), at most CHUNK of them, that have one of bits; returns how many.
+// Fills the subgroup's lists from pairs [begin, end), at least one and at most CHUNK of them, that have one of bits;
+// returns how many.
 uint collect_hits(uint begin, uint end, uint bits) {
     order_within_subgroup();  // the lists may still be read
-    uint count = 0u;
-    for (uint batch = begin; batch < end; batch += SUBGROUP_SIZE) {
+    uint count = 0u, batch = begin;
+    do {  // ends at its bottom: see emit_cells
         const uint j = batch + gl_SubgroupInvocationID;
         uint pair = 0u;
         if (j < end) pair = pair_splat[pair_order[j]];
@@ -26,7 +27,8 @@ uint collect_hits(uint begin, uint end, uint bits) {
             hit_index[at] = j;
         }
         count += subgroupBallotBitCount(hits);
-    }
+        batch += SUBGROUP_SIZE;
+    } while (batch < end);
     order_within_subgroup();
     return count;
 }

@@ -1,21 +1,36 @@
-// Exact test of a splat's ellipse against a rectangle of pixel centres, used for tile bounds and for the
-// blocks of a subgroup in the blend passes.
+// The part of a splat's ellipse within a band of pixel rows, for the tiles of a splat and the blocks of a tile: a
+// rectangle is touched where its rows' part of the ellipse reaches its columns.
 
-// The smallest q over the rectangle [low, high]; mean and corners in px. q is convex, so its minimum lies
-// where the rectangle faces the mean; both facing edges are tried, each with the other axis free.
-float smallest_q(vec2 mean, float l11, float l21, float l22, vec2 low, vec2 high) {
-    const vec2 near_low = mean - high, near_high = mean - low;  // the range of d = mean - pixel
-    const vec2 facing = clamp(vec2(0.0), near_low, near_high);
-    const float dy = clamp(-l11 * l21 * facing.x / (l21 * l21 + l22 * l22), near_low.y, near_high.y);
-    const float dx = clamp(-l21 * facing.y / l11, near_low.x, near_high.x);
-    const float x0 = l11 * facing.x + l21 * dy, y0 = l22 * dy;
-    const float x1 = l11 * dx + l21 * facing.y, y1 = l22 * facing.y;
-    return min(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1);
+// Of one splat: q <= reach, with slack for rounding: what a pass skips must be below the alpha cut-off for certain.
+struct EllipseRows {
+    vec2 mean;             // px
+    float l21, l22, width; // width: 1 / l11
+    float reach;           // with the slack
+    float top;             // the largest |dy|, d = mean - pixel
+    float lean;            // dy where dx is largest
+};
+
+EllipseRows ellipse_rows(vec2 mean, float l11, float l21, float l22, float reach) {
+    EllipseRows e;
+    e.mean = mean;
+    e.l21 = l21;
+    e.l22 = l22;
+    e.width = 1.0 / l11;
+    e.reach = reach * 1.001 + 1e-3;
+    e.top = sqrt(e.reach) / l22;
+    const float tilt = clamp(l21 / l22, -1e15, 1e15);
+    e.lean = -e.top * tilt * inversesqrt(1.0 + tilt * tilt);
+    return e;
 }
 
-// Slack for the rounding of q: what a pass skips must be below the alpha cut-off for certain.
-bool reaches(float q, float reach) {
-    return q <= reach * 1.001 + 1e-3;
+// The lowest and highest x, in px, of the ellipse between two rows of pixel centres; low > high: it is not there.
+vec2 columns_between(EllipseRows e, float low_y, float high_y) {
+    const float near = max(e.mean.y - high_y, -e.top), far = min(e.mean.y - low_y, e.top);
+    const float right = clamp(e.lean, near, far), left = clamp(-e.lean, near, far);  // dy of the largest, smallest dx
+    const float v = e.l22 * right, w = e.l22 * left;
+    const float most = (sqrt(max(e.reach - v * v, 0.0)) - e.l21 * right) * e.width;
+    const float least = (sqrt(max(e.reach - w * w, 0.0)) + e.l21 * left) * -e.width;
+    return near > far ? vec2(1.0, -1.0) : e.mean.x - vec2(most, least);
 }
 
 // A splat's tiles: a rectangle of tiles cut into at most 8 x 8 cells, with one bit for each cell that the
