@@ -127,11 +127,14 @@ GUARDS = [
      "if (n == 0) return result;", "",
      "densify_test", "Densify.an_empty_model_stays_empty"),
     ("coordinates at 1e6 m", "recentring", "engine/scene/edit_splats.cpp",
-     "> kRecentreBeyond)", "> 1e300)",
+     "std::abs(median[axis]) > most * width", "false",
      "ply_test", "Ply.map_coordinates_keep_millimetres"),
     ("coordinates at 1e6 m", "recentring_of_points", "trainer/initial_model.cpp",
-     "extent > kRecentreBeyond ?", "extent > 1e300 ?",
+     "choose_origin(points.position, kFarOff)", "glm::dvec3(0.0)",
      "initial_model_test", "InitialModel.map_coordinates_keep_millimetres"),
+    ("coordinates at 1e6 m", "difference_before_rotation", COVARIANCE,
+     "(p - camera.centre) - camera.centre_rest", "p - camera.centre",
+     "hard_case_test", "every/HardCase.matches_double/floats_far_off_gaussian_psi"),
     ("odd image sizes, more than 65,536 tiles", "pixels_within_the_image", "shaders/forward/blend.comp",
      """        if (at.x >= args.width || at.y >= args.height) continue;
         const uint o = at.y * args.width + at.x;

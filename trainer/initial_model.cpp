@@ -6,13 +6,15 @@
 #include <numeric>
 
 #include "engine/core/rng.h"
+#include "engine/scene/edit_splats.h"
 
 namespace darb {
 
 namespace {
 
 constexpr double kShC0 = 0.28209479177387814;
-constexpr double kRecentreBeyond = 1e4;  // float32 keeps a millimetre up to there
+// float32 resolves 1/4,000,000 of a scene's width there: an update late in a run is 1/600,000 of it.
+constexpr double kFarOff = 4;
 
 struct Region {
     glm::dvec3 centre;
@@ -87,18 +89,6 @@ PointCloud drawn_from(const PointCloud& cloud, std::uint32_t count, std::uint64_
     return part;
 }
 
-glm::dvec3 choose_origin(const PointCloud& points) {
-    glm::dvec3 sum(0.0), largest(0.0);
-    for (size_t i = 0; i < points.size(); ++i) {
-        const glm::dvec3 p(points.position[3 * i], points.position[3 * i + 1],
-                           points.position[3 * i + 2]);
-        sum += p;
-        largest = glm::max(largest, glm::abs(p));
-    }
-    const double extent = std::max({largest.x, largest.y, largest.z});
-    return extent > kRecentreBeyond ? sum / double(points.size()) : glm::dvec3(0.0);
-}
-
 }  // namespace
 
 std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options) {
@@ -120,7 +110,7 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     model.sh_degree = options.sh_degree;
     model.kernel = options.kernel;
     model.footprint = options.footprint;
-    model.origin = choose_origin(points);
+    model.origin = choose_origin(points.position, kFarOff);
     model.resize(points.size());
     // A hair above: the default is what is pruned, too, and a point that no frame has shown stays.
     const double opacity = std::min(1.001 * options.initial_opacity, 0.999);

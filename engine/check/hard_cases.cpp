@@ -1,9 +1,11 @@
 #include "engine/check/hard_cases.h"
 
 #include <cmath>
+#include <glm/gtc/quaternion.hpp>
 #include <limits>
 
 #include "engine/core/rng.h"
+#include "engine/scene/edit_splats.h"
 
 namespace darb::check {
 
@@ -144,6 +146,19 @@ void Cases::projection() {
     far.model.origin = {431'000.25, 5'412'000.5, 812.125};
     far.camera.translation -= far.camera.rotation * far.model.origin;
     add("map_coordinates", "float32 loses millimetres at 1e6", std::move(far));
+
+    TestScene off = random(80, 105);  // float32 positions as a file has them, seen from aslant
+    const glm::dmat3 turn = glm::mat3_cast(glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, 3))));
+    const glm::dvec3 centre = off.camera.centre(), away(9'000.3, -7'000.7, 8'000.9);
+    for (size_t i = 0; i < off.model.size(); ++i) {
+        const glm::dvec3 to_splat = position_of(off.model, i) - centre;
+        for (int a = 0; a < 3; ++a)
+            off.model.position[3 * i + static_cast<size_t>(a)] =
+                static_cast<float>((turn * to_splat + away)[a]);
+    }
+    off.camera.rotation = off.camera.rotation * glm::transpose(turn);
+    off.camera.translation = -(off.camera.rotation * away);
+    add("floats_far_off", "the camera's rotation and translation cancel", std::move(off));
 }
 
 void Cases::parameters() {

@@ -63,8 +63,9 @@ gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin, floa
     d.row0 = glm::vec3(rows[0]);
     d.row1 = glm::vec3(rows[1]);
     d.row2 = glm::vec3(rows[2]);
-    d.translation = glm::vec3(camera.rotation * origin + camera.translation);
-    d.centre = glm::vec3(camera.centre() - origin);
+    const glm::dvec3 centre = camera.centre() - origin;
+    d.centre = glm::vec3(centre);
+    d.centre_rest = glm::vec3(centre - glm::dvec3(d.centre));
     d.focal = glm::vec2(camera.fx, camera.fy);
     d.principal = glm::vec2(camera.cx, camera.cy);
     glm::dvec2 low(-camera.cx / camera.fx, -camera.cy / camera.fy);

@@ -13,7 +13,8 @@ namespace darb {
 
 namespace {
 
-constexpr double kRecentreBeyond = 1e4;  // float32 resolves 1e-3 there
+constexpr double kFarOff = 256;  // float32 resolves 1/65,000 of a width there
+constexpr double kNoWidth = 1e4;  // of splats in one place, from where on float32 has no millimetres
 
 // A reflection is the one of x followed by a proper rotation. It takes the rotation of a splat to
 // its conjugate, which turns the other way about the y and z axes.
@@ -76,17 +77,36 @@ void transform_splats(const Similarity& similarity, SplatModel& model) {
     rotate_sh(sh_rotation(similarity.turn), model.sh_degree, model.sh_rest);
 }
 
-void set_positions(const std::vector<double>& positions, SplatModel& model) {
-    glm::dvec3 low(1e300), high(-1e300);
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-        const int axis = static_cast<int>(i % 3);
-        low[axis] = std::min(low[axis], positions[i]);
-        high[axis] = std::max(high[axis], positions[i]);
+glm::dvec3 choose_origin(const std::vector<double>& positions, double most) {
+    const std::size_t count = positions.size() / 3;
+    if (count == 0) return glm::dvec3(0.0);
+    glm::dvec3 median(0.0);
+    double width = 0;
+    std::vector<double> values(count);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (std::size_t i = 0; i < count; ++i) values[i] = positions[3 * i + axis];
+        const auto rank = [&](std::size_t at) {
+            const auto it = values.begin() + static_cast<std::ptrdiff_t>(at);
+            std::nth_element(values.begin(), it, values.end());
+            return *it;
+        };
+        median[static_cast<int>(axis)] = rank(count / 2);
+        width = std::max(width, (rank(count - 1 - count / 4) - rank(count / 4)) / 2);
     }
-    model.origin = glm::dvec3(0.0);
-    for (int axis = 0; axis < 3 && !positions.empty(); ++axis)
-        if (std::max(std::abs(low[axis]), std::abs(high[axis])) > kRecentreBeyond)
-            model.origin[axis] = std::round(0.5 * low[axis] + 0.5 * high[axis]);
+    glm::dvec3 origin(0.0);
+    if (width == 0) width = kNoWidth / most;
+    const double step = std::exp2(std::floor(std::log2(width)));
+    for (int axis = 0; axis < 3; ++axis)
+        if (std::abs(median[axis]) > most * width)
+            origin[axis] = std::round(median[axis] / step) * step;
+    return origin;
+}
+
+void set_positions(const std::vector<double>& positions, SplatModel& model) {
+    const bool exact = std::all_of(positions.begin(), positions.end(), [](double p) {
+        return static_cast<double>(static_cast<float>(p)) == p;
+    });
+    model.origin = exact ? glm::dvec3(0.0) : choose_origin(positions, kFarOff);
     for (std::size_t i = 0; i < positions.size(); ++i)
         model.position[i] =
             static_cast<float>(positions[i] - model.origin[static_cast<int>(i % 3)]);

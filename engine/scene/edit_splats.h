@@ -23,8 +23,13 @@ struct Similarity {
 /// Positions, log scales, rotations and harmonics; float32 rounding alone.
 void transform_splats(const Similarity& similarity, SplatModel& model);
 
-/// positions: [N][3] world. Stored relative to a whole-numbered origin on axes where any lies
-/// beyond 1e4 from 0, where float32 resolves 1e-3; as they are on the others.
+/// What float32 positions are best counted from, for positions [N][3]: by axis, the median where it
+/// is more than `most` times as far from 0 as half of the width that the middle half of the
+/// positions takes on its widest axis (1e4 where they are in one place); else 0. Rounded to that
+/// width, so that sums stay exact.
+glm::dvec3 choose_origin(const std::vector<double>& positions, double most);
+/// positions: [N][3] world. As they are where they are float32 numbers; else relative to an origin
+/// on axes where float32 would resolve less than 1/65,000 of their width.
 void set_positions(const std::vector<double>& positions, SplatModel& model);
 /// World position of a splat.
 glm::dvec3 position_of(const SplatModel& model, std::size_t splat);

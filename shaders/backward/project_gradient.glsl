@@ -64,8 +64,9 @@ vec3 outside_is_zero(vec3 gradient, vec3 value, float limit) {
 
 SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     SplatGradient g;
-    const vec3 world = vec3(position[3 * i], position[3 * i + 1], position[3 * i + 2]);
-    const vec3 p = to_camera(camera, world) + camera.translation;
+    const vec3 to_splat =
+        from_centre(camera, vec3(position[3 * i], position[3 * i + 1], position[3 * i + 2]));
+    const vec3 p = to_camera(camera, to_splat);
     const vec3 raw_scale = vec3(log_scale[3 * i], log_scale[3 * i + 1], log_scale[3 * i + 2]);
     vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)), share = vec3(1.0);
     float kept = 1.0;  // of the opacity, by the filters
@@ -98,7 +99,6 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     g.position = to_world(camera, camera_point_gradient(camera, p, d_j0, d_j1, g.mean));
     g.opacity_logit = abs(logit) <= OPACITY_LOGIT_LIMIT ? sums.d_opacity * kept * o * rest : 0.0;
 
-    const vec3 to_splat = world - camera.centre;
     const float range = length(to_splat);
     g.direction = to_splat / range;
     vec3 colour = 0.5 + SH_C0 * vec3(sh_dc[3 * i], sh_dc[3 * i + 1], sh_dc[3 * i + 2]);

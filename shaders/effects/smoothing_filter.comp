@@ -32,7 +32,7 @@ void main() {
     float least = 1e30;
     for (uint c = 0u; c < args.camera_count; ++c) {
         const CameraData camera = cameras[c];
-        const vec3 p = to_camera(camera, position[i]) + camera.translation;
+        const vec3 p = to_camera(camera, from_centre(camera, position[i]));
         vec2 pixel;
         if (!(p.z > camera.near_plane) || !pixel_of(camera, p, pixel)) continue;
         const vec2 size = vec2(camera.width, camera.height);

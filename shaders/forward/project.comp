@@ -110,8 +110,8 @@ uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCov
 // 0 pairs and the reason, or the number of pairs.
 uint project(uint i, out int reason) {
     const CameraData camera = cameras[args.camera_index];
-    const vec3 p_world = position[i];
-    const vec3 p = to_camera(camera, p_world) + camera.translation;
+    const vec3 to_splat = from_centre(camera, position[i]);
+    const vec3 p = to_camera(camera, to_splat);
     reason = CULL_NEAR;
     if (!(p.z > camera.near_plane && p.z < 1e30) || !(abs(p.x) + abs(p.y) < 1e30)) return 0u;
 
@@ -159,7 +159,7 @@ uint project(uint i, out int reason) {
     if (count == 0u) return 0u;
 
     reason = CULL_COLOUR;
-    const vec3 colour = splat_colour(i, normalize(p_world - camera.centre));
+    const vec3 colour = splat_colour(i, normalize(to_splat));
     if (!all(lessThan(colour, vec3(1e30)))) return 0u;
 
     float slope = 0.0;

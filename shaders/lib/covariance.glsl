@@ -24,6 +24,10 @@ bool normalise_rotation(vec4 q, out vec4 unit, out float norm) {
 vec3 to_camera(CameraData camera, vec3 v) {
     return vec3(dot(camera.row0, v), dot(camera.row1, v), dot(camera.row2, v));
 }
+// From the camera's centre to p, both world. Rotated after the difference, it is as exact as p far from the world's 0.
+vec3 from_centre(CameraData camera, vec3 p) {
+    return (p - camera.centre) - camera.centre_rest;
+}
 vec3 to_world(CameraData camera, vec3 v) {
     return camera.row0 * v.x + camera.row1 * v.y + camera.row2 * v.z;
 }

@@ -57,6 +57,19 @@ TEST(InitialModel, map_coordinates_keep_millimetres) {
         EXPECT_NEAR(model.origin[int(i % 3)] + model.position[i], d.points.position[i], 1e-6);
 }
 
+// At 5,000 float32 has steps of 5e-4, beyond what most updates of a small scene are.
+TEST(InitialModel, a_scene_off_zero_can_move_by_its_smallest_updates) {
+    Dataset d = looking_at(20, false);
+    for (double& p : d.points.position) p += 5000.0;
+    d.points.position.insert(d.points.position.end(), {1e12, 0, 0});  // moves no median
+    d.points.colour.insert(d.points.colour.end(), {0, 0, 0});
+    const SplatModel model = initial_model(d, {});
+    for (size_t i = 0; i < 60; ++i) {
+        const float p = model.position[i];
+        EXPECT_LT(std::nextafter(std::abs(p), 1e9f) - std::abs(p), 1e-6f) << i << ": " << p;
+    }
+}
+
 TEST(InitialModel, a_cap_draws_from_the_whole_cloud) {
     Dataset d = looking_at(1000, false);
     TrainOptions options;

@@ -99,6 +99,30 @@ TEST(EditSplats, scenes_moved_far_away_keep_their_precision) {
             1e-6);
 }
 
+TEST(EditSplats, positions_are_counted_from_where_most_of_them_are) {
+    std::vector<double> positions;
+    for (int i = 0; i < 100; ++i)
+        for (const double axis : {70'000.1, -0.3, 5.0}) positions.push_back(axis + 0.01 * i);
+    for (const double far : {1e9, 0.3, -1e8}) positions.push_back(far);
+    SplatModel model;
+    model.resize(101);
+    set_positions(positions, model);
+    EXPECT_NEAR(model.origin.x, 70'000.6, 0.3);
+    EXPECT_EQ(model.origin.y, 0);
+    EXPECT_EQ(model.origin.z, 0);
+    for (size_t i = 0; i < 300; ++i)
+        EXPECT_NEAR(model.origin[int(i % 3)] + model.position[i], positions[i], 1e-6) << i;
+}
+
+TEST(EditSplats, one_far_splat_leaves_float32_numbers_as_they_are) {
+    SplatModel model;
+    model.resize(3);
+    set_positions({0.1f, -0.3f, 0.25f, 7e4f, 1.5f, 3, 1e8f, -1e12f, 0.7f}, model);
+    EXPECT_EQ(model.origin, glm::dvec3(0));
+    EXPECT_EQ(model.position,
+              (std::vector<float>{0.1f, -0.3f, 0.25f, 7e4f, 1.5f, 3, 1e8f, -1e12f, 0.7f}));
+}
+
 TEST(EditSplats, every_up_axis_ends_at_minus_y) {
     const std::pair<const char*, glm::dvec3> axes[] = {{"x", {1, 0, 0}},   {"y", {0, 1, 0}},
                                                        {"z", {0, 0, 1}},   {"-x", {-1, 0, 0}},

@@ -256,9 +256,9 @@ TEST(Ply, map_coordinates_keep_millimetres) {
     for (const char* axis : {"float x", "float y", "float z"})
         text.replace(text.find(axis), 5, "double");
     const SplatModel model = parse(text);
-    EXPECT_EQ(model.origin, glm::dvec3(450005, 0, 0));
-    EXPECT_NEAR(model.position[0], -4.999, 1e-6);
-    EXPECT_NEAR(model.position[3], 5.002, 1e-6);
+    EXPECT_EQ(model.origin, glm::dvec3(450012, 0, 0));
+    EXPECT_NEAR(model.position[0], -11.999, 1e-6);
+    EXPECT_NEAR(model.position[3], -1.998, 1e-6);
     const SplatModel again = parse_ply(encode_ply(model), "memory");
     expect_same(again, model);
 }
