@@ -13,7 +13,8 @@ namespace darb {
 namespace {
 
 constexpr double kShC0 = 0.28209479177387814;
-// float32 resolves 1/4,000,000 of a scene's width there: an update late in a run is 1/600,000 of it.
+// float32 resolves 1/4,000,000 of a scene's width there: an update late in a run is 1/600,000 of
+// it.
 constexpr double kFarOff = 4;
 
 struct Region {

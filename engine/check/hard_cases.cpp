@@ -148,7 +148,8 @@ void Cases::projection() {
     add("map_coordinates", "float32 loses millimetres at 1e6", std::move(far));
 
     TestScene off = random(80, 105);  // float32 positions as a file has them, seen from aslant
-    const glm::dmat3 turn = glm::mat3_cast(glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, 3))));
+    const glm::dmat3 turn =
+        glm::mat3_cast(glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, 3))));
     const glm::dvec3 centre = off.camera.centre(), away(9'000.3, -7'000.7, 8'000.9);
     for (size_t i = 0; i < off.model.size(); ++i) {
         const glm::dvec3 to_splat = position_of(off.model, i) - centre;

@@ -14,7 +14,8 @@ namespace darb {
 namespace {
 
 constexpr double kFarOff = 256;  // float32 resolves 1/65,000 of a width there
-constexpr double kNoWidth = 1e4;  // of splats in one place, from where on float32 has no millimetres
+constexpr double kNoWidth =
+    1e4;  // of splats in one place, from where on float32 has no millimetres
 
 // A reflection is the one of x followed by a proper rotation. It takes the rotation of a splat to
 // its conjugate, which turns the other way about the y and z axes.

@@ -19,7 +19,8 @@ namespace darb {
 /// skipped; compressed PLY too (compressed_ply.h); ascii and binary of both byte orders. A splat
 /// with a NaN or infinite parameter is dropped, but for what infinite_values.h keeps; *dropped
 /// (where given) is their count. Without
-/// comments: gaussian, psi, default. Positions as set_positions has them. Throws Error naming the file, the record and the reason.
+/// comments: gaussian, psi, default. Positions as set_positions has them. Throws Error naming the
+/// file, the record and the reason.
 SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped = nullptr);
 /// The same from memory; `where` stands for the file name in errors.
 /// progress as read_ply_rows takes it.

@@ -64,9 +64,9 @@ struct CameraData {
     vec3 row2;
     vec3 centre;       // world
     vec3 centre_rest;  // what float32 leaves of the centre
-    vec2 focal;      // px
-    vec2 principal;  // px
-    vec2 ratio_min;  // x/z and y/z are clamped to [ratio_min, ratio_max] in the Jacobian
+    vec2 focal;        // px
+    vec2 principal;    // px
+    vec2 ratio_min;    // x/z and y/z are clamped to [ratio_min, ratio_max] in the Jacobian
     vec2 ratio_max;
     uint width;   // px
     uint height;  // px
