@@ -136,9 +136,10 @@ PlyProperty parse_property(const std::vector<std::string_view>& words, const std
     return property;
 }
 
-void parse_header_line(std::string_view line, PlyHeader& header, const std::string& where) {
+/// Whether the line names the format.
+bool parse_header_line(std::string_view line, PlyHeader& header, const std::string& where) {
     const std::vector<std::string_view> words = split_words(line);
-    if (words.empty() || words[0] == "obj_info") return;
+    if (words.empty() || words[0] == "obj_info") return false;
     if (words[0] == "comment") {
         const std::size_t begin = line.find("comment") + 7;
         const std::size_t text = line.find_first_not_of(" \t", begin);
@@ -148,6 +149,7 @@ void parse_header_line(std::string_view line, PlyHeader& header, const std::stri
                                          : line.substr(text, last + 1 - text));
     } else if (words[0] == "format") {
         parse_format(words, header, where);
+        return true;
     } else if (words[0] == "element" && words.size() == 3) {
         header.elements.push_back({std::string(words[1]), parse_count(words[2], where, line), {}});
     } else if (words[0] == "property" && !header.elements.empty()) {
@@ -155,6 +157,7 @@ void parse_header_line(std::string_view line, PlyHeader& header, const std::stri
     } else {
         throw Error(where, fmt::format("header line '{}' is not understood", line), kCopyAgain);
     }
+    return false;
 }
 
 /// Smallest size of a row; lists count with their length field only (binary) or one word (ascii).
@@ -258,6 +261,7 @@ PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& w
     if (!text.starts_with("ply\n") && !text.starts_with("ply\r"))
         throw Error(where, "is no PLY file: it does not begin with 'ply'", "Check the path.");
     PlyHeader header;
+    bool has_format = false;
     for (std::size_t begin = text.find('\n') + 1;;) {
         const std::size_t end = text.find('\n', begin);
         if (begin == 0 || end == std::string_view::npos)
@@ -267,10 +271,11 @@ PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& w
             line.remove_suffix(1);
         begin = end + 1;
         if (line == "end_header") {
+            if (!has_format) throw Error(where, "the header has no format line", kCopyAgain);
             header.data_begin = begin;
             return header;
         }
-        parse_header_line(line, header, where);
+        has_format |= parse_header_line(line, header, where);
     }
 }
 

@@ -236,6 +236,9 @@ TEST(Ply, malformed_headers_are_errors_that_say_why) {
     EXPECT_NE(error_of("").find("no PLY"), std::string::npos);
     EXPECT_NE(error_of("ply\nformat binary 1.0\nend_header\n").find("format"), std::string::npos);
     EXPECT_NE(error_of("ply\nformat ascii 1.0\nend_header\n").find("vertex"), std::string::npos);
+    std::string no_format = ascii_file("1", kAsciiRow);
+    no_format.erase(4, no_format.find("element") - 4);
+    EXPECT_NE(error_of(no_format).find("no format line"), std::string::npos);
     EXPECT_NE(error_of("ply\nproperty float x\nend_header\n").find("property"), std::string::npos);
     std::string text = ascii_file("1", kAsciiRow);
     text.replace(text.find("scale_1"), 7, "other__");
