@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/scene/infinite_values.h"
 #include "engine/scene/sh_rotation.h"
+#include "shaders/shared/limits.h"
 
 namespace darb {
 
@@ -152,6 +153,13 @@ std::size_t drop_non_finite(SplatModel& model) {
                    row_is_finite(model.sh_dc, i, 3) && row_is_finite(model.sh_rest, i, rest);
         },
         model);
+}
+
+bool has_rotation(const SplatModel& model, std::size_t splat) {
+    double square = 0;
+    for (std::size_t k = 4 * splat; k < 4 * splat + 4; ++k)
+        square += double{model.rotation[k]} * model.rotation[k];
+    return square > ROTATION_MIN_SQUARE;
 }
 
 std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model) {

@@ -40,6 +40,8 @@ SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>
 std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model);
 /// Drops splats with a NaN or infinite parameter, after the rule of infinite_values.h.
 std::size_t drop_non_finite(SplatModel& model);
+/// Whether a splat's rotation has a length; one without is never drawn.
+bool has_rotation(const SplatModel& model, std::size_t splat);
 /// Drops splats whose centre is outside the box, world.
 std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatModel& model);
 /// Drops splats of lower opacity (of the sigmoid, 0 to 1).

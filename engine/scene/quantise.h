@@ -10,6 +10,7 @@
 #include <cstring>
 #include <span>
 
+#include "engine/scene/infinite_values.h"
 #include "engine/scene/sh_basis.h"
 
 namespace darb {
@@ -19,11 +20,10 @@ inline std::uint8_t nearest_byte(double value) {
     return static_cast<std::uint8_t>(std::clamp(std::round(value), 0.0, 255.0));
 }
 
-/// The opacity byte / 255, as a logit. 0 and 255 stand for 1/512 and 1 - 1/512: both lie in what
-/// rounds to them, and the logit stays finite.
+/// The opacity byte / 255, as a logit; 0 and 255 are opacities of 0 and 1.
 inline float logit_of_byte(std::uint8_t byte) {
-    const double alpha = std::clamp(byte / 255.0, 1.0 / 512, 1 - 1.0 / 512);
-    return static_cast<float>(std::log(alpha / (1 - alpha)));
+    const double alpha = byte / 255.0;
+    return limit_infinite_logit(static_cast<float>(std::log(alpha) - std::log1p(-alpha)));
 }
 inline std::uint8_t byte_of_logit(double logit) {
     return nearest_byte(255 / (1 + std::exp(-logit)));
@@ -37,13 +37,19 @@ inline double dc_of_colour(double colour) {
     return (colour - 0.5) / kShBand0;
 }
 
+inline std::size_t count_outside(std::span<const float> values, double low, double high) {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(values, [&](float v) { return v < low || v > high; }));
+}
+
 /// A quaternion of length 1 without its largest component, which is taken positive.
 struct SmallestThree {
     std::size_t largest = 0;
     std::array<double, 3> others{};  // in order, each in [-sqrt(1/2), sqrt(1/2)]
 };
 
-/// q: in any fixed order of components; the identity of first component 1 where it has no length.
+/// q: in any fixed order of components. One without length means nothing: encode_splats leaves such
+/// splats out.
 inline SmallestThree smallest_three(const std::array<double, 4>& q) {
     SmallestThree result;
     double square = 0;

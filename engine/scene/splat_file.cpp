@@ -102,15 +102,6 @@ SplatModel load_dot_splat(Bytes bytes, const std::string& where, SplatFile& file
     return parse_dot_splat(bytes, where, &file.dropped);
 }
 
-std::size_t count_colours_outside(const SplatModel& model) {
-    std::size_t count = 0;
-    for (const float dc : model.sh_dc) {
-        const double colour = colour_of_dc(dc);
-        count += colour < -1 / 510.0 || colour > 1 + 1 / 510.0;
-    }
-    return count;
-}
-
 }  // namespace
 
 std::string_view format_name(SplatFormat format) {
@@ -178,9 +169,15 @@ std::optional<SplatFormat> format_to_write(const fs::path& path) {
     return std::nullopt;
 }
 
-std::vector<std::string> losses_of(SplatFormat format, const SplatModel& model) {
+std::vector<std::string> losses_of(SplatFormat format, const SplatModel& scene) {
     std::vector<std::string> losses;
     if (format == SplatFormat::ply) return losses;
+    SplatModel model = scene;
+    if (const std::size_t count = drop_unwritable(format, model); count > 0)
+        losses.push_back(
+            fmt::format("{} splats with a rotation of length 0, NaN or infinity, which are not "
+                        "drawn, are left out",
+                        count));
     const std::string_view name = format_name(format);
     const bool has_comments = format == SplatFormat::compressed_ply;
     if (!has_comments && model.kernel != KERNEL_GAUSSIAN)
@@ -194,23 +191,39 @@ std::vector<std::string> losses_of(SplatFormat format, const SplatModel& model) 
         if (model.sh_degree > 0)
             losses.push_back(fmt::format(".splat has no place for harmonics: degree {} becomes 0",
                                          model.sh_degree));
-        if (const std::size_t count = count_colours_outside(model); count > 0)
+        if (const std::size_t count =
+                count_outside(model.sh_dc, dc_of_colour(-1 / 510.0), dc_of_colour(1 + 1 / 510.0));
+            count > 0)
             losses.push_back(fmt::format("{} colours outside 0 to 1 are cut to it", count));
     }
-    if (model.origin != glm::dvec3(0.0))
-        losses.push_back(fmt::format("{} has no place for double positions: they are rounded to {}",
-                                     name, format == SplatFormat::spz ? "24 bits" : "float32"));
+    if (format == SplatFormat::compressed_ply)
+        if (const std::size_t count = count_outside(model.sh_rest, -4, 4); count > 0)
+            losses.push_back(
+                fmt::format("{} coefficients of harmonics outside -4 to 4 are cut to it", count));
+    if (format == SplatFormat::spz) {
+        const std::vector<std::string> cut = spz_losses(model);
+        losses.insert(losses.end(), cut.begin(), cut.end());
+    } else if (model.origin != glm::dvec3(0.0)) {
+        losses.push_back(
+            fmt::format("{} has no place for double positions: they are rounded to float32", name));
+    }
     return losses;
+}
+
+std::size_t drop_unwritable(SplatFormat format, SplatModel& model) {
+    if (format == SplatFormat::ply) return 0;
+    return drop_non_finite(model) +
+           keep_splats([&](std::size_t i) { return has_rotation(model, i); }, model);
 }
 
 std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model) {
     DARB_CHECK(format != SplatFormat::sog);
     if (format == SplatFormat::ply) return encode_ply(model);
-    SplatModel finite = model;
-    drop_non_finite(finite);
-    if (format == SplatFormat::compressed_ply) return encode_compressed_ply(finite);
-    if (format == SplatFormat::dot_splat) return encode_dot_splat(finite);
-    return encode_spz(finite);
+    SplatModel kept = model;
+    drop_unwritable(format, kept);
+    if (format == SplatFormat::compressed_ply) return encode_compressed_ply(kept);
+    if (format == SplatFormat::dot_splat) return encode_dot_splat(kept);
+    return encode_spz(kept);
 }
 
 void save_splats(const fs::path& path, SplatFormat format, const SplatModel& model) {

@@ -42,5 +42,8 @@ SplatModel parse_spz(std::span<const std::byte> file, const std::string& where,
 /// harmonic 1/32 (degree 1) or 1/16 within [-1, 1]. Keeps the render mode; kernel and footprint
 /// have no place. Throws Error where positions do not fit 24 bits.
 std::vector<std::byte> encode_spz(const SplatModel& model);
+/// What lies outside these ranges, and the step of positions where it is more than 2^-12; a
+/// sentence each. Throws as encode_spz does.
+std::vector<std::string> spz_losses(const SplatModel& model);
 
 }  // namespace darb

@@ -11,6 +11,7 @@
 #include "engine/scene/splat_shapes.h"
 #include "engine/scene/spz.h"
 #include "engine/scene/spz_layout.h"
+#include "shaders/shared/limits.h"
 
 namespace darb {
 
@@ -24,14 +25,25 @@ constexpr int kSteps = 23;         // 24 bits with sign
 constexpr int kStepOfDegree1 = 8;  // of a harmonic's byte; what the reference writer keeps
 constexpr int kStepOfHigher = 16;
 
+// Where bytes end, and half a step of each, which is rounding.
+constexpr double kLeastLogScale = -10, kMostLogScale = 255 / 16.0 - 10, kHalfLogScale = 1 / 32.0;
+constexpr double kMostDc = 0.5 / spz::kColourScale, kHalfDc = kMostDc / 255;
+constexpr double kLeastHarmonic = -1, kMostHarmonic = 127 / 128.0;
+constexpr double kHalfHarmonic = kStepOfDegree1 / 256.0;
+
 const glm::dmat3 kToRightUpBack(1, 0, 0, 0, -1, 0, 0, 0, -1);
 
-int choose_fractional_bits(const SplatModel& model) {
+double largest_coordinate(const SplatModel& model) {
     double largest = 0;
     for (std::size_t i = 0; i < model.size(); ++i) {
         const glm::dvec3 p = glm::abs(position_of(model, i));
         largest = std::max({largest, p.x, p.y, p.z});
     }
+    return largest;
+}
+
+int choose_fractional_bits(const SplatModel& model) {
+    const double largest = largest_coordinate(model);
     if (largest == 0) return kUsualBits;
     const int exponent = std::ilogb(largest);  // 2^exponent <= largest < 2^(exponent + 1)
     const int fitting = kSteps - 1 - exponent;
@@ -46,9 +58,8 @@ void append(std::uint64_t value, std::size_t bytes, Stream& to) {
         to.push_back(static_cast<std::byte>(value >> (8 * i) & 255));
 }
 
-std::uint32_t pack_rotation(const float* q) {  // w x y z; the identity where it has no length
-    const bool none = q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0;
-    const SmallestThree three = smallest_three({q[1], q[2], q[3], none ? 1.0 : q[0]});
+std::uint32_t pack_rotation(const float* q) {  // w x y z
+    const SmallestThree three = smallest_three({q[1], q[2], q[3], q[0]});
     auto packed = static_cast<std::uint32_t>(three.largest);
     for (const double part : three.others) {
         const auto size =
@@ -87,6 +98,37 @@ std::array<Stream, 6> pack(const SplatModel& model, int fractional_bits) {
 }
 
 }  // namespace
+
+std::vector<std::string> spz_losses(const SplatModel& model) {
+    std::vector<std::string> losses;
+    if (const std::size_t count = count_outside(model.log_scale, kLeastLogScale - kHalfLogScale,
+                                                kMostLogScale + kHalfLogScale);
+        count > 0) {
+        const auto [least, most] = std::ranges::minmax(model.log_scale);
+        const double shrunk = std::min<double>(most, LOG_SCALE_LIMIT) - kMostLogScale;
+        const double grown = kLeastLogScale - std::max<double>(least, -LOG_SCALE_LIMIT);
+        losses.push_back(fmt::format(
+            "{} scales outside {:.2g} to {:.3g} are cut to it, by up to {:.3g} times", count,
+            std::exp(kLeastLogScale), std::exp(kMostLogScale), std::exp(std::max(shrunk, grown))));
+    }
+    if (const std::size_t count = count_outside(model.sh_dc, -kMostDc - kHalfDc, kMostDc + kHalfDc);
+        count > 0)
+        losses.push_back(fmt::format("{} colours outside {:.2f} to {:.2f} are cut to it", count,
+                                     colour_of_dc(-kMostDc), colour_of_dc(kMostDc)));
+    if (const std::size_t count = count_outside(model.sh_rest, kLeastHarmonic - kHalfHarmonic,
+                                                kMostHarmonic + kHalfHarmonic);
+        count > 0)
+        losses.push_back(
+            fmt::format("{} coefficients of harmonics outside {} to {:.2f} are cut to "
+                        "it",
+                        count, kLeastHarmonic, kMostHarmonic));
+    if (const int bits = choose_fractional_bits(model); bits < kUsualBits)
+        losses.push_back(fmt::format(
+            "positions reach {:g}: all are rounded to steps of {:g}; --crop leaves out what lies "
+            "far off",
+            largest_coordinate(model), std::ldexp(1.0, -bits)));
+    return losses;
+}
 
 std::vector<std::byte> encode_spz(const SplatModel& scene) {
     check_splat_shapes(scene);

@@ -113,6 +113,17 @@ TEST(Convert, what_gets_lost_is_said) {
         EXPECT_NE(lost.find(word), std::string::npos) << word << " in\n" << lost;
 }
 
+TEST(Convert, splats_that_are_not_drawn_are_left_out_and_counted) {
+    SplatModel model = sample_model(0, 20);
+    std::fill_n(model.rotation.begin(), 4, 0.0f);
+    const std::string ply = scene_file("unturned.ply", model);
+    for (const char* name : {"u.spz", "u.splat", "u.compressed.ply"}) {
+        const Outcome o = darb("convert " + ply + " " + out(name));
+        EXPECT_NE(o.err.find("1 splats with a rotation of length 0"), std::string::npos) << o.err;
+        EXPECT_NE(o.out.find(", 19 splats, "), std::string::npos) << o.out;
+    }
+}
+
 TEST(Convert, kernels_become_gaussians_with_the_error_printed) {
     SplatModel model = sample_model(0, 60);
     model.kernel = KERNEL_RAISED_COSINE;

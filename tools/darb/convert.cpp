@@ -69,6 +69,7 @@ int convert(const ConvertFlags& flags) {
     }
     for (const std::string& loss : losses_of(*format, model))
         fmt::print(stderr, "warning: {}: {}\n", flags.output.string(), loss);
+    drop_unwritable(*format, model);
     save_splats(flags.output, *format, model);
     fmt::print("{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
                model.size(), std::filesystem::file_size(flags.output));

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "shaders/shared/limits.h"
 
@@ -68,15 +69,12 @@ void add_splats(const SplatModel& model, json& info) {
     std::vector<double> scales, opacities;
     size_t zero_rotations = 0, huge = 0, needles = 0, saturated = 0, invisible = 0;
     for (size_t i = 0; i < model.size(); ++i) {
-        double square = 0;
-        for (size_t k = 0; k < 4; ++k)
-            square += double{model.rotation[4 * i + k]} * model.rotation[4 * i + k];
         std::array<double, 3> s{};
         for (size_t k = 0; k < 3; ++k) s[k] = std::exp(double{model.log_scale[3 * i + k]});
         std::sort(s.begin(), s.end());
         scales.push_back(s[2]);
         opacities.push_back(1 / (1 + std::exp(-double{model.opacity[i]})));
-        zero_rotations += square < ROTATION_MIN_SQUARE;
+        zero_rotations += !has_rotation(model, i);
         huge += s[2] > huge_scale;
         needles += s[2] > kNeedleRatio * s[1];
         saturated += model.opacity[i] > kSaturatedLogit;
