@@ -35,6 +35,15 @@ std::string read_string(const json& object, const char* key, const std::string& 
     return at->get<std::string>();
 }
 
+/// Writers put 0 and 1 for false and true.
+bool read_bool(const json& object, const char* key, const std::string& where, bool absent) {
+    const auto at = object.find(key);
+    if (at == object.end() || at->is_null()) return absent;
+    if (at->is_boolean()) return at->get<bool>();
+    if (at->is_number()) return at->get<double>() != 0;
+    throw Error(where, fmt::format("{} is neither true or false nor a number", key), kExport);
+}
+
 /// Keys that are absent leave what is there: the file's values are the frames' defaults.
 void read_intrinsics(const json& object, const std::string& where, TransformsIntrinsics& to) {
     // A frame's own focal length or angle outranks the file's.
@@ -69,8 +78,7 @@ void read_intrinsics(const json& object, const std::string& where, TransformsInt
     to.p2 = p2.value_or(to.p2);
     if (std::string model = read_string(object, "camera_model", where); !model.empty())
         to.camera_model = std::move(model);
-    const auto fisheye = object.find("is_fisheye");
-    if (fisheye != object.end() && fisheye->is_boolean()) to.is_fisheye = fisheye->get<bool>();
+    to.is_fisheye = read_bool(object, "is_fisheye", where, to.is_fisheye);
 }
 
 void read_pose(const json& object, const std::string& where, TransformsFrame& frame) {
