@@ -24,6 +24,10 @@ constexpr std::size_t kHeadBytes = std::size_t{1}
                                    << 18;  // EXIF and ICC come before the frame header
 constexpr const char* kReplace = "Replace the file by a PNG or JPEG that an image viewer opens.";
 
+// Of pictures that cameras are named after, read here or not.
+constexpr const char* kPictureExtensions[] = {".png", ".jpg",  ".jpeg", ".webp",
+                                              ".tif", ".tiff", ".bmp",  ".heic"};
+
 const stbi_uc* raw(std::span<const std::byte> bytes) {
     return reinterpret_cast<const stbi_uc*>(bytes.data());
 }
@@ -155,7 +159,10 @@ void write_png(const std::filesystem::path& path, const ImageU8& image) {
 }
 
 std::string picture_name(const std::string& view_name, std::set<std::string>& used) {
-    std::string stem = std::filesystem::path(view_name).replace_extension().string();
+    std::string stem = view_name;
+    if (std::ranges::any_of(kPictureExtensions,
+                            [&](const char* e) { return has_extension(view_name, e); }))
+        stem = std::filesystem::path(view_name).replace_extension().string();
     std::replace_if(
         stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
     if (stem.empty()) stem = "view";
