@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,6 +30,14 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
     return arguments;
 }
 
+// Whether all of it is a number that float32 holds as infinity.
+bool beyond_float(const std::string& value) {
+    char* end = nullptr;
+    const double number = std::strtod(value.c_str(), &end);
+    return end != value.c_str() && *end == '\0' &&
+           std::abs(number) > std::numeric_limits<float>::max();
+}
+
 // The parser takes these for numbers, and lets them through every limit.
 void refuse_no_numbers(const std::vector<std::string>& arguments) {
     for (const std::string& argument : arguments) {
@@ -37,7 +48,7 @@ void refuse_no_numbers(const std::vector<std::string>& arguments) {
         std::transform(value.begin(), value.end(), value.begin(),
                        [](unsigned char c) { return std::tolower(c); });
         if (value.starts_with('-') || value.starts_with('+')) value.erase(0, 1);
-        if (value == "nan" || value == "inf" || value == "infinity")
+        if (value == "nan" || value == "inf" || value == "infinity" || beyond_float(value))
             throw darb::Error(argument, "is no number that anything here can take",
                               "Give a finite number; a file of that name as ./" + value + ".");
     }
