@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
@@ -22,6 +23,8 @@ struct Tally {
     bool masked = false;     // some photo has a mask, or a gap after it was straightened
     std::size_t resized = 0, unturned = 0, undistorted = 0, too_wide = 0, downscaled = 0;
     std::string resize_example;
+    std::size_t unfit = 0;  // photos that cannot be used, where only cameras are wanted
+    std::string unfit_example;
 };
 
 bool same_aspect(const LensModel& lens, int width, int height) {
@@ -61,6 +64,20 @@ void fit_lens(View& view, Tally& tally) {
     view.lens = scale_lens(view.lens, width, height);
 }
 
+/// Where only cameras are wanted: a photo that is there has its say, one that cannot be used not.
+void fit_lens_if_possible(View& view, Tally& tally) {
+    if (!std::filesystem::is_regular_file(view.photo)) return;
+    View fitted = view;
+    try {
+        fit_lens(fitted, tally);
+    } catch (const Error& error) {
+        if (tally.unfit++ == 0)
+            tally.unfit_example = fmt::format("{} {}", error.where, error.reason);
+        return;
+    }
+    view = std::move(fitted);
+}
+
 void set_intrinsics(View& view, const UndistortedFrame& frame, int resolution, Tally& tally) {
     const Camera& full = frame.camera;
     const PhotoSize size = size_at_resolution(full.width, full.height, resolution);
@@ -91,6 +108,10 @@ void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& datas
         dataset.notes.push_back(fmt::format("The intrinsics of {} were scaled to the photos: {}.",
                                             counted(tally.resized, "camera"),
                                             tally.resize_example));
+    if (tally.unfit > 0)
+        dataset.notes.push_back(
+            fmt::format("Kept at the size that is declared: {}, as its photo cannot be used: {}.",
+                        counted(tally.unfit, "camera"), tally.unfit_example));
     if (tally.unturned > 0)
         dataset.notes.push_back(
             fmt::format("Kept as stored in spite of an EXIF rotation, as calibrated: {}.",
@@ -139,8 +160,10 @@ void fit_views(Dataset& dataset, const DatasetOptions& options) {
     // Many views share one lens: its frame is found once.
     std::map<std::pair<std::string, std::vector<double>>, UndistortedFrame> frames;
     for (View& view : dataset.views) {
-        if (options.require_photos || std::filesystem::is_regular_file(view.photo))
+        if (options.require_photos)
             fit_lens(view, tally);
+        else
+            fit_lens_if_possible(view, tally);
         std::vector<double> key = view.lens.parameters;
         key.insert(key.end(), {double(view.lens.width), double(view.lens.height)});
         const auto [at, is_new] = frames.try_emplace({view.lens.model, std::move(key)});
