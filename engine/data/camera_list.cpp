@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -120,7 +121,8 @@ void write_camera_list(const std::filesystem::path& path, const std::vector<View
     write_file_atomic(path, format_camera_list(views));
 }
 
-std::vector<View> load_cameras(const std::filesystem::path& path, const DatasetOptions& options) {
+std::vector<View> load_cameras(const std::filesystem::path& path, const DatasetOptions& options,
+                               std::vector<std::string>* notes) {
     std::filesystem::path list = path;
     if (std::filesystem::is_directory(path)) list = path / "cameras.json";
     if (std::filesystem::is_regular_file(list) && has_extension(list, ".json")) {
@@ -131,7 +133,9 @@ std::vector<View> load_cameras(const std::filesystem::path& path, const DatasetO
     }
     DatasetOptions without_photos = options;
     without_photos.require_photos = false;
-    return load_dataset(path, without_photos).views;
+    Dataset dataset = load_dataset(path, without_photos);
+    if (notes) *notes = std::move(dataset.notes);
+    return std::move(dataset.views);
 }
 
 }  // namespace darb

@@ -20,8 +20,9 @@ std::string format_camera_list(const std::vector<View>& views);
 void write_camera_list(const std::filesystem::path& path, const std::vector<View>& views);
 
 /// path: a data set folder, a folder with cameras.json, a transforms.json or a cameras.json. Photos
-/// are not required.
+/// are not required. notes: those of the data set.
 std::vector<View> load_cameras(const std::filesystem::path& path,
-                               const DatasetOptions& options = {});
+                               const DatasetOptions& options = {},
+                               std::vector<std::string>* notes = nullptr);
 
 }  // namespace darb

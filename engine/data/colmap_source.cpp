@@ -80,7 +80,7 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     if (model.dropped_points > 0)
         dataset.notes.push_back(fmt::format("{} with NaN or infinity were dropped.",
                                             counted(model.dropped_points, "point")));
-    if (dataset.points.size() == 0)
+    if (dataset.points.size() == 0 && options.require_photos)
         dataset.notes.push_back("There are no sparse points; training starts from random ones.");
     if (has_masks && without_mask > 0)
         dataset.notes.push_back(fmt::format("{}: {} of {} photos have none.", masks.string(),

@@ -32,15 +32,20 @@ float first_channel(const ImageF& image, std::size_t pixel) {
 
 }  // namespace
 
-void write_depth_png(const std::filesystem::path& path, const ImageF& depth, double unit) {
+DepthRange write_depth_png(const std::filesystem::path& path, const ImageF& depth, double unit) {
     DARB_CHECK(unit > 0 && depth.channels >= 1, "unit {}, {} channels", unit, depth.channels);
+    DepthRange range;
     std::string rows;
     for (int y = 0; y < depth.height; ++y) {
         rows += '\0';  // no filter
         for (int x = 0; x < depth.width; ++x) {
-            const double steps =
-                first_channel(depth, static_cast<std::size_t>(y) * depth.width + x) / unit;
-            const auto grey = static_cast<std::uint32_t>(std::clamp(steps + 0.5, 0.0, 65535.0));
+            const double value =
+                first_channel(depth, static_cast<std::size_t>(y) * depth.width + x);
+            const double steps = value / unit + 0.5;
+            const auto grey =
+                static_cast<std::uint32_t>(std::clamp(steps, 0.0, double{kDepthSteps}));
+            range.clipped += steps >= kDepthSteps + 1 ? 1 : 0;
+            range.farthest = std::max(range.farthest, value);
             rows += static_cast<char>(grey >> 8);
             rows += static_cast<char>(grey & 0xff);
         }
@@ -63,6 +68,7 @@ void write_depth_png(const std::filesystem::path& path, const ImageF& depth, dou
     put_chunk(file, "IDAT", packed);
     put_chunk(file, "IEND", "");
     write_file_atomic(path, file);
+    return range;
 }
 
 }  // namespace darb

@@ -89,9 +89,11 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
     }
 }
 
-void add_points(const fs::path& root, const std::string& ply, Dataset& dataset) {
+void add_points(const fs::path& root, const std::string& ply, const DatasetOptions& options,
+                Dataset& dataset) {
     const fs::path path = ply.empty() ? root / "points3D.ply" : root / ply;
     if (!fs::is_regular_file(path)) {
+        if (!options.require_photos) return;  // only cameras are wanted
         dataset.notes.push_back(
             ply.empty() ? "There are no sparse points; training starts from random ones."
                         : fmt::format("The point cloud {} is missing; training starts from random "
@@ -147,7 +149,7 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
             fmt::format("--images {} has no effect: no file_path in {} begins with images/. Use "
                         "-r to scale.",
                         options.images_folder, json.filename().string()));
-    add_points(dataset.root, ply, dataset);
+    add_points(dataset.root, ply, options, dataset);
     return dataset;
 }
 

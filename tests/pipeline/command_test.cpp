@@ -32,7 +32,7 @@ TEST(Command, bad_usage_is_exit_code_2) {
     const std::string train = "train " + kScene + out;
     const std::string ply = (scratch() / "itself.ply").string();
     std::ofstream{ply};
-    const std::string halved = "render a.ply --cameras b --render-scale 1/2" + out;
+    const std::string render = "render a.ply --cameras b" + out;
     expect_refused({{"", "subcommand"},
                     {"no_such", "no_such"},
                     {"train --no-such-option", "--no-such-option"},
@@ -55,7 +55,11 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"eval", "scene"},
                     {"eval a.ply b --split no_such", "--split"},
                     {"render a.ply -o b", "--cameras"},
-                    {halved + "--depth png", "Add --render-scale 1."},
+                    {render + "--render-scale 1/2 --depth png", "Add --render-scale 1."},
+                    {render + "--render-scale 1/2 --effects +depth", "Add --render-scale 1."},
+                    {render + "--accuracy fast --effects +depth", "Add --storage float32."},
+                    {render + "--depth npy --effects=-depth", "leave --depth out"},
+                    {render + "--near 1e39", "finite number"},
                     {"info", "path"},
                     {"plan " + kScene + " --depth", "this is a data set"},
                     {"plan " + kScene + " --cameras a", "this is a data set"},
@@ -416,6 +420,28 @@ TEST_F(TrainedCommand, frames_of_equal_names_are_kept_apart) {
     for (const char* name : {"a_b.png", "a_b_2.png", ".._.._a.png"})
         EXPECT_TRUE(fs::exists(fs::path(frames) / name)) << name;
     EXPECT_EQ(count_png(frames), 3U);
+}
+
+TEST_F(TrainedCommand, what_a_data_set_notes_is_said) {
+    const fs::path set = scratch() / "noted" / "transforms.json";
+    json cameras = json::parse(read_text_file(kScene + "/transforms_test.json"));
+    for (json& frame : cameras["frames"])
+        frame["file_path"] = kScene + "/" + frame["file_path"].get<std::string>();
+    cameras["frames"][0]["file_path"] = "no_photo.png";
+    cameras["k1"] = 1e-3;
+    write_file_atomic(set, cameras.dump());
+    const Outcome e = darb(fmt::format("eval {} {} -r 8 --split all", ply(), set.string()));
+    EXPECT_EQ(e.code, 0) << e.err;
+    EXPECT_NE(e.err.find("note: Skipped: 1 frame whose photo"), std::string::npos) << e.err;
+    const Outcome r =
+        darb(fmt::format("render {} --cameras {} -r 8 -o {} --depth png "
+                         "--depth-unit 1e-6",
+                         ply(), set.string(), (scratch() / "noted_out").string()));
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_NE(r.err.find("note: Undistorted at load: 8 photos"), std::string::npos) << r.err;
+    EXPECT_NE(r.err.find("pixels of the depth PNGs lie beyond 0.065535 world units"),
+              std::string::npos)
+        << r.err;
 }
 
 TEST_F(TrainedCommand, info_describes_the_scene) {

@@ -10,8 +10,8 @@
 #include "engine/check/dump.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/data/camera_list.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
 
@@ -89,7 +89,7 @@ int dump_view(const CheckFlags& flags) {
         throw Error(flags.json.empty() ? "darb check --every-kernel" : "darb check --json",
                     "has nothing to say of --dump", "Leave one of them out.");
     const SplatModel model = load_scene(flags.scene);
-    const std::vector<View> views = load_cameras(flags.cameras, flags.data);
+    const std::vector<View> views = open_cameras(flags.cameras, flags.data);
     if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())
         throw Error(flags.cameras.string(), fmt::format("there is no view {}", flags.view),
                     fmt::format("--view takes 0 to {}.", views.size() - 1));

@@ -6,6 +6,7 @@
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/compare_flags.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_run.h"
 #include "tools/darb/tune_flags.h"
@@ -23,6 +24,7 @@ class Comparer {
         : flags_(flags), name_(name), lpips_(lpips) {
         TrainFlags first = train_flags_of(flags, name, kernel, 0);
         dataset_ = load_training_data(first);
+        if (!flags.quiet) print_notes(dataset_.notes);
         for (const View& v : dataset_.views)
             if (v.is_test) cameras_.push_back(v.camera);
         if (cameras_.empty())

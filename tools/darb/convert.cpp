@@ -5,11 +5,11 @@
 #include <memory>
 
 #include "engine/core/error.h"
-#include "engine/data/camera_list.h"
 #include "engine/scene/gaussian_scene.h"
 #include "tools/cost/views.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/compare_scenes.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_edits.h"
 #include "tools/darb/scene_file.h"
 
@@ -39,7 +39,7 @@ std::vector<View> views_around(const SplatModel& scene) {
 void print_difference(const char* what, const SplatModel& scene, const SplatModel& other,
                       const ConvertFlags& flags) {
     const std::vector<View> views =
-        flags.cameras.empty() ? views_around(scene) : load_cameras(flags.cameras);
+        flags.cameras.empty() ? views_around(scene) : open_cameras(flags.cameras);
     if (views.empty())
         throw Error(flags.cameras.string(), "holds no cameras", "Name another list or data set.");
     const SceneDifference d = compare_scenes(scene, other, views, flags.device);

@@ -11,6 +11,7 @@
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/devices.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/pixel_size.h"
 #include "tools/darb/scene_file.h"
 
@@ -39,7 +40,9 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
     }
     DatasetOptions options = flags.data;
     options.hold_out = true;
-    return dataset_views(load_dataset(flags.dataset, options), most);
+    const Dataset dataset = load_dataset(flags.dataset, options);
+    if (!flags.quiet) print_notes(dataset.notes);
+    return dataset_views(dataset, most);
 }
 
 int cost(const CostFlags& flags) {

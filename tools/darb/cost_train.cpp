@@ -6,6 +6,7 @@
 #include "engine/core/files.h"
 #include "tools/cost/train_cost.h"
 #include "tools/darb/cost_flags.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/train_run.h"
 
 namespace darb {
@@ -33,6 +34,7 @@ int train_cost(const CostFlags& flags) {
     plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
     if (flags.seeds > 0) plan.seeds = flags.seeds;
     Dataset dataset = load_dataset(run.dataset, run.data);
+    if (!flags.quiet) print_notes(dataset.notes);
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);

@@ -4,11 +4,33 @@
 #include <filesystem>
 
 #include "engine/core/image.h"
+#include "engine/data/depth_io.h"
+#include "engine/render/accuracy.h"
+#include "engine/render/effect_plan.h"
 
 namespace darb {
 
-/// depth: Renderer::render_depth. FRAME_depth.png in steps of `unit` world units, or
-/// FRAME_depth.npy in world units.
-void write_depth(const std::filesystem::path& frame, const ImageF& depth, bool npy, double unit);
+struct DepthFlags {
+    std::string format;   // png or npy; empty: none asked for
+    double unit = 0.001;  // world units of one step of a PNG
+};
+
+/// Throws Error where depths are on and the accuracy has no place for them, or are asked for and
+/// the effects leave them out.
+void check_depth(const DepthFlags& flags, const Accuracy& accuracy, const EffectChoice& effects);
+
+class DepthFiles {
+  public:
+    explicit DepthFiles(const DepthFlags& flags) : flags_(flags) {}
+    /// depth: Renderer::render_depth. FRAME_depth.png in steps of the unit, or FRAME_depth.npy in
+    /// world units.
+    void write(const std::filesystem::path& frame, const ImageF& depth);
+    /// Says on stderr how many pixels lay beyond the last step, and which unit holds all.
+    void print_clipped() const;
+
+  private:
+    DepthFlags flags_;
+    DepthRange range_;  // of all that were written
+};
 
 }  // namespace darb

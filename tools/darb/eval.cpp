@@ -13,6 +13,7 @@
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/evaluation.h"
@@ -69,6 +70,7 @@ int eval(EvalFlags flags) {
     const EffectChoice choice = parse_effects(flags.effects);
     SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
+    print_notes(dataset.notes);
     std::vector<View> views = views_of(dataset, flags);
     DeviceOptions device_options;
     device_options.select = flags.device;

@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "engine/core/error.h"
-#include "engine/data/camera_list.h"
 #include "engine/kernels/kernel_family.h"
 #include "tools/cost/views.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 
 namespace darb {
@@ -51,6 +51,7 @@ PlanSubject open_subject(const PlanFlags& flags) {
         refuse(flags.depth, "--depth");
         refuse(!flags.cameras.empty(), "--cameras");
         s.dataset = load_dataset(flags.what, flags.data);
+        print_notes(s.dataset.notes);
         if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
             s.photos = load_photos(s.dataset.views);
         return s;
@@ -58,7 +59,7 @@ PlanSubject open_subject(const PlanFlags& flags) {
     refuse(flags.sh_degree.has_value(), "--sh-degree");
     refuse(flags.kernel.has_value(), "--kernel");
     s.model = load_scene(flags.what);
-    if (!flags.cameras.empty()) s.views = load_cameras(flags.cameras, flags.data);
+    if (!flags.cameras.empty()) s.views = open_cameras(flags.cameras, flags.data);
     return s;
 }
 

@@ -9,13 +9,13 @@
 #include <set>
 
 #include "engine/core/error.h"
-#include "engine/data/camera_list.h"
 #include "engine/data/image_io.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/depth_file.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/evaluation.h"
@@ -29,8 +29,8 @@ struct RenderFlags {
     std::string device;
     bool white_background = false;
     float near_plane = static_cast<float>(NEAR_DEFAULT);
-    std::string effects = "auto", depth;
-    double depth_unit = 0.001;
+    std::string effects = "auto";
+    DepthFlags depth;
     DatasetOptions data;
     AccuracyFlags accuracy;
     TuneFlags tune;
@@ -58,14 +58,9 @@ double median(std::vector<double> values) {
 int render(const RenderFlags& flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const EffectChoice choice = parse_effects(flags.effects);
-    if (!flags.depth.empty() && accuracy.value(kStorage) != STORAGE_FLOAT32)
-        throw Error("--depth", "depths do not fit the float16 storage that was chosen",
-                    "Add --storage float32.");
-    if (!flags.depth.empty() && accuracy.value(kRenderScale) != 1)
-        throw Error("--depth", "depths would be of the render scale, half the size of the frames",
-                    "Add --render-scale 1.");
+    check_depth(flags.depth, accuracy, choice);
     SplatModel model = load_scene(flags.scene);
-    std::vector<View> views = load_cameras(flags.cameras, flags.data);
+    std::vector<View> views = open_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
     if (is_list)
         for (View& view : views) scale_camera(view.camera, flags.data.resolution);
@@ -74,12 +69,14 @@ int render(const RenderFlags& flags) {
     Device device(device_options);
     settle_tuning(device, flags.tune);
     EffectPlan plan = plan_rendering(
-        model, views, {.depth = !flags.depth.empty(), .near_plane = flags.near_plane}, choice);
+        model, views, {.depth = !flags.depth.format.empty(), .near_plane = flags.near_plane},
+        choice);
     apply_plan(plan, model);
     apply_plan(plan, views);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.crowds());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     std::set<std::string> used;
+    DepthFiles depths(flags.depth);
     std::vector<double> frame_ms;
     for (const View& view : views) {
         const auto start = std::chrono::steady_clock::now();
@@ -90,9 +87,9 @@ int render(const RenderFlags& flags) {
         plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
         const auto file = flags.output / picture_name(view.name, used);
         write_png(file, to_8bit(image));
-        if (plan.on(EFFECT_DEPTH))
-            write_depth(file, renderer.render_depth(), flags.depth == "npy", flags.depth_unit);
+        if (plan.on(EFFECT_DEPTH)) depths.write(file, renderer.render_depth());
     }
+    depths.print_clipped();
     fmt::print("effects: {}\n", plan_line(plan));
     fmt::print("{} frames in {}, median {:.2f} ms a frame on {}\n", views.size(),
                flags.output.string(), median(frame_ms), device.info().name);
@@ -113,7 +110,8 @@ void add_render(CLI::App& app, Action& action) {
     command->add_option("-o,--output", flags->output, "folder of the frames, made where missing")
         ->required();
     command->add_option("-r,--resolution", flags->data.resolution,
-                        "1, 2, 4, 8: divide the cameras' size; above 8: width in px");
+                        "1, 2, 4, 8: divide the cameras' size; above 8: width in px; default: as "
+                        "they are, those of a data set at most 1,600 px wide");
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
     command->add_option("--near", flags->near_plane, "nearest distance drawn, world units")
         ->capture_default_str()
@@ -122,11 +120,11 @@ void add_render(CLI::App& app, Action& action) {
     add_effects_flag(*command, flags->effects);
     add_lens_flag(*command, flags->data);
     command
-        ->add_option("--depth", flags->depth,
+        ->add_option("--depth", flags->depth.format,
                      "depth images beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) "
                      "or npy (float32, world units)")
         ->check(CLI::IsMember({"png", "npy"}));
-    command->add_option("--depth-unit", flags->depth_unit, "world units of one step of a depth PNG")
+    command->add_option("--depth-unit", flags->depth.unit, "world units of one step of a depth PNG")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");

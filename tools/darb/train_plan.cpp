@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "tools/darb/open_cameras.h"
 #include "trainer/forecast.h"
 #include "trainer/progress.h"
 
@@ -106,7 +107,7 @@ void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags)
     fmt::print(stderr, "{}: {}, {} photos to train on, {} held out, {} points\n",
                dataset.root.string(), dataset.source, dataset.views.size() - held_out, held_out,
                dataset.points.size());
-    for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}\n", note);
+    print_notes(dataset.notes);
     fmt::print(stderr, "device: {} ({})\n", device.info().name, device.info().driver);
     fmt::print(stderr, "effects: {}\n", flags.run.effects);
     if (!flags.strategy_note.empty()) fmt::print(stderr, "{}\n", flags.strategy_note);

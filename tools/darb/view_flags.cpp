@@ -5,6 +5,7 @@
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/open_cameras.h"
 
 namespace darb {
 
@@ -25,7 +26,7 @@ std::vector<View> cameras_beside(const fs::path& scene) {
 std::vector<View> find_views(const ViewFlags& flags, std::string& note) {
     DatasetOptions options = flags.data;
     options.require_photos = false;
-    if (!flags.cameras.empty()) return load_cameras(flags.cameras, options);
+    if (!flags.cameras.empty()) return open_cameras(flags.cameras, options);
     if (flags.scene.empty()) return {};
     try {
         return cameras_beside(flags.scene);

@@ -9,6 +9,7 @@
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
 #include "engine/data/colmap_write.h"
+#include "engine/data/depth_io.h"
 #include "engine/data/exif.h"
 #include "engine/data/image_io.h"
 #include "engine/data/resample.h"
@@ -139,6 +140,19 @@ TEST(ImageIo, pictures_of_views_never_share_a_name) {
     EXPECT_EQ(picture_name("left_01.png", used), "left_01_2.png");
     EXPECT_EQ(picture_name("01.jpg", used), "01.png");
     EXPECT_EQ(picture_name("01.png", used), "01_2.png");
+    EXPECT_EQ(picture_name("1.000", used), "1.000.png");
+    EXPECT_EQ(picture_name("1.001", used), "1.001.png");
+    EXPECT_EQ(picture_name("1.001.JPG", used), "1.001_2.png");
+}
+
+TEST(DepthIo, pixels_beyond_the_last_step_are_counted) {
+    ImageF depth(3, 1, 1);
+    depth.data = {0, 65.535f, 80};
+    const auto path = test_folder() / "depth.png";
+    const DepthRange coarse = write_depth_png(path, depth, 0.002);
+    EXPECT_EQ(coarse.clipped, 0u);
+    EXPECT_EQ(coarse.farthest, 80);
+    EXPECT_EQ(write_depth_png(path, depth, 0.001).clipped, 1u);
 }
 
 TEST(ImageIo, png_round_trips_with_each_channel_count) {

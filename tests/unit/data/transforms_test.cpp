@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/core/files.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/colmap_write.h"
 #include "engine/data/image_io.h"
 #include "engine/data/lens.h"
@@ -61,6 +62,10 @@ TEST(Transforms, intrinsics_of_every_dialect) {
     EXPECT_EQ(lens_of(fisheye + R"("camera_model": "OPENCV_FISHEYE", )").parameters,
               (std::vector<double>{50, 50, 40, 30, 1, 2, 3, 4}));
     EXPECT_EQ(lens_of(fisheye + R"("is_fisheye": true, )").model, "OPENCV_FISHEYE");
+    EXPECT_EQ(lens_of(fisheye + R"("is_fisheye": 1, )").model, "OPENCV_FISHEYE");
+    EXPECT_EQ(lens_of(R"("fl_x": 50, "is_fisheye": 0, )").model, "PINHOLE");
+    EXPECT_NE(error_of([] { lens_of(R"("fl_x": 50, "is_fisheye": "yes", )"); }).find("is_fisheye"),
+              std::string::npos);
     EXPECT_EQ(lens_of(R"("fl_x": 50, "k1": 1, "k3": 3, )").parameters,
               (std::vector<double>{50, 50, 40, 30, 1, 0, 0, 0, 3, 0, 0, 0}));
 }
@@ -250,6 +255,23 @@ TEST(TransformsSource, it_stands_in_for_a_colmap_model_whose_photos_are_missing)
     }
     std::filesystem::remove(folder / "images/a.png");
     EXPECT_EQ(load_dataset(folder, cameras_only).views.at(0).camera.fx, 20);
+}
+
+TEST(TransformsSource, cameras_alone_do_without_photos_that_cannot_be_used) {
+    const auto folder = test_folder();
+    write_file_atomic(folder / "a.webp", std::string("RIFF"));
+    write_png(folder / "b.png", ImageU8(8, 8, 3));  // of another aspect
+    write_file_atomic(folder / "transforms.json", file(R"("w": 8, "h": 6, "fl_x": 10, )",
+                                                       frame("a.webp") + "," + frame("b.png")));
+    std::vector<std::string> notes;
+    for (const View& view : load_cameras(folder, {}, &notes)) {
+        EXPECT_EQ(view.camera.width, 8) << view.name;
+        EXPECT_EQ(view.camera.height, 6) << view.name;
+    }
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("2 cameras"), std::string::npos) << notes[0];
+    EXPECT_NE(notes[0].find("a.webp is no PNG"), std::string::npos) << notes[0];
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("a.webp"), std::string::npos);
 }
 
 TEST(TransformsSource, synthetic_folder_has_train_and_test_and_no_extensions) {

@@ -233,7 +233,8 @@ TEST(SplatFile, compressed_ply_agrees_with_an_independent_expansion) {
         const fs::path base = *folder / "splats" / name;
         SplatModel a = load_splats(base.string() + ".compressed.ply");
         // It keeps opacities 1/512 away from 0 and 1.
-        for (float& logit : a.opacity) logit = std::clamp(logit, -std::log(511.0f), std::log(511.0f));
+        for (float& logit : a.opacity)
+            logit = std::clamp(logit, -std::log(511.0f), std::log(511.0f));
         const SplatModel b = load_splats(base.string() + ".decoded.ply");
         ASSERT_EQ(a.size(), b.size());
         ASSERT_EQ(a.sh_degree, b.sh_degree);

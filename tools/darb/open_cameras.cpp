@@ -1,0 +1,20 @@
+#include "tools/darb/open_cameras.h"
+
+#include <fmt/format.h>
+
+#include "engine/data/camera_list.h"
+
+namespace darb {
+
+void print_notes(const std::vector<std::string>& notes) {
+    for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", note);
+}
+
+std::vector<View> open_cameras(const std::filesystem::path& path, const DatasetOptions& options) {
+    std::vector<std::string> notes;
+    std::vector<View> views = load_cameras(path, options, &notes);
+    print_notes(notes);
+    return views;
+}
+
+}  // namespace darb

@@ -1,0 +1,19 @@
+// Cameras and data sets as subcommands open them: with what the readers note on stderr.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+/// "note: ..." lines on stderr, as of Dataset::notes.
+void print_notes(const std::vector<std::string>& notes);
+
+/// load_cameras, its notes printed.
+std::vector<View> open_cameras(const std::filesystem::path& path,
+                               const DatasetOptions& options = {});
+
+}  // namespace darb
