@@ -108,7 +108,7 @@ std::vector<std::string> spz_losses(const SplatModel& model) {
         const double shrunk = std::min<double>(most, LOG_SCALE_LIMIT) - kMostLogScale;
         const double grown = kLeastLogScale - std::max<double>(least, -LOG_SCALE_LIMIT);
         losses.push_back(fmt::format(
-            "{} scales outside {:.2g} to {:.3g} are cut to it, by up to {:.3g} times", count,
+            "{} scales outside {:.2g} to {:.3g} are cut to it, by up to {:.1f} times", count,
             std::exp(kLeastLogScale), std::exp(kMostLogScale), std::exp(std::max(shrunk, grown))));
     }
     if (const std::size_t count = count_outside(model.sh_dc, -kMostDc - kHalfDc, kMostDc + kHalfDc);
