@@ -119,9 +119,8 @@ std::vector<std::string> spz_losses(const SplatModel& model) {
                                                 kMostHarmonic + kHalfHarmonic);
         count > 0)
         losses.push_back(
-            fmt::format("{} coefficients of harmonics outside {} to {:.2f} are cut to "
-                        "it",
-                        count, kLeastHarmonic, kMostHarmonic));
+            fmt::format("{} coefficients of harmonics outside {} to {:.2f} are cut to it", count,
+                        kLeastHarmonic, kMostHarmonic));
     if (const int bits = choose_fractional_bits(model); bits < kUsualBits)
         losses.push_back(fmt::format(
             "positions reach {:g}: all are rounded to steps of {:g}; --crop leaves out what lies "
