@@ -204,6 +204,55 @@ TEST(Command, effects_begin_with_a_minus_or_a_base) {
         EXPECT_EQ(row["on"].get<bool>(), row["effect"] == "lens") << row.dump();
 }
 
+TEST(Command, effects_that_a_command_cannot_do_are_refused) {
+    const std::string out = " -o " + (scratch() / "unused").string() + " --effects ";
+    const std::string plan = "plan " + kScene + " --no-price --effects ";
+    expect_refused({{"train " + kScene + out + "+depth", "Leave +depth out."},
+                    {"render a.ply --cameras b" + out + "+exposure", "'exposure' is nothing"},
+                    {"render a.ply --cameras b" + out + "all,+alpha", "'alpha' is nothing"},
+                    {"eval a.ply b --effects +depth", "'depth' is nothing"},
+                    {"view a.ply --effects +alpha", "'alpha' is nothing"},
+                    {plan + "none,+depth", "'depth' is nothing"},
+                    {plan + "none --lens original", "keep the effect with +lens"}});
+    EXPECT_EQ(darb(plan + "none,+alpha,-depth").code, 0);
+    EXPECT_EQ(darb(plan + "none,+lens --lens original").code, 0);
+}
+
+// Flat pictures of a fisheye have another size and another focal length than its photos.
+TEST(Command, without_the_lens_effect_a_wide_fisheye_is_straightened_as_by_lens_undistort) {
+    json cameras = json::parse(read_text_file(kScene + "/transforms_train.json"));
+    for (json& frame : cameras["frames"])
+        frame["file_path"] = kScene + "/" + frame["file_path"].get<std::string>();
+    cameras["is_fisheye"] = true;
+    cameras["fl_x"] = cameras["fl_y"] = 60;  // 95 degrees to a side
+    const fs::path dataset = scratch() / "fisheye.json";
+    std::ofstream(dataset) << cameras.dump();
+    const auto trained = [&](const std::string& name, const std::string& options) {
+        const fs::path out = scratch() / name;
+        const Outcome o =
+            darb(fmt::format("train {} -o {} -r 4 -q --eval --no-report --iterations 1 {}",
+                             dataset.string(), out.string(), options));
+        EXPECT_EQ(o.code, 0) << o.err;
+        const json metrics = json::parse(read_text_file(out / "metrics.json"));
+        return std::pair(read_text_file(out / "cameras.json"), metrics["evaluations"]);
+    };
+    const auto [cameras_of, evaluations] = trained("flat", "--lens undistort --effects none");
+    const auto kept = trained("kept", "--effects none,+lens");
+    const auto dropped = trained("dropped", "--effects none");
+    EXPECT_NE(kept.first, cameras_of) << "the lens is kept where nothing drops it";
+    EXPECT_EQ(dropped.first, cameras_of);
+    EXPECT_EQ(dropped.second[0]["psnr_db"], evaluations[0]["psnr_db"]);
+    const auto measured = [&](const std::string& options) {
+        const fs::path file = scratch() / "measured.json";
+        const Outcome o =
+            darb(fmt::format("eval {} {} -r 4 --json {} {}", (scratch() / "flat").string(),
+                             dataset.string(), file.string(), options));
+        EXPECT_EQ(o.code, 0) << o.err;
+        return json::parse(read_text_file(file));
+    };
+    EXPECT_EQ(measured("--effects all,-lens"), measured("--effects all --lens undistort"));
+}
+
 TEST(Command, the_plan_prices_the_lens_where_photos_are_distorted) {
     const auto lens_row = [](const fs::path& dataset) {
         const Outcome o = darb("plan " + dataset.string() + " -r 8 --json");

@@ -1,6 +1,10 @@
 #include "tools/darb/effect_flags.h"
 
+#include <fmt/format.h>
+
 #include <utility>
+
+#include "engine/core/error.h"
 
 namespace darb {
 
@@ -25,6 +29,24 @@ void add_lens_flag(CLI::App& command, DatasetOptions& data) {
             "for a fisheye that sees more than 60 degrees to a side, straight for all others")
         ->check(CLI::IsMember({"auto", "undistort", "original"}))
         ->default_str("auto");
+}
+
+EffectChoice choose_effects(const std::string& text, const std::vector<int>& impossible,
+                            DatasetOptions& data) {
+    const EffectChoice choice = parse_effects(text);
+    for (const int effect : impossible)
+        if (choice.changed[static_cast<std::size_t>(effect)].value_or(false))
+            throw Error(
+                "--effects " + text,
+                fmt::format("'{}' is nothing that this command can do", effect_name(effect)),
+                fmt::format("Leave +{} out.", effect_name(effect)));
+    if (choice.changed[EFFECT_LENS].value_or(choice.base != EffectChoice::Base::none))
+        return choice;
+    if (data.original_lens)
+        throw Error("--effects " + text, "drops the lens that --lens original keeps",
+                    "Leave --lens out, or keep the effect with +lens.");
+    data.original_where_wide = false;
+    return choice;
 }
 
 void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options) {

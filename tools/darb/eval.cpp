@@ -67,7 +67,8 @@ void print_table(const Evaluation& evaluation) {
 int eval(EvalFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
-    const EffectChoice choice = parse_effects(flags.effects);
+    const EffectChoice choice =
+        choose_effects(flags.effects, {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH}, flags.data);
     SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
     print_notes(dataset.notes);

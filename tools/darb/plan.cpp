@@ -8,6 +8,7 @@
 #include "tools/darb/commands.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/plan_subject.h"
+#include "tools/darb/scene_file.h"
 
 namespace darb {
 
@@ -29,8 +30,12 @@ json compare_choices(const PlanSubject& s, const PlanFlags& flags) {
     return list;
 }
 
-int run_plan(const PlanFlags& flags) {
-    const EffectChoice choice = parse_effects(flags.effects);
+int run_plan(PlanFlags flags) {
+    const bool scene = is_scene(flags.what);
+    const EffectChoice choice = choose_effects(
+        flags.effects,
+        scene ? std::vector<int>{EFFECT_EXPOSURE, EFFECT_ALPHA} : std::vector<int>{EFFECT_DEPTH},
+        flags.data);
     const PlanSubject s = open_subject(flags);
     EffectPlan plan = plan_of(s, flags, choice);
     const bool empty = !s.training && s.model.size() == 0;

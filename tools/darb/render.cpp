@@ -55,9 +55,10 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-int render(const RenderFlags& flags) {
+int render(RenderFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
-    const EffectChoice choice = parse_effects(flags.effects);
+    const EffectChoice choice =
+        choose_effects(flags.effects, {EFFECT_EXPOSURE, EFFECT_ALPHA}, flags.data);
     check_depth(flags.depth, accuracy, choice);
     SplatModel model = load_scene(flags.scene);
     std::vector<View> views = open_cameras(flags.cameras, flags.data);

@@ -64,7 +64,6 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
     settle_tuning(device, tune);
-    check_effects(flags);
     Dataset dataset = load_training_data(flags);
     plan_effects(dataset, flags);
     plan_strategy(dataset, flags);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "engine/core/error.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/train_flags.h"
 
 namespace darb {
@@ -38,6 +39,7 @@ void finish_train_flags(TrainFlags& f) {
         throw Error(fmt::format("--kernel {} --pulses {}", f.kernel, f.pulses),
                     "there is no such kernel",
                     "Only raised_cosine and sinc have --pulses 2 or 3; others have one.");
+    choose_effects(f.effects, {EFFECT_DEPTH}, f.data);
     finish_strategy(f);
     f.train.kernel = *row;
     f.train.accuracy = chosen_accuracy(f.accuracy, true);

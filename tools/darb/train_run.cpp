@@ -28,10 +28,6 @@ EffectChoice training_choice(const TrainFlags& flags) {
 
 }  // namespace
 
-void check_effects(const TrainFlags& flags) {
-    training_choice(flags);
-}
-
 // The photos stay for the run where the plan had to look at them.
 void plan_effects(Dataset& dataset, TrainFlags& flags) {
     if ((!dataset.points.seen_begin.empty() || dataset.has_alpha) && flags.run.photos.empty())

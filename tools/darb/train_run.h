@@ -8,9 +8,6 @@
 
 namespace darb {
 
-/// Throws Error where --effects cannot be read.
-void check_effects(const TrainFlags& flags);
-
 /// Plans the effects of the run and sets flags.train, flags.run and the views as it wants them.
 /// Loads the photos into flags.run.photos where the plan has to look at them and they are not there
 /// yet.

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
 #include "tools/darb/view_times.h"
@@ -43,13 +44,13 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     return 0;
 }
 
-int view(const ViewFlags& flags) {
+int view(ViewFlags flags) {
     const PixelSize size = parse_size(flags.size);
     ViewerOptions options;
     options.up = flags.up;
     options.gui_scale = flags.gui_scale;
     options.accuracy = chosen_accuracy(flags.accuracy);
-    options.effects = parse_effects(flags.effects);
+    options.effects = choose_effects(flags.effects, {EFFECT_EXPOSURE, EFFECT_ALPHA}, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
     std::string note;
     options.views = find_views(flags, note);
