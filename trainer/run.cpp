@@ -76,6 +76,8 @@ class Run {
     bool is_finished() const;
     void report_troubles();
     void report_resolution();
+    void report_growth();
+    void report_probes();
     double seconds() const {
         return seconds_ +
                (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
@@ -102,11 +104,38 @@ class Run {
     RunSummary summary_;
     IterationResult latest_;
     size_t told_probes_ = 0;
+    std::uint32_t told_by_memory_ = 0, told_by_pairs_ = 0;  // the splats at which growth stopped
     int told_divisor_ = 1;
     double seconds_ = 0;
     bool running_ = false;
     Clock::time_point started_;
 };
+
+// What an earlier run in the folder would pass on as this one's: to --resume, and to what looks for
+// the folder's scene. Replaces what was set aside before.
+void set_aside(const std::filesystem::path& output) {
+    namespace fs = std::filesystem;
+    std::error_code none;  // there is no such file
+    for (const char* name : {"checkpoint.darb", "metrics.json", "exposure.json"})
+        fs::rename(output / name, output / (std::string("earlier.") + name), none);
+    std::vector<fs::path> scenes;
+    for (const fs::directory_entry& entry : fs::directory_iterator(output / "point_cloud", none))
+        scenes.push_back(entry.path());
+    const fs::path earlier = output / "earlier.point_cloud";
+    if (!scenes.empty()) fs::create_directories(earlier, none);
+    for (const fs::path& scene : scenes) {
+        fs::remove_all(earlier / scene.filename(), none);
+        fs::rename(scene, earlier / scene.filename(), none);
+    }
+}
+
+// Whether the run that wrote a checkpoint is the one that the folder holds.
+bool is_own(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
+    std::error_code none;
+    const std::filesystem::path folder = std::filesystem::absolute(checkpoint).parent_path();
+    return !checkpoint.filename().string().starts_with("earlier.") &&
+           std::filesystem::equivalent(folder, output, none);
+}
 
 void Run::resume() {
     const Checkpoint checkpoint = std::move(checkpoint_.value());
@@ -115,7 +144,9 @@ void Run::resume() {
     trainer_.restore(checkpoint.state);
     told_divisor_ = trainer_.resolution_divisor();
     seconds_ = checkpoint.seconds;
-    log_.cut_after(checkpoint.state.iteration);
+    const bool own = is_own(run_.resume_from, run_.output);
+    if (!own) set_aside(run_.output);
+    log_.cut_after(own ? checkpoint.state.iteration : -1);
     progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
@@ -188,15 +219,6 @@ void Run::show_step() {
     progress_.leave_out(paused_s);
 }
 
-// What an earlier run in the folder would pass on as this one's: to --resume, and to what looks for
-// the folder's scene.
-void set_aside(const std::filesystem::path& output) {
-    for (const char* name : {"checkpoint.darb", "metrics.json"}) {
-        std::error_code none;  // there is no such file
-        std::filesystem::rename(output / name, output / (std::string("earlier.") + name), none);
-    }
-}
-
 // Whether metrics.json is that of a whole run, which nothing is to be added to.
 bool Run::is_finished() const {
     const std::filesystem::path path = run_.output / "metrics.json";
@@ -222,6 +244,9 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
         summary_.seconds = seconds_;
         return summary_;
     }
+    // Of where the run was interrupted; it goes on, and its scene is the latest until it has ended.
+    std::error_code none;
+    std::filesystem::remove(run_.output / "metrics.json", none);
     log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
 
     try {
@@ -247,27 +272,13 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
 
 void Run::train(const std::atomic<bool>* stop) {
     const std::filesystem::path latest = run_.output / "checkpoint.darb";
-    std::uint32_t stopped = 0;
     stopwatch(true);
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         trainer_.step();
         report_resolution();
-        if (const std::uint32_t n = trainer_.stopped_by_memory(); n != 0 && stopped == 0)
-            progress_.note(fmt::format("growth stops at {} splats: --max-memory", stopped = n));
-        if (const std::uint32_t n = trainer_.stopped_by_pairs(); n != 0 && stopped == 0)
-            progress_.note(
-                fmt::format("growth stops at {} splats: frames come near the pairs of "
-                            "splats and tiles that this device can bind; a smaller -r "
-                            "leaves room",
-                            stopped = n));
+        report_growth();
+        report_probes();
         const int i = trainer_.iteration();
-        for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
-            const Trainer::Probe& p = trainer_.probes()[told_probes_];
-            progress_.note(
-                fmt::format("iteration {}: colour of degree {} {} ({:+.3f} dB on photos "
-                            "set aside)",
-                            p.iteration, p.degree, p.admitted ? "admitted" : "refused", p.gain_db));
-        }
         const bool last = i == options_.iterations;
         if (last || contains(run_.test_iterations, i)) evaluate(i);
         if (last || contains(run_.save_iterations, i)) save_model(i);
@@ -290,6 +301,29 @@ void Run::report_resolution() {
     progress_.note(divisor == 1
                        ? fmt::format("iteration {}: photos at their full size", i)
                        : fmt::format("iteration {}: photos at 1/{} of their sides", i, divisor));
+}
+
+void Run::report_growth() {
+    const auto tell = [&](std::uint32_t splats, std::uint32_t& told, const char* limit,
+                          const char* reason) {
+        if (splats == told) return;
+        if (told == 0) progress_.note(fmt::format("growth stops at {} splats: {}", splats, reason));
+        log_.growth_stopped(trainer_.iteration(), limit, told = splats);
+    };
+    tell(trainer_.stopped_by_memory(), told_by_memory_, "memory", "--max-memory");
+    tell(trainer_.stopped_by_pairs(), told_by_pairs_, "pairs",
+         "frames come near the pairs of splats and tiles that this device can bind; a smaller -r "
+         "leaves room");
+}
+
+void Run::report_probes() {
+    for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
+        const Trainer::Probe& p = trainer_.probes()[told_probes_];
+        log_.probe(trainer_.iteration(), p);
+        progress_.note(
+            fmt::format("iteration {}: colour of degree {} {} ({:+.3f} dB on photos set aside)",
+                        p.iteration, p.degree, p.admitted ? "admitted" : "refused", p.gain_db));
+    }
 }
 
 void Run::report_troubles() {

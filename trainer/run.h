@@ -3,6 +3,7 @@
 //   point_cloud/iteration_N/point_cloud.ply  cameras.json  cfg_args
 //   run.jsonl (a line an event)  metrics.json  report.html  held_out/ITERATION/*.png
 //   checkpoint.darb
+// What an earlier run left there and this one would be taken for is kept as earlier.*.
 #pragma once
 
 #include <atomic>

@@ -161,6 +161,22 @@ void RunLog::resolution(int iteration, int divisor) {
     write({{"event", "resolution"}, {"iteration", iteration}, {"divisor", divisor}});
 }
 
+void RunLog::probe(int iteration, const Trainer::Probe& probe) {
+    write({{"event", "probe"},
+           {"iteration", iteration},
+           {"after", probe.iteration},
+           {"degree", probe.degree},
+           {"gain_db", probe.gain_db},
+           {"admitted", probe.admitted}});
+}
+
+void RunLog::growth_stopped(int iteration, const char* limit, std::uint32_t splats) {
+    write({{"event", "growth_stopped"},
+           {"iteration", iteration},
+           {"limit", limit},
+           {"splats", splats}});
+}
+
 void RunLog::failure(int iteration, const std::string& what) {
     write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
 }
@@ -261,6 +277,30 @@ std::vector<ReportPass> RunLog::passes(const Trainer& trainer) const {
     return passes;
 }
 
+namespace {
+
+Json probes_of(const std::vector<Json>& events) {
+    Json probes = Json::array();
+    for (const Json& e : events)
+        if (e.value("event", "") == "probe")
+            probes.push_back({{"iteration", e.value("after", 0)},
+                              {"degree", e.value("degree", 0)},
+                              {"gain_db", number(e, "gain_db")},
+                              {"admitted", e.value("admitted", false)}});
+    return probes;
+}
+
+/// The splats at which a limit stopped the growth last; 0: it did not.
+std::uint32_t stopped_by(const std::vector<Json>& events, const char* limit) {
+    std::uint32_t splats = 0;
+    for (const Json& e : events)
+        if (e.value("event", "") == "growth_stopped" && e.value("limit", "") == limit)
+            splats = e.value("splats", 0u);
+    return splats;
+}
+
+}  // namespace
+
 std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& trainer,
                                      const Device& device, bool with_report) {
     const TrainCounters& c = trainer.counters();
@@ -272,12 +312,6 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
     Json evaluations = Json::array();
     for (const Json& e : events_)
         if (e.value("event", "") == "evaluation") evaluations.push_back(e);
-    Json probes = Json::array();
-    for (const Trainer::Probe& p : trainer.probes())
-        probes.push_back({{"iteration", p.iteration},
-                          {"degree", p.degree},
-                          {"gain_db", p.gain_db},
-                          {"admitted", p.admitted}});
     const Json metrics{
         {"start", start_},
         {"iteration", summary.iteration},
@@ -295,14 +329,14 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"longest_list", c.longest_list},
         {"huge_splats", c.huge_splats},
         {"most_pairs", c.most_pairs},
-        {"splats_stopped_by_memory", trainer.stopped_by_memory()},
-        {"splats_stopped_by_pairs", trainer.stopped_by_pairs()},
+        {"splats_stopped_by_memory", stopped_by(events_, "memory")},
+        {"splats_stopped_by_pairs", stopped_by(events_, "pairs")},
         {"bad_gradients", c.bad_gradients},
         {"cloned_or_split", c.cloned_or_split},
         {"pruned", c.pruned},
         {"culled_splat_frames", culled_json(c)},
         {"effects", start_.value("effects", Json::array())},
-        {"sh_probes", probes},
+        {"sh_probes", probes_of(events_)},
         {"sh_degree", trainer.sh_degree()},
         {"evaluations", evaluations}};
     write_file_atomic(folder_ / "metrics.json", text_of(metrics, 2) + "\n");

@@ -28,7 +28,7 @@ class RunLog {
     /// be written.
     RunLog(const std::filesystem::path& folder, bool append);
 
-    /// Forgets events after an iteration: a resumed run writes them again.
+    /// Forgets events after an iteration, -1: all; a resumed run writes them again.
     void cut_after(int iteration);
 
     /// rates: of the device, for the roofline.
@@ -40,6 +40,10 @@ class RunLog {
                    const std::vector<PassTotal>& totals);
     /// The photos' sides are divided by so much from this iteration on.
     void resolution(int iteration, int divisor);
+    /// What a probe found before this iteration.
+    void probe(int iteration, const Trainer::Probe& probe);
+    /// What limits the growth, "memory" or "pairs", and at how many splats.
+    void growth_stopped(int iteration, const char* limit, std::uint32_t splats);
     /// What ended the run before its time.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -38,8 +39,52 @@ TEST_F(RunFolder, a_shorter_run_after_a_longer_one_is_the_scene) {
     const Outcome info = darb("info " + folder_.string());
     EXPECT_NE(info.out.find("iteration_2"), std::string::npos) << info.out;
     EXPECT_NE(info.out.find("sinc"), std::string::npos) << info.out;
+    const fs::path earlier = folder_ / "earlier.point_cloud" / "iteration_3";
+    ASSERT_TRUE(fs::exists(earlier / "point_cloud.ply")) << "kept";
+    fs::rename(earlier, folder_ / "point_cloud" / "iteration_3");
+    EXPECT_NE(darb("info " + folder_.string()).out.find("iteration_2"), std::string::npos);
     fs::remove(folder_ / "metrics.json");  // as of another program: the last one
     EXPECT_NE(darb("info " + folder_.string()).out.find("iteration_3"), std::string::npos);
+}
+
+TEST_F(RunFolder, a_run_that_is_resumed_and_killed_shows_its_latest_scene) {
+    ASSERT_EQ(train("--iterations 4 -q --checkpoint-iterations 2 --save-iterations 2").code, 0);
+    // As after Ctrl-C at iteration 2.
+    json metrics = json::parse(read_text_file(folder_ / "metrics.json"));
+    metrics["iteration"] = 2;
+    metrics["interrupted"] = true;
+    std::ofstream(folder_ / "metrics.json") << metrics.dump();
+    fs::remove_all(folder_ / "point_cloud" / "iteration_4");
+    fs::rename(folder_ / "chkpnt2.darb", folder_ / "checkpoint.darb");
+    fs::create_directory(folder_ / "chkpnt4.darb");  // ends it once iteration 4 is saved
+    const Outcome o = train(
+        "--iterations 4 -q --resume --checkpoint-iterations 4 --save-iterations 2 --no-report");
+    ASSERT_EQ(o.code, 2) << o.err;
+    const Outcome info = darb("info " + folder_.string());
+    EXPECT_NE(info.out.find("iteration_4"), std::string::npos) << info.out;
+}
+
+TEST_F(RunFolder, a_checkpoint_of_another_folder_begins_a_log_of_its_own) {
+    const fs::path other = scratch() / "other_folder";
+    ASSERT_EQ(train("--iterations 3 -q --checkpoint-iterations 2 --eval").code, 0);
+    ASSERT_EQ(darb(kTrain + "-o " + other.string() +
+                   " --iterations 2 -q --eval --test-iterations "
+                   "1 --kernel sinc --effects +exposure")
+                  .code,
+              0);
+    ASSERT_TRUE(fs::exists(other / "exposure.json"));
+    const Outcome o = darb(kTrain + "-o " + other.string() +
+                           " --iterations 3 -q --eval "
+                           "--start-checkpoint " +
+                           (folder_ / "chkpnt2.darb").string());
+    ASSERT_EQ(o.code, 0) << o.err;
+    const json metrics = json::parse(read_text_file(other / "metrics.json"));
+    ASSERT_EQ(metrics["evaluations"].size(), 1U) << metrics["evaluations"];
+    EXPECT_EQ(metrics["evaluations"][0]["iteration"], 3);
+    EXPECT_TRUE(fs::exists(other / "earlier.metrics.json"));
+    EXPECT_FALSE(fs::exists(other / "exposure.json")) << "this run trains none";
+    EXPECT_TRUE(fs::exists(other / "earlier.exposure.json"));
+    EXPECT_FALSE(fs::exists(other / "point_cloud" / "iteration_2"));
 }
 
 TEST_F(RunFolder, resume_takes_the_runs_own_checkpoint_once_there_is_one) {

@@ -43,5 +43,49 @@ TEST(RunLog, names_that_are_no_utf_8_and_numbers_that_are_not_finite_are_written
     EXPECT_TRUE(std::isnan(data.samples.at(0).loss));
 }
 
+// Probes after 3 and 6 iterations and growth that ends before the checkpoint, all found again by
+// the run that goes on behind them.
+TEST(RunLog, a_resumed_run_reports_what_it_found_before) {
+    Dataset dataset = load_dataset(std::filesystem::path(DARB_SOURCE_DIR) / "assets" / "scene",
+                                   {.resolution = 8});
+    dataset.views.resize(6);  // too few photos for a trial: each degree is admitted
+    dataset.points.seen_begin.clear();
+    dataset.points.seen_by.clear();
+    TrainOptions options;
+    options.iterations = 8;
+    options.probe_sh = true;
+    options.sh_interval = 3;
+    options.densify_from = 1;
+    options.densify_interval = 2;
+    options.densify_until = 5;
+    options.densify_grad_threshold = 1e-7f;
+    options.prune_opacity = 0;
+    RunOptions run;
+    run.output = std::filesystem::path(testing::TempDir()) / fmt::format("again_{}", getpid());
+    run.checkpoint_iterations = {7};
+    run.quiet = true;
+    run.report = false;
+    const auto metrics = [&](std::uint64_t most_bytes) {
+        options.max_memory_bytes = most_bytes;
+        Device device;
+        run_training(device, dataset, options, run);
+        return nlohmann::json::parse(read_text_file(run.output / "metrics.json"));
+    };
+    const auto peak = [&](int densify_until) {
+        options.densify_until = densify_until;
+        return metrics(0)["peak_device_bytes"].get<std::uint64_t>();
+    };
+    const std::uint64_t still = peak(0), grown = peak(5);
+    ASSERT_GT(grown, still);
+    const nlohmann::json whole = metrics(still + (grown - still) / 2);
+    ASSERT_EQ(whole["sh_probes"].size(), 2U) << whole["sh_probes"];
+    ASSERT_GT(whole["splats_stopped_by_memory"].get<int>(), 0);
+    run.resume_from = run.output / "chkpnt7.darb";
+    const nlohmann::json resumed = metrics(options.max_memory_bytes);
+    std::filesystem::remove_all(run.output);
+    for (const char* name : {"sh_probes", "splats_stopped_by_memory", "splats", "sh_degree"})
+        EXPECT_EQ(resumed[name], whole[name]) << name;
+}
+
 }  // namespace
 }  // namespace darb

@@ -29,7 +29,7 @@ long iteration_of(const fs::path& folder) {
 }
 
 // Where the run of an output folder ended, which may be before the end of an earlier one; -1:
-// unknown.
+// unknown, as while it goes on.
 long last_iteration(const fs::path& output) {
     std::error_code none;
     if (!fs::is_regular_file(output / "metrics.json", none)) return -1;
