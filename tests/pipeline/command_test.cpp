@@ -66,6 +66,8 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"cost a.ply --quick --full", "--full"},
                     {"cost a.ply --seeds 2", "--train"},
                     {"cost a.ply b --size 64x64", "--size"},
+                    {"cost --train " + kScene + " --train-options='--accuracy fast'",
+                     "each row of the measurement"},
                     {"check --reference", "--dump"},
                     {"check --every-kernel --scene a --cameras b --dump c", "--every-kernel"},
                     {"check --scene a.ply", "belong together"},

@@ -30,6 +30,10 @@ int train_cost(const CostFlags& flags) {
         words.push_back(fmt::format("--resolution={}", flags.data.resolution));
     if (flags.white_background) words.emplace_back("--white-background");
     TrainFlags run = parse_train_flags(words, flags.train_options, "darb cost --train");
+    if (run.train.accuracy != Accuracy{})
+        throw Error("--train-options " + flags.train_options,
+                    "sets the accuracy, which each row of the measurement sets itself",
+                    "Leave it out; the rows fast and exact are among them.");
     TrainCostPlan plan;
     plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
     if (flags.seeds > 0) plan.seeds = flags.seeds;
