@@ -167,6 +167,26 @@ TEST(Growth, Exponent_isFittedOverTheLargestDecade) {
     EXPECT_NEAR(growth_exponent(points, "pairs"), 1.6, 1e-9);
 }
 
+TEST(Growth, Page_saysWhatIsHeld) {
+    const auto curve = [](const char* name, const char* by, double splats, double pixels) {
+        GrowthCurve c{name, by, {GrowthPoint{}}};
+        c.points[0].splats = splats;
+        c.points[0].pixels = pixels;
+        return c;
+    };
+    nlohmann::json context;
+    for (const char* key : {"device", "driver", "processor", "date", "commit"}) context[key] = key;
+    context["num_cpus"] = 2;
+    const std::string html =
+        growth_html({curve("frame", "splats", 7, 1111), curve("frame", "pixels", 2222, 7),
+                     curve("iteration", "splats", 7, 3333), curve("iteration", "pixels", 4444, 7)},
+                    context);
+    for (const char* text :
+         {"A frame has 1,111 pixels where splats vary and 2,222 splats where pixels vary;",
+          "Adam) has 3,333 pixels where splats vary and 4,444 splats where pixels vary."})
+        EXPECT_NE(html.find(text), std::string::npos) << text;
+}
+
 TEST(BenchCommand, BadUse_isRefused) {
     expect_refused({{"bench '('", "no regular expression"},
                     {"bench no_such_case", "fits no case"},

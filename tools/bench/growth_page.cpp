@@ -43,6 +43,20 @@ PlotSeries series(const std::string& name, const std::vector<GrowthPoint>& point
     return s;
 }
 
+// What stays the same while the splats or the pixels vary, as the page says it.
+std::string held_text(const std::vector<GrowthCurve>& curves, const std::string& name) {
+    std::string text;
+    for (const GrowthCurve& curve : curves) {
+        if (curve.name != name || curve.points.empty()) continue;
+        const GrowthPoint& p = curve.points.back();
+        const bool by_splats = curve.by == "splats";
+        text += fmt::format("{}{} {} where {} vary", text.empty() ? "" : " and ",
+                            format_number(by_splats ? p.pixels : p.splats),
+                            by_splats ? "pixels" : "splats", curve.by);
+    }
+    return text.empty() ? "nothing" : text;
+}
+
 Plot log_plot(const std::string& title, const std::string& x_label) {
     Plot plot{title, x_label, "ms", {}};
     plot.log_x = plot.log_y = true;
@@ -143,10 +157,11 @@ std::string growth_html(const std::vector<GrowthCurve>& curves, const Json& cont
         "<div class='plots'>" + svg_plot(splats) + svg_plot(pixels) + svg_plot(pairs) + passes +
             "</div>\n" + tables +
             "<h2>How to read it</h2><p>Random splats in the unit sphere, seen from outside, degree "
-            "0. A frame is drawn at 1280x720 where splats vary and of 100,000 splats where pixels "
-            "do; an iteration (forward, loss, backward, Adam) at 640x360 and of 30,000. Time is "
-            "that of the wall clock, the median; exponents b of ms = a x^b are fitted over the "
-            "largest decade, where fixed costs no longer rule.</p>\n");
+            "0. A frame has " +
+            held_text(curves, "frame") + "; an iteration (forward, loss, backward, Adam) has " +
+            held_text(curves, "iteration") +
+            ". Time is that of the wall clock, the median; exponents b of ms = a x^b are fitted "
+            "over the largest decade, where fixed costs no longer rule.</p>\n");
 }
 
 }  // namespace darb
