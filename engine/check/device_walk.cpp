@@ -31,7 +31,8 @@ std::vector<float> to_planes(const Image<double>& image) {
 
 DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera& camera,
                           const Image<double>& d_image, const WalkSettings& settings) {
-    const ForwardOptions options = forward_options(model, settings);
+    ForwardOptions options = forward_options(model, settings);
+    options.effects.lens = camera.lens.active;
     const int degree = std::min(settings.sh_degree, model.sh_degree);
     GpuSplats splats(device, model, true);
     Forward forward(device, options);

@@ -10,6 +10,7 @@
 #include "engine/reference/render.h"
 #include "tests/support/device_walk.h"
 #include "tests/support/scoped_variants.h"
+#include "tests/support/test_lenses.h"
 
 namespace darb::test {
 namespace {
@@ -162,6 +163,12 @@ TEST(WalkCases, needles_across_the_picture_match_double) {
         {.count = 40, .width = 121, .height = 83, .sh_degree = 0, .max_logit = 0, .seed = 57});
     for (size_t i = 0; i < s.model.size(); ++i)
         for (int c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = c == 0 ? 3.0f : -8.0f;
+    expect_walk_matches(s, {}, tolerance("gradient_scaled_float32"));
+}
+
+TEST(WalkCases, a_camera_with_a_lens_matches_double) {
+    TestScene s = random_scene({.count = 60, .width = 53, .height = 37, .sh_degree = 1, .seed = 7});
+    s.camera.lens = test_lenses()[2].second;
     expect_walk_matches(s, {}, tolerance("gradient_scaled_float32"));
 }
 
