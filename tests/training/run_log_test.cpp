@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/core/files.h"
+#include "trainer/initial_model.h"
 
 namespace darb {
 namespace {
@@ -71,11 +72,16 @@ TEST(RunLog, a_resumed_run_reports_what_it_found_before) {
         run_training(device, dataset, options, run);
         return nlohmann::json::parse(read_text_file(run.output / "metrics.json"));
     };
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
     const auto peak = [&](int densify_until) {
-        options.densify_until = densify_until;
-        return metrics(0)["peak_device_bytes"].get<std::uint64_t>();
+        TrainOptions unlimited = options;
+        unlimited.densify_until = densify_until;
+        Device device;
+        Trainer trainer(device, dataset, photos, initial_model(dataset, unlimited), unlimited);
+        while (trainer.iteration() < options.iterations) trainer.step();
+        return device.peak_bytes();
     };
-    const std::uint64_t still = peak(0), grown = peak(5);
+    const std::uint64_t still = peak(0), grown = peak(options.densify_until);
     ASSERT_GT(grown, still);
     const nlohmann::json whole = metrics(still + (grown - still) / 2);
     ASSERT_EQ(whole["sh_probes"].size(), 2U) << whole["sh_probes"];
