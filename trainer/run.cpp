@@ -69,6 +69,10 @@ class Run {
     void resume();
     void on_result(const IterationResult& result);
     void evaluate(int iteration);
+    std::filesystem::path model_path(int iteration) const {
+        return run_.output / "point_cloud" / fmt::format("iteration_{}", iteration) /
+               "point_cloud.ply";
+    }
     void save_model(int iteration);
     void show_step();
     void save_checkpoint(const std::filesystem::path& path);
@@ -196,8 +200,7 @@ void Run::evaluate(int iteration) {
 
 void Run::save_model(int iteration) {
     stopwatch(false);
-    summary_.model =
-        run_.output / "point_cloud" / fmt::format("iteration_{}", iteration) / "point_cloud.ply";
+    summary_.model = model_path(iteration);
     write_ply(summary_.model, trainer_.model());
     if (const auto maps = trainer_.exposures(); !maps.empty())
         write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
@@ -273,6 +276,13 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
 void Run::train(const std::atomic<bool>* stop) {
     const std::filesystem::path latest = run_.output / "checkpoint.darb";
     stopwatch(true);
+    // A checkpoint of the run's end that was made in another folder.
+    if (const int end = options_.iterations;
+        trainer_.iteration() == end && !std::filesystem::exists(model_path(end))) {
+        evaluate(end);
+        save_model(end);
+        save_checkpoint(latest);
+    }
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         trainer_.step();
         report_resolution();

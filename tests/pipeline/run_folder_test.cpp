@@ -85,6 +85,14 @@ TEST_F(RunFolder, a_checkpoint_of_another_folder_begins_a_log_of_its_own) {
     EXPECT_FALSE(fs::exists(other / "exposure.json")) << "this run trains none";
     EXPECT_TRUE(fs::exists(other / "earlier.exposure.json"));
     EXPECT_FALSE(fs::exists(other / "point_cloud" / "iteration_2"));
+
+    fs::remove_all(other);  // and from the end of a run
+    EXPECT_EQ(darb(kTrain + "-o " + other.string() + " --iterations 3 -q --eval " +
+                   "--start-checkpoint " + (folder_ / "checkpoint.darb").string())
+                  .code,
+              0);
+    EXPECT_NE(darb("info " + other.string()).out.find("iteration_3"), std::string::npos);
+    EXPECT_EQ(json::parse(read_text_file(other / "metrics.json"))["evaluations"].size(), 1U);
 }
 
 TEST_F(RunFolder, resume_takes_the_runs_own_checkpoint_once_there_is_one) {
