@@ -120,7 +120,7 @@ class Run {
 void set_aside(const std::filesystem::path& output) {
     namespace fs = std::filesystem;
     std::error_code none;  // there is no such file
-    for (const char* name : {"checkpoint.darb", "metrics.json", "exposure.json"})
+    for (const char* name : {"checkpoint.darb", "metrics.json", "exposure.json", "report.html"})
         fs::rename(output / name, output / (std::string("earlier.") + name), none);
     std::vector<fs::path> scenes;
     for (const fs::directory_entry& entry : fs::directory_iterator(output / "point_cloud", none))

@@ -74,7 +74,7 @@ TEST_F(RunFolder, a_checkpoint_of_another_folder_begins_a_log_of_its_own) {
               0);
     ASSERT_TRUE(fs::exists(other / "exposure.json"));
     const Outcome o = darb(kTrain + "-o " + other.string() +
-                           " --iterations 3 -q --eval "
+                           " --iterations 3 -q --eval --no-report "
                            "--start-checkpoint " +
                            (folder_ / "chkpnt2.darb").string());
     ASSERT_EQ(o.code, 0) << o.err;
@@ -82,6 +82,8 @@ TEST_F(RunFolder, a_checkpoint_of_another_folder_begins_a_log_of_its_own) {
     ASSERT_EQ(metrics["evaluations"].size(), 1U) << metrics["evaluations"];
     EXPECT_EQ(metrics["evaluations"][0]["iteration"], 3);
     EXPECT_TRUE(fs::exists(other / "earlier.metrics.json"));
+    EXPECT_FALSE(fs::exists(other / "report.html")) << "this run writes none";
+    EXPECT_TRUE(fs::exists(other / "earlier.report.html"));
     EXPECT_FALSE(fs::exists(other / "exposure.json")) << "this run trains none";
     EXPECT_TRUE(fs::exists(other / "earlier.exposure.json"));
     EXPECT_FALSE(fs::exists(other / "point_cloud" / "iteration_2"));
