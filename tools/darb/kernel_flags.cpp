@@ -1,5 +1,7 @@
 #include "tools/darb/kernel_flags.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <sstream>
 
@@ -26,6 +28,11 @@ std::vector<int> kernels_from_list(const std::string& option, const std::string&
         for (int k = 0; k < KERNEL_COUNT; ++k)
             known += (k == 0 ? "" : ", ") + std::string(kernel_name(k));
         if (!kernel) throw Error(option + " " + name, "no such kernel", "There are " + known + ".");
+        if (*kernel >= KERNEL_COUNT)
+            throw Error(option + " " + name, "has more than one pulse",
+                        fmt::format("Write {}: darb train and compare have --pulses, and darb psi "
+                                    "lists more pulses below its table.",
+                                    kernel_name(kernel_with_pulses(*kernel, 1).value())));
         add(*kernel);
     }
     if (kernels.empty()) throw Error(option, "names no kernel", "Write all, or names with commas.");

@@ -104,24 +104,24 @@ std::string curves(const Study1dResult& result, std::size_t signal) {
     return "<div class='plots'>" + html + "</div>\n";
 }
 
-/// How many kernels have a lesser median: 0 for the best, and for all that tie with it.
+/// How many kernels have a lesser median: 0 for the best, and for all that tie with it. A kernel
+/// whose every run failed comes last and is never the best.
 std::vector<std::size_t> ranks(const Study1dResult& result, std::size_t signal, std::size_t n) {
     const std::size_t kernels = result.options.kernels.size();
-    const auto loss = [&](std::size_t k) {
-        const double v = result.row(signal, k, n).median;
-        return std::isfinite(v) ? v : 1e30;
-    };
+    const auto loss = [&](std::size_t k) { return result.row(signal, k, n).median; };
     std::vector<std::size_t> rank(kernels, 0);
-    for (std::size_t k = 0; k < kernels; ++k)
-        for (std::size_t other = 0; other < kernels; ++other)
+    for (std::size_t k = 0; k < kernels; ++k) {
+        if (!std::isfinite(loss(k))) rank[k] = kernels;
+        for (std::size_t other = 0; other < kernels && rank[k] < kernels; ++other)
             if (loss(other) < loss(k)) ++rank[k];
+    }
     return rank;
 }
 
 struct Standing {
     int wins = 0;
-    double log_ratio = 0;  // mean over signals of ln(median / Gaussian's median)
-    int compared = 0, failed = 0;
+    double log_ratio = 0;          // mean over signals of ln(median / Gaussian's median)
+    int compared = 0, failed = 0;  // signals with a ratio; runs
 };
 
 /// [kernel][N] over the signals; ratios only where the Gaussian takes part.
@@ -149,18 +149,24 @@ std::vector<std::vector<Standing>> standings(const Study1dResult& result) {
     return all;
 }
 
-std::string ratio_text(const Standing& s) {
+constexpr const char* kFewer =
+    "/n: over n of the signals; on the others every run of the kernel, or of the gaussian, failed";
+
+std::string ratio_text(const Standing& s, std::size_t signals) {
     if (s.compared == 0) return "-";
     const double ratio = std::exp(s.log_ratio / s.compared);
-    return ratio < 0.01 ? fmt::format("{:.1e}", ratio) : fmt::format("{:.2f}", ratio);
+    const bool all = static_cast<std::size_t>(s.compared) == signals;
+    return (ratio < 0.01 ? fmt::format("{:.1e}", ratio) : fmt::format("{:.2f}", ratio)) +
+           (all ? "" : fmt::format("/{}", s.compared));
 }
 
 std::string html_standings(const Study1dResult& result) {
     const Study1dOptions& o = result.options;
-    std::string html =
+    std::string html = fmt::format(
         "<p class='soft'>Ratio: geometric mean over the signals of the median loss over the "
-        "gaussian's. Won: signals with the least median loss.</p><div class='wide'><table><tr>"
-        "<th>kernel</th>";
+        "gaussian's; {}. Won: signals with the least median loss.</p><div class='wide'><table><tr>"
+        "<th>kernel</th>",
+        kFewer);
     for (const int n : o.primitives)
         html += fmt::format("<th>N = {}: ratio</th><th>won</th><th>failed</th>", n);
     html += "</tr>\n";
@@ -168,8 +174,8 @@ std::string html_standings(const Study1dResult& result) {
     for (std::size_t k = 0; k < o.kernels.size(); ++k) {
         html += fmt::format("<tr><td>{}</td>", kernel_1d_name(o.kernels[k]));
         for (const Standing& s : all[k])
-            html +=
-                fmt::format("<td>{}</td><td>{}</td><td>{}</td>", ratio_text(s), s.wins, s.failed);
+            html += fmt::format("<td>{}</td><td>{}</td><td>{}</td>",
+                                ratio_text(s, o.signals.size()), s.wins, s.failed);
         html += "</tr>\n";
     }
     return html + "</table></div>\n";
@@ -217,12 +223,13 @@ std::string study_1d_table(const Study1dResult& result) {
     for (std::size_t k = 0; k < o.kernels.size(); ++k) {
         text += fmt::format("{:<43}", kernel_1d_name(o.kernels[k]));
         for (const Standing& s : all[k])
-            text +=
-                fmt::format(" {:>17}", fmt::format("{} ({}, {})", ratio_text(s), s.wins, s.failed));
+            text += fmt::format(
+                " {:>17}",
+                fmt::format("{} ({}, {})", ratio_text(s, o.signals.size()), s.wins, s.failed));
         text += "\n";
     }
-    return text +
-           fmt::format("* least; (n!) failed runs of {}; {:.0f} s\n", o.seeds, result.seconds);
+    return text + fmt::format("* least; (n!) failed runs of {}; {}; {:.0f} s\n", o.seeds, kFewer,
+                              result.seconds);
 }
 
 nlohmann::json study_1d_json(const Study1dResult& result) {

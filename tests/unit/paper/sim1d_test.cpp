@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "engine/kernels/kernel_family.h"
 #include "tools/paper/study1d.h"
@@ -102,6 +103,31 @@ TEST(Study1d, Result_repeatsOnAnyNumberOfThreadsAndCountsFailures) {
     EXPECT_GT(study_1d(options, none).rows[0].failed, 0);
     EXPECT_NE(study_1d_html(one).find("sawtooth"), std::string::npos);
     EXPECT_NE(study_1d_table(one).find("parabolic"), std::string::npos);
+}
+
+TEST(Study1d, KernelWhoseEveryRunFailed_neverWinsAndItsRatioNamesTheSignals) {
+    const double nan = std::nan("");
+    Study1dResult result;
+    result.options.signals = {0, 1};
+    result.options.kernels = {KERNEL_GAUSSIAN, KERNEL_SINC};
+    result.options.primitives = {1};
+    result.options.seeds = 2;
+    for (const auto& [signal, kernel, loss] : {std::tuple{0, KERNEL_GAUSSIAN, nan},
+                                               {0, KERNEL_SINC, nan},
+                                               {1, KERNEL_GAUSSIAN, 0.5},
+                                               {1, KERNEL_SINC, 0.25}}) {
+        Study1dRow row;
+        row.signal = signal;
+        row.kernel = kernel;
+        row.primitives = 1;
+        row.failed = std::isnan(loss) ? 2 : 0;
+        row.median = loss;
+        result.rows.push_back(row);
+    }
+    const std::string table = study_1d_table(result);
+    EXPECT_EQ(table.find("-*"), std::string::npos) << table;
+    EXPECT_NE(table.find("1.00/1 (0, 2)"), std::string::npos) << table;
+    EXPECT_NE(table.find("0.50/1 (1, 2)"), std::string::npos) << table;
 }
 
 }  // namespace
