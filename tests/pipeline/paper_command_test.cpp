@@ -52,7 +52,7 @@ TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
               medians[2]["psnr_db"]);
 
     const Outcome other = darb(command + " --train-options '--opacity-lr 0.01'");
-    EXPECT_EQ(other.code, 1);
+    EXPECT_EQ(other.code, 2);
     EXPECT_NE(other.out.find("of a run with other settings: opacity_lr"), std::string::npos)
         << other.out;
 }
@@ -68,6 +68,48 @@ TEST(CompareCommand, RunOfDarbTrain_counts_slow) {
         darb("compare " + kScene + " --kernels parabolic" + options + " -o " + out.string());
     EXPECT_EQ(compared.code, 0) << compared.err;
     EXPECT_NE(compared.err.find("parabolic, seed 0: is there"), std::string::npos) << compared.err;
+    EXPECT_EQ(compared.out.find("LPIPS  "), std::string::npos) << compared.out;  // no weights
+
+    // A link keeps its name, an evaluation that was not made is named, and what cannot be measured
+    // leaves the run as it is.
+    const fs::path link = scratch() / "truck";
+    fs::create_directory_symlink(kScene, link);
+    fs::rename(out / "scene", out / "truck");
+    write_file_atomic(out / "truck/parabolic/seed0/point_cloud/iteration_12/point_cloud.ply",
+                      std::string_view("broken"));
+    const Outcome again =
+        darb("compare " + link.string() +
+             " --kernels parabolic --iterations 6,12 -r 8 --effects=none -o " + out.string());
+    EXPECT_EQ(again.code, 2);
+    const nlohmann::json set = read_json(out / "compare.json")["datasets"][0];
+    EXPECT_EQ(set["name"], "truck");
+    EXPECT_EQ(set["paper"].size(), 10u);
+    EXPECT_EQ(set["runs"][0]["failure"], "");
+    EXPECT_TRUE(set["medians"][1]["psnr_db"]["median"].is_number());
+    const std::string notes = set["runs"][0]["notes"];
+    EXPECT_NE(notes.find("without an evaluation after 6 iterations"), std::string::npos) << notes;
+    EXPECT_NE(notes.find("Without blending: "), std::string::npos) << notes;
+}
+
+TEST(CompareCommand, CamerasThatKeepTheirLens_areBlendedWithIt_slow) {
+    const fs::path set = scratch() / "fisheye", out = scratch() / "compare_fisheye";
+    fs::create_directories(set);
+    fs::create_directory_symlink(kScene + "/images", set / "images");
+    nlohmann::json cameras = read_json(kScene + "/transforms_train.json");
+    cameras["camera_model"] = "OPENCV_FISHEYE";
+    cameras["k1"] = 0.02;
+    write_file_atomic(set / "transforms_train.json", cameras.dump());
+    const Outcome compared =
+        darb("compare " + set.string() +
+             " --kernels gaussian --iterations 2 -r 8 --train-options=--lens=original "
+             "--blending-views 1 -o " +
+             out.string());
+    ASSERT_EQ(compared.code, 0) << compared.err;
+    const nlohmann::json run = read_json(out / "compare.json")["datasets"][0]["runs"][0];
+    EXPECT_EQ(run["failure"], "");
+    const nlohmann::json metrics = read_json(out / "fisheye/gaussian/seed0/metrics.json");
+    EXPECT_TRUE(metrics["start"]["settings"]["effects"]["lens"].get<bool>());
+    EXPECT_GT(run["blending"]["blended_per_pixel"].get<double>(), 0.1);
 }
 
 TEST(CompareCommand, MorePulses_areTrainedStoredAndSetAgainstOne_slow) {
@@ -117,7 +159,7 @@ TEST(CompareCommand, DataSetThatCannotBeLoaded_isAFailureInTheReport) {
     const fs::path empty = scratch() / "empty_set", out = scratch() / "compare_empty";
     fs::create_directories(empty);
     const Outcome one = darb("compare " + empty.string() + " -o " + out.string());
-    EXPECT_EQ(one.code, 1) << one.err;
+    EXPECT_EQ(one.code, 2) << one.err;
     EXPECT_NE(read_text_file(out / "compare.html").find("every kernel"), std::string::npos);
 }
 
@@ -127,9 +169,11 @@ TEST(PsiCommand, TableJsonAndPage_agree) {
                              json.string() + " --html " + page.string());
     ASSERT_EQ(psi.code, 0) << psi.err;
     EXPECT_NE(psi.out.find("0.655153"), std::string::npos) << psi.out;
+    EXPECT_NE(psi.out.find("psi = 1"), std::string::npos) << psi.out;
     EXPECT_NEAR(read_json(json)["kernels"][1]["exact"].get<double>(), 1.176219, 5e-7);
     EXPECT_NE(read_text_file(page).find("<svg"), std::string::npos);
-    EXPECT_EQ(darb("psi --kernel triangle").code, 2);
+    expect_refused({{"psi --kernel triangle", "no such kernel"},
+                    {"psi --kernel sinc_2_pulses", "more than one pulse"}});
 }
 
 TEST(Sim1dCommand, TableJsonAndPage_areWritten) {
@@ -141,7 +185,8 @@ TEST(Sim1dCommand, TableJsonAndPage_areWritten) {
     ASSERT_EQ(sim.code, 0) << sim.err;
     EXPECT_EQ(read_json(json)["rows"].size(), 4u);
     EXPECT_NE(read_text_file(page).find("N = 2"), std::string::npos);
-    EXPECT_EQ(darb("sim1d --signals noise").code, 2);
+    expect_refused({{"sim1d --signals noise", "no such signal"},
+                    {"sim1d --kernels raised_cosine_2_pulses", "more than one pulse"}});
 }
 
 }  // namespace

@@ -88,13 +88,13 @@ int compare(CompareFlags flags) {
         comparison.device = device.info().name + ", " + device.info().driver;
     }
     const std::atomic<bool>& stop = stop_on_signals();
-    bool failed = false;
+    int exit_code = 0;
     for (const std::string& dataset : flags.datasets) {
         if (stop) break;
         comparison.datasets.push_back(
             compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, stop));
         for (const ComparedRun& run : comparison.datasets.back().runs)
-            failed |= !run.failure.empty();
+            if (exit_code != 1 && run.exit_code != 0) exit_code = run.exit_code;
         write_file_atomic(flags.json,
                           comparison_json(comparison)
                                   .dump(1, ' ', false, nlohmann::json::error_handler_t::replace) +
@@ -104,7 +104,7 @@ int compare(CompareFlags flags) {
     fmt::print("{}{}\nreport   {}\n", comparison_table(comparison), comparison.lpips_note,
                flags.html.string());
     if (stop) fmt::print("interrupted; the same command goes on\n");
-    return failed ? 1 : 0;
+    return exit_code;
 }
 
 }  // namespace

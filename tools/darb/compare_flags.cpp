@@ -90,7 +90,8 @@ std::string dataset_path(const std::string& dataset) {
 }
 
 std::string dataset_name(const std::string& dataset) {
-    return std::filesystem::weakly_canonical(dataset_path(dataset)).filename().string();
+    const auto path = std::filesystem::absolute(dataset_path(dataset)).lexically_normal();
+    return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
 TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset, int kernel,

@@ -37,7 +37,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags);
 /// "PATH@IMAGES" names the photo folder of one data set; what has no such part keeps --images.
 std::string dataset_path(const std::string& dataset);
 
-/// The last folder of the path.
+/// The last folder of the path as it is given: a link keeps its name.
 std::string dataset_name(const std::string& dataset);
 
 /// The options that `darb train` would have for this run. Throws Error for --train-options that it

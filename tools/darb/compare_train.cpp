@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <optional>
+#include <set>
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
@@ -25,9 +26,7 @@ class Comparer {
         TrainFlags first = train_flags_of(flags, name, kernel, 0);
         dataset_ = load_training_data(first);
         if (!flags.quiet) print_notes(dataset_.notes);
-        for (const View& v : dataset_.views)
-            if (v.is_test) cameras_.push_back(v.camera);
-        if (cameras_.empty())
+        if (held_out().empty())
             throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
         plan_sees_photos_ = !dataset_.points.seen_begin.empty() || dataset_.has_alpha;
         photos_ = load_photos(dataset_.views);
@@ -36,7 +35,14 @@ class Comparer {
     ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
 
   private:
+    std::vector<Camera> held_out() const {  // as the effects of the last run have them
+        std::vector<Camera> cameras;
+        for (const View& v : dataset_.views)
+            if (v.is_test) cameras.push_back(v.camera);
+        return cameras;
+    }
     void train(TrainFlags& f, const std::atomic<bool>& stop);
+    void measure(ComparedRun& run);
     void note(const std::string& line) const {
         if (!flags_.quiet) fmt::print(stderr, "{}\n", line);
     }
@@ -44,10 +50,10 @@ class Comparer {
     const CompareFlags& flags_;
     std::string name_;
     Dataset dataset_;
-    std::vector<Camera> cameras_;  // held out
     bool plan_sees_photos_ = false;
     std::vector<ImageU8> photos_;
     ViewLpips lpips_;
+    std::set<std::string> blended_;  // kernels
 };
 
 void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
@@ -58,7 +64,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     f.run.photos = photos_;
     const std::string settings = settings_text(f.train);
     const RunState state = run_state(f.run.output, settings, format_camera_list(dataset_.views),
-                                     f.train.iterations, cameras_.size());
+                                     f.train.iterations, held_out().size());
     const std::string title = fmt::format("{}: {}, seed {}", dataset_name(name_),
                                           kernel_name(f.train.kernel), f.train.seed);
     if (state == RunState::finished) return note(title + ": is there");
@@ -71,6 +77,21 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     run_training(device, dataset_, f.train, f.run, &stop);
 }
 
+/// LPIPS, and blending of the first run of a kernel that came to its end. What fails here leaves
+/// the run as it is.
+void Comparer::measure(ComparedRun& run) {
+    attempt(run, "LPIPS", [&] { lpips_.measure(run); });
+    if (flags_.blending_views == 0 || blended_.contains(run.kernel)) return;
+    attempt(run, "blending", [&] {
+        DeviceOptions options;
+        options.select = flags_.device;
+        Device device(options);
+        settle_tuning(device);
+        measure_blending_of(run, device, held_out(), flags_.blending_views);
+        blended_.insert(run.kernel);
+    });
+}
+
 ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
     TrainFlags f = train_flags_of(flags_, name_, kernel, seed);
     ComparedRun run;
@@ -79,23 +100,19 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
     run.folder = f.run.output;
     try {
         train(f, stop);
-        if (stop) {
-            run.failure = "interrupted; the same command goes on with it";
-            return run;
-        }
-        read_run(run, flags_.iterations);
-        lpips_.measure(run);
-        if (seed == 0 && flags_.blending_views > 0) {
-            DeviceOptions options;
-            options.select = flags_.device;
-            Device device(options);
-            settle_tuning(device);
-            measure_blending_of(run, device, cameras_, flags_.blending_views);
-        }
+        if (stop) run.failure = "interrupted; the same command goes on with it";
+        if (!stop) read_run(run, flags_.iterations);
     } catch (const std::exception& e) {
         run.failure = e.what();
+        count_exception(e, run);
         note(fmt::format("failed: {}", e.what()));
     }
+    if (run.failure.empty())
+        measure(run);
+    else
+        read_unfinished_run(run, flags_.iterations, settings_text(f.train),
+                            format_camera_list(dataset_.views));
+    if (!run.notes.empty()) note("note: " + run.notes);
     return run;
 }
 
@@ -112,6 +129,7 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
         ComparedRun failed;
         failed.kernel = "every kernel";
         failed.failure = e.what();
+        failed.exit_code = 2;
         fmt::print(stderr, "failed: {}\n", e.what());
         result.runs.push_back(std::move(failed));
         return result;

@@ -28,7 +28,9 @@ double blended_splats(const SplatModel& model, const Camera& camera) {
 BlendStatistics measure_blending(Device& device, const SplatModel& model,
                                  const std::vector<Camera>& cameras, int repeats) {
     DARB_CHECK(!cameras.empty() && repeats >= 1, "{} cameras, {} repeats", cameras.size(), repeats);
-    Renderer renderer(device, model);
+    ProjectionEffects effects;
+    for (const Camera& camera : cameras) effects.lens |= camera.lens.active;
+    Renderer renderer(device, model, {}, effects);
     BlendStatistics sum;
     double splats = 0, pixels = 0, pairs = 0, visible = 0;
     for (const Camera& camera : cameras) {

@@ -40,10 +40,12 @@ struct ComparedRun {
     std::string kernel;  // its name
     std::uint64_t seed = 0;
     std::filesystem::path folder;
-    std::string failure;  // what ended it; empty where it is finished
-    std::vector<ComparedAt> at;
+    std::string failure;         // what ended it; empty where it is finished
+    std::string notes;           // what could not be read or measured; empty or sentences
+    int exit_code = 0;           // that failure and notes call for
+    std::vector<ComparedAt> at;  // in steps; of a failed run those that it came to
     std::vector<CurvePoint> curve;
-    double peak_mb = 0;  // of device memory, 10^6 bytes
+    std::optional<double> peak_mb;  // of device memory, over the whole run, 10^6 bytes
     std::optional<BlendStatistics> blending;
 };
 
@@ -72,8 +74,14 @@ RunState run_state(const std::filesystem::path& folder, const std::string& setti
                    const std::string& cameras, int iterations, std::size_t held_out);
 
 /// Fills at, curve and peak_mb from metrics.json and run.jsonl in run.folder, for those of
-/// `iterations` that were evaluated. Throws Error naming the file.
+/// `iterations` that were evaluated, and notes with those that were not. Throws Error naming the
+/// file.
 void read_run(ComparedRun& run, const std::vector<int>& iterations);
+
+/// The same from run.jsonl alone, for a run that did not get to its end: nothing where the log is
+/// missing or that of other settings or cameras.
+void read_unfinished_run(ComparedRun& run, const std::vector<int>& iterations,
+                         const std::string& settings, const std::string& cameras);
 
 /// Of the three parts of a held-out picture.
 struct HeldOutPicture {

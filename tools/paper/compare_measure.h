@@ -1,6 +1,7 @@
 // What a comparison measures on finished runs: LPIPS of held-out pictures, and blending.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -11,17 +12,30 @@
 
 namespace darb {
 
-/// Of one data set: keeps the features of its photos.
+/// Of one data set: keeps the features of its photos, as far as they fit into `room` bytes. Those
+/// of a photo of 1.6 million px are 0.8 GB with VGG16.
 class ViewLpips {
   public:
-    explicit ViewLpips(const Lpips* lpips) : lpips_(lpips) {}  // null: measures nothing
+    explicit ViewLpips(const Lpips* lpips, std::size_t room = std::size_t{1} << 29)
+        : lpips_(lpips), room_(room) {}  // null: measures nothing
     /// Fills lpips of every view with a picture on disk, and the mean where every view has one.
     void measure(ComparedRun& run);
 
+    std::size_t photos_kept() const { return photos_.size(); }
+
   private:
+    double distance(const ComparedView& view, const HeldOutPicture& picture);
+
     const Lpips* lpips_;
+    std::size_t room_;                             // left
     std::map<std::string, LpipsFeatures> photos_;  // by view
 };
+
+/// run.exit_code of an exception as main has it: 2 for what the user can mend, 1 else; 1 is kept.
+void count_exception(const std::exception& e, ComparedRun& run);
+
+/// An exception of the measurement becomes a note that names it; the run stays as it is.
+void attempt(ComparedRun& run, const std::string& what, const std::function<void()>& measurement);
 
 /// run.blending, of the last saved model, over at most `views` of the cameras.
 void measure_blending_of(ComparedRun& run, Device& device, std::vector<Camera> cameras, int views);

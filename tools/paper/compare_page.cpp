@@ -8,6 +8,7 @@
 #include "engine/kernels/kernel_family.h"
 #include "tools/paper/compare.h"
 #include "tools/paper/compare_crops.h"
+#include "tools/paper/compare_means.h"
 #include "tools/paper/compare_pulses.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
@@ -61,37 +62,51 @@ std::string table_of(const Comparison& c, const ComparedDataset& dataset, int it
     return html + "</table></div>\n";
 }
 
-/// Means over the data sets where every kernel has the value.
-std::string means_table(const Comparison& c, int iteration) {
-    const std::vector<Column>& columns = quality_columns();
-    std::vector<std::vector<std::optional<double>>> means(columns.size());
-    std::vector<Marks> marks;
+std::string means_row(const std::string& name, const std::vector<Column>& columns,
+                      const std::vector<std::vector<std::optional<double>>>& values,
+                      std::size_t row, const std::vector<Marks>* marks) {
+    std::string html = "<tr><td>" + html_escape(name) + "</td>";
     for (std::size_t k = 0; k < columns.size(); ++k) {
-        std::vector<double> sums(c.kernels.size(), 0.0);
-        int count = 0;
-        for (const ComparedDataset& dataset : c.datasets) {
-            std::vector<std::optional<double>> values;
-            for (const std::string& kernel : c.kernels)
-                values.push_back(over_seeds(dataset, kernel, iteration, columns[k]).median);
-            if (std::count(values.begin(), values.end(), std::nullopt) > 0) continue;
-            for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += *values[i];
-            ++count;
-        }
-        for (const double sum : sums)
-            means[k].push_back(count > 0 ? std::optional(sum / count) : std::nullopt);
-        marks.push_back(marks_of(means[k], columns[k]));
+        const auto& value = values[k][row];
+        const std::string text = value ? format_number(*value, columns[k].decimals) : "-";
+        html += "<td>" + (marks == nullptr ? text : marked(text, row, (*marks)[k])) + "</td>";
     }
+    return html + "</tr>\n";
+}
+
+/// The means of one group of data sets; the last row says how many each column covers.
+std::string means_table(const Comparison& c, const Means& means,
+                        const std::vector<Column>& columns) {
+    std::vector<Marks> marks;
+    for (std::size_t k = 0; k < columns.size(); ++k)
+        marks.push_back(marks_of(means.values[k], columns[k]));
     std::string html = head_of("kernel", columns);
     for (std::size_t row = 0; row < c.kernels.size(); ++row) {
-        html += "<tr><td>" + html_escape(c.kernels[row]) + "</td>";
-        for (std::size_t k = 0; k < columns.size(); ++k)
-            html += "<td>" +
-                    marked(means[k][row] ? format_number(*means[k][row], columns[k].decimals) : "-",
-                           row, marks[k]) +
-                    "</td>";
-        html += "</tr>\n";
+        html += means_row(c.kernels[row], columns, means.values, row, &marks);
+        if (std::any_of(means.paper.begin(), means.paper.end(),
+                        [&](const auto& values) { return values[row].has_value(); }))
+            html += means_row(c.kernels[row] + ", the paper", columns, means.paper, row, nullptr);
     }
-    return html + "</table></div>\n";
+    html += "<tr><td>data sets</td>";
+    for (const int covered : means.covered) html += fmt::format("<td>{}</td>", covered);
+    return html + "</tr>\n</table></div>\n";
+}
+
+std::string means_part(const Comparison& c, int iteration) {
+    const std::vector<Column> columns = shown_columns(c);
+    std::string html;
+    for (const Means& means : means_of(c, iteration, columns)) {
+        std::string names;
+        for (const std::string& name : means.names) names += (names.empty() ? "" : ", ") + name;
+        html += fmt::format(
+                    "<h2>Means, {}, {} iterations</h2><p class='soft'>{}. Each over the data sets "
+                    "where every kernel has the value; the last row says how many. {}</p>",
+                    means.benchmark.empty() ? "all data sets" : means.benchmark,
+                    format_number(iteration), html_escape(names),
+                    means.benchmark.empty() ? "" : "The paper's are over the same scenes.") +
+                means_table(c, means, columns);
+    }
+    return html;
 }
 
 const ComparedRun* first_run(const Comparison& c, const ComparedDataset& dataset,
@@ -245,16 +260,17 @@ std::string dataset_part(const Comparison& c, const ComparedDataset& dataset) {
     std::string html = "<h2>" + html_escape(dataset.name) + "</h2>\n";
     for (const int iteration : c.iterations)
         html += fmt::format("<h3>{} iterations</h3>", format_number(iteration)) +
-                table_of(c, dataset, iteration, quality_columns());
+                table_of(c, dataset, iteration, shown_columns(c));
     html += paper_table(dataset) + pulse_html(c, dataset) + curves(c, dataset);
     if (std::any_of(dataset.runs.begin(), dataset.runs.end(),
                     [](const ComparedRun& run) { return run.blending.has_value(); }))
         html += "<h3>What blending takes</h3>" +
                 table_of(c, dataset, c.iterations.back(), blending_columns());
     for (const ComparedRun& run : dataset.runs)
-        if (!run.failure.empty())
-            html += fmt::format("<p>Failed: {}, seed {}: {}</p>\n", html_escape(run.kernel),
-                                run.seed, html_escape(run.failure));
+        for (const auto& [what, why] : {std::pair{"Failed", run.failure}, {"Note", run.notes}})
+            if (!why.empty())
+                html += fmt::format("<p>{}: {}, seed {}: {}</p>\n", what, html_escape(run.kernel),
+                                    run.seed, html_escape(why));
     return html + crop_rows(c, dataset);
 }
 
@@ -262,21 +278,16 @@ std::string dataset_part(const Comparison& c, const ComparedDataset& dataset) {
 
 std::string comparison_html(const Comparison& c) {
     std::string body;
-    if (c.datasets.size() > 1)
-        for (const int iteration : c.iterations)
-            body += fmt::format(
-                        "<h2>Means, {} iterations</h2><p class='soft'>Over the data sets "
-                        "where every kernel has the value.</p>",
-                        format_number(iteration)) +
-                    means_table(c, iteration);
+    for (const int iteration : c.iterations) body += means_part(c, iteration);
     for (const ComparedDataset& dataset : c.datasets) body += dataset_part(c, dataset);
     body += splat_figure(c);
     body += fmt::format(
         "<h2>How to read it</h2><p>Bold: best; underlined: third best, of the medians of a column "
         "as they are printed; all that tie are marked. "
         "Held-out views. Medians over {} seed{}, range in brackets; curves and crops are of the "
-        "first. {}</p><p>{}</p><p>Model: the PLY file. Peak: device memory. Training: without "
-        "evaluation. Splats blended per pixel are those with alpha at or over the cut-off before "
+        "first. {}</p><p>{}</p><p>Model: the PLY file. Peak: device memory, over the whole run, "
+        "whatever the iteration. Training: without evaluation. Splats blended per pixel are those "
+        "with alpha at or over the cut-off before "
         "the pixel is opaque, counted in double precision; ns per splat and pixel is the time of "
         "the blend pass over them.</p>\n",
         c.seeds, c.seeds == 1 ? "" : "s", html_escape(c.settings), html_escape(c.lpips_note));

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "tools/paper/compare.h"
+#include "trainer/report/html.h"
 
 namespace darb {
 
@@ -36,13 +38,6 @@ std::string differences(const Json& there, const Json& wanted) {
     return text;
 }
 
-fs::path picture_of(const fs::path& folder, int iteration, const std::string& view) {
-    std::string stem = fs::path(view).replace_extension().string();
-    std::replace_if(
-        stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
-    return folder / "held_out" / std::to_string(iteration) / (stem + ".png");
-}
-
 // JSON has NaN and infinity as null.
 double number(const Json& record, const char* key) {
     const Json& value = record.at(key);
@@ -56,9 +51,11 @@ ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
     at.psnr_db = number(e, "psnr_db");
     at.ssim = number(e, "ssim");
     at.splats = e.at("splats");
+    const fs::path pictures = folder / "held_out" / std::to_string(at.iteration);
+    std::set<std::string> used;  // in the order in which the run named them
     for (const Json& v : e.at("views"))
         at.views.push_back({v.at("name"), number(v, "psnr_db"), number(v, "ssim"), std::nullopt,
-                            picture_of(folder, at.iteration, v.at("name"))});
+                            pictures / picture_name(v.at("name"), used)});
     const fs::path model =
         folder / "point_cloud" / fmt::format("iteration_{}", at.iteration) / "point_cloud.ply";
     if (fs::exists(model)) {
@@ -68,16 +65,27 @@ ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
     return at;
 }
 
-std::vector<CurvePoint> curve_of(const fs::path& log) {
-    std::vector<CurvePoint> curve;
+std::vector<Json> events_of(const fs::path& log) {
+    std::vector<Json> events;
     std::istringstream lines(read_text_file(log));
-    for (std::string line; std::getline(lines, line);) {
-        const Json e = Json::parse(line, nullptr, false);
-        if (!e.is_object() || e.value("event", "") != "iteration") continue;
-        curve.push_back({e.value("iteration", 0), e.value("seconds", 0.0), number(e, "loss"),
-                         e.value("splats", 0.0)});
-    }
+    for (std::string line; std::getline(lines, line);)
+        if (Json e = Json::parse(line, nullptr, false); e.is_object())
+            events.push_back(std::move(e));
+    return events;
+}
+
+std::vector<CurvePoint> curve_of(const std::vector<Json>& events) {
+    std::vector<CurvePoint> curve;
+    for (const Json& e : events)
+        if (e.value("event", "") == "iteration")
+            curve.push_back({e.value("iteration", 0), e.value("seconds", 0.0), number(e, "loss"),
+                             e.value("splats", 0.0)});
     return curve;
+}
+
+void take_evaluation(const Json& e, const std::vector<int>& iterations, ComparedRun& run) {
+    if (std::find(iterations.begin(), iterations.end(), e.at("iteration")) != iterations.end())
+        run.at.push_back(evaluation_of(e, run.folder));
 }
 
 }  // namespace
@@ -108,17 +116,36 @@ void read_run(ComparedRun& run, const std::vector<int>& iterations) {
     const fs::path path = run.folder / "metrics.json";
     const Json metrics = read_json(path);
     try {
-        for (const Json& e : metrics.at("evaluations")) {
-            const int iteration = e.at("iteration");
-            if (std::find(iterations.begin(), iterations.end(), iteration) != iterations.end())
-                run.at.push_back(evaluation_of(e, run.folder));
-        }
+        for (const Json& e : metrics.at("evaluations")) take_evaluation(e, iterations, run);
         run.peak_mb = 1e-6 * metrics.at("peak_device_bytes").get<double>();
     } catch (const Json::exception& e) {
         throw Error(path.string(), std::string("lacks what it should have: ") + e.what(),
                     "Remove the folder to train again.");
     }
-    run.curve = curve_of(run.folder / "run.jsonl");
+    run.curve = curve_of(events_of(run.folder / "run.jsonl"));
+    for (const int iteration : iterations)
+        if (std::none_of(run.at.begin(), run.at.end(),
+                         [&](const ComparedAt& at) { return at.iteration == iteration; }))
+            run.notes += fmt::format(
+                "It was trained without an evaluation after {} iterations; remove {} to train it "
+                "again. ",
+                format_number(iteration), run.folder.string());
+}
+
+void read_unfinished_run(ComparedRun& run, const std::vector<int>& iterations,
+                         const std::string& settings, const std::string& cameras) {
+    const fs::path log = run.folder / "run.jsonl", list = run.folder / "cameras.json";
+    if (!fs::exists(log) || !fs::exists(list) || read_text_file(list) != cameras) return;
+    const std::vector<Json> events = events_of(log);
+    const auto start = std::find_if(events.rbegin(), events.rend(),
+                                    [](const Json& e) { return e.value("event", "") == "start"; });
+    if (start == events.rend() ||
+        !differences(start->value("settings", Json::object()), Json::parse(settings)).empty())
+        return;
+    run.at.clear();
+    for (const Json& e : events)
+        if (e.value("event", "") == "evaluation") take_evaluation(e, iterations, run);
+    run.curve = curve_of(events);
 }
 
 HeldOutPicture read_held_out(const fs::path& picture) {

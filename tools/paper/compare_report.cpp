@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "tools/paper/compare.h"
+#include "tools/paper/compare_means.h"
 #include "tools/paper/compare_pulses.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
@@ -35,9 +36,10 @@ Json at_json(const ComparedAt& at) {
 }
 
 Json run_json(const ComparedRun& run) {
-    Json json{{"kernel", run.kernel},   {"seed", run.seed},       {"folder", run.folder.string()},
-              {"failure", run.failure}, {"peak_mb", run.peak_mb}, {"at", Json::array()},
-              {"curve", Json::array()}};
+    Json json{
+        {"kernel", run.kernel},   {"seed", run.seed},      {"folder", run.folder.string()},
+        {"failure", run.failure}, {"notes", run.notes},    {"peak_mb", optional_json(run.peak_mb)},
+        {"at", Json::array()},    {"curve", Json::array()}};
     for (const ComparedAt& at : run.at) json["at"].push_back(at_json(at));
     for (const CurvePoint& p : run.curve)
         json["curve"].push_back({{"iteration", p.iteration},
@@ -88,17 +90,18 @@ Json paper_json(const std::string& dataset) {
 
 std::string comparison_table(const Comparison& c) {
     std::string text;
+    const std::vector<Column> columns = shown_columns(c);
     for (const ComparedDataset& dataset : c.datasets)
         for (const int iteration : c.iterations) {
             text += fmt::format("{}, {} iterations\n{:<26}", dataset.name, format_number(iteration),
                                 "");
-            for (const Column& column : quality_columns())
+            for (const Column& column : columns)
                 text += fmt::format(
                     " {:>12}", column.unit.empty() ? column.name : column.name + " " + column.unit);
             text += "\n";
             for (const std::string& kernel : c.kernels) {
                 text += fmt::format("{:<26}", kernel);
-                for (const Column& column : quality_columns()) {
+                for (const Column& column : columns) {
                     const OverSeeds v = over_seeds(dataset, kernel, iteration, column);
                     text += fmt::format(" {:>12}",
                                         v.median ? format_number(*v.median, column.decimals) : "-");
@@ -110,9 +113,10 @@ std::string comparison_table(const Comparison& c) {
     for (const ComparedDataset& dataset : c.datasets) text += pulse_lines(c, dataset);
     for (const ComparedDataset& dataset : c.datasets)
         for (const ComparedRun& run : dataset.runs)
-            if (!run.failure.empty())
-                text += fmt::format("failed: {}, {}, seed {}: {}\n", dataset.name, run.kernel,
-                                    run.seed, run.failure);
+            for (const auto& [what, why] : {std::pair{"failed", run.failure}, {"note", run.notes}})
+                if (!why.empty())
+                    text += fmt::format("{}: {}, {}, seed {}: {}\n", what, dataset.name, run.kernel,
+                                        run.seed, why);
     return text;
 }
 
@@ -130,7 +134,7 @@ nlohmann::json comparison_json(const Comparison& c) {
     }
     return {{"version", DARB_VERSION}, {"device", c.device},    {"settings", c.settings},
             {"seeds", c.seeds},        {"lpips", c.lpips_note}, {"iterations", c.iterations},
-            {"kernels", c.kernels},    {"datasets", datasets}};
+            {"kernels", c.kernels},    {"datasets", datasets},  {"means", means_json(c)}};
 }
 
 }  // namespace darb

@@ -35,10 +35,21 @@ const std::vector<Column>& quality_columns() {
         {"splats", "", "splats", 0, false,
          [](const ComparedRun&, const ComparedAt& at) { return Value(at.splats); }},
         {"peak", "MB", "peak_mb", 0, false,
-         [](const ComparedRun& run, const ComparedAt&) { return Value(run.peak_mb); }},
+         [](const ComparedRun& run, const ComparedAt&) { return run.peak_mb; }},
         {"training", "s", "training_s", 1, false,
          [](const ComparedRun&, const ComparedAt& at) { return Value(at.seconds); }},
     };
+    return columns;
+}
+
+std::vector<Column> shown_columns(const Comparison& comparison) {
+    bool lpips = false;
+    for (const ComparedDataset& dataset : comparison.datasets)
+        for (const ComparedRun& run : dataset.runs)
+            for (const ComparedAt& at : run.at) lpips |= at.lpips.has_value();
+    std::vector<Column> columns;
+    for (const Column& column : quality_columns())
+        if (lpips || column.json != "lpips") columns.push_back(column);
     return columns;
 }
 
@@ -60,7 +71,7 @@ OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, 
                      const Column& column) {
     std::vector<double> values;
     for (const ComparedRun& run : dataset.runs) {
-        if (run.kernel != kernel || !run.failure.empty()) continue;
+        if (run.kernel != kernel) continue;
         for (const ComparedAt& at : run.at)
             if (at.iteration == iteration)
                 if (const Value v = column.value(run, at); v && std::isfinite(*v))

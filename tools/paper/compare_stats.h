@@ -27,9 +27,12 @@ struct Column {
 };
 /// PSNR, SSIM, LPIPS, model MB, splats, peak MB, seconds.
 const std::vector<Column>& quality_columns();
+/// Those of quality_columns that a table shows: without LPIPS where no run has it.
+std::vector<Column> shown_columns(const Comparison& comparison);
 /// splats blended per pixel, pairs per splat, ns per splat-pixel, blend ms, frame ms.
 const std::vector<Column>& blending_columns();
 
+/// Of a failed run what it came to counts.
 OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, int iteration,
                      const Column& column);
 

@@ -44,7 +44,7 @@ constexpr Row kVgg16[] = {{1, 0, 0, 1, 1, false}, {1, 2, 0, 1, 1, true},   {2, 5
 
 constexpr const char* kRemedy =
     "Save the state_dict of lpips.LPIPS, or that of torchvision's net together with the package's "
-    "lin layers, as safetensors.";
+    "lin layers, as safetensors, each tensor cloned (docs/paper.md has the lines).";
 
 const Tensor& tensor_of(const Tensors& tensors, const std::vector<std::string>& names,
                         const std::string& where) {
@@ -154,7 +154,15 @@ Plane scaled(const ImageF& image, bool as_3dgs) {
 
 Tensors read_all(const std::vector<std::filesystem::path>& files) {
     Tensors all;
-    for (const std::filesystem::path& file : files) all.merge(read_safetensors(file));
+    for (const std::filesystem::path& file : files) {
+        Tensors more = read_safetensors(file);
+        all.merge(more);
+        if (!more.empty())  // what was there already
+            throw Error(file.string(),
+                        "has tensor " + more.begin()->first + ", as a file before it has",
+                        "Give the weights of one network: two take two runs of darb compare, the "
+                        "second of which trains nothing.");
+    }
     return all;
 }
 

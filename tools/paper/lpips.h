@@ -27,6 +27,12 @@ struct LpipsFeatures {
         std::vector<float> data;  // [channels][pixels]
     };
     std::vector<Map> maps;
+
+    std::size_t bytes() const {
+        std::size_t floats = 0;
+        for (const Map& map : maps) floats += map.data.size();
+        return floats * sizeof(float);
+    }
 };
 
 class Lpips {
@@ -34,7 +40,8 @@ class Lpips {
     /// Tensors of all files together. Trunk: features.N.weight and .bias as torchvision names them
     /// (AlexNet 0 3 6 8 10; VGG16 0 2 5 7 10 12 14 17 19 21 24 26 28), or net.sliceK.N.* as in the
     /// lpips package. Heads: linK.model.1.weight, K = 0 to 4. The size of the first filter tells
-    /// the net. Throws Error naming the tensor that is missing or has another shape.
+    /// the net. Throws Error naming the tensor that is missing, has another shape, or is in two
+    /// files.
     explicit Lpips(const std::vector<std::filesystem::path>& files,
                    const LpipsOptions& options = {});
     Lpips(const Tensors& tensors, const std::string& where, const LpipsOptions& options = {});

@@ -147,7 +147,21 @@ constexpr std::array kNumbers = std::to_array<PaperNumbers>({
 });
 // clang-format on
 
+constexpr std::string_view kBenchmarks[] = {"Mip-NeRF 360", "Tanks and Temples", "Deep Blending"};
+
 }  // namespace
+
+std::span<const std::string_view> paper_benchmarks() {
+    return kBenchmarks;
+}
+
+std::string_view paper_benchmark_of(std::string_view dataset) {
+    const std::vector<PaperNumbers> rows = paper_numbers_of(dataset);
+    if (rows.empty()) return {};
+    const std::string_view scene = rows.front().scene;
+    if (scene == "truck" || scene == "train") return kBenchmarks[1];
+    return kBenchmarks[scene == "drjohnson" || scene == "playroom" ? 2 : 0];
+}
 
 std::span<const PaperNumbers> paper_numbers() {
     return kNumbers;

@@ -21,4 +21,10 @@ std::span<const PaperNumbers> paper_numbers();
 /// Those of the scene whose name is the data set's, in any case; empty where there is none.
 std::vector<PaperNumbers> paper_numbers_of(std::string_view dataset);
 
+/// "Mip-NeRF 360", "Tanks and Temples", "Deep Blending".
+std::span<const std::string_view> paper_benchmarks();
+
+/// The one that has a scene of the data set's name, in any case; empty where none has.
+std::string_view paper_benchmark_of(std::string_view dataset);
+
 }  // namespace darb

@@ -15,6 +15,9 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "engine/data/image_io.h"
+#include "engine/data/metrics.h"
+#include "tools/paper/compare_measure.h"
 
 namespace darb {
 namespace {
@@ -176,6 +179,48 @@ std::vector<std::byte> bytes_of(const std::string& header, std::size_t data) {
     std::memcpy(file.data(), &length, 8);
     std::memcpy(file.data() + 8, header.data(), header.size());
     return file;
+}
+
+TEST(Lpips, TensorInTwoFiles_isRefused) {
+    const fs::path file = fs::path(testing::TempDir()) / fmt::format("twice_{}", ::getpid());
+    write_file_atomic(file,
+                      bytes_of(R"({"x":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}})", 4));
+    try {
+        Lpips({file, file});
+        FAIL() << "no error";
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("has tensor x, as a file before it"),
+                  std::string::npos)
+            << e.what();
+    }
+    fs::remove(file);
+}
+
+TEST(ViewLpips, PhotosThatDoNotFit_areMeasuredAllTheSame) {
+    const fs::path folder = fs::path(testing::TempDir()) / fmt::format("views_{}", ::getpid());
+    const Lpips lpips(tiny_alexnet(), "tiny");
+    ComparedRun run;
+    run.at.emplace_back();
+    for (const char* name : {"a", "b"}) {
+        ImageU8 all(3 * 40, 40, 3);  // photo | render | error
+        Pcg32 rng(static_cast<std::uint64_t>(name[0]));
+        for (std::uint8_t& v : all.data) v = static_cast<std::uint8_t>(255 * rng.uniform());
+        write_png(folder / name, all);
+        run.at[0].views.push_back({name, 0, 0, std::nullopt, folder / name});
+    }
+    ComparedRun again = run;
+    const std::size_t bytes = lpips.features(to_float(read_held_out(folder / "a").photo)).bytes();
+    ViewLpips none(&lpips, bytes - 1), one(&lpips, bytes);
+    none.measure(run);
+    one.measure(again);
+    EXPECT_EQ(none.photos_kept(), 0u);
+    EXPECT_EQ(one.photos_kept(), 1u);
+    one.measure(again);
+    EXPECT_GT(*run.at[0].views[0].lpips, 0);
+    EXPECT_NE(*run.at[0].views[0].lpips, *run.at[0].views[1].lpips);
+    for (std::size_t v = 0; v < 2; ++v)
+        EXPECT_EQ(*run.at[0].views[v].lpips, *again.at[0].views[v].lpips);
+    fs::remove_all(folder);
 }
 
 TEST(Safetensors, Types_becomeFloats) {
