@@ -4,7 +4,7 @@
 #   tools/paper_tables.sh ROOT OUT [options of darb compare...]
 # ROOT holds the scenes' folders, at any depth up to three: bicycle flowers garden stump treehill room counter
 # kitchen bonsai truck train drjohnson playroom. Missing ones are named and left out. Runs again go on. The schedule is
-# that of 3DGS, as the paper's, unless --train-options says otherwise.
+# that of 3DGS, as the paper's, unless --train-options names another --schedule.
 set -euo pipefail
 
 if [[ $# -lt 2 ]]; then
@@ -39,5 +39,15 @@ add images truck train drjohnson playroom
 
 [[ ${#missing[@]} == 0 ]] || echo "paper_tables.sh: left out, not found: ${missing[*]}" >&2
 [[ ${#datasets[@]} -gt 0 ]] || exit 2
-[[ " $*" == *" --train-options"* ]] || set -- --train-options="--schedule 3dgs" "$@"
-exec "$darb" compare "${datasets[@]}" -o "$out" --kernels paper --iterations 7000,30000 --lpips-as-3dgs "$@"
+training="" rest=()
+while [[ $# -gt 0 ]]; do
+    case $1 in
+        --train[-_]options=*) training=${1#*=} ;;
+        --train[-_]options) training=${2?--train-options has no value} && shift ;;
+        *) rest+=("$1") ;;
+    esac
+    shift
+done
+[[ $training == *--schedule* ]] || training="--schedule 3dgs${training:+ $training}"
+exec "$darb" compare "${datasets[@]}" -o "$out" --kernels paper --iterations 7000,30000 --lpips-as-3dgs \
+    --train-options="$training" ${rest[@]+"${rest[@]}"}

@@ -14,7 +14,8 @@ import sys
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FIGURES = os.path.join(ROOT, "assets/results/scenes_lavapipe.json")
 PAGE = os.path.join(ROOT, "docs/paper.md")
-KEPT = {"psnr_db": 3, "ssim": 4, "lpips": 4, "model_mb": 3, "splats": 0, "training_s": 1}
+KEPT = {"psnr_db": 3, "ssim": 4, "lpips": 4, "model_mb": 3, "splats": 0, "peak_mb": 1, "training_s": 1}
+BLENDING = {"blended_per_pixel": 1, "pairs_per_splat": 2, "blend_ms": 1, "ns_per_splat_pixel": 2, "frame_ms": 1}
 
 
 def kept(report):
@@ -24,23 +25,28 @@ def kept(report):
         for m in dataset["medians"]:
             row = {"dataset": dataset["name"], "kernel": m["kernel"], "iteration": m["iteration"]}
             for name, digits in KEPT.items():
-                if m[name] is not None:
+                if m.get(name) is not None:  # null: every run failed, or none was evaluated there
                     row[name] = [round(m[name][k], digits) for k in ("median", "low", "high")]
                     row["runs"] = m[name]["runs"]
             rows.append(row)
         rows += [{"dataset": dataset["name"], "kernel": r["kernel"], "seed": r["seed"], "failure": r["failure"]}
                  for r in dataset["runs"] if r["failure"]]
+        rows += [{"dataset": dataset["name"], "kernel": r["kernel"], "seed": r["seed"]} |
+                 {name: round(r["blending"][name], digits) for name, digits in BLENDING.items()}
+                 for r in dataset["runs"] if r.get("blending")]
     return {"device": report["driver"] if "driver" in report else report["device"], "settings": report["settings"],
             "median_low_high": rows}
 
 
-def spread(values, form):
-    median, low, high = values
+def spread(row, name, form):
+    if name not in row:
+        return "-"
+    median, low, high = row[name]
     return form.format(median) + (f" ({form.format(low)} to {form.format(high)})" if low != high else "")
 
 
 def table(title, figures):
-    rows = [r for r in figures["median_low_high"] if "failure" not in r]
+    rows = [r for r in figures["median_low_high"] if "iteration" in r]
     steps = sorted({r["iteration"] for r in rows})
     lines = [f"**{title}** {figures['settings']}", "",
              "| data set | kernel | " + " | ".join(f"PSNR dB, SSIM at {n:,}" for n in steps) +
@@ -50,17 +56,40 @@ def table(title, figures):
         at = {r["iteration"]: r for r in rows if (r["dataset"], r["kernel"]) == (name, kernel)}
         cells = [name if name != before else "", kernel]
         for step in steps:
-            best = max(r["psnr_db"][0] for r in rows if r["dataset"] == name and r["iteration"] == step)
-            mark = "**" if step in at and at[step]["psnr_db"][0] == best else ""
-            cells.append(f"{mark}{spread(at[step]['psnr_db'], '{:.2f}')}{mark}, "
-                         f"{spread(at[step]['ssim'], '{:.4f}')}" if step in at else "-")
+            known = [r["psnr_db"][0] for r in rows
+                     if r["dataset"] == name and r["iteration"] == step and "psnr_db" in r]
+            row = at.get(step, {})
+            mark = "**" if "psnr_db" in row and row["psnr_db"][0] == max(known) else ""
+            cells.append(f"{mark}{spread(row, 'psnr_db', '{:.2f}')}{mark}, {spread(row, 'ssim', '{:.4f}')}"
+                         if "psnr_db" in row else "-")
         last = at[max(at)]
-        cells += [spread(last["splats"], "{:,.0f}"), spread(last["training_s"], "{:.0f}")]
+        cells += [spread(last, "splats", "{:,.0f}"), spread(last, "training_s", "{:.0f}")]
         lines.append("| " + " | ".join(cells) + " |")
         before = name
     failed = [f"{r['dataset']}, {r['kernel']}, seed {r['seed']}: {r['failure']}"
               for r in figures["median_low_high"] if "failure" in r]
     return "\n".join(lines + ([""] + failed if failed else []))
+
+
+def blending_table(title, figures):
+    """Of each kernel's first run: a column a data set; nothing where none was measured."""
+    rows = [r for r in figures["median_low_high"] if "blended_per_pixel" in r]
+    sets, kernels = (list(dict.fromkeys(r[key] for r in rows)) for key in ("dataset", "kernel"))
+    lines = [f"**{title}**", "", "| blended per pixel, pairs per splat, ms | " + " | ".join(sets) + " |",
+             "|---|" + "---|" * len(sets)]
+    for kernel in kernels:
+        cells = {r["dataset"]: f"{r['blended_per_pixel']:.1f}, {r['pairs_per_splat']:.2f}, {r['blend_ms']:.1f}"
+                 for r in reversed(rows) if r["kernel"] == kernel}
+        lines.append(f"| {kernel} | " + " | ".join(cells.get(name, "-") for name in sets) + " |")
+    return "\n".join(lines) if rows else ""
+
+
+def replaced(page, name, tables):
+    """The page with these tables between its marks of this name."""
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+    if begin not in page or end not in page:
+        sys.exit(f"{PAGE}: has no {begin.strip()} before {end}; put both back")
+    return page[:page.index(begin) + len(begin)] + "\n\n".join(t for t in tables if t) + "\n" + page[page.index(end):]
 
 
 def main():
@@ -74,15 +103,15 @@ def main():
             sys.exit(__doc__)
         with open(path, encoding="utf-8") as file:
             figures[title] = kept(json.load(file))
-    with open(FIGURES, "w", encoding="utf-8") as file:  # a row a line
-        text = json.dumps(figures, indent=1)
-        file.write(re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n")
     with open(PAGE, encoding="utf-8") as file:
         page = file.read()
-    begin, end = "<!-- tables of the data sets -->\n", "<!-- end of the tables -->"
-    tables = "\n\n".join(table(title, of) for title, of in figures.items())
+    page = replaced(page, "the tables of blending", [blending_table(*item) for item in figures.items()])
+    page = replaced(page, "the tables of the data sets", [table(*item) for item in figures.items()])
+    text = json.dumps(figures, indent=1)
+    with open(FIGURES, "w", encoding="utf-8") as file:  # a row a line
+        file.write(re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text) + "\n")
     with open(PAGE, "w", encoding="utf-8") as file:
-        file.write(page[:page.index(begin) + len(begin)] + tables + "\n" + page[page.index(end):])
+        file.write(page)
 
 
 if __name__ == "__main__":

@@ -23,8 +23,10 @@ output=$("$script" "$fake/root" "$fake/out" --seeds 2 2>&1)
 check "sizes of 3DGS" "bicycle@images_4 .*room@images_2 .*Truck@images " "$output"
 check "iterations and options" "--iterations 7000,30000 .*--seeds 2" "$output"
 check "the paper's schedule" "--train-options=--schedule 3dgs" "$output"
-check "another schedule" "--lpips-as-3dgs --train-options --schedule darb$" \
-    "$("$script" "$fake/root" "$fake/out" --train-options "--schedule darb" 2>/dev/null)"
+check "another schedule" "--lpips-as-3dgs --train-options=--schedule darb --seeds 2$" \
+    "$("$script" "$fake/root" "$fake/out" --train-options "--schedule darb" --seeds 2 2>/dev/null)"
+check "other options keep the schedule" "--train-options=--schedule 3dgs --opacity-lr 0.01$" \
+    "$("$script" "$fake/root" "$fake/out" --train-options="--opacity-lr 0.01" 2>/dev/null)"
 check "missing scenes are named" "left out, not found: .*garden.*playroom" "$output"
 check "photos that are called train" "left out, not found: .*train" "$output"
 check "links" "room@images_2" "$("$script" "$fake/links" "$fake/out" 2>/dev/null)"
