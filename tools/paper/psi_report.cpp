@@ -175,19 +175,19 @@ std::string html_table(const std::vector<PsiResult>& results) {
 
 std::string psi_table(const std::vector<PsiResult>& results) {
     std::string text = fmt::format(
-        "{:<22} {:^27} {:>9} {:>9}  {:^13} {:^13} {:^15}\n{:<22} {:>8} {:>9} {:>8} {:>9} {:>9}  "
-        "{:>6} {:>6} {:>6} {:>6} {:>7} {:>7}\n",
-        "psi", "grid, median", "exact", "least", "psi footprint", "least squares",
+        "{:<22} {:^27} {:>9} {:>9}  {:^13} {:^13} {:^13} {:^15}\n{:<22} {:>8} {:>9} {:>8} {:>9} "
+        "{:>9}  {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7} {:>7}\n",
+        "psi", "grid, median", "exact", "least", "psi footprint", "psi = 1", "least squares",
         "exact footprint", "", "xx", "xy", "yy", "moments", "squares", "L2", "max", "L2", "max",
-        "L2", "max");
+        "L2", "max", "L2", "max");
     for (const PsiResult& r : results)
         text += fmt::format(
             "{:<22} {:>8.5f} {:>9.5f} {:>8.5f} {:>9.6f} {:>9.6f}  {:>6.4f} {:>6.4f} {:>6.4f} "
-            "{:>6.4f} {:>7.1e} {:>7.1e}\n{:<22} {:>8.5f} {:>9.5f} {:>8.5f}\n",
+            "{:>6.4f} {:>6.4f} {:>6.4f} {:>7.1e} {:>7.1e}\n{:<22} {:>8.5f} {:>9.5f} {:>8.5f}\n",
             r.kernel, r.grid[0].median, r.grid[1].median, r.grid[2].median, r.exact, r.best,
-            r.by_psi.l2, r.by_psi.linf, r.by_best.l2, r.by_best.linf, r.by_exact_footprint.l2,
-            r.by_exact_footprint.linf, "  standard deviation", r.grid[0].deviation,
-            r.grid[1].deviation, r.grid[2].deviation);
+            r.by_psi.l2, r.by_psi.linf, r.by_one.l2, r.by_one.linf, r.by_best.l2, r.by_best.linf,
+            r.by_exact_footprint.l2, r.by_exact_footprint.linf, "  standard deviation",
+            r.grid[0].deviation, r.grid[1].deviation, r.grid[2].deviation);
     text += fmt::format("\n{:<22} {:>8} {:>9} {:>9} {:>16}\n", "with more pulses", "pulses",
                         "radius", "psi", "mass beyond one");
     for (const Rings& r : all_rings())
