@@ -8,6 +8,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -137,6 +138,24 @@ TEST_F(KilledRun, interrupted_run_saves_and_resumes_by_its_folder_alone) {
     ASSERT_EQ(Command({"train", "--resume", "-q", "-o", stopped.string()}, log()).wait(), 0)
         << read_text_file(log());
     EXPECT_EQ(read_file(model(stopped)), read_file(model(whole)));
+}
+
+// A comparison ends with 0 and reports what the run came to.
+TEST_F(KilledRun, interrupted_comparison_keeps_the_evaluations_that_were_made) {
+    const fs::path run = folder_ / "scene/gaussian/seed0";
+    Command command(
+        {"compare", std::string(DARB_SOURCE_DIR) + "/assets/scene", "-o", folder_.string(), "-r",
+         "8", "-q", "--kernels", "gaussian", "--iterations", "10,1000000", "--blending-views", "0"},
+        log());
+    while (command.running() && !fs::exists(run / "point_cloud/iteration_10")) ::usleep(200);
+    ASSERT_TRUE(command.running()) << read_text_file(log());
+    command.interrupt();
+    EXPECT_EQ(command.wait(), 0) << read_text_file(log());
+    const auto report = nlohmann::json::parse(read_text_file(folder_ / "compare.json"));
+    const auto& set = report["datasets"][0];
+    EXPECT_GT(set["medians"][0]["psnr_db"]["median"].get<double>(), 5);
+    EXPECT_TRUE(set["medians"][1]["psnr_db"].is_null());
+    EXPECT_EQ(set["runs"][0]["failure"].get<std::string>().find("interrupted"), 0u);
 }
 
 }  // namespace
