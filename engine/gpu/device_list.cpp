@@ -7,15 +7,17 @@
 #include <numeric>
 #include <optional>
 
+#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/gpu/device_state.h"
+#include "engine/gpu/shader_table.h"
+#include "engine/gpu/spirv_reflect.h"
 
 namespace darb {
 
 namespace {
 
 constexpr std::uint32_t kMinSharedBytes = 16 * 1024;
-constexpr std::uint32_t kMinStorageBuffers = 8;
 constexpr std::uint32_t kMinSubgroup = 4, kMaxSubgroup = 64;  // lanes, of the blend passes
 
 std::string type_name(VkPhysicalDeviceType type) {
@@ -82,8 +84,7 @@ std::string missing_part(VkPhysicalDevice device, const DeviceInfo& info) {
         return "subgroup operations missing";
     if (const std::string trouble = subgroup_trouble(info); !trouble.empty()) return trouble;
     if (info.shared_memory_bytes < kMinSharedBytes) return "less than 16 KiB of shared memory";
-    if (info.max_storage_buffers < kMinStorageBuffers) return "too few storage buffers per shader";
-    return {};
+    return buffers_trouble(info, kRendering);
 }
 
 bool float_atomics(VkPhysicalDevice device) {
@@ -166,6 +167,8 @@ DeviceInfo describe(VkPhysicalDevice device) {
 
 std::string lower(std::string text) {
     for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (const std::string few = buffers_trouble(info, kTraining); info.usable && !few.empty())
+        info.reason += ", which cannot train: " + few;
     return text;
 }
 
@@ -199,6 +202,20 @@ int compute_queue_family(VkPhysicalDevice device) {
     vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
     std::vector<VkQueueFamilyProperties> families(count);
     vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+std::uint32_t storage_buffers(std::string_view shader) {
+    const auto table = shader_table();
+    const auto found = std::find_if(table.begin(), table.end(),
+                                    [&](const ShaderBinary& s) { return s.name == shader; });
+    DARB_CHECK(found != table.end(), "no shader {}", shader);
+    return static_cast<std::uint32_t>(reflect_spirv(found->words, shader).bindings.size());
+}
+
+std::string buffers_trouble(const DeviceInfo& info, std::string_view shader) {
+    const std::uint32_t needs = storage_buffers(shader);
+    if (info.max_storage_buffers >= needs) return {};
+    return fmt::format("{} storage buffers a shader, needs {}", info.max_storage_buffers, needs);
+}
+
     for (const VkQueueFlags wanted : {VkQueueFlags{VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT},
                                       VkQueueFlags{VK_QUEUE_COMPUTE_BIT}})
         for (std::uint32_t i = 0; i < count; ++i)

@@ -30,6 +30,13 @@ std::string hex(std::span<const std::uint8_t> bytes);
 /// The queue family that does compute, with graphics too if there is one; -1 = none.
 int compute_queue_family(VkPhysicalDevice device);
 
+/// The shaders that bind the most storage buffers: of a rendering, and of all.
+constexpr std::string_view kRendering = "project", kTraining = "project_backward";
+/// What a shader binds of them.
+std::uint32_t storage_buffers(std::string_view shader);
+/// Why a device cannot run this shader for want of them, or "".
+std::string buffers_trouble(const DeviceInfo& info, std::string_view shader);
+
 /// The bytes of a pipeline cache file, or nothing where it is missing, broken or of another device.
 std::vector<std::byte> load_pipeline_cache(const std::filesystem::path& file);
 /// Errors are ignored: a cache that cannot be written only costs time.

@@ -1,6 +1,7 @@
 // Device: listing, selection, buffers, budgets and injected faults.
 #include "engine/gpu/device.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -10,7 +11,9 @@
 #include "engine/core/error.h"
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
+#include "engine/gpu/device_state.h"
 #include "engine/gpu/faults.h"
+#include "engine/gpu/shader_table.h"
 
 namespace darb {
 namespace {
@@ -94,6 +97,25 @@ TEST(ListDevices, subgroups_that_the_blend_cannot_use_are_a_reason) {
     EXPECT_NE(trouble(8, 32, false).find("cannot require"), std::string::npos);
     EXPECT_NE(trouble(1, 1, true).find("needs 4 to 64"), std::string::npos);
     EXPECT_NE(trouble(128, 128, true).find("needs 4 to 64"), std::string::npos);
+}
+
+TEST(ListDevices, too_few_storage_buffers_are_a_reason) {
+    DeviceInfo info;
+    const std::uint32_t rendering = storage_buffers(kRendering),
+                        training = storage_buffers(kTraining);
+    info.max_storage_buffers = rendering - 1;
+    EXPECT_NE(buffers_trouble(info, kRendering).find(fmt::format("needs {}", rendering)),
+              std::string::npos);
+    info.max_storage_buffers = rendering;
+    EXPECT_EQ(buffers_trouble(info, kRendering), "");
+    EXPECT_NE(buffers_trouble(info, kTraining).find(fmt::format("needs {}", training)),
+              std::string::npos);
+    for (const ShaderBinary& shader : shader_table())
+        EXPECT_LE(storage_buffers(shader.name), training) << shader.name;
+    for (const char* shader :
+         {"compact", "emit", "emit_huge", "tile_ranges", "blend", "depth_light", "upsample",
+          "scan_apply", "radix_scatter_ballot", "display"})
+        EXPECT_LE(storage_buffers(shader), rendering) << shader;
 }
 
 TEST(ListDevices, every_usable_device_has_its_limits) {
