@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
+#include "engine/render/frame_limit.h"
 #include "engine/render/tuning.h"
 #include "engine/scene/ply.h"
 #include "trainer/checkpoint.h"
@@ -349,3 +350,5 @@ RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptio
 }
 
 }  // namespace darb
+    for (const View& view : dataset.views)
+        check_frame(device, view.camera.width, view.camera.height, view.name);

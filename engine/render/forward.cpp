@@ -7,6 +7,7 @@
 #include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/render/blend_backward.h"
+#include "engine/render/frame_limit.h"
 #include "engine/render/groups.h"
 #include "engine/render/kernel_constants.h"
 #include "engine/render/tuning.h"
@@ -297,6 +298,7 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         make_buffers(d, *this, pixel_buffers(options_, pixels, size_.list_segments), "blend");
         size_.pixels = pixels;
     }
+        check_frame(d, width, height);
     if (size_.checkpoint_records() > checkpoint_records())
         make_buffers(d, *this, checkpoint_buffers(size_.checkpoint_records()), "blend");
 }

@@ -1,5 +1,6 @@
 #include "engine/render/upsample.h"
 
+#include "engine/render/frame_limit.h"
 #include "engine/render/groups.h"
 #include "shaders/shared/render_args.h"
 
@@ -27,6 +28,7 @@ Upsample::Upsample(Device& device)
 const Buffer& Upsample::record(Commands& commands, const Buffer& image, const Camera& rendered,
                                const Camera& shown) {
     const std::uint64_t pixels = std::uint64_t(shown.width) * shown.height;
+    check_frame(*device_, shown.width, shown.height);
     if (!image_ || image_.bytes() < pixels * 12)
         image_ = Buffer(*device_, "upsampled image", pixels * 12);
     const gpu::UpsampleArgs args{

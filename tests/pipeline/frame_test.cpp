@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/render/blend_backward.h"
+#include "engine/render/frame_limit.h"
 #include "tests/support/device_walk.h"
 #include "tests/support/projected_frame.h"
 #include "tests/support/scoped_variants.h"
@@ -273,6 +274,30 @@ TEST(Frame, a_budget_without_ample_room_gets_the_room_it_needs) {
         EXPECT_THROW(grown(290'000), Error);
         device.set_memory_budget(0);
     }
+}
+
+TEST(Frame, a_picture_beyond_a_binding_names_its_camera_and_a_resolution) {
+    const Device& device = shared_device();
+    const int side = static_cast<int>(std::sqrt(double(max_frame_pixels(device))));
+    const auto refusal = [&](int width, int height) -> std::string {
+        try {
+            check_frame(device, width, height, "north");
+        } catch (const Error& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_EQ(refusal(side, side), "");
+    const std::string text = refusal(2 * side, 3 * side);
+    EXPECT_NE(text.find("\"north\""), std::string::npos) << text;
+    EXPECT_NE(text.find(fmt::format("{} pixels", max_frame_pixels(device))), std::string::npos);
+    const std::size_t at = text.find("-r ");
+    ASSERT_NE(at, std::string::npos) << text;
+    const int width = std::stoi(text.substr(at + 3));
+    EXPECT_GT(width, 0.8 * side);
+    EXPECT_EQ(refusal(width, static_cast<int>(std::lround(1.5 * width))), "");
+    Forward forward(shared_device(), {});
+    EXPECT_THROW(forward.reserve(1, 1, 2 * side, side), Error);
 }
 
 TEST(Frame, pairs_beyond_the_buckets_name_the_way_that_holds_them) {

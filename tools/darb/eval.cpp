@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/dataset.h"
+#include "engine/render/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
@@ -80,6 +81,8 @@ int eval(EvalFlags flags) {
     const EffectPlan plan = plan_rendering(model, views, {}, choice);
     apply_plan(plan, model);
     apply_plan(plan, views);
+    for (const View& view : views)
+        check_frame(device, view.camera.width, view.camera.height, view.name);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.crowds());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     Evaluation evaluation;

@@ -10,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
+#include "engine/render/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
@@ -74,6 +75,8 @@ int render(RenderFlags flags) {
         choice);
     apply_plan(plan, model);
     apply_plan(plan, views);
+    for (const View& view : views)
+        check_frame(device, view.camera.width, view.camera.height, view.name);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.crowds());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     std::set<std::string> used;
