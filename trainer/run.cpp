@@ -79,6 +79,7 @@ class Run {
     void save_checkpoint(const std::filesystem::path& path);
     void train(const std::atomic<bool>* stop);
     bool is_finished() const;
+    std::string other_way() const;
     void report_troubles();
     void report_resolution();
     void report_growth();
@@ -156,8 +157,8 @@ void Run::resume() {
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
     if (checkpoint.tuning != tuning_)
-        progress_.note(
-            fmt::format("goes on with {} as it began, not with {}", checkpoint.tuning, tuning_));
+        progress_.note(fmt::format("goes on with {} as it began; {} is for a run that starts again",
+                                   checkpoint.tuning, tuning_));
 }
 
 // As 3DGS writes it: name -> three rows of four.
@@ -274,6 +275,15 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     return summary_;
 }
 
+// Of the backward blend, where that holds more pairs.
+std::string Run::other_way() const {
+    if (result_variants(device_) == "backward=subgroup") return "";
+    return fmt::format(
+        ", and so does --tune backward=subgroup, which holds {}, in a run that "
+        "starts again",
+        BlendBackward::max_pairs(device_));
+}
+
 void Run::train(const std::atomic<bool>* stop) {
     const std::filesystem::path latest = run_.output / "checkpoint.darb";
     stopwatch(true);
@@ -316,15 +326,16 @@ void Run::report_resolution() {
 
 void Run::report_growth() {
     const auto tell = [&](std::uint32_t splats, std::uint32_t& told, const char* limit,
-                          const char* reason) {
+                          const std::string& reason) {
         if (splats == told) return;
         if (told == 0) progress_.note(fmt::format("growth stops at {} splats: {}", splats, reason));
         log_.growth_stopped(trainer_.iteration(), limit, told = splats);
     };
     tell(trainer_.stopped_by_memory(), told_by_memory_, "memory", "--max-memory");
     tell(trainer_.stopped_by_pairs(), told_by_pairs_, "pairs",
-         "frames come near the pairs of splats and tiles that this device can bind; a smaller -r "
-         "leaves room");
+         fmt::format("frames come near the {} pairs of splats and tiles that this device can hold; a "
+                     "smaller -r leaves room{}",
+                     Forward::max_pairs(device_), other_way()));
 }
 
 void Run::report_probes() {
@@ -346,9 +357,9 @@ void Run::report_troubles() {
 
 RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
                         const RunOptions& run, const std::atomic<bool>* stop) {
+    for (const View& view : dataset.views)
+        check_frame(device, view.camera.width, view.camera.height, view.name);
     return Run(device, dataset, options, run).execute(stop);
 }
 
 }  // namespace darb
-    for (const View& view : dataset.views)
-        check_frame(device, view.camera.width, view.camera.height, view.name);

@@ -212,7 +212,7 @@ bool Forward::make_room(const gpu::FrameStatus& status) {
         const std::uint64_t other_way = most_trained_pairs(*device_);
         const std::string instead =
             size_.bucket > 0 && wanted <= other_way
-                ? fmt::format("Run with --tune backward=subgroup, which holds {}, or lower",
+                ? fmt::format("Start again with --tune backward=subgroup, which holds {}, or lower",
                               other_way)
                 : "Lower";
         throw Error("splat-tile pairs",

@@ -19,9 +19,8 @@ namespace darb {
 
 namespace {
 
-constexpr double kGain = 0.97;                                    // less is not worth another way
-constexpr std::uint64_t kBucketBinding = std::uint64_t{1} << 30;  // bytes
-constexpr int kFormat = 1;
+constexpr double kGain = 0.97;  // less is not worth another way
+constexpr int kFormat = 2;
 
 // A frame of a CPU must not take long, one of a GPU must not be too short to tell ways apart.
 struct Size {
@@ -109,25 +108,6 @@ std::filesystem::path file_of(const DeviceInfo& info, const std::filesystem::pat
            fmt::format("tuning-{:016x}.json", fnv1a(kHashStart, std::span<const char>(key)));
 }
 
-bool may_choose(const DeviceInfo& info, const TuningTime& time) {
-    return time.way != "buckets" || info.max_storage_buffer_bytes >= kBucketBinding;
-}
-
-std::string choose(const DeviceInfo& info, const TuningGroup& group,
-                   const std::vector<TuningTime>& times) {
-    std::string best = group.ways.front();
-    double least = 0;
-    for (const TuningTime& time : times) {
-        if (time.group != group.name || !may_choose(info, time)) continue;
-        const bool usual = time.way == group.ways.front();  // the first that is measured
-        if (usual || time.ms < least) {
-            least = usual ? kGain * time.ms : time.ms;
-            best = time.way;
-        }
-    }
-    return best;
-}
-
 // The least of the frames' times for each of several sets of passes.
 std::vector<double> measure(Device& device, const Variants& variants,
                             const std::vector<TuningGroup>& groups) {
@@ -144,6 +124,20 @@ std::vector<double> measure(Device& device, const Variants& variants,
 }
 
 }  // namespace
+
+std::string fastest_way(const TuningGroup& group, const std::vector<TuningTime>& times) {
+    std::string best = group.ways.front();
+    double least = 0;
+    for (const TuningTime& time : times) {
+        if (time.group != group.name || time.way == "buckets") continue;
+        const bool usual = time.way == group.ways.front();  // the first that is measured
+        if (usual || time.ms < least) {
+            least = usual ? kGain * time.ms : time.ms;
+            best = time.way;
+        }
+    }
+    return best;
+}
 
 TuningFrame::TuningFrame(Device& device)
     : splats_(device, tuning_scene(size_for(device.info())), false),
@@ -198,7 +192,7 @@ TuningRecord measure_tuning(Device& device) {
             } catch (const Error&) {
             }
         }
-        record.choice[groups[g].name] = choose(device.info(), groups[g], record.times);
+        record.choice[groups[g].name] = fastest_way(groups[g], record.times);
     }
     device.set_variants(before);
     device.forget_peak();

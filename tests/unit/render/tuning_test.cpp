@@ -113,6 +113,18 @@ TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
     EXPECT_EQ(RadixSort(device, 100).strategy(), RadixSort::Strategy::ballot);
 }
 
+TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_pairs) {
+    const auto taken = [](const char* group, const std::vector<TuningTime>& times) {
+        for (const TuningGroup& g : tuning_groups(some_gpu()))
+            if (g.name == group) return fastest_way(g, times);
+        return std::string();
+    };
+    EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.98}}), "subgroup");
+    EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.9}}), "thread");
+    EXPECT_EQ(taken("backward", {{"backward", "subgroup", 1}, {"backward", "buckets", 0.1}}),
+              "subgroup");
+}
+
 TEST_F(Tuner, a_record_is_read_back) {
     write_tuning(some_gpu(), folder_, record());
     const auto read = read_tuning(some_gpu(), folder_);
