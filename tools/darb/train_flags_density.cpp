@@ -89,7 +89,8 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
     command
         .add_option(
             "--largest-scale", t.largest_scale,
-            "in scene extents, or in half distances to the points where these are more: no splat "
+            "in scene extents, or in half distances to the points where these are more, times what "
+            "the kernel's lengths are longer than a Gaussian's (raised_cosine: 1.28): no splat "
             "grows beyond it; 0: no limit (default 1 with a kernel that covers less than a "
             "Gaussian, as raised_cosine, else 0)")
         ->check(CLI::NonNegativeNumber);
