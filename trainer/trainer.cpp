@@ -192,6 +192,10 @@ void Trainer::drain() {
     settle(flights_[iteration_ & 1]);
 }
 
+void Trainer::reserve_backward() {
+    backward_.reserve(splats_.count(), forward_.pair_capacity(), forward_.checkpoint_records());
+}
+
 void Trainer::launch(int iteration) {
     Flight& flight = flights_[iteration & 1];
     DARB_CHECK(flight.iteration == 0, "iteration {} is still in flight", flight.iteration);
@@ -200,7 +204,7 @@ void Trainer::launch(int iteration) {
     const int width = static_cast<int>(data.width), height = static_cast<int>(data.height);
     const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
     forward_.reserve(splats_.count(), pairs, width, height);
-    backward_.reserve(splats_.count(), forward_.pair_capacity());
+    reserve_backward();
     note_memory();
 
     flight.iteration = iteration;
@@ -288,7 +292,7 @@ void Trainer::settle(Flight& flight) {
         do {
             counters_.overflows += status.overflow != 0 ? 1 : 0;
             ++counters_.redone_iterations;
-            forward_.make_room(status);
+            forward_.make_room(status, [this] { reserve_backward(); });
             launch(i);
             status = finish(flights_[i & 1]);
         } while (status.overflow != 0);
@@ -321,7 +325,8 @@ void Trainer::density_control(int iteration) {
             counters_.most_pairs > kMostPairs * Forward::max_pairs(*device_);
         if (pairs_are_near && stopped_by_pairs_ == 0) stopped_by_pairs_ = splats_.count();
         const std::uint32_t limit =
-            std::min({options_.max_splats, within_memory, GpuSplats::max_count(*device_, true),
+            std::min({options_.max_splats, within_memory,
+                      GpuSplats::max_count(*device_, options_.sh_degree, true),
                       pairs_are_near ? splats_.count() : 0xFFFFFFFFu});
         args.gradient_threshold = options_.densify_grad_threshold;
         const double length = options_.length_scale() * extent_;
@@ -375,7 +380,7 @@ ImageF Trainer::render(const Camera& camera) {
         commands.begin();
         forward_.record(commands, splats_, cameras, 0, data, sh_degree(), background_);
         commands.submit_and_wait();
-        if (!forward_.make_room(forward_.read_status())) break;
+        if (!forward_.make_room(forward_.read_status(), [this] { reserve_backward(); })) break;
     }
     return planes_to_image(
         forward_.image().download<float>(size_t(camera.width) * camera.height * 3), camera.width,

@@ -136,6 +136,7 @@ class Trainer {
     };
     int view_for(int iteration);
     int degree_at(int iteration) const;
+    void reserve_backward();  // beside forward_
     void launch(int iteration);
     void record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
                 const Buffer& loss);

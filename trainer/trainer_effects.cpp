@@ -92,7 +92,7 @@ double Trainer::photo_psnr(int view) {
                      photos_[view], d_image_, flight.loss, 0, width, height, background_,
                      options_.lambda_dssim);
         flight.commands.submit_and_wait();
-    } while (forward_.make_room(forward_.read_status()));
+    } while (forward_.make_room(forward_.read_status(), [this] { reserve_backward(); }));
     gpu::LossResult loss;
     std::memcpy(&loss, flight.loss.mapped(), sizeof loss);
     const double mse = double(loss.mse) / std::max(double(loss.weight), 1e-12);

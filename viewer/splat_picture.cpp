@@ -51,10 +51,11 @@ SplatPicture::SplatPicture(Device& device)
 
 void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
                              std::vector<std::uint32_t> important) {
-    if (const std::uint32_t most = GpuSplats::max_count(*device_, false); model.size() > most)
+    if (const std::uint32_t most = GpuSplats::max_count(*device_, model.sh_degree, false);
+        model.size() > most)
         throw Error(
             "the scene",
-            fmt::format("has {} splats, {} can bind {}", model.size(), device_->info().name, most),
+            fmt::format("has {} splats, {} can hold {}", model.size(), device_->info().name, most),
             "Choose another device (darb devices), or prune the scene.");
     own_ = GpuSplats(*device_, model, false);
     styled_.reset();

@@ -59,7 +59,7 @@ VkBuffer create_handle(const Device::State& state, std::uint64_t bytes, const st
 
 void check_limits(const Device::State& state, const std::string& name, std::uint64_t bytes,
                   const std::string& what) {
-    const std::uint64_t limit = std::min(state.max_buffer_bytes, state.info.max_allocation_bytes);
+    const std::uint64_t limit = state.info.max_allocation_bytes;
     if (bytes > limit)
         throw Error(what,
                     fmt::format("{} allows at most {} MiB a buffer", state.info.name, limit >> 20),
@@ -72,7 +72,8 @@ void check_limits(const Device::State& state, const std::string& name, std::uint
                         static_cast<double>(in_use) / (1 << 20),
                         static_cast<double>(budget) / (1 << 20)),
             "Raise the memory budget (--max-memory), or use smaller images or fewer splats.");
-    if (state.faults.fails_allocation(name)) check_vulkan(VK_ERROR_OUT_OF_DEVICE_MEMORY, what);
+    if (state.faults.fails_allocation(name, in_use + bytes))
+        check_vulkan(VK_ERROR_OUT_OF_DEVICE_MEMORY, what);
 }
 
 }  // namespace

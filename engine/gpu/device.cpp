@@ -93,6 +93,9 @@ Device::State::State(const DeviceOptions& options, bool validation)
     physical = chosen.handle;
     info = chosen.info;
     if (faults.binding_bytes != 0) info.max_storage_buffer_bytes = faults.binding_bytes;
+    if (faults.allocation_bytes != 0) info.max_allocation_bytes = faults.allocation_bytes;
+    info.max_storage_buffer_bytes =
+        std::min(info.max_storage_buffer_bytes, info.max_allocation_bytes);
     lavapipe = info.driver.starts_with("llvmpipe");
     vkGetPhysicalDeviceMemoryProperties(physical, &memory);
     try {
@@ -105,14 +108,9 @@ Device::State::State(const DeviceOptions& options, bool validation)
 }
 
 void Device::State::create_device(const DeviceOptions& options) {
-    VkPhysicalDeviceMaintenance4Properties maintenance{};
-    maintenance.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES;
-    VkPhysicalDeviceProperties2 properties{};
-    properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
-    properties.pNext = &maintenance;
-    vkGetPhysicalDeviceProperties2(physical, &properties);
-    limits = properties.properties.limits;
-    max_buffer_bytes = maintenance.maxBufferSize;
+    VkPhysicalDeviceProperties properties{};
+    vkGetPhysicalDeviceProperties(physical, &properties);
+    limits = properties.limits;
 
     queue_family = static_cast<std::uint32_t>(compute_queue_family(physical));
     std::uint32_t count = 0;

@@ -26,8 +26,8 @@ struct DeviceInfo {
     std::uint32_t api_version = 0;
     std::uint64_t heap_bytes = 0;                // largest device-local heap
     std::uint64_t max_storage_buffer_bytes = 0;  // maxStorageBufferRange
-    std::uint64_t max_allocation_bytes = 0;
-    std::uint32_t max_storage_buffers = 0;  // per stage
+    std::uint64_t max_allocation_bytes = 0;      // the most of one buffer
+    std::uint32_t max_storage_buffers = 0;       // per stage
     std::uint32_t max_workgroup_threads = 0;
     std::uint32_t shared_memory_bytes = 0;
     std::uint32_t max_groups_x = 0;

@@ -120,9 +120,13 @@ DeviceInfo describe(VkPhysicalDevice device) {
     VkPhysicalDeviceDriverProperties driver{};
     driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;
     driver.pNext = &subgroup;
+    VkPhysicalDeviceMaintenance4Properties buffers{};  // of Vulkan 1.3
+    buffers.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES;
+    buffers.pNext = &driver;
+    buffers.maxBufferSize = ~VkDeviceSize{0};
     VkPhysicalDeviceMaintenance3Properties maintenance{};
     maintenance.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES;
-    maintenance.pNext = &driver;
+    maintenance.pNext = &buffers;
     VkPhysicalDeviceProperties2 properties{};
     properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
     properties.pNext = &maintenance;
@@ -138,7 +142,8 @@ DeviceInfo describe(VkPhysicalDevice device) {
     info.type = type_name(core.deviceType);
     info.api_version = core.apiVersion;
     info.max_storage_buffer_bytes = limits.maxStorageBufferRange;
-    info.max_allocation_bytes = maintenance.maxMemoryAllocationSize;
+    info.max_allocation_bytes =
+        std::min(maintenance.maxMemoryAllocationSize, buffers.maxBufferSize);
     info.max_storage_buffers = limits.maxPerStageDescriptorStorageBuffers;
     info.max_workgroup_threads = limits.maxComputeWorkGroupInvocations;
     info.shared_memory_bytes = limits.maxComputeSharedMemorySize;
@@ -162,13 +167,13 @@ DeviceInfo describe(VkPhysicalDevice device) {
     const std::string missing = missing_part(device, info);
     info.usable = missing.empty();
     info.reason = info.usable ? info.type + " device" : "rejected: " + missing;
+    if (const std::string few = buffers_trouble(info, kTraining); info.usable && !few.empty())
+        info.reason += ", which cannot train: " + few;
     return info;
 }
 
 std::string lower(std::string text) {
     for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (const std::string few = buffers_trouble(info, kTraining); info.usable && !few.empty())
-        info.reason += ", which cannot train: " + few;
     return text;
 }
 
@@ -197,11 +202,6 @@ std::string subgroup_trouble(const DeviceInfo& info) {
     return {};
 }
 
-int compute_queue_family(VkPhysicalDevice device) {
-    std::uint32_t count = 0;
-    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
-    std::vector<VkQueueFamilyProperties> families(count);
-    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
 std::uint32_t storage_buffers(std::string_view shader) {
     const auto table = shader_table();
     const auto found = std::find_if(table.begin(), table.end(),
@@ -216,6 +216,11 @@ std::string buffers_trouble(const DeviceInfo& info, std::string_view shader) {
     return fmt::format("{} storage buffers a shader, needs {}", info.max_storage_buffers, needs);
 }
 
+int compute_queue_family(VkPhysicalDevice device) {
+    std::uint32_t count = 0;
+    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
+    std::vector<VkQueueFamilyProperties> families(count);
+    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
     for (const VkQueueFlags wanted : {VkQueueFlags{VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT},
                                       VkQueueFlags{VK_QUEUE_COMPUTE_BIT}})
         for (std::uint32_t i = 0; i < count; ++i)

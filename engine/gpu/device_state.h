@@ -56,7 +56,6 @@ struct Device::State {
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkPhysicalDeviceMemoryProperties memory{};
     VkPhysicalDeviceLimits limits{};
-    std::uint64_t max_buffer_bytes = 0;
     std::uint32_t timestamp_bits = 0;
     std::uint32_t queue_family = 0;
     bool queue_graphics = false;

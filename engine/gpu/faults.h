@@ -2,6 +2,8 @@
 //   oom:NAME   creating the buffer NAME fails as if the device were out of memory
 //   lost:N     the N-th submit of the device (from 1) and all later ones report a lost device
 //   binding:N  the device says that a storage buffer binding holds at most N bytes
+//   allocation:N  the device says that a buffer has at most N bytes
+//   memory:N   buffers beyond N bytes in all fail as if the device were out of memory
 // Unset in normal use. Read once per Device; a text that is neither is an Error.
 #pragma once
 
@@ -16,8 +18,11 @@ struct Faults {
     std::vector<std::string> out_of_memory;  // buffer names
     std::uint64_t lost_at_submit = 0;        // 0 = never
     std::uint64_t binding_bytes = 0;         // 0 = what the device says
+    std::uint64_t allocation_bytes = 0;      // 0 = what the device says
+    std::uint64_t memory_bytes = 0;          // 0 = no limit
 
-    bool fails_allocation(std::string_view buffer) const;
+    /// in_all: bytes of all buffers, this one included.
+    bool fails_allocation(std::string_view buffer, std::uint64_t in_all) const;
     bool fails_submit(std::uint64_t submit) const {
         return lost_at_submit != 0 && submit >= lost_at_submit;
     }

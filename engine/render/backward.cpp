@@ -53,14 +53,16 @@ Pipeline& Backward::project_pipeline(int sh_degree) {
         .first->second;
 }
 
-void Backward::reserve(std::uint32_t splats, std::uint32_t pairs) {
+void Backward::reserve(std::uint32_t splats, std::uint32_t pairs, std::uint32_t records) {
     if (splats > splat_capacity_ || splat_capacity_ == 0) {
-        splat_capacity_ = std::max(splats, 1024u);
-        make_buffers(*device_, *this, splat_buffers(splat_capacity_), "project backward");
+        splat_capacity_ = 0;
+        splats = std::max(splats, 1024u);
+        make_buffers(*device_, *this, splat_buffers(splats), "project backward");
+        splat_capacity_ = splats;
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
     const std::uint32_t window_pairs = blend_.window_pairs();
-    blend_.reserve(pairs);
+    blend_.reserve(pairs, records);
     if (blend_.window_pairs() != window_pairs) project_.clear();
 }
 

@@ -33,9 +33,9 @@ class Backward {
   public:
     Backward(Device& device, const ForwardOptions& options, BackwardResult result);
 
-    /// Buffers for so many splats and pairs: never shrinks, 0 of either asks for no more. Where
-    /// there are more splats, gradient_sum() starts at 0.
-    void reserve(std::uint32_t splats, std::uint32_t pairs);
+    /// Buffers for so many splats and pairs, and records as BlendBackward::reserve says: never
+    /// shrinks, 0 of any asks for no more. Where there are more splats, gradient_sum() starts at 0.
+    void reserve(std::uint32_t splats, std::uint32_t pairs, std::uint32_t records = 0);
     /// Device memory beside a Forward of this size.
     static FrameBytes device_bytes(const FrameSize& size);
 

@@ -17,8 +17,10 @@ std::uint64_t pairs_of_a_binding(const Device& device) {
 
 }  // namespace
 
+// Several bindings, but one buffer.
 std::uint64_t BlendBackward::max_pairs(const Device& device) {
-    return pairs_of_a_binding(device) * PARTIAL_WINDOWS;
+    return std::min(pairs_of_a_binding(device) * PARTIAL_WINDOWS,
+                    device.info().max_allocation_bytes / kPartialBytes);
 }
 
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
@@ -68,10 +70,15 @@ void BlendBackward::make_pipelines(bool segmented) {
     bucket_behind_ = Pipeline(*device_, "bucket_behind", constants);
 }
 
-void BlendBackward::reserve(std::uint32_t pairs) {
+// A size is taken note of once its buffers are there, as in Forward.
+void BlendBackward::reserve(std::uint32_t pairs, std::uint32_t records) {
+    if (records > 0 && bucket_tile_.bytes() < std::uint64_t{records} * 4)
+        make_buffers(*device_, *this, bucket_buffers(records), "blend backward");
     if (pairs <= pair_capacity_ && pair_capacity_ > 0) return;
-    pair_capacity_ = std::max(pairs, 1024u);
-    make_buffers(*device_, *this, pair_buffers(pair_capacity_), "blend backward");
+    pair_capacity_ = 0;
+    pairs = std::max(pairs, 1024u);
+    make_buffers(*device_, *this, pair_buffers(pairs), "blend backward");
+    pair_capacity_ = pairs;
     const std::uint64_t most = pairs_of_a_binding(*device_);
     if (window_pairs_ > 0 || pair_capacity_ <= most) return;
     window_pairs_ = static_cast<std::uint32_t>(most);
@@ -120,8 +127,7 @@ void BlendBackward::record_buckets(Commands& commands, const Forward& forward,
                                    const Buffer& d_image, gpu::BlendArgs args) {
     const std::uint32_t records = forward.checkpoint_records();
     DARB_CHECK(records > 0, "the forward pass stores no checkpoints");
-    if (bucket_tile_.bytes() < std::uint64_t{records} * 4)
-        make_buffers(*device_, *this, bucket_buffers(records), "blend backward");
+    reserve(pair_capacity_, records);
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     const gpu::BucketArgs buckets{args.width, args.height, args.tiles_x, records};
     commands.fill(bucket_tile_, 0);

@@ -13,8 +13,9 @@ class BlendBackward {
     /// one that the forward pass was made with.
     BlendBackward(Device& device, const ForwardOptions& options);
 
-    /// Makes the outputs fit; never shrinks. The queue must be idle.
-    void reserve(std::uint32_t pairs);
+    /// Makes the outputs fit; never shrinks. The queue must be idle. records: those of the forward
+    /// pass's checkpoints, for which record() makes room where nobody did.
+    void reserve(std::uint32_t pairs, std::uint32_t records = 0);
     /// Device memory beside a Forward of this size, once a frame was recorded.
     static FrameBytes device_bytes(const FrameSize& size);
 
@@ -22,7 +23,7 @@ class BlendBackward {
     void record(Commands& commands, const Forward& forward, const Buffer& d_image,
                 const gpu::CameraData& data, const glm::vec3& background);
 
-    /// Pairs that the buffers below can have.
+    /// Pairs that the buffers below can have, by the device's bindings and its largest buffer.
     static std::uint64_t max_pairs(const Device& device);
 
     /// What shaders/backward/blend_backward.comp says, in the order of the pairs' slots: float

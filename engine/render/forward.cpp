@@ -188,21 +188,25 @@ bool Forward::within_budget(std::uint32_t pairs) const {
 
 // Half as many again, so that fuller frames need no further round; where memory does not allow it,
 // just those.
-void Forward::make_room_for(std::uint32_t wanted, std::uint32_t most) {
+void Forward::make_room_for(std::uint32_t wanted, std::uint32_t most,
+                            const std::function<void()>& beside) {
     const auto ample =
         static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted + wanted / 2ull, most));
     if (ample > wanted && within_budget(ample)) {
         try {
             reserve(size_.splats, ample, 1, 1);
+            if (beside) beside();
             return;
         } catch (const Error&) {  // the device refuses what the budget allows
             size_.pairs = 0;
+            if (size_.bucket > 0) checkpoints_ = Buffer();
         }
     }
     reserve(size_.splats, wanted, 1, 1);
+    if (beside) beside();
 }
 
-bool Forward::make_room(const gpu::FrameStatus& status) {
+bool Forward::make_room(const gpu::FrameStatus& status, const std::function<void()>& beside) {
     note_crowds(status);
     if (status.overflow == 0) return false;
     const std::uint32_t most = most_pairs(*device_, options_);
@@ -220,7 +224,7 @@ bool Forward::make_room(const gpu::FrameStatus& status) {
                                 wanted == 0xFFFFFFFFu ? "more than " : "", wanted, most),
                     instead + " the resolution (-r) or the number of splats (--cap-max).");
     }
-    if ((status.overflow & OVERFLOW_PAIRS) != 0) make_room_for(wanted, most);
+    if ((status.overflow & OVERFLOW_PAIRS) != 0) make_room_for(wanted, most, beside);
     const std::uint32_t segments = (status.longest_list + LIST_SEGMENT - 1) / LIST_SEGMENT;
     if (segments > size_.list_segments) {
         make_blend(segments + segments / 4);
@@ -294,11 +298,11 @@ void Forward::reserve(std::uint32_t splats, std::uint32_t pairs, int width, int 
         size_.tiles = tiled;
     }
     if (pixels > size_.pixels) {
+        check_frame(d, width, height);
         size_.pixels = 0;
         make_buffers(d, *this, pixel_buffers(options_, pixels, size_.list_segments), "blend");
         size_.pixels = pixels;
     }
-        check_frame(d, width, height);
     if (size_.checkpoint_records() > checkpoint_records())
         make_buffers(d, *this, checkpoint_buffers(size_.checkpoint_records()), "blend");
 }

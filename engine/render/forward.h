@@ -106,7 +106,9 @@ class Forward {
     /// After a frame whose status is given: false where it is whole. Else makes room for what it
     /// wanted, half as many pairs again where memory allows it, and clears the status; the frame
     /// must then be recorded again. Throws Error where it can never fit. The queue must be idle.
-    bool make_room(const gpu::FrameStatus& status);
+    /// beside: makes the room that others need beside the pairs that are there then; where it
+    /// throws, they are made no more than wanted.
+    bool make_room(const gpu::FrameStatus& status, const std::function<void()>& beside = {});
     /// Whether the next frame is emitted with a workgroup for each huge splat. note_crowds: the
     /// counters of a frame decide on the next, where the options leave it to them; make_room calls
     /// it. The queue may be busy.
@@ -176,7 +178,8 @@ class Forward {
     void make_blend(std::uint32_t segments);
     void make_cooperation();
     bool within_budget(std::uint32_t pairs) const;
-    void make_room_for(std::uint32_t wanted, std::uint32_t most);
+    void make_room_for(std::uint32_t wanted, std::uint32_t most,
+                       const std::function<void()>& beside);
 
     Device* device_;
     ForwardOptions options_;

@@ -91,11 +91,15 @@ BufferRange GpuSplats::rows(const Buffer& of_rest, const SplatRange& range) cons
     return {of_rest, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
 }
 
-// Rotations are the widest of what is bound whole, beside four words a splat of a frame.
-std::uint32_t GpuSplats::max_count(const Device& device, bool with_moments) {
-    const std::uint64_t row = (with_moments ? 8 : 4) * sizeof(float);
+// Rotations are the widest of what is bound whole, beside four words a splat of a frame; the
+// harmonics are bound by range, but are one buffer.
+std::uint32_t GpuSplats::max_count(const Device& device, int sh_degree, bool with_moments) {
+    const std::uint64_t word = (with_moments ? 2 : 1) * sizeof(float);
+    const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree);
+    const std::uint32_t widest = *std::max_element(all.begin(), all.end());
     return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(device.info().max_storage_buffer_bytes / row, 1u << 30));
+        std::min<std::uint64_t>({device.info().max_storage_buffer_bytes / (4 * word),
+                                 device.info().max_allocation_bytes / (widest * word), 1u << 30}));
 }
 
 }  // namespace darb

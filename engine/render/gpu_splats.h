@@ -57,8 +57,8 @@ class GpuSplats {
     /// Floats per splat of the attributes.
     static std::array<std::uint32_t, kAttributeCount> strides(int sh_degree);
 
-    /// The most splats that this device's bindings allow.
-    static std::uint32_t max_count(const Device& device, bool with_moments);
+    /// The most splats that this device's bindings and its largest buffer allow.
+    static std::uint32_t max_count(const Device& device, int sh_degree, bool with_moments);
 
   private:
     SplatModel header_;  // no splats, only what is not per splat

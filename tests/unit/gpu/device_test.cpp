@@ -192,7 +192,12 @@ TEST(Faults, text_that_is_no_fault_is_an_error) {
     EXPECT_NE(error_of([] { parse_faults("binding:-1"); }), "no error");
     EXPECT_EQ(parse_faults("binding:4096").binding_bytes, 4096U);
     const Faults faults = parse_faults("oom:a,lost:3,oom:b");
-    EXPECT_TRUE(faults.fails_allocation("b"));
+    EXPECT_TRUE(faults.fails_allocation("b", 16));
+    EXPECT_FALSE(faults.fails_allocation("c", 1 << 30));
+    const Faults limits = parse_faults("allocation:64,memory:100");
+    EXPECT_EQ(limits.allocation_bytes, 64U);
+    EXPECT_FALSE(limits.fails_allocation("c", 100));
+    EXPECT_TRUE(limits.fails_allocation("c", 101));
     EXPECT_FALSE(faults.fails_submit(2));
     EXPECT_TRUE(faults.fails_submit(3));
 }
