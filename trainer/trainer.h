@@ -159,6 +159,7 @@ class Trainer {
     const gpu::CameraData& camera_data_of(int view) const;
     double position_rate(int iteration) const;
     glm::vec3 background_for(int iteration) const;
+    MemoryDemand growth_demand() const;
     std::uint32_t splats_within_memory() const;
     void settle_order();                    // after a round of density control
     void note_memory();                     // into planned_bytes_, what is held now

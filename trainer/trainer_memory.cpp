@@ -45,17 +45,29 @@ std::uint64_t Trainer::planned_bytes() const {
     return std::max(planned_bytes_, plan_memory(*device_, memory_demand()).total());
 }
 
-// With half more pairs a splat than the buffers hold now, which is what they grow by, and what is
-// in use beyond the plan.
+// Of a frame with half more pairs than the fullest so far, in buffers that grew to half more than
+// those. From what a checkpoint holds, not from the size that the buffers came to have: a run that
+// is resumed, or shows other pictures meanwhile, has the same limit.
+MemoryDemand Trainer::growth_demand() const {
+    MemoryDemand demand = memory_demand();
+    const std::uint64_t most = counters_.most_pairs;
+    demand.room_splats = 0;
+    demand.pairs = std::max(4 * demand.splats, most + most / 2);
+    demand.pairs += demand.pairs / 2;
+    demand.list_segments = counters_.longest_list > LIST_SEGMENT ? 2 : demand_.list_segments;
+    demand.cooperates = demand_.cooperates || counters_.huge_splats > 0;
+    demand.densifies = true;
+    return demand;
+}
+
+// Less what is in use beyond the plan.
 std::uint32_t Trainer::splats_within_memory() const {
     if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
-    MemoryDemand demand = memory_demand();
-    demand.densifies = true;
     const std::uint64_t in_use = device_->allocated_bytes();
-    const std::uint64_t planned = plan_memory(*device_, demand).resident();
+    const std::uint64_t planned = plan_memory(*device_, memory_demand()).resident();
     const std::uint64_t extra = in_use - std::min(in_use, planned);
     const std::uint64_t budget = options_.max_memory_bytes;
-    demand.pairs += demand.pairs / 2;
+    const MemoryDemand demand = growth_demand();
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(
         splats_within(*device_, demand, budget - std::min(budget, extra)), 0xFFFFFFFFu));
 }

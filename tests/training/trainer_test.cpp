@@ -2,15 +2,11 @@
 // never stopped, survive frames that need more room, and bring the loss down.
 #include "engine/core/error.h"
 #include "engine/data/metrics.h"
+#include "tests/support/resumed_run.h"
 #include "tests/support/tiny_training.h"
-#include "trainer/checkpoint.h"
 
 namespace darb::test {
 namespace {
-
-void run_to(Trainer& trainer, int iteration) {
-    while (trainer.iteration() < iteration) trainer.step();
-}
 
 TEST(Training, the_same_seed_gives_the_same_bits) {
     const TinyTraining t = tiny_training();
@@ -56,29 +52,7 @@ TEST(Training, a_resumed_run_equals_one_that_never_stopped) {
     t.options.white_background = true;  // over a fixed background: resets opacities once more
     Trainer whole = t.trainer();
     run_to(whole, 60);
-    for (const int stop : {1, 19, 20, 25, 33, 59}) {
-        SCOPED_TRACE(fmt::format("stopped at {}", stop));
-        const auto path = std::filesystem::path(testing::TempDir()) /
-                          fmt::format("darb_resume_{}_{}", ::getpid(), stop);
-        {
-            Trainer first = t.trainer();
-            run_to(first, stop);
-            write_checkpoint(path, {first.state(), settings_text(t.options),
-                                    dataset_fingerprint(t.dataset, t.photos), 1.0});
-        }
-        const Checkpoint checkpoint = read_checkpoint(path);
-        check_resumable(checkpoint, path, t.options, t.dataset,
-                        dataset_fingerprint(t.dataset, t.photos));
-        Trainer second = t.trainer();
-        second.restore(checkpoint.state);
-        EXPECT_EQ(second.iteration(), stop);
-        run_to(second, 60);
-        EXPECT_TRUE(same_state(whole, second));
-        EXPECT_EQ(second.counters().cloned_or_split, whole.counters().cloned_or_split);
-        EXPECT_EQ(second.counters().pruned, whole.counters().pruned);
-        EXPECT_EQ(second.counters().culled, whole.counters().culled);
-        std::filesystem::remove(path);
-    }
+    expect_resumes(t, whole, {1, 19, 20, 25, 33, 59});
 }
 
 TEST(Training, looking_at_pictures_meanwhile_changes_nothing) {
@@ -332,74 +306,6 @@ TEST(Training, no_scale_grows_beyond_the_largest) {
     };
     EXPECT_GT(largest(0), 0.11) << "0: no limit";
     EXPECT_LE(largest(0.1f), 0.1 * (1 + 1e-6));
-}
-
-TEST(Training, splats_stop_growing_at_the_limit) {
-    TinyTraining t = tiny_training();
-    t.options.max_splats = 70;
-    t.options.prune_opacity = 0;
-    t.options.prune_extent = 100;
-    Trainer trainer = t.trainer();
-    run_to(trainer, 60);
-    EXPECT_EQ(trainer.splat_count(), 70U);
-    EXPECT_GT(trainer.counters().cloned_or_split, 5U);
-}
-
-TEST(Training, growth_stops_before_the_memory_budget) {
-    TinyTraining t = tiny_training({.splats = 600});
-    t.options.prune_opacity = 0;
-    t.options.prune_extent = 100;
-    t.options.densify_grad_threshold = 1e-7f;
-    t.options.opacity_reset_interval = 1000;
-    Device& device = shared_device();
-    std::uint64_t before = 0, after = 0;
-    std::uint32_t unlimited = 0;
-    {
-        Trainer trainer = t.trainer();
-        run_to(trainer, 15);
-        before = device.allocated_bytes();
-        run_to(trainer, 60);
-        after = device.allocated_bytes();
-        unlimited = trainer.splat_count();
-    }
-    ASSERT_GT(unlimited, 2000U);
-    t.options.max_memory_bytes = before + (after - before) / 2;
-    Trainer trainer = t.trainer();
-    run_to(trainer, 60);
-    EXPECT_LT(trainer.splat_count(), unlimited);
-    EXPECT_GT(trainer.splat_count(), 600U);
-    EXPECT_GE(trainer.stopped_by_memory(), 600U);
-    EXPECT_LE(device.allocated_bytes(), t.options.max_memory_bytes);
-    device.set_memory_budget(0);
-}
-
-TEST(Training, growth_stops_before_the_pairs_that_the_bindings_hold) {
-    TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 300});
-    t.options.initial_scale = 3;
-    t.options.prune_opacity = 0;
-    t.options.prune_extent = 100;
-    t.options.densify_grad_threshold = 1e-7f;
-    t.options.opacity_reset_interval = 1000;
-    ::setenv("DARB_FAULT", "binding:20480", 1);  // 3,200 pairs, in windows
-    Device narrow;
-    ::unsetenv("DARB_FAULT");
-    Trainer trainer(narrow, t.dataset, t.photos, t.start(), t.options);
-    run_to(trainer, 60);
-    EXPECT_GT(trainer.counters().most_pairs, 3200U * 7 / 10);
-    EXPECT_GT(trainer.stopped_by_pairs(), 300U);
-    EXPECT_EQ(trainer.splat_count(), trainer.stopped_by_pairs());
-}
-
-TEST(Training, a_budget_below_the_start_is_an_error_that_names_it) {
-    TinyTraining t = tiny_training();
-    t.options.max_memory_bytes = 100'000;
-    try {
-        t.trainer();
-        ADD_FAILURE() << "no error";
-    } catch (const Error& e) {
-        EXPECT_NE(std::string(e.what()).find("--max-memory"), std::string::npos) << e.what();
-    }
-    shared_device().set_memory_budget(0);
 }
 
 // A colour whose square is beyond float32: SSIM's windows there have no finite gradient.

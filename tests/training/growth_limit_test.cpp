@@ -1,0 +1,145 @@
+// Where splats stop growing in number, and what a run does with the memory that there is.
+#include "engine/core/error.h"
+#include "tests/support/resumed_run.h"
+
+namespace darb::test {
+namespace {
+
+std::unique_ptr<Device> faulty_device(const std::string& fault) {
+    ::setenv("DARB_FAULT", fault.c_str(), 1);
+    auto device = std::make_unique<Device>();
+    ::unsetenv("DARB_FAULT");
+    return device;
+}
+
+TEST(Limits, splats_stop_growing_at_the_limit) {
+    TinyTraining t = tiny_training();
+    t.options.max_splats = 70;
+    t.options.prune_opacity = 0;
+    t.options.prune_extent = 100;
+    Trainer trainer = t.trainer();
+    run_to(trainer, 60);
+    EXPECT_EQ(trainer.splat_count(), 70U);
+    EXPECT_GT(trainer.counters().cloned_or_split, 5U);
+}
+
+/// Every splat grows in every round, none goes.
+TinyTraining growing(const TinyOptions& tiny) {
+    TinyTraining t = tiny_training(tiny);
+    t.options.prune_opacity = 0;
+    t.options.prune_extent = 100;
+    t.options.densify_grad_threshold = 1e-7f;
+    t.options.opacity_reset_interval = 1000;
+    return t;
+}
+
+/// Of `t`: half of what an unlimited run adds after its first round.
+std::uint64_t half_of_the_growth(const TinyTraining& t, std::uint32_t& unlimited) {
+    Trainer trainer = t.trainer();
+    run_to(trainer, 15);
+    const std::uint64_t before = shared_device().allocated_bytes();
+    run_to(trainer, 60);
+    unlimited = trainer.splat_count();
+    return before + (shared_device().allocated_bytes() - before) / 2;
+}
+
+// The budget is not enforced here, so that what exceeds it is seen rather than refused.
+TEST(Limits, growth_stops_before_the_memory_budget) {
+    TinyTraining t = growing({.splats = 600});
+    Device& device = shared_device();
+    std::uint32_t unlimited = 0;
+    t.options.max_memory_bytes = half_of_the_growth(t, unlimited);
+    ASSERT_GT(unlimited, 2000U);
+    Trainer trainer = t.trainer();
+    device.set_memory_budget(0);
+    device.forget_peak();
+    run_to(trainer, 60);
+    EXPECT_LT(trainer.splat_count(), unlimited);
+    EXPECT_GT(trainer.splat_count(), 600U);
+    EXPECT_GE(trainer.stopped_by_memory(), 600U);
+    EXPECT_LE(device.peak_bytes(), t.options.max_memory_bytes);
+}
+
+// The buffers of one that is resumed grow in other steps.
+TEST(Limits, a_run_in_a_memory_budget_is_resumed_to_the_same_bits) {
+    TinyTraining t = growing({.splats = 300});
+    t.options.initial_scale = 4;  // the fullest frames are the first
+    std::uint32_t unlimited = 0;
+    t.options.max_memory_bytes = half_of_the_growth(t, unlimited);
+    Device own;
+    Trainer whole(own, t.dataset, t.photos, t.start(), t.options);
+    run_to(whole, 60);
+    ASSERT_LT(whole.splat_count(), unlimited);
+    ASSERT_GT(whole.stopped_by_memory(), 0U);
+    expect_resumes(t, whole, {20, 35});
+    shared_device().set_memory_budget(0);
+}
+
+TEST(Limits, growth_stops_before_the_pairs_that_the_bindings_hold) {
+    TinyTraining t = growing({.width = 32, .height = 24, .splats = 300});
+    t.options.sh_degree = 0;
+    // Five windows of 640 pairs; of which one buffer holds 2,560 in the second.
+    for (const auto& [fault, most, scale] :
+         {std::tuple{"binding:20480", 3200U, 3.0f},
+          std::tuple{"binding:20480,allocation:81920", 2560U, 2.0f}}) {
+        SCOPED_TRACE(fault);
+        t.options.initial_scale = scale;
+        const std::unique_ptr<Device> narrow = faulty_device(fault);
+        EXPECT_EQ(Forward::max_pairs(*narrow), most);
+        Trainer trainer(*narrow, t.dataset, t.photos, t.start(), t.options);
+        run_to(trainer, 60);
+        EXPECT_GT(trainer.counters().most_pairs, most * 7 / 10);
+        EXPECT_GT(trainer.stopped_by_pairs(), 300U);
+        EXPECT_EQ(trainer.splat_count(), trainer.stopped_by_pairs());
+    }
+}
+
+// The moments of the harmonics of degree 3 are one buffer, of 360 bytes a splat.
+TEST(Limits, growth_stops_at_the_largest_buffer) {
+    TinyTraining t = growing({.width = 32, .height = 24, .splats = 300});
+    t.options.sh_degree = 3;
+    const std::unique_ptr<Device> narrow = faulty_device("allocation:180000");
+    Trainer trainer(*narrow, t.dataset, t.photos, t.start(), t.options);
+    run_to(trainer, 60);
+    EXPECT_EQ(trainer.splat_count(), 500U);
+}
+
+// Half more pairs than wanted are more than the device has: it gets those that are wanted.
+TEST(Limits, a_device_without_ample_room_for_the_backward_pass_gets_what_it_needs) {
+    // One view wants more pairs than the first room of 1,024.
+    TinyTraining t = tiny_training({.width = 320, .height = 200, .splats = 24, .close_up = 3});
+    t.options.densify_until = 0;
+    const auto pairs = [&](const std::string& fault, std::uint64_t& peak) {
+        const std::unique_ptr<Device> device = faulty_device(fault);
+        Trainer trainer(*device, t.dataset, t.photos, t.start(), t.options);
+        run_to(trainer, 10);
+        trainer.drain();
+        peak = device->peak_bytes();
+        EXPECT_GT(trainer.counters().redone_iterations, 0U);
+        return trainer.memory_demand().pairs;
+    };
+    for (const char* way : {"subgroup", "buckets"}) {
+        SCOPED_TRACE(way);
+        ::setenv("DARB_TUNE", fmt::format("backward={}", way).c_str(), 1);
+        std::uint64_t peak = 0, within = 0;
+        const std::uint64_t ample = pairs("", peak);
+        EXPECT_LT(pairs(fmt::format("memory:{}", peak - 1), within), ample);
+        EXPECT_LT(within, peak);
+        ::unsetenv("DARB_TUNE");
+    }
+}
+
+TEST(Limits, a_budget_below_the_start_is_an_error_that_names_it) {
+    TinyTraining t = tiny_training();
+    t.options.max_memory_bytes = 100'000;
+    try {
+        t.trainer();
+        ADD_FAILURE() << "no error";
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("--max-memory"), std::string::npos) << e.what();
+    }
+    shared_device().set_memory_budget(0);
+}
+
+}  // namespace
+}  // namespace darb::test
