@@ -107,27 +107,49 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     return result;
 }
 
+// Splats and pairs at the end: of the splats that are wanted no more than a budget of memory leaves
+// room for, where Trainer's growth stops.
+void settle_size(const Device& device, const TrainOptions& options, std::uint32_t wanted,
+                 double pairs_per_splat, Forecast& f) {
+    const double room = std::max(double{kMinPairsPerSplat}, kPairRoom * pairs_per_splat);
+    const auto demand_for = [&](std::uint64_t splats) {
+        f.demand.splats = splats;
+        f.demand.pairs = static_cast<std::uint64_t>(room * static_cast<double>(splats));
+    };
+    f.splats = wanted;
+    demand_for(wanted);
+    if (options.max_memory_bytes == 0) return;
+    MemoryDemand grown = f.demand;
+    grown.pairs += grown.pairs / 2;
+    const std::uint64_t within = std::max<std::uint64_t>(
+        splats_within(device, grown, options.max_memory_bytes), f.start_splats);
+    f.splats = static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, within));
+    demand_for(f.splats);
+}
+
 // Times and pairs of the forecast, from the count at the start and one near that at the end.
 void measure_both(Device& device, const Dataset& dataset, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
     const Dataset few = some_views(dataset);
     const Measurement at_start = measure_training(device, few, start, options);
     f.start_ms = f.end_ms = at_start.ms;
-    double pairs_per_splat = static_cast<double>(at_start.pairs) / std::max(f.start_splats, 1u);
+    const auto pairs_per_splat = [](const Measurement& m, std::size_t splats) {
+        return static_cast<double>(m.pairs) / std::max(static_cast<double>(splats), 1.0);
+    };
+    const std::uint32_t wanted = f.splats;
+    settle_size(device, options, wanted, pairs_per_splat(at_start, start.size()), f);
     const std::uint32_t most = device.info().type == "cpu" ? kMostMeasuredCpu : kMostMeasuredGpu;
     const SplatModel grown = split_model(start, std::min(f.splats, most), options.seed);
     if (grown.size() > start.size()) {
         const Measurement at_end = measure_training(device, few, grown, options);
         const double more = static_cast<double>(grown.size() - start.size());
         const double per_splat = std::max(0.0, (at_end.ms - at_start.ms) / more);
+        settle_size(device, options, wanted, pairs_per_splat(at_end, grown.size()), f);
         f.end_ms = at_start.ms + per_splat * (f.splats - f.start_splats);
-        pairs_per_splat = static_cast<double>(at_end.pairs) / static_cast<double>(grown.size());
     }
     const double share = (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
                          std::max(1.0, double(f.splats) - f.start_splats);
     f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
-    f.demand.pairs = std::max(f.demand.pairs,
-                              static_cast<std::uint64_t>(kPairRoom * pairs_per_splat * f.splats));
 }
 
 }  // namespace
@@ -208,15 +230,14 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
     f.demand.sh_degree = degrees.most;
     f.start_splats = static_cast<std::uint32_t>(start.size());
-    const std::uint32_t limit = std::min(options.max_splats, GpuSplats::max_count(scratch, true));
+    const std::uint32_t limit =
+        std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);
-    f.demand.splats = f.splats;
-    f.demand.pairs = std::uint64_t{kMinPairsPerSplat} * f.splats;
     f.demand.densifies = options.densify_end() > options.densify_from;
+    settle_size(scratch, options, f.splats, 0, f);
     if (measure && f.demand.photo_pixels > 0) try {
             measure_both(scratch, dataset, start, options, f);
         } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
-            f.start_ms = f.end_ms = f.seconds = 0;
         }
     return f;
 }

@@ -14,7 +14,7 @@ namespace darb {
 
 struct Forecast {
     std::uint32_t start_splats = 0;
-    std::uint32_t splats = 0;         // at the end
+    std::uint32_t splats = 0;         // at the end, within options.max_memory_bytes
     double start_ms = 0, end_ms = 0;  // an iteration at these counts; 0: not measured
     double seconds = 0;               // of the whole run; 0: not measured
     // At the end. Exact is what the plan makes of it; splats, pairs and degree are as uncertain as
@@ -47,8 +47,8 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
 
 /// Runs some iterations on grey photos at the start's count and at the predicted one, a few
 /// seconds in all; time is a + b * splats through both. measure = false, and where the device has
-/// no room for that: splats and memory alone. scratch: a device of its own, so that the run's
-/// peak_bytes stay the run's.
+/// no room for that: splats and memory, and what was measured until then. scratch: a device of its
+/// own, so that the run's peak_bytes stay the run's.
 Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
                            bool measure = true);
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "trainer/initial_model.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 namespace {
@@ -85,6 +86,31 @@ TEST(Forecast, measures_on_the_scratch_device) {
     EXPECT_GE(f.seconds, options.iterations * f.start_ms * 0.999e-3);
     EXPECT_LE(f.seconds, options.iterations * f.end_ms * 1.001e-3);
     EXPECT_GE(f.demand.pairs, 4U * f.splats);
+}
+
+TEST(Forecast, stays_within_the_memory_budget) {
+    TrainOptions options;
+    use_strategy(Strategy::mcmc, options);
+    options.max_splats = 16'000;
+    Device scratch;
+    const auto predicted = [&](std::uint64_t budget) {
+        options.max_memory_bytes = budget;
+        return forecast_training(scratch, small_scene(), options);
+    };
+    const Forecast free = predicted(0);
+    const std::uint64_t all = plan_memory(scratch, free.demand).total();
+    MemoryDemand start = free.demand;
+    start.splats = free.start_splats;
+    start.pairs = 6 * start.splats;
+    const std::uint64_t budget = (plan_memory(scratch, start).total() + all) / 2;
+    const Forecast tight = predicted(budget);
+    scratch.set_memory_budget(0);
+    EXPECT_LE(plan_memory(scratch, tight.demand).total(), budget);
+    EXPECT_EQ(tight.demand.splats, tight.splats);
+    EXPECT_GT(tight.splats, tight.start_splats);
+    EXPECT_LT(tight.splats, free.splats);
+    EXPECT_GT(tight.start_ms, 0);
+    EXPECT_GT(tight.seconds, 0);
 }
 
 TEST(Forecast, without_measuring_has_no_time) {

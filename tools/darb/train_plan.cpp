@@ -41,7 +41,10 @@ std::string time_text(const Forecast& f, const TrainOptions& options) {
     const int iterations = options.iterations;
     const bool grows = f.splats > f.start_splats;
     const std::string end = grows ? about(f.splats) : std::to_string(f.splats);
-    if (f.seconds <= 0) return fmt::format("{} iterations, {} splats at the end", iterations, end);
+    if (f.seconds <= 0)
+        return fmt::format(
+            "{} iterations{}, {} splats at the end", iterations,
+            f.start_ms > 0 ? fmt::format(", {:.1f} ms each at first", f.start_ms) : "", end);
     const std::string later = grows ? fmt::format(", {:.1f} ms at {}", f.end_ms, end) : "";
     return fmt::format("{} {} for {} iterations, {:.1f} ms each at {} splats{}",
                        options.resolution_ramp ? "at most" : "about", format_duration(f.seconds),
