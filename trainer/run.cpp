@@ -333,9 +333,10 @@ void Run::report_growth() {
     };
     tell(trainer_.stopped_by_memory(), told_by_memory_, "memory", "--max-memory");
     tell(trainer_.stopped_by_pairs(), told_by_pairs_, "pairs",
-         fmt::format("frames come near the {} pairs of splats and tiles that this device can hold; a "
-                     "smaller -r leaves room{}",
-                     Forward::max_pairs(device_), other_way()));
+         fmt::format(
+             "frames come near the {} pairs of splats and tiles that this device can hold; a "
+             "smaller -r leaves room{}",
+             Forward::max_pairs(device_), other_way()));
 }
 
 void Run::report_probes() {
