@@ -22,7 +22,7 @@ Row compare_row(const std::string& group, const std::string& name, std::span<con
     row.detail = reference::comparison_failures(stats, allowed);
     row.pass = row.detail.empty();
     row.outside = stats.failures;
-    row.band = static_cast<size_t>(allowed.max_fail_ratio * static_cast<double>(row.count));
+    row.band = reference::values_in_band(allowed, row.count);
     if (row.count == 0) return row;
     const double rms = scaled ? reference::root_mean_square(expected) : 0;
     const double unit = rms > 0 ? rms : 1;

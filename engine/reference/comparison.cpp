@@ -64,16 +64,21 @@ ComparisonStats comparison_stats(std::span<const double> expected, std::span<con
     return stats;
 }
 
+size_t values_in_band(const Tolerance& tolerance, size_t count) {
+    if (tolerance.max_fail_ratio == 0) return 0;
+    const auto share = static_cast<size_t>(tolerance.max_fail_ratio * static_cast<double>(count));
+    return std::max(share, std::min<size_t>(6, count / 20));
+}
+
 std::string comparison_failures(const ComparisonStats& stats, const Tolerance& tolerance) {
     std::string reasons;
-    const double fail_ratio =
-        static_cast<double>(stats.failures) / static_cast<double>(std::max<size_t>(stats.count, 1));
+    const size_t allowed = values_in_band(tolerance, stats.count);
     if (stats.count == 0) {
         reasons += "\n  nothing to compare";
     }
-    if (fail_ratio > tolerance.max_fail_ratio) {
+    if (stats.failures > allowed) {
         reasons += fmt::format("\n  {} of {} values outside, {} allowed", stats.failures,
-                               stats.count, tolerance.max_fail_ratio);
+                               stats.count, allowed);
     }
     if (!(stats.cosine >= tolerance.min_cosine)) {
         reasons += fmt::format("\n  cosine 1 - {:.3g}, at least 1 - {:.3g}", 1 - stats.cosine,

@@ -28,6 +28,10 @@ double error_ratio(double expected, double got, const Tolerance& tolerance);
 ComparisonStats comparison_stats(std::span<const double> expected, std::span<const double> got,
                                  const Tolerance& tolerance);
 
+/// How many of `count` values may be outside: max_fail_ratio of them where that is not 0, but room
+/// for two splats of three values each, as a pixel on the boundary has them, up to a twentieth.
+size_t values_in_band(const Tolerance& tolerance, size_t count);
+
 /// A line for each way in which the tolerance is broken; empty: passed.
 std::string comparison_failures(const ComparisonStats& stats, const Tolerance& tolerance);
 
