@@ -21,8 +21,8 @@ void check_frame(const Device& device, int width, int height, const std::string&
         camera.empty() ? "frame" : fmt::format("camera \"{}\"", camera),
         fmt::format("a frame of {} x {} px is too large: {} holds at most {} pixels a frame", width,
                     height, device.info().name, most),
-        fmt::format("Use -r {} (a width in px), or choose another device (darb devices).",
-                    fitting));
+        fmt::format("{} {} (a width in px), or choose another device (darb devices).",
+                    camera.empty() ? "Use at most" : "Use -r", fitting));
 }
 
 }  // namespace darb
