@@ -281,7 +281,7 @@ std::string Run::other_way() const {
     return fmt::format(
         ", and so does --tune backward=subgroup, which holds {}, in a run that "
         "starts again",
-        BlendBackward::max_pairs(device_));
+        Forward::max_pairs(device_, BackwardBlend::subgroup));
 }
 
 void Run::train(const std::atomic<bool>* stop) {

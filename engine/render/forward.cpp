@@ -10,7 +10,6 @@
 #include "engine/render/frame_limit.h"
 #include "engine/render/groups.h"
 #include "engine/render/kernel_constants.h"
-#include "engine/render/tuning.h"
 #include "shaders/shared/lens.h"
 
 namespace darb {
@@ -31,10 +30,6 @@ int bits_for(std::uint32_t count) {
 std::uint64_t most_pairs(const Device& device) {
     return std::min({device.info().max_storage_buffer_bytes / 4, std::uint64_t{1} << 30,
                      RadixSort::max_capacity(device)});
-}
-
-std::uint64_t most_trained_pairs(const Device& device) {
-    return std::min(most_pairs(device), BlendBackward::max_pairs(device));
 }
 
 std::uint32_t most_pairs(const Device& device, const ForwardOptions& options) {
@@ -213,7 +208,7 @@ bool Forward::make_room(const gpu::FrameStatus& status, const std::function<void
     const std::uint32_t wanted =
         (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.pairs;
     if (wanted > most) {
-        const std::uint64_t other_way = most_trained_pairs(*device_);
+        const std::uint32_t other_way = max_pairs(*device_, BackwardBlend::subgroup);
         const std::string instead =
             size_.bucket > 0 && wanted <= other_way
                 ? fmt::format("Start again with --tune backward=subgroup, which holds {}, or lower",
@@ -253,9 +248,13 @@ Pipeline& Forward::project_pipeline(int sh_degree) {
 }
 
 std::uint32_t Forward::max_pairs(const Device& device) {
+    return max_pairs(device, tuning_of(device).backward);
+}
+
+std::uint32_t Forward::max_pairs(const Device& device, BackwardBlend way) {
     // Of the checkpoints' records half are left for the tiles, whose last buckets are not full.
-    std::uint64_t most = most_trained_pairs(device);
-    if (tuning_of(device).backward == BackwardBlend::buckets)
+    std::uint64_t most = std::min(most_pairs(device), BlendBackward::max_pairs(device));
+    if (way == BackwardBlend::buckets)
         most = std::min(most, device.info().max_storage_buffer_bytes / CHECKPOINT_BYTES / 2 *
                                   bucket_pairs(device));
     return static_cast<std::uint32_t>(most);

@@ -16,6 +16,7 @@
 #include "engine/render/gpu_splats.h"
 #include "engine/render/radix_sort.h"
 #include "engine/render/scan.h"
+#include "engine/render/tuning.h"
 #include "engine/scene/camera.h"
 #include "shaders/shared/accuracy_list.h"
 #include "shaders/shared/limits.h"
@@ -114,8 +115,10 @@ class Forward {
     /// it. The queue may be busy.
     bool cooperates() const { return cooperates_; }
     void note_crowds(const gpu::FrameStatus& status);
-    /// The most pairs that this device's buffer bindings allow.
+    /// The most pairs that this device's buffers and bindings allow, in its way of the backward
+    /// blend or in another.
     static std::uint32_t max_pairs(const Device& device);
+    static std::uint32_t max_pairs(const Device& device, BackwardBlend way);
 
     /// One frame of camera `camera_index` of `cameras` (data: the same on the host), colours up to
     /// sh_degree. Needs reserve() for the splats and the size.
