@@ -134,8 +134,8 @@ TEST(SplatFile, what_lies_outside_the_ranges_of_spz_is_counted) {
         "2 scales outside 4.5e-05 to 379 are cut to it, by up to 20.1 times",
         "1 colours outside -0.44 to 1.44 are cut to it",
         "3 coefficients of harmonics outside -1 to 0.99 are cut to it",
-        "positions reach 4096: all are rounded to steps of 0.000976562; --crop leaves out what "
-        "lies far off"};
+        ("positions reach 4096: all are rounded to steps of 0.000976562; --crop leaves out what "
+         "lies far off")};
     ASSERT_EQ(losses.size(), std::size(expected));
     for (size_t i = 0; i < losses.size(); ++i) EXPECT_EQ(losses[i], expected[i]);
 }
