@@ -12,7 +12,7 @@ inline void run_to(Trainer& trainer, int iteration) {
     while (trainer.iteration() < iteration) trainer.step();
 }
 
-/// `whole`, at iteration 60, and runs that stop and go on from the file.
+/// `whole`, where it is, and runs that stop before and go on from the file.
 inline void expect_resumes(const TinyTraining& t, Trainer& whole, const std::vector<int>& stops) {
     for (const int stop : stops) {
         SCOPED_TRACE(fmt::format("stopped at {}", stop));
@@ -30,8 +30,9 @@ inline void expect_resumes(const TinyTraining& t, Trainer& whole, const std::vec
         Trainer second = t.trainer();
         second.restore(checkpoint.state);
         EXPECT_EQ(second.iteration(), stop);
-        run_to(second, 60);
+        run_to(second, whole.iteration());
         EXPECT_TRUE(same_state(whole, second));
+        EXPECT_EQ(second.state().error_shares, whole.state().error_shares);
         EXPECT_EQ(second.counters().cloned_or_split, whole.counters().cloned_or_split);
         EXPECT_EQ(second.counters().pruned, whole.counters().pruned);
         EXPECT_EQ(second.counters().culled, whole.counters().culled);

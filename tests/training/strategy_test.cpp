@@ -2,19 +2,12 @@
 // checkpoint as if never stopped, keep to their counts and bring held-out pictures closer.
 #include "trainer/strategy.h"
 
-#include <filesystem>
-
 #include "engine/core/error.h"
-#include "tests/support/tiny_training.h"
-#include "trainer/checkpoint.h"
+#include "tests/support/resumed_run.h"
 #include "trainer/forecast.h"
 
 namespace darb::test {
 namespace {
-
-void run_to(Trainer& trainer, int iteration) {
-    while (trainer.iteration() < iteration) trainer.step();
-}
 
 TinyTraining tiny_with(Strategy strategy, const TinyOptions& tiny = {}) {
     TinyTraining t = tiny_training(tiny);
@@ -32,27 +25,7 @@ TEST_P(EveryStrategy, a_resumed_run_equals_one_that_never_stopped) {
     run_to(whole, 42);
     EXPECT_GT(whole.splat_count(), 60U) << "growth must take part";
     EXPECT_LE(whole.splat_count(), 90U);
-    for (const int stop : {18, 30}) {
-        SCOPED_TRACE(fmt::format("stopped at {}", stop));
-        const auto path = std::filesystem::path(testing::TempDir()) /
-                          fmt::format("darb_strategy_{}_{}", ::getpid(), stop);
-        {
-            Trainer first = t.trainer();
-            run_to(first, stop);
-            write_checkpoint(path, {first.state(), settings_text(t.options),
-                                    dataset_fingerprint(t.dataset, t.photos), 1.0});
-        }
-        const Checkpoint checkpoint = read_checkpoint(path);
-        check_resumable(checkpoint, path, t.options, t.dataset,
-                        dataset_fingerprint(t.dataset, t.photos));
-        Trainer second = t.trainer();
-        second.restore(checkpoint.state);
-        run_to(second, 42);
-        EXPECT_TRUE(same_state(whole, second));
-        EXPECT_EQ(whole.state().error_shares, second.state().error_shares);
-        EXPECT_EQ(second.counters().pruned, whole.counters().pruned);
-        std::filesystem::remove(path);
-    }
+    expect_resumes(t, whole, {18, 30});
 }
 
 TEST_P(EveryStrategy, held_out_picture_gets_closer_to_the_photo) {
