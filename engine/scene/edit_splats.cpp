@@ -14,9 +14,8 @@ namespace darb {
 
 namespace {
 
-constexpr double kFarOff = 256;  // float32 resolves 1/65,000 of a width there
-constexpr double kNoWidth =
-    1e4;  // of splats in one place, from where on float32 has no millimetres
+constexpr double kFarOff = 256;   // float32 resolves 1/65,000 of a width there
+constexpr double kNoWidth = 1e4;  // for splats in one place: float32 has no millimetres from there
 
 // A reflection is the one of x followed by a proper rotation. It takes the rotation of a splat to
 // its conjugate, which turns the other way about the y and z axes.
@@ -104,11 +103,15 @@ glm::dvec3 choose_origin(const std::vector<double>& positions, double most) {
     return origin;
 }
 
-void set_positions(const std::vector<double>& positions, SplatModel& model) {
+glm::dvec3 origin_for_float32(const std::vector<double>& positions) {
     const bool exact = std::all_of(positions.begin(), positions.end(), [](double p) {
         return static_cast<double>(static_cast<float>(p)) == p;
     });
-    model.origin = exact ? glm::dvec3(0.0) : choose_origin(positions, kFarOff);
+    return exact ? glm::dvec3(0.0) : choose_origin(positions, kFarOff);
+}
+
+void set_positions(const std::vector<double>& positions, SplatModel& model) {
+    model.origin = origin_for_float32(positions);
     for (std::size_t i = 0; i < positions.size(); ++i)
         model.position[i] =
             static_cast<float>(positions[i] - model.origin[static_cast<int>(i % 3)]);

@@ -28,8 +28,10 @@ void transform_splats(const Similarity& similarity, SplatModel& model);
 /// positions takes on its widest axis (1e4 where they are in one place); else 0. Rounded to that
 /// width, so that sums stay exact.
 glm::dvec3 choose_origin(const std::vector<double>& positions, double most);
-/// positions: [N][3] world. As they are where they are float32 numbers; else relative to an origin
-/// on axes where float32 would resolve less than 1/65,000 of their width.
+/// 0 where positions [N][3] are float32 numbers, and on axes where float32 resolves 1/65,000 of
+/// their width; else choose_origin's.
+glm::dvec3 origin_for_float32(const std::vector<double>& positions);
+/// positions: [N][3] world, to be counted from their origin_for_float32.
 void set_positions(const std::vector<double>& positions, SplatModel& model);
 /// World position of a splat.
 glm::dvec3 position_of(const SplatModel& model, std::size_t splat);

@@ -97,11 +97,10 @@ void store_splat(const double* values, const Columns& columns, std::size_t at, S
 
 bool needs_double(const SplatModel& model) {
     if (model.origin == glm::dvec3(0.0)) return false;
-    for (std::size_t i = 0; i < model.position.size(); ++i) {
-        const double value = model.origin[static_cast<int>(i % 3)] + double{model.position[i]};
-        if (static_cast<double>(static_cast<float>(value)) != value) return true;
-    }
-    return false;
+    std::vector<double> positions(model.position.begin(), model.position.end());
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        positions[i] += model.origin[static_cast<int>(i % 3)];
+    return origin_for_float32(positions) != glm::dvec3(0.0);
 }
 
 std::string make_header(const SplatModel& model, bool double_positions) {

@@ -30,8 +30,9 @@ SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
 /// 72 f_rest properties: harmonics of degree 4, one more than a model holds.
 bool has_degree_4(const PlyElement& vertex);
 
-/// Little-endian float32; x y z are double where origin + position is no float32 (scenes at map
-/// coordinates). A file that was read without recentring is written back bit-equal in its values.
+/// Little-endian float32; x y z are double where float32 does not resolve them (origin_for_float32:
+/// scenes at map coordinates). A file that was read without recentring is written back bit-equal in
+/// its values.
 void write_ply(const std::filesystem::path& path, const SplatModel& model);
 std::vector<std::byte> encode_ply(const SplatModel& model);
 

@@ -266,6 +266,20 @@ TEST(Ply, map_coordinates_keep_millimetres) {
     expect_same(again, model);
 }
 
+// Training counts positions from near their median long before float32 fails; other programs read
+// float32 alone.
+TEST(Ply, doubles_are_written_only_where_float32_does_not_resolve_the_positions) {
+    const auto header_at = [](double origin) {
+        SplatModel model =
+            parse(ascii_file("2", "0.1" + kAsciiRow.substr(1) + "3" + kAsciiRow.substr(1)));
+        model.origin.x = origin;
+        const std::vector<std::byte> file = encode_ply(model);
+        return std::string(reinterpret_cast<const char*>(file.data()), 200);
+    };
+    EXPECT_NE(header_at(40).find("property float x"), std::string::npos);
+    EXPECT_NE(header_at(4e5).find("property double x"), std::string::npos);
+}
+
 TEST(Ply, float_file_at_map_coordinates_keeps_its_values) {
     const std::string rows = "5000000.5" + kAsciiRow.substr(1) + "5000128" + kAsciiRow.substr(1);
     const SplatModel model = parse(ascii_file("2", rows));
