@@ -87,11 +87,16 @@ for step in $steps; do
         echo "=== $step: left out, its build failed"
         continue
     fi
-    "do_$step"
-    status=$?
     case $step in
-        unit | gpu | sanitize | sync) ;; # counted case by case
-        *) if [[ $status == 0 ]]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi ;;
+        unit | gpu | sanitize | sync) # counted case by case
+            "do_$step"
+            status=$?
+            ;;
+        *)
+            "do_$step" 2>&1 | tee "$logs/$step"
+            status=${PIPESTATUS[0]}
+            if [[ $status == 0 ]]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
+            ;;
     esac
     [[ $status == 0 ]] || failures+=("$step")
     echo "=== $step: $([[ $status == 0 ]] && echo ok || echo FAILED), $((SECONDS - begun)) s"
@@ -99,6 +104,14 @@ for step in $steps; do
     [[ $status == 0 || ! " setup release " == *" $step "* ]] || break
 done
 
+# What failed, once more, as whoever sees only the end needs it.
+for step in ${failures[@]+"${failures[@]}"}; do
+    echo "=== $step, what failed:"
+    case $step in
+        unit | gpu | sanitize | sync) grep -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step" | head -120 ;;
+        *) tail -n 60 "$logs/$step" ;;
+    esac
+done
 [[ ${#failures[@]} == 0 ]] || echo "failed steps: ${failures[*]}"
 [[ ${#failed_cases[@]} == 0 ]] || printf 'failed case: %s\n' "${failed_cases[@]}"
 echo "$((SECONDS - started)) s, $skipped skipped (they name what they miss)"
