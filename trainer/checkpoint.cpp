@@ -228,6 +228,7 @@ std::string settings_text(const TrainOptions& o) {
                   {"prune_extent", o.prune_extent},
                   {"largest_scale", o.scale_limit()},
                   {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
+                  {"last_opacity_reset", o.last_opacity_reset()},
                   {"max_splats", o.max_splats},
                   {"regularisers", {o.opacity_weight, o.scale_weight}},
                   {"initial_opacity", o.initial_opacity},

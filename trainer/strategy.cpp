@@ -53,6 +53,7 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.opacity_lr = 0.025f;
     options.final_lr_share = 1;
     options.prune_opacity = 0.005f;
+    options.late_resets = true;
     options.opacity_weight = options.scale_weight = 0;
     options.random_background = false;
     options.lengths_by_area = false;

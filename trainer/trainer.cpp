@@ -312,10 +312,12 @@ void Trainer::check_gradients(int iteration, const gpu::FrameStatus& status) con
 void Trainer::density_control(int iteration) {
     if (iteration >= options_.densify_end()) return;
     const bool round = refines_after(options_, iteration);
-    const bool reset = options_.strategy == Strategy::adc &&
-                       (iteration % options_.opacity_reset_interval == 0 ||
-                        (options_.white_background && !options_.random_background &&
-                         iteration == options_.densify_from));
+    const int last_reset = options_.last_opacity_reset();
+    const bool reset =
+        options_.strategy == Strategy::adc &&
+        ((iteration % options_.opacity_reset_interval == 0 && iteration <= last_reset) ||
+         (options_.white_background && !options_.random_background &&
+          iteration == options_.densify_from));
     if (!round && !reset) return;
     drain();
     if (round) {
@@ -332,7 +334,7 @@ void Trainer::density_control(int iteration) {
         const double length = options_.length_scale() * extent_;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * length);
         args.prune_opacity = options_.prune_opacity;
-        args.prune_scale = iteration > options_.opacity_reset_interval
+        args.prune_scale = iteration > options_.opacity_reset_interval && last_reset > 0
                                ? static_cast<float>(options_.prune_extent * length)
                                : 0.0f;
         args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);

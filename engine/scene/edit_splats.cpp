@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kFarOff = 256;   // float32 resolves 1/65,000 of a width there
 constexpr double kNoWidth = 1e4;  // for splats in one place: float32 has no millimetres from there
+constexpr double kMostOrigin = 1e30;  // no float32 less this is beyond float32
 
 // A reflection is the one of x followed by a proper rotation. It takes the rotation of a splat to
 // its conjugate, which turns the other way about the y and z axes.
@@ -98,7 +99,7 @@ glm::dvec3 choose_origin(const std::vector<double>& positions, double most) {
     if (width == 0) width = kNoWidth / most;
     const double step = std::exp2(std::floor(std::log2(width)));
     for (int axis = 0; axis < 3; ++axis)
-        if (std::abs(median[axis]) > most * width)
+        if (std::abs(median[axis]) > most * width && std::abs(median[axis]) < kMostOrigin)
             origin[axis] = std::round(median[axis] / step) * step;
     return origin;
 }

@@ -171,6 +171,7 @@ TEST(TrainCost, prices_every_setting_of_training) {
                                          {.resolution = 8, .hold_out = true});
     TrainOptions options;
     options.iterations = 8;
+    options.opacity_reset_interval = 3;  // one late reset
     options.kernel = KERNEL_RAISED_COSINE;
     const TrainCostResult result =
         measure_train_cost(shared_device(), dataset, options, {1, 2}, [](const std::string&) {});
@@ -178,7 +179,8 @@ TEST(TrainCost, prices_every_setting_of_training) {
     std::set<std::string> names;
     for (const TrainCostRow& r : result.rows) {
         EXPECT_GT(r.ms.median, 0) << r.name;
-        EXPECT_GT(r.psnr_db.median, 5) << r.name;
+        // The reset of 3DGS, to 0.01, has four iterations to come back from.
+        EXPECT_GT(r.psnr_db.median, r.name == "schedule of 3DGS" ? 3 : 5) << r.name;
         names.insert(r.name);
         EXPECT_EQ(r.gradient_error.has_value(), !r.change) << r.name;
         if (!r.gradient_error) continue;
@@ -192,6 +194,7 @@ TEST(TrainCost, prices_every_setting_of_training) {
     }
     EXPECT_EQ(names.size(), result.rows.size());
     EXPECT_TRUE(names.contains("with resolution ramp"));
+    EXPECT_TRUE(names.contains("late opacity resets"));
     EXPECT_TRUE(names.contains("sh degree 2 by the iteration"));
     EXPECT_EQ(train_cost_json(result)["rows"].size(), result.rows.size());
     expect_all_drawn(train_cost_html(result), 3);

@@ -145,6 +145,20 @@ TEST(Regularisers, fade_what_no_photo_shows) {
     }
 }
 
+TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
+    TrainOptions options;
+    EXPECT_EQ(options.last_opacity_reset(), 12'000);
+    options.iterations = 12'000;
+    EXPECT_EQ(options.last_opacity_reset(), 3'000);
+    options.iterations = 7'000;
+    EXPECT_EQ(options.last_opacity_reset(), 0);
+    options.iterations = 1;
+    EXPECT_EQ(options.last_opacity_reset(), 0);
+    use_3dgs_schedule(options);
+    options.iterations = 7'000;
+    EXPECT_EQ(options.last_opacity_reset(), 3'000);
+}
+
 TEST(GrowthTarget, follows_its_rule_to_the_limit) {
     TrainOptions options;
     use_strategy(Strategy::mcmc, options);

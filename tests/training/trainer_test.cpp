@@ -246,10 +246,13 @@ TEST(Training, a_device_whose_bindings_hold_few_pairs_trains_the_same_bits) {
     }
 }
 
-// An evaluation at the iteration of a reset shows the scene that was trained.
-TEST(Training, opacities_are_reset_when_the_next_iteration_begins) {
+// Whether opacities fall when iteration 26 begins: an evaluation at the iteration of a reset shows
+// the scene that was trained.
+bool resets_after_25(int densify_until, bool late_resets) {
     TinyTraining t = tiny_training();
     t.options.opacity_reset_interval = 25;
+    t.options.densify_until = densify_until;
+    t.options.late_resets = late_resets;
     t.options.prune_opacity = 0.05f;
     t.options.opacity_lr = 0.05f;
     Trainer trainer = t.trainer();
@@ -259,9 +262,16 @@ TEST(Training, opacities_are_reset_when_the_next_iteration_begins) {
     };
     run_to(trainer, 25);
     const float before = largest();
-    run_to(trainer, 26);
     EXPECT_GT(before, -1);
-    EXPECT_LT(largest(), before - 1);
+    run_to(trainer, 26);
+    return largest() < before - 1;
+}
+
+TEST(Training, opacities_are_reset_where_density_control_goes_on_for_another_interval) {
+    EXPECT_TRUE(resets_after_25(50, false));
+    EXPECT_FALSE(resets_after_25(49, false));
+    EXPECT_TRUE(resets_after_25(49, true));
+    EXPECT_FALSE(resets_after_25(25, true));
 }
 
 TEST(Training, a_kernel_that_covers_less_has_longer_lengths) {

@@ -55,6 +55,11 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         add("one background", [](TrainOptions& o) { o.random_background = false; });
     if (options.opacity_weight > 0 || options.scale_weight > 0)
         add("no regularisers", [](TrainOptions& o) { o.opacity_weight = o.scale_weight = 0; });
+    TrainOptions late = options;
+    late.late_resets = true;
+    if (options.strategy == Strategy::adc &&
+        late.last_opacity_reset() != options.last_opacity_reset())
+        add("late opacity resets", [](TrainOptions& o) { o.late_resets = true; });
     if (options.strategy == Strategy::adc)
         add("schedule of 3DGS", [](TrainOptions& o) { use_3dgs_schedule(o); });
     return rows;

@@ -62,7 +62,10 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::NonNegativeNumber);
     command.add_option("--densify-until-iter", t.densify_until,
                        "default: half of the run, at most 15,000; mcmc: 5/6 of it, at most 25,000");
-    only_with("adc", command.add_option("--opacity-reset-interval", t.opacity_reset_interval), f)
+    only_with("adc",
+              command.add_option("--opacity-reset-interval", t.opacity_reset_interval,
+                                 "none where density control ends before the next one would come"),
+              f)
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
     only_with("adc budget",

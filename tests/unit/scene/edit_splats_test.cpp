@@ -114,6 +114,16 @@ TEST(EditSplats, positions_are_counted_from_where_most_of_them_are) {
         EXPECT_NEAR(model.origin[int(i % 3)] + model.position[i], positions[i], 1e-6) << i;
 }
 
+TEST(EditSplats, positions_at_both_ends_of_float32_stay_finite) {
+    const double most = 3.4e38;
+    std::vector<double> positions(12, most);
+    positions[0] = positions[1] = positions[2] = -most;
+    SplatModel model;
+    model.resize(4);
+    set_positions(positions, model);
+    for (const float p : model.position) EXPECT_TRUE(std::isfinite(p)) << p;
+}
+
 TEST(EditSplats, one_far_splat_leaves_float32_numbers_as_they_are) {
     SplatModel model;
     model.resize(3);
