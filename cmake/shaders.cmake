@@ -2,8 +2,8 @@
 # The result is a static library with one table, darb::shader_table(), name -> SPIR-V words; the
 # name is the file's stem. Specialization constants stay open until pipeline creation.
 function(darb_compile_shaders target folder)
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${folder}/*/*.comp)
-  set(out ${CMAKE_BINARY_DIR}/generated/shaders)
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*/*.comp)
+  set(out ${PROJECT_BINARY_DIR}/generated/shaders)
   file(MAKE_DIRECTORY ${out})
   set(headers "")
   set(includes "")
@@ -12,8 +12,8 @@ function(darb_compile_shaders target folder)
     get_filename_component(stem ${source} NAME_WE)
     set(header ${out}/${stem}.spv.h)
     add_custom_command(OUTPUT ${header}
-      COMMAND ${GLSLANG_VALIDATOR} -V --quiet --target-env vulkan1.3 -I${CMAKE_SOURCE_DIR}/shaders
-        -I${CMAKE_SOURCE_DIR} --vn spv_${stem} --depfile ${header}.d -o ${header} ${source}
+      COMMAND ${GLSLANG_VALIDATOR} -V --quiet --target-env vulkan1.3 -I${PROJECT_SOURCE_DIR}/shaders
+        -I${PROJECT_SOURCE_DIR} --vn spv_${stem} --depfile ${header}.d -o ${header} ${source}
       DEPENDS ${source} DEPFILE ${header}.d COMMENT "GLSL ${stem}" VERBATIM)
     list(APPEND headers ${header})
     string(APPEND includes "#include \"${stem}.spv.h\"\n")

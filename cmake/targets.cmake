@@ -1,9 +1,9 @@
 # darb_library(NAME DEPENDS...): static library darb_NAME from engine/NAME/*.cpp. A folder that has
 # only headers so far still becomes a library, so that the arrows in CMakeLists.txt hold.
 function(darb_library name)
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/engine/${name}/*.cpp)
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/engine/${name}/*.cpp)
   if(NOT sources)
-    set(sources ${CMAKE_BINARY_DIR}/generated/headers_only.cpp)
+    set(sources ${PROJECT_BINARY_DIR}/generated/headers_only.cpp)
     file(CONFIGURE OUTPUT ${sources} CONTENT "")
   endif()
   list(TRANSFORM ARGN PREPEND darb_ OUTPUT_VARIABLE depends)
@@ -16,7 +16,7 @@ endfunction()
 # forgotten include is an error there (CMAKE_DISABLE_PRECOMPILE_HEADERS in CMakePresets.json).
 set(darb_slow_headers <algorithm> <cmath> <filesystem> <functional> <optional> <string> <vector>
   <fmt/format.h> <glm/glm.hpp> <nlohmann/json.hpp>)
-file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/precompiled.cpp CONTENT "")
-add_library(darb_precompiled STATIC ${CMAKE_BINARY_DIR}/generated/precompiled.cpp)
+file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/generated/precompiled.cpp CONTENT "")
+add_library(darb_precompiled STATIC ${PROJECT_BINARY_DIR}/generated/precompiled.cpp)
 target_link_libraries(darb_precompiled PRIVATE darb_options nlohmann_json::nlohmann_json)
 target_precompile_headers(darb_precompiled PRIVATE ${darb_slow_headers})
