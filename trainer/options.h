@@ -125,7 +125,7 @@ struct TrainOptions {
         return position_lr_final > 0 ? position_lr_final : 1.6e-6f * position_lr_scale();
     }
     int densify_end() const {
-        if (densify_until >= 0) return densify_until;
+        if (densify_until >= 0) return std::min(densify_until, iterations);
         if (strategy == Strategy::mcmc) return std::min(iterations / 6 * 5, 25'000);
         return std::min(iterations / 2, 15'000);
     }

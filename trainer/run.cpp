@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -46,6 +47,19 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const std::filesystem::p
     return checkpoint;
 }
 
+// Where RunOptions does not bring the photos as they are to be trained and compared; without the
+// effect alpha every pixel is opaque.
+std::vector<ImageU8> own_photos(const Dataset& dataset, const TrainOptions& options,
+                                const RunOptions& run) {
+    if (!run.photos.empty() && options.alpha) return {};
+    std::vector<ImageU8> photos = run.photos.empty() ? load_photos(dataset.views) : run.photos;
+    if (options.alpha) return photos;
+    for (ImageU8& photo : photos)
+        if (photo.channels == 4)
+            for (std::size_t a = 3; a < photo.data.size(); a += 4) photo.data[a] = 255;
+    return photos;
+}
+
 // One run: the loop and what it writes. The stopwatch counts training alone.
 class Run {
   public:
@@ -54,8 +68,8 @@ class Run {
           dataset_(dataset),
           options_(options),
           run_(run),
-          loaded_(run.photos.empty() ? load_photos(dataset.views) : std::vector<ImageU8>{}),
-          photos_(run.photos.empty() ? loaded_ : run.photos),
+          loaded_(own_photos(dataset, options, run)),
+          photos_(loaded_.empty() ? run.photos : loaded_),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
           rates_(rates_of(device)),
           tuning_(result_variants(device)),
@@ -180,21 +194,19 @@ void Run::on_result(const IterationResult& result) {
 void Run::evaluate(int iteration) {
     stopwatch(false);
     Evaluation evaluation = evaluate_held_out(trainer_, dataset_, photos_);
+    if (evaluation.views.empty()) return stopwatch(true);  // nothing is held out
     evaluation.iteration = iteration;
     evaluation.seconds = seconds_;
     evaluation.splats = trainer_.splat_count();
-    if (!evaluation.views.empty()) {
-        const auto folder = run_.output / "held_out" / std::to_string(iteration);
-        const auto files = write_side_by_side(trainer_, dataset_, photos_, folder);
-        summary_.pictures.clear();
-        for (size_t v = 0; v < files.size(); ++v)
-            summary_.pictures.push_back({evaluation.views[v].name, files[v],
-                                         evaluation.views[v].psnr_db, evaluation.views[v].ssim});
-        progress_.note(fmt::format(
-            "iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats",
-            iteration, evaluation.psnr_db, evaluation.ssim, evaluation.views.size(),
-            evaluation.splats));
-    }
+    const auto folder = run_.output / "held_out" / std::to_string(iteration);
+    const auto files = write_side_by_side(trainer_, dataset_, photos_, folder);
+    summary_.pictures.clear();
+    for (size_t v = 0; v < files.size(); ++v)
+        summary_.pictures.push_back({evaluation.views[v].name, files[v],
+                                     evaluation.views[v].psnr_db, evaluation.views[v].ssim});
+    progress_.note(fmt::format(
+        "iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats", iteration,
+        evaluation.psnr_db, evaluation.ssim, evaluation.views.size(), evaluation.splats));
     log_.evaluation(evaluation);
     summary_.evaluations.push_back(std::move(evaluation));
     stopwatch(true);
@@ -343,9 +355,12 @@ void Run::report_probes() {
     for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
         const Trainer::Probe& p = trainer_.probes()[told_probes_];
         log_.probe(trainer_.iteration(), p);
-        progress_.note(
-            fmt::format("iteration {}: colour of degree {} {} ({:+.3f} dB on photos set aside)",
-                        p.iteration, p.degree, p.admitted ? "admitted" : "refused", p.gain_db));
+        const std::string reason = !std::isnan(p.gain_db)
+                                       ? fmt::format("{:+.3f} dB on photos set aside", p.gain_db)
+                                   : p.admitted ? "too few photos to set some aside"
+                                                : "--max-memory has no room for it";
+        progress_.note(fmt::format("iteration {}: colour of degree {} {} ({})", p.iteration,
+                                   p.degree, p.admitted ? "admitted" : "refused", reason));
     }
 }
 

@@ -116,14 +116,7 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
                    const TrainOptions& options, std::uint32_t splats,
                    const std::string& effects_json) {
     rates_ = rates;
-    int held_out = 0;
-    double pixels = 0;
-    for (const View& v : dataset.views) {
-        held_out += v.is_test ? 1 : 0;
-        if (!v.is_test) pixels += double(v.camera.width) * v.camera.height;
-    }
-    counts_.pixels = pixels / std::max<double>(1.0, double(dataset.views.size()) - held_out);
-    counts_.sh_degree = options.sh_degree;
+    const auto held_out = std::ranges::count_if(dataset.views, &View::is_test);
     start_ = {{"event", "start"},
               {"version", DARB_VERSION},
               {"device", device.info().name},
@@ -186,6 +179,8 @@ void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, 
     counts_.splats += r.splats;
     counts_.visible += r.visible;
     counts_.pairs += r.pairs;
+    counts_.pixels += r.pixels;
+    counts_.rest_floats += r.rest_floats;
     ++counted_;
     loss_sum_ += r.loss;
     psnr_sum_ += r.psnr_db;
@@ -264,9 +259,8 @@ ReportData RunLog::report_data(const RunSummary& summary) const {
 std::vector<ReportPass> RunLog::passes(const Trainer& trainer) const {
     std::vector<ReportPass> passes;
     FrameCounts mean = counts_;
-    mean.splats /= std::max(counted_, 1.0);
-    mean.visible /= std::max(counted_, 1.0);
-    mean.pairs /= std::max(counted_, 1.0);
+    for (double* sum : {&mean.splats, &mean.visible, &mean.pairs, &mean.pixels, &mean.rest_floats})
+        *sum /= std::max(counted_, 1.0);
     for (const PassTotal& p : trainer.pass_totals()) {
         const double ms = p.ms / std::max<double>(1.0, double(trainer.timed_iterations()));
         ReportPass pass{p.name, ms, std::nullopt};

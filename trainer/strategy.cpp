@@ -65,6 +65,20 @@ bool refines_after(const TrainOptions& options, int iteration) {
            iteration % options.densify_interval == 0;
 }
 
+bool resets_after(const TrainOptions& options, int iteration) {
+    if (options.strategy != Strategy::adc || iteration <= 0) return false;
+    const bool first_round_follows =
+        options.densify_from + options.densify_interval < options.densify_end();
+    const bool at_start = options.white_background && !options.random_background &&
+                          iteration == options.densify_from && first_round_follows;
+    return at_start || (iteration % options.opacity_reset_interval == 0 &&
+                        iteration <= options.last_opacity_reset());
+}
+
+bool prunes_by_size(const TrainOptions& options, int iteration) {
+    return iteration > options.opacity_reset_interval && options.last_opacity_reset() > 0;
+}
+
 bool regularises_unseen(const TrainOptions& options, std::size_t photos, int iteration) {
     const auto interval = static_cast<int>((photos + kPhotosThatBear - 1) / kPhotosThatBear);
     return options.strategy == Strategy::mcmc || iteration % std::max(interval, 1) == 0;

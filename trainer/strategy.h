@@ -36,6 +36,14 @@ std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uin
 /// Whether density control has a round after this iteration.
 bool refines_after(const TrainOptions& options, int iteration);
 
+/// Whether adc resets opacities after this iteration: every so many up to last_opacity_reset(),
+/// and, as 3DGS does, where growth begins over a white background.
+bool resets_after(const TrainOptions& options, int iteration);
+
+/// Whether a round of this iteration prunes by size: after the first opacity reset, or where it
+/// would be, so that growth has time to fill what is taken away.
+bool prunes_by_size(const TrainOptions& options, int iteration);
+
 /// Whether the regularisers act at this iteration on what its frame does not show too. A splat that
 /// few photos show is worth less than one that many show: in sets of up to 50 photos at each, in
 /// larger ones at 50 in a round of the photos, so that what ten of a thousand show stays; with mcmc

@@ -208,6 +208,7 @@ void Trainer::launch(int iteration) {
     note_memory();
 
     flight.iteration = iteration;
+    flight.pixels = data.width * data.height;
     Commands& commands = flight.commands;
     commands.begin();
     record(commands, view, iteration, degree_at(iteration), rates(iteration), flight.loss);
@@ -274,7 +275,8 @@ gpu::FrameStatus Trainer::finish(Flight& flight) {
     if (on_result) {
         const double mse = std::max(double(loss.mse) / std::max(double(loss.weight), 1e-12), 1e-12);
         on_result({iteration, Loss::value(loss, options_.lambda_dssim), -10.0 * std::log10(mse),
-                   splats_.count(), status.visible, status.pairs});
+                   splats_.count(), status.visible, status.pairs, flight.pixels,
+                   static_cast<int>(GpuSplats::strides(splats_.sh_degree())[kShRest])});
     }
     return status;
 }
@@ -312,12 +314,7 @@ void Trainer::check_gradients(int iteration, const gpu::FrameStatus& status) con
 void Trainer::density_control(int iteration) {
     if (iteration >= options_.densify_end()) return;
     const bool round = refines_after(options_, iteration);
-    const int last_reset = options_.last_opacity_reset();
-    const bool reset =
-        options_.strategy == Strategy::adc &&
-        ((iteration % options_.opacity_reset_interval == 0 && iteration <= last_reset) ||
-         (options_.white_background && !options_.random_background &&
-          iteration == options_.densify_from));
+    const bool reset = resets_after(options_, iteration);
     if (!round && !reset) return;
     drain();
     if (round) {
@@ -334,7 +331,7 @@ void Trainer::density_control(int iteration) {
         const double length = options_.length_scale() * extent_;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * length);
         args.prune_opacity = options_.prune_opacity;
-        args.prune_scale = iteration > options_.opacity_reset_interval && last_reset > 0
+        args.prune_scale = prunes_by_size(options_, iteration)
                                ? static_cast<float>(options_.prune_extent * length)
                                : 0.0f;
         args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);

@@ -35,6 +35,8 @@ struct IterationResult {
     double loss = 0;
     double psnr_db = 0;  // of the training view
     std::uint32_t splats = 0, visible = 0, pairs = 0;
+    std::uint32_t pixels = 0;  // of the photo, at the size of now
+    int rest_floats = 0;       // of a splat's harmonics, as buffers hold them
 };
 
 /// Counts over the whole run.
@@ -84,7 +86,9 @@ class Trainer {
     /// What a probe for view-dependent colour found.
     struct Probe {
         int iteration = 0, degree = 0;  // degree: the one on trial
-        double gain_db = 0;             // on the photos set aside
+        // On the photos set aside; NaN where nothing was measured: too few photos, which admits the
+        // degree, or no room for it within max_memory_bytes, which refuses it.
+        double gain_db = 0;
         bool admitted = false;
     };
     const std::vector<Probe>& probes() const { return probes_; }
@@ -129,10 +133,11 @@ class Trainer {
   private:
     struct Flight {
         explicit Flight(Device& device);
-        Buffer loss;        // gpu::LossResult, host
-        Buffer status;      // gpu::FrameStatus, host
-        int iteration = 0;  // 0: empty
-        Commands commands;  // last: they are waited for before anything that they use goes
+        Buffer loss;               // gpu::LossResult, host
+        Buffer status;             // gpu::FrameStatus, host
+        int iteration = 0;         // 0: empty
+        std::uint32_t pixels = 0;  // of its photo
+        Commands commands;         // last: they are waited for before anything that they use goes
     };
     int view_for(int iteration);
     int degree_at(int iteration) const;
@@ -160,7 +165,9 @@ class Trainer {
     double position_rate(int iteration) const;
     glm::vec3 background_for(int iteration) const;
     MemoryDemand growth_demand() const;
+    std::uint64_t bytes_to_plan() const;
     std::uint32_t splats_within_memory() const;
+    bool has_room_for_degree(int degree) const;
     void settle_order();                    // after a round of density control
     void note_memory();                     // into planned_bytes_, what is held now
     void note_round(std::uint32_t before);  // the same of a round of density control just over

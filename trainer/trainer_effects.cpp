@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
+#include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -77,20 +79,21 @@ double Trainer::probe_arm(const State& start, int degree, const std::vector<int>
 // The photo as the loss sees it: one frame and its loss, nothing updated.
 double Trainer::photo_psnr(int view) {
     Flight& flight = flights_[0];
-    const gpu::CameraData& data = camera_data_[view];
+    const gpu::CameraData& data = camera_data_of(view);
+    const Buffer& cameras = divisor_ > 1 ? small_cameras_ : cameras_;
+    const Buffer& photo = divisor_ > 1 ? small_photos_[view] : photos_[view];
     const int width = static_cast<int>(data.width), height = static_cast<int>(data.height);
     forward_.reserve(splats_.count(), std::max(forward_.pair_capacity(), splats_.count() * 4),
                      width, height);
     do {
         flight.commands.begin();
-        forward_.record(flight.commands, splats_, cameras_, static_cast<std::uint32_t>(view), data,
+        forward_.record(flight.commands, splats_, cameras, static_cast<std::uint32_t>(view), data,
                         sh_degree(), background_);
         if (exposure_)
             exposure_->record(flight.commands, forward_.image(), photo_of(view),
                               data.width * data.height);
-        loss_.record(flight.commands, exposure_ ? exposure_->mapped() : forward_.image(),
-                     photos_[view], d_image_, flight.loss, 0, width, height, background_,
-                     options_.lambda_dssim);
+        loss_.record(flight.commands, exposure_ ? exposure_->mapped() : forward_.image(), photo,
+                     d_image_, flight.loss, 0, width, height, background_, options_.lambda_dssim);
         flight.commands.submit_and_wait();
     } while (forward_.make_room(forward_.read_status(), [this] { reserve_backward(); }));
     gpu::LossResult loss;
@@ -102,8 +105,9 @@ double Trainer::photo_psnr(int view) {
 void Trainer::probe_degree() {
     const int degree = splats_.sh_degree();
     State before = state();
-    Probe probe{iteration_, degree + 1, 0, true};
-    if (train_views_.size() >= kFewestViews) {
+    Probe probe{iteration_, degree + 1, std::numeric_limits<double>::quiet_NaN(),
+                has_room_for_degree(degree + 1)};
+    if (probe.admitted && train_views_.size() >= kFewestViews) {
         std::vector<int> aside, rest;
         for (std::size_t i = 0; i < train_views_.size(); ++i) {
             const bool out = i % kAsideEvery == kAsideEvery / 2 && aside.size() < kMostAside;
@@ -123,8 +127,11 @@ void Trainer::probe_degree() {
         on_result = listener;
     }
     if (probe.admitted) set_degree(before, degree + 1);
-    before.next_probe = probe.admitted ? before.iteration + std::max(options_.sh_interval, 1)
-                                       : 2 * before.iteration;
+    const int interval = std::max(options_.sh_interval, 1);
+    before.next_probe =
+        probe.admitted ? before.iteration + interval : 2 * std::max(before.iteration, 1);
+    // Not while opacities come back from a reset.
+    if (resets_after(options_, before.next_probe)) before.next_probe += (interval + 1) / 2;
     restore(before);
     probes_.push_back(probe);
 }

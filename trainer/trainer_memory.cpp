@@ -50,7 +50,15 @@ std::uint64_t Trainer::planned_bytes() const {
 // is resumed, or shows other pictures meanwhile, has the same limit.
 MemoryDemand Trainer::growth_demand() const {
     MemoryDemand demand = memory_demand();
-    const std::uint64_t most = counters_.most_pairs;
+    std::uint64_t most = counters_.most_pairs;
+    if (divisor_ > 1) {
+        // Photos of the ramp's larger step are still to come, and frames in which a splat has more
+        // pairs: at the sizes that splats come to, about as many times more as sides are longer.
+        demand.small_pixels = std::max(demand.small_pixels, demand_.small_pixels);
+        most *= static_cast<std::uint64_t>(divisor_);
+    }
+    if (options_.probe_sh)  // the next degree on trial is to have room
+        demand.sh_degree = std::min(demand.sh_degree + 1, options_.sh_degree);
     demand.room_splats = 0;
     demand.pairs = std::max(4 * demand.splats, most + most / 2);
     demand.pairs += demand.pairs / 2;
@@ -60,16 +68,25 @@ MemoryDemand Trainer::growth_demand() const {
     return demand;
 }
 
-// Less what is in use beyond the plan.
-std::uint32_t Trainer::splats_within_memory() const {
-    if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
+// Of the budget, less what is in use beyond the plan.
+std::uint64_t Trainer::bytes_to_plan() const {
     const std::uint64_t in_use = device_->allocated_bytes();
     const std::uint64_t planned = plan_memory(*device_, memory_demand()).resident();
     const std::uint64_t extra = in_use - std::min(in_use, planned);
-    const std::uint64_t budget = options_.max_memory_bytes;
-    const MemoryDemand demand = growth_demand();
+    return options_.max_memory_bytes - std::min(options_.max_memory_bytes, extra);
+}
+
+std::uint32_t Trainer::splats_within_memory() const {
+    if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(
-        splats_within(*device_, demand, budget - std::min(budget, extra)), 0xFFFFFFFFu));
+        splats_within(*device_, growth_demand(), bytes_to_plan()), 0xFFFFFFFFu));
+}
+
+bool Trainer::has_room_for_degree(int degree) const {
+    if (options_.max_memory_bytes == 0) return true;
+    MemoryDemand demand = memory_demand();
+    demand.sh_degree = degree;
+    return plan_memory(*device_, demand).total() <= bytes_to_plan();
 }
 
 }  // namespace darb

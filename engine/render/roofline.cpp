@@ -62,7 +62,7 @@ DeviceRates measure_rates(Device& device) {
 }
 
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
-    const double rest = 3.0 * ((c.sh_degree + 1) * (c.sh_degree + 1) - 1);
+    const double rest = c.rest_floats;
     const double floats = 14 + rest;  // parameters of a splat
     const double samples = c.evaluated > 0 ? c.evaluated : c.pairs * kTilePixels * kTouchedShare;
     if (pass == "project")

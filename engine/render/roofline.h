@@ -20,8 +20,8 @@ DeviceRates measure_rates(Device& device);
 /// Means of the frames or iterations that a time belongs to.
 struct FrameCounts {
     double splats = 0, visible = 0, pairs = 0, pixels = 0;
-    int sh_degree = 0;     // of the buffers
-    double evaluated = 0;  // splat-pixels of blending; 0: estimated from the pairs
+    double rest_floats = 0;  // of a splat in the buffers: 3 ((d + 1)^2 - 1) at SH degree d
+    double evaluated = 0;    // splat-pixels of blending; 0: estimated from the pairs
 };
 
 struct PassWork {

@@ -142,6 +142,18 @@ TEST_F(RunFolder, schedule_of_3dgs_has_the_lengths_of_a_gaussian_for_every_kerne
     }
 }
 
+TEST_F(RunFolder, without_held_out_photos_there_is_no_evaluation) {
+    const fs::path whole = scratch() / "whole_scene";  // names no test views of its own
+    fs::create_directories(whole);
+    for (const char* part : {"images", "sparse"})
+        fs::create_symlink(fs::path(DARB_SOURCE_DIR) / "assets" / "scene" / part, whole / part);
+    const Outcome o = darb("train " + whole.string() + " -r 8 --iterations 2 -q --no-report -o " +
+                           folder_.string());
+    fs::remove_all(whole);
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(json::parse(read_text_file(folder_ / "metrics.json"))["evaluations"].size(), 0U);
+}
+
 TEST_F(RunFolder, the_plan_knows_the_kernel) {
     const auto antialias = [&](const char* options) {
         EXPECT_EQ(train(std::string("--iterations 1 -q ") + options).code, 0);
@@ -151,6 +163,10 @@ TEST_F(RunFolder, the_plan_knows_the_kernel) {
     EXPECT_TRUE(antialias("--kernel sinc"));
     EXPECT_FALSE(antialias("--kernel sinc --effects=-antialias"));
     EXPECT_FALSE(antialias("--kernel sinc --schedule 3dgs"));
+    EXPECT_FALSE(antialias("--kernel sinc --effects=-huge --schedule 3dgs"));
+    EXPECT_FALSE(antialias("--kernel sinc --schedule 3dgs --effects auto"));
+    EXPECT_TRUE(antialias("--kernel sinc --schedule 3dgs --effects +antialias"));
+    EXPECT_TRUE(antialias("--kernel sinc --schedule 3dgs --effects all"));
 }
 
 TEST_F(RunFolder, an_opacity_reset_leaves_what_can_be_seen) {

@@ -63,6 +63,23 @@ TEST(SphericalHarmonicsProbe, colours_that_change_with_the_view_admit_a_degree) 
     EXPECT_GT(largest, 1e-3) << "the bands are meant to be trained after they were admitted";
 }
 
+// Tiny memory: all that is there, and less than a degree more takes.
+TEST(SphericalHarmonicsProbe, a_degree_without_room_is_refused_unmeasured) {
+    ProbeCase t = training_of(0.25f);
+    Device device;
+    Trainer roomy(device, t.dataset, t.photos, t.start(), t.options);
+    for (int i = 0; i < 149; ++i) roomy.step();
+    roomy.drain();
+    t.options.max_memory_bytes = device.allocated_bytes() + 1024;
+    Device narrow;
+    Trainer trainer(narrow, t.dataset, t.photos, t.start(), t.options);
+    for (int i = 0; i < 200; ++i) trainer.step();
+    ASSERT_EQ(trainer.probes().size(), 1u);
+    EXPECT_FALSE(trainer.probes()[0].admitted);
+    EXPECT_TRUE(std::isnan(trainer.probes()[0].gain_db));
+    EXPECT_EQ(trainer.sh_degree(), 0);
+}
+
 TEST(SphericalHarmonicsProbe, a_refused_probe_leaves_no_trace) {
     ProbeCase t = training_of(0.0f);
     Trainer probed = t.from_truth();

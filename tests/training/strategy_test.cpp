@@ -154,9 +154,38 @@ TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
     EXPECT_EQ(options.last_opacity_reset(), 0);
     options.iterations = 1;
     EXPECT_EQ(options.last_opacity_reset(), 0);
-    use_3dgs_schedule(options);
     options.iterations = 7'000;
+    options.densify_until = 15'000;  // of a longer run: growth ends with this one
     EXPECT_EQ(options.last_opacity_reset(), 3'000);
+    options.densify_until = -1;
+    use_3dgs_schedule(options);
+    EXPECT_EQ(options.last_opacity_reset(), 3'000);
+}
+
+TEST(OpacityReset, only_adc_has_them_and_every_strategy_prunes_by_size_from_there) {
+    TrainOptions options;
+    EXPECT_TRUE(resets_after(options, 12'000));
+    EXPECT_FALSE(resets_after(options, 15'000));
+    EXPECT_FALSE(prunes_by_size(options, 3'000));
+    EXPECT_TRUE(prunes_by_size(options, 3'100));
+    options.iterations = 7'000;
+    EXPECT_FALSE(resets_after(options, 3'000));
+    EXPECT_FALSE(prunes_by_size(options, 3'100));
+    use_strategy(Strategy::budget, options);
+    EXPECT_FALSE(prunes_by_size(options, 3'100));
+    options.iterations = 30'000;
+    EXPECT_TRUE(prunes_by_size(options, 3'100));
+    EXPECT_FALSE(resets_after(options, 12'000));
+}
+
+TEST(OpacityReset, over_white_where_growth_begins_if_it_does) {
+    TrainOptions options;
+    EXPECT_FALSE(resets_after(options, 500));
+    options.white_background = true;
+    options.random_background = false;
+    EXPECT_TRUE(resets_after(options, 500));
+    options.iterations = 1'200;  // growth would end with the round of iteration 600
+    EXPECT_FALSE(resets_after(options, 500));
 }
 
 TEST(GrowthTarget, follows_its_rule_to_the_limit) {

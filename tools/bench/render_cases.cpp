@@ -75,7 +75,7 @@ BenchResult measure_frames(Device& device, const SplatModel& model, const Camera
                      static_cast<double>(status.visible),
                      static_cast<double>(status.pairs),
                      static_cast<double>(camera.width) * camera.height,
-                     p.model.sh_degree,
+                     static_cast<double>(p.model.rest_count()),
                      0};
     rate_passes(rates, result);
     return result;

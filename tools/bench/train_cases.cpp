@@ -57,7 +57,7 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     const double scale = result.counts.pairs / std::max(blend.counts.pairs, 1.0);
     result.counts.evaluated = scale * blend.counts.evaluated;
     result.contributing = scale * blend.contributing;
-    result.counts.sh_degree = model.sh_degree;
+    result.counts.rest_floats = model.rest_count();
     result.counts.pixels = blend.counts.pixels;
     result.yardsticks = blend.yardsticks;
     rate_passes(rates, result);

@@ -165,7 +165,7 @@ BlendFigures measure_blend(Device& device, const SplatModel& model,
         }
     }
     figures.counts.splats = static_cast<double>(model.size());
-    figures.counts.sh_degree = model.sh_degree;
+    figures.counts.rest_floats = model.rest_count();
     if (!mean_ms[0].empty()) figures.yardsticks = yardsticks(mean_ms, worst_psnr, worst_error);
     return figures;
 }

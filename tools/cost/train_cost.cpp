@@ -43,6 +43,7 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         if (options.probe_sh || degree < options.sh_degree)
             add(fmt::format("sh degree {} by the iteration", degree), [degree](TrainOptions& o) {
                 o.sh_degree = degree;
+                o.sh_interval = std::max(1, std::min(o.sh_interval, o.iterations / 8));
                 o.probe_sh = false;
             });
     add(options.antialias ? "without antialias" : "with antialias",

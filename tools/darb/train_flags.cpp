@@ -52,7 +52,7 @@ void add_schedule_flag(CLI::App& command, TrainFlags& f) {
                 f.schedule = schedule;
                 if (schedule != "3dgs") return;
                 use_3dgs_schedule(f.train);
-                f.effects = "+sh,-exposure,-antialias";
+                f.schedule_effects = "+sh,-exposure,-antialias";
             },
             "3dgs: its rates, limits and background, no regularisers, harmonics by the iteration; "
             "options that are given beside it count")

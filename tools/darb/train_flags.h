@@ -17,7 +17,7 @@ namespace darb {
 struct TrainFlags {
     std::string dataset;
     std::string device;
-    std::string effects = "auto";
+    std::string effects = "auto", schedule_effects;
     bool antialiasing = false;  // as 3DGS spells +antialias
     bool resume = false;
     bool view = false;  // follow in a window

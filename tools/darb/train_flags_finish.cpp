@@ -29,7 +29,21 @@ TrainFlags parse_train_flags(std::vector<std::string> words, const std::string& 
     return f;
 }
 
+namespace {
+
+// The schedule's changes before those that are given beside it, of which the last word counts; all
+// and none say everything.
+std::string effects_beside(const std::string& schedule, std::string given) {
+    if (schedule.empty() || given.empty() || given.starts_with("all") || given.starts_with("none"))
+        return given;
+    if (given.starts_with("auto")) given.erase(0, std::string("auto,").size());
+    return given.empty() ? schedule : schedule + "," + given;
+}
+
+}  // namespace
+
 void finish_train_flags(TrainFlags& f) {
+    f.effects = effects_beside(f.schedule_effects, f.effects);
     const auto kernel = kernel_from_name(f.kernel);
     if (!kernel)
         throw Error("--kernel " + f.kernel, "no such kernel",

@@ -18,7 +18,7 @@ TEST(Roofline, rates_are_those_of_a_device) {
 }
 
 TEST(Roofline, work_grows_with_the_counts) {
-    const FrameCounts counts{1000, 800, 5000, 10'000, 2}, more{2000, 1600, 10'000, 20'000, 2};
+    const FrameCounts counts{1000, 800, 5000, 10'000, 24}, more{2000, 1600, 10'000, 20'000, 24};
     for (const char* pass : {"project", "compact", "depth sort", "emit", "tile sort", "tile ranges",
                              "blend", "loss", "exposure", "blend backward", "project backward"}) {
         const auto one = pass_work(pass, counts), two = pass_work(pass, more);
