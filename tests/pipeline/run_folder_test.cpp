@@ -142,6 +142,14 @@ TEST_F(RunFolder, schedule_of_3dgs_has_the_lengths_of_a_gaussian_for_every_kerne
     }
 }
 
+TEST_F(RunFolder, a_run_too_short_to_grow_says_so) {
+    const std::string nothing = "growth: none";
+    EXPECT_NE(train("--iterations 4 --no-report").err.find(nothing), std::string::npos);
+    const Outcome grows =
+        train("--iterations 8 --densify-from-iter 0 --densification-interval 1 --no-report");
+    EXPECT_EQ(grows.err.find(nothing), std::string::npos) << grows.err;
+}
+
 TEST_F(RunFolder, without_held_out_photos_there_is_no_evaluation) {
     const fs::path whole = scratch() / "whole_scene";  // names no test views of its own
     fs::create_directories(whole);

@@ -54,8 +54,8 @@ void add_schedule_flag(CLI::App& command, TrainFlags& f) {
                 use_3dgs_schedule(f.train);
                 f.schedule_effects = "+sh,-exposure,-antialias";
             },
-            "3dgs: its rates, limits and background, no regularisers, harmonics by the iteration; "
-            "options that are given beside it count")
+            "3dgs: its rates, limits, resets and background, no regularisers, harmonics by the "
+            "iteration; options that are given beside it count")
         ->check(CLI::IsMember({"darb", "3dgs"}))
         ->default_str("darb");
 }

@@ -9,6 +9,7 @@
 #include "tools/darb/open_cameras.h"
 #include "trainer/forecast.h"
 #include "trainer/progress.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -101,6 +102,16 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     print_advice(device, dataset, f, bytes);
 }
 
+void print_growth(const TrainOptions& options) {
+    for (int i = 1; i < options.iterations; ++i)
+        if (refines_after(options, i)) return;
+    if (options.densify_end() > 0)
+        fmt::print(stderr,
+                   "growth: none, it would end after {} iterations and begin after {}: a longer "
+                   "run or --densify-from-iter changes that\n",
+                   options.densify_end(), options.densify_from);
+}
+
 }  // namespace
 
 void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags) {
@@ -114,6 +125,7 @@ void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags)
     fmt::print(stderr, "device: {} ({})\n", device.info().name, device.info().driver);
     fmt::print(stderr, "effects: {}\n", flags.run.effects);
     if (!flags.strategy_note.empty()) fmt::print(stderr, "{}\n", flags.strategy_note);
+    print_growth(flags.train);
     // A resumed run knows better: its progress shows the time left.
     if (flags.run.resume_from.empty() && held_out < dataset.views.size())
         print_forecast(device, dataset, flags);
