@@ -63,7 +63,7 @@ struct TrainOptions {
     // 80,811 splats on fox at 200 px after 2,000 iterations, and 27.47 rather than 26.75 dB on
     // held-out views.
     float prune_opacity = 0.1f;
-    float prune_extent = 0.1f;  // share of the scene extent, after the first opacity reset
+    float prune_extent = 0;  // share of the scene extent, after the first opacity reset; 0: never
     int opacity_reset_interval = 3'000;
     // Whether opacities are reset where density control ends before the next reset, as 3DGS does.
     // What grows back then is not pruned: splats beside cameras stay as veils over other views. The

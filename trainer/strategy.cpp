@@ -53,6 +53,7 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.opacity_lr = 0.025f;
     options.final_lr_share = 1;
     options.prune_opacity = 0.005f;
+    options.prune_extent = 0.1f;
     options.late_resets = true;
     options.opacity_weight = options.scale_weight = 0;
     options.random_background = false;
@@ -76,7 +77,7 @@ bool resets_after(const TrainOptions& options, int iteration) {
 }
 
 bool prunes_by_size(const TrainOptions& options, int iteration) {
-    return iteration > options.opacity_reset_interval && options.last_opacity_reset() > 0;
+    return options.prune_extent > 0 && iteration > options.opacity_reset_interval;
 }
 
 bool regularises_unseen(const TrainOptions& options, std::size_t photos, int iteration) {

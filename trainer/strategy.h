@@ -40,8 +40,8 @@ bool refines_after(const TrainOptions& options, int iteration);
 /// and, as 3DGS does, where growth begins over a white background.
 bool resets_after(const TrainOptions& options, int iteration);
 
-/// Whether a round of this iteration prunes by size: after the first opacity reset, or where it
-/// would be, so that growth has time to fill what is taken away.
+/// Whether a round after this iteration prunes by size: as 3DGS does after its first opacity reset,
+/// where there is a size to prune by.
 bool prunes_by_size(const TrainOptions& options, int iteration);
 
 /// Whether the regularisers act at this iteration on what its frame does not show too. A splat that

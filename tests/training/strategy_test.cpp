@@ -162,20 +162,23 @@ TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
     EXPECT_EQ(options.last_opacity_reset(), 3'000);
 }
 
-TEST(OpacityReset, only_adc_has_them_and_every_strategy_prunes_by_size_from_there) {
+TEST(OpacityReset, only_adc_has_them) {
     TrainOptions options;
     EXPECT_TRUE(resets_after(options, 12'000));
     EXPECT_FALSE(resets_after(options, 15'000));
-    EXPECT_FALSE(prunes_by_size(options, 3'000));
-    EXPECT_TRUE(prunes_by_size(options, 3'100));
     options.iterations = 7'000;
     EXPECT_FALSE(resets_after(options, 3'000));
-    EXPECT_FALSE(prunes_by_size(options, 3'100));
     use_strategy(Strategy::budget, options);
-    EXPECT_FALSE(prunes_by_size(options, 3'100));
     options.iterations = 30'000;
-    EXPECT_TRUE(prunes_by_size(options, 3'100));
     EXPECT_FALSE(resets_after(options, 12'000));
+}
+
+TEST(PruneBySize, only_3dgs_does_and_after_its_first_reset) {
+    TrainOptions options;
+    EXPECT_FALSE(prunes_by_size(options, 3'100));
+    use_3dgs_schedule(options);
+    EXPECT_FALSE(prunes_by_size(options, 3'000));
+    EXPECT_TRUE(prunes_by_size(options, 3'100));
 }
 
 TEST(OpacityReset, over_white_where_growth_begins_if_it_does) {
