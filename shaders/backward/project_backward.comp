@@ -73,9 +73,9 @@ Partial sum_partials(uint i) {
 }
 
 bool finite(SplatGradient g) {
-    const vec3 all_parts = abs(g.position) + abs(g.log_scale) + abs(g.rotation.xyz) + abs(g.colour) +
-                           vec3(abs(g.rotation.w) + abs(g.opacity_logit) + abs(g.mean.x) + abs(g.mean.y));
-    return all_parts.x + all_parts.y + all_parts.z < GRADIENT_LIMIT;
+    const uint ellipsoid = max(max(magnitude(g.position), magnitude(g.log_scale)), magnitude(g.rotation));
+    const uint light = max(magnitude(g.colour), magnitude(vec3(g.opacity_logit, g.mean)));
+    return below(max(ellipsoid, light), GRADIENT_LIMIT);
 }
 
 void update_rest(uint i, SplatGradient g) {

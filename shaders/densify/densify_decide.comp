@@ -11,6 +11,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
 
+#include "lib/finite.glsl"
 #include "lib/linear_id.glsl"
 
 layout(push_constant, scalar) uniform Push { DensifyArgs args; };
@@ -24,15 +25,16 @@ layout(set = 0, binding = 5, scalar) writeonly buffer Action { uint action[]; };
 const float SPLIT_SHRINK = 1.6;
 
 uint decide(uint i) {
-    const vec3 s = exp(log_scale[i]);
+    const vec3 raw_scale = log_scale[i], s = exp(raw_scale);
     const float largest = max(s.x, max(s.y, s.z));
-    const float opacity = 1.0 / (1.0 + exp(-opacity_logit[i]));
+    const float logit = opacity_logit[i], opacity = 1.0 / (1.0 + exp(-logit));
     const vec2 sum = gradient_sum[i];
     const bool grows = sum.y > 0.0 && sum.x >= args.gradient_threshold * sum.y;
     const bool splits = grows && largest > args.clone_split_scale;
     const float final_scale = splits ? largest / SPLIT_SHRINK : largest;
-    if (!(opacity >= args.prune_opacity)) return DENSIFY_PRUNE;
-    if (args.prune_scale > 0.0 && !(final_scale <= args.prune_scale)) return DENSIFY_PRUNE;
+    if (is_nan(logit) || !(opacity >= args.prune_opacity)) return DENSIFY_PRUNE;
+    if (args.prune_scale > 0.0 && (any_nan(raw_scale) || !(final_scale <= args.prune_scale)))
+        return DENSIFY_PRUNE;
     return splits ? DENSIFY_SPLIT : grows ? DENSIFY_CLONE : DENSIFY_KEEP;
 }
 

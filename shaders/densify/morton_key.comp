@@ -10,6 +10,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
 
+#include "lib/finite.glsl"
 #include "lib/linear_id.glsl"
 
 layout(push_constant, scalar) uniform Push { MortonArgs args; };
@@ -26,7 +27,7 @@ uint spread(uint bits) {
 
 uint axis(float at) {
     const float cells = float(1u << MORTON_AXIS_BITS);
-    if (!(abs(at) < 1e30)) return (1u << MORTON_AXIS_BITS) - 1u;
+    if (!magnitude_below(at, 1e30)) return (1u << MORTON_AXIS_BITS) - 1u;
     return uint(clamp(at, 0.0, cells - 1.0));
 }
 

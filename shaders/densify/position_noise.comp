@@ -47,5 +47,5 @@ void main() {
     const mat3 axes = rotation_matrix(unit);
     const vec3 s = exp(clamp(log_scale[i], -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT));
     const vec3 offset = args.rate * gate * (axes * (s * s * (normal * axes)));
-    if (dot(offset, offset) < 1e30) position[i] += offset;
+    if (magnitude_below(dot(offset, offset), 1e30)) position[i] += offset;
 }

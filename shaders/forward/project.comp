@@ -42,6 +42,7 @@ layout(set = 0, binding = 12, scalar) writeonly buffer Visible { uint visible[];
 layout(set = 0, binding = 13, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 14, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
 
+// Not clamped: max may drop NaN.
 vec3 splat_colour(uint i, vec3 direction) {
     vec3 colour = 0.5 + SH_C0 * sh_dc[i];
     if (SH_DEGREE > 0) {
@@ -54,7 +55,7 @@ vec3 splat_colour(uint i, vec3 direction) {
             colour += basis[k] * vec3(sh_rest[o], sh_rest[o + 1u], sh_rest[o + 2u]);
         }
     }
-    return mix(colour, vec3(0.0), lessThan(colour, vec3(0.0)));  // keeps NaN, which max may drop
+    return colour;
 }
 
 // Given the image position, a splat's depth has the mean z - slope . (x, y), (x, y) the whitened offset of blend.comp:
@@ -113,7 +114,7 @@ uint project(uint i, out int reason) {
     const vec3 to_splat = from_centre(camera, position[i]);
     const vec3 p = to_camera(camera, to_splat);
     reason = CULL_NEAR;
-    if (!(p.z > camera.near_plane && p.z < 1e30) || !(abs(p.x) + abs(p.y) < 1e30)) return 0u;
+    if (!magnitude_below(p, 1e30) || !(p.z > camera.near_plane)) return 0u;
 
     vec4 unit;
     float norm;
@@ -126,7 +127,7 @@ uint project(uint i, out int reason) {
         1.0 / (1.0 + exp(-clamp(logit, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT)));
     if (STORAGE == STORAGE_FLOAT16 && !FILTERED) opacity = round_half(opacity);
     float reach = kernel_reach(opacity);
-    if (!(reach > 0.0) || isnan(logit)) return 0u;
+    if (!(reach > 0.0) || is_nan(logit)) return 0u;
 
     reason = CULL_COVARIANCE;
     const vec3 raw_scale = log_scale[i];
@@ -140,15 +141,15 @@ uint project(uint i, out int reason) {
     const vec3 r2 = (to_world(camera, j1) * axes) * s;
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
     const float unit_area = f.shrink * f.shrink;
-    if (!(f.determinant > DETERMINANT_MIN * unit_area * unit_area) || any(isnan(raw_scale)))
-        return 0u;
+    if (!is_finite(f.determinant) || any_nan(raw_scale)) return 0u;
+    if (!(f.determinant > DETERMINANT_MIN * unit_area * unit_area)) return 0u;
 
     if (FILTERED) {
         reason = CULL_OPACITY;
         if (ANTIALIAS == 1) opacity *= compensation(r1, r2, f);
         if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);
         reach = kernel_reach(opacity);
-        if (!(reach > 0.0)) return 0u;
+        if (!(reach > 0.0) || is_nan(opacity)) return 0u;
     }
 
     reason = CULL_OUTSIDE;
@@ -159,8 +160,8 @@ uint project(uint i, out int reason) {
     if (count == 0u) return 0u;
 
     reason = CULL_COLOUR;
-    const vec3 colour = splat_colour(i, normalize(to_splat));
-    if (!all(lessThan(colour, vec3(1e30)))) return 0u;
+    const vec3 signed_colour = splat_colour(i, normalize(to_splat)), colour = max(signed_colour, 0.0);
+    if (any_nan(signed_colour) || !magnitude_below(colour, 1e30)) return 0u;
 
     float slope = 0.0;
     if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) slope = depth_slope(f, r1, r2, (camera.row2 * axes) * s);

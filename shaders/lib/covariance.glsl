@@ -1,5 +1,6 @@
 // From a splat's parameters and a camera to the projected Cholesky factor, with its derivatives' ingredients.
 // KERNELS: M = sqrt(scale) J W R diag(s), S' = M M^T + low_pass I, q = (l11 dx + l21 dy)^2 + (l22 dy)^2.
+#include "lib/finite.glsl"
 
 // Rotation matrix of a unit quaternion (w, x, y, z); column k is the splat's axis k in the world.
 mat3 rotation_matrix(vec4 q) {
@@ -18,7 +19,7 @@ bool normalise_rotation(vec4 q, out vec4 unit, out float norm) {
     const float length_scaled = sqrt(dot(scaled, scaled));
     unit = scaled / length_scaled;
     norm = largest * length_scaled;
-    return norm * norm > ROTATION_MIN_SQUARE && largest < 1e30;
+    return magnitude_below(q, 1e30) && is_finite(norm) && norm * norm > ROTATION_MIN_SQUARE;
 }
 
 vec3 to_camera(CameraData camera, vec3 v) {

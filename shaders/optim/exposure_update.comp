@@ -19,6 +19,7 @@ layout(set = 0, binding = 1, scalar) buffer Maps { float maps[]; };        // [v
 layout(set = 0, binding = 2, scalar) buffer Moments { vec2 moments[]; };   // [views][12]
 layout(set = 0, binding = 3, scalar) readonly buffer Status { FrameStatus status; };
 
+#include "lib/finite.glsl"
 #include "optim/adam.glsl"
 
 void main() {
@@ -26,7 +27,7 @@ void main() {
     const uint k = gl_LocalInvocationID.x, at = args.view * EXPOSURE_TERMS + k;
     float gradient = 0.0;
     for (uint g = 0u; g < args.groups; ++g) gradient += partials[g * EXPOSURE_TERMS + k];
-    if (!(abs(gradient) < GRADIENT_LIMIT)) return;
+    if (!magnitude_below(gradient, GRADIENT_LIMIT)) return;
     vec2 moment = moments[at];
     const float change = adam_step(0.0, moment, gradient, args.rate);
     moments[at] = moment;

@@ -21,6 +21,7 @@ layout(set = 0, binding = 2, scalar) readonly buffer TileRange { uvec2 tile_rang
 layout(set = 0, binding = 3, scalar) readonly buffer LastPair { uint last_pair[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Pixels { uint pixels[]; };
 
+#include "lib/finite.glsl"
 #include "lib/linear_id.glsl"
 
 // Black, violet, red, orange, pale yellow: dark to light, so that it also reads in grey.
@@ -66,7 +67,6 @@ void main() {
         const uint last = last_pair[i];
         colour = heat(last > begin ? float(last - begin) / args.heat_max : 0.0);
     }
-    const bvec3 bad = isnan(colour);
-    colour = any(bad) ? vec3(1.0, 0.0, 1.0) : colour;
+    colour = any_nan(colour) ? vec3(1.0, 0.0, 1.0) : colour;
     pixels[i] = packUnorm4x8(vec4(colour.bgr, 1.0));
 }

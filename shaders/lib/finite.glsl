@@ -1,0 +1,23 @@
+// Comparisons that hold for NaN and infinity on every device, by the bits: SPIR-V as compiled here promises
+// nothing of them, and drivers that assume that there are none (fast math of Metal, LLPC) may turn !(x < y) into
+// x >= y and isnan(x) into false. Without their sign the bits are ordered as the magnitudes, then infinity, then NaN.
+#ifndef DARB_FINITE_GLSL
+#define DARB_FINITE_GLSL
+
+const uint MAGNITUDE_BITS = 0x7FFFFFFFu, INFINITY_BITS = 0x7F800000u;
+
+bool is_nan(float x) { return (floatBitsToUint(x) & MAGNITUDE_BITS) > INFINITY_BITS; }
+bool any_nan(vec3 x) { return is_nan(x.x) || is_nan(x.y) || is_nan(x.z); }
+
+uint magnitude(float x) { return floatBitsToUint(x) & MAGNITUDE_BITS; }
+uint magnitude(vec3 x) { return max(max(magnitude(x.x), magnitude(x.y)), magnitude(x.z)); }
+uint magnitude(vec4 x) { return max(magnitude(x.xyz), magnitude(x.w)); }
+
+// Whether the magnitude of each part is below the limit, which is positive; not so for NaN.
+bool below(uint largest_magnitude, float limit) { return largest_magnitude < floatBitsToUint(limit); }
+bool magnitude_below(float x, float limit) { return below(magnitude(x), limit); }
+bool magnitude_below(vec3 x, float limit) { return below(magnitude(x), limit); }
+bool magnitude_below(vec4 x, float limit) { return below(magnitude(x), limit); }
+bool is_finite(float x) { return magnitude(x) < INFINITY_BITS; }
+
+#endif
