@@ -1,4 +1,4 @@
-// The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected at
+// The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected near
 // d = 0. For comparison of cost and accuracy; Vulkan leaves sin and cos 2^-11 of error. Only kernels that have
 // such a formula: others, and the exact footprints of the compact ones, keep their polynomial. KERNEL_SUPPORT ends
 // the pulses; there is no polynomial for more than one.
@@ -11,12 +11,18 @@ bool builtin_exists() {
 }
 
 const float PI = 3.14159265;
-const float LEAST_DISTANCE = 1e-6;  // keeps sin(kd)/d at its limit k at the centre
 
-// sin(x)/x and its derivative by x^2, whose closed form cancels near 0.
+// sin(x)/x. Below x = 1/2 its series, to 1.1e-8: sin(x) may be absolutely wrong, or 0 for small angles, and 0/0 is
+// the centre.
+float sinc(float x) {
+    const float s = x * x;
+    return s < 0.25 ? 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0))) : sin(x) / x;
+}
+
+// sinc and its derivative by x^2, whose closed form cancels near 0.
 void sinc_slope(float x, out float w, out float slope) {
     const float s = x * x;
-    w = sin(x) / x;
+    w = sinc(x);
     slope = s < 0.25 ? -1.0 / 6.0 + s * (1.0 / 60.0 - s * (1.0 / 1680.0))
                      : (cos(x) - w) / (2.0 * s);
 }
@@ -27,11 +33,11 @@ void builtin_value_slope(float q, out float w, out float slope) {
         slope = -0.5 * w;
         return;
     }
-    const float d = sqrt(max(q, LEAST_DISTANCE * LEAST_DISTANCE));
+    const float d = sqrt(q);
     if (KERNEL == KERNEL_RAISED_COSINE) {
         const float k = PI / 2.5;
         w = 0.5 + 0.5 * cos(k * d);
-        slope = -0.25 * k * sin(k * d) / d;
+        slope = -0.25 * k * k * sinc(k * d);
     } else if (KERNEL == KERNEL_HALF_COSINE_SQUARED) {
         const float k = PI / 18.0;
         w = cos(k * q);
@@ -47,12 +53,12 @@ void builtin_value_slope(float q, out float w, out float slope) {
     } else if (KERNEL == KERNEL_COSINE) {
         const float k = PI / 6.0;
         w = cos(k * d);
-        slope = -0.5 * k * sin(k * d) / d;
+        slope = -0.5 * k * k * sinc(k * d);
     } else {
         const float k = PI / 3.0;
         const float root = 0.5 + 0.5 * cos(k * d);
         w = root * root;
-        slope = -0.5 * k * root * sin(k * d) / d;
+        slope = -0.5 * k * k * root * sinc(k * d);
     }
     const bool inside = q < KERNEL_SUPPORT;
     w = inside ? max(w, 0.0) : 0.0;
