@@ -19,7 +19,6 @@ namespace darb::check {
 namespace {
 
 constexpr double kCutoff = 1 / 255.0;
-constexpr double kRounding = 3e-7;  // of float32 arithmetic, on w; as in KERNELS
 constexpr double kSlopeRounding = 2e-6;
 // Of the built-in sin and cos, which rings take: 2^-11 by the letter of Vulkan, no driver is so
 // bad.
@@ -81,7 +80,7 @@ Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
     reference::Tolerance allowed;
     allowed.name = "kernel";
     const bool rings = k.form == KERNEL_FORM_RINGS;
-    allowed.abs = 1.1 * k.value_error + (rings ? kRingRounding : kRounding);
+    allowed.abs = 1.1 * k.value_error + (rings ? kRingRounding : float_rounding(k));
     const Row row = compare_row("kernels", name + " value", value, got_value, allowed);
     allowed.rel = rings ? kRingSlopeRounding : kSlopeRounding;
     allowed.abs = 1.2 * k.slope_error + allowed.rel;

@@ -38,6 +38,15 @@ struct KernelCoefficients {
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree);
 const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, int degree);
 
+/// Absolute, of w, that float32 on any device may add to value_error. Multiplications and additions
+/// are rounded correctly: 3e-7. Division is not, nor is a square root: Vulkan allows 2.5 ulp, 2 for
+/// inversesqrt, and for sqrt both of them, so 7 for 1/sqrt(1+q), each 6e-8 below w = 1.
+inline double float_rounding(const KernelCoefficients& k) {
+    const bool divides = k.form == KERNEL_FORM_QUADRIC;
+    const bool has_root = k.form == KERNEL_FORM_COMPACT && k.half_power % 2 == 1;
+    return divides || has_root ? 3e-7 + 6e-7 : 3e-7;
+}
+
 /// w and dw/dq as the shaders compute them with EVALUATION_POLYNOMIAL.
 template <class Real>
 void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope);
