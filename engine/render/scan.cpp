@@ -36,6 +36,12 @@ SpecConstants constants(const Device& device, const Scan::Strategy& strategy) {
             {"TEAM_IS_THREAD", strategy.team_is_thread ? 1 : 0}};
 }
 
+SpecConstants apply_constants(const Device& device, const Scan::Strategy& strategy, bool in_place) {
+    SpecConstants result = constants(device, strategy);
+    result["IN_PLACE"] = in_place ? 1 : 0;
+    return result;
+}
+
 SpecConstants top_constants(const Device& device) {
     const std::uint32_t threads = device.is_lavapipe() ? kTopThreadsLavapipe : kTopThreads;
     return {{"THREADS", static_cast<std::int32_t>(threads)}};
@@ -55,7 +61,10 @@ Scan::Scan(Device& device, std::uint32_t capacity, const Strategy& strategy)
       prepare_(device, "scan_prepare"),
       reduce_(device, "scan_reduce", constants(device, strategy), true, strategy.subgroup_size),
       top_(device, "scan_top", top_constants(device), true, strategy.subgroup_size),
-      apply_(device, "scan_apply", constants(device, strategy), true, strategy.subgroup_size) {
+      apply_(device, "scan_apply", apply_constants(device, strategy, false), true,
+             strategy.subgroup_size),
+      apply_in_place_(device, "scan_apply", apply_constants(device, strategy, true), true,
+                      strategy.subgroup_size) {
     DARB_CHECK(capacity > 0);
     if (capacity > max_capacity(device, strategy))
         throw Error(
@@ -96,7 +105,8 @@ void Scan::run(Commands& commands, const Buffer& counts, const Buffer& offsets,
     const gpu::ScanTopArgs top_args{static_cast<std::uint32_t>(total.offset / 4)};
     commands.dispatch_indirect(reduce_, NoArgs{}, {plan_, counts, chunk_sums_}, plan_, 0);
     commands.dispatch(top_, top_args, {plan_, chunk_sums_, *total.buffer}, 1);
-    commands.dispatch_indirect(apply_, NoArgs{}, {plan_, counts, chunk_sums_, offsets}, plan_, 0);
+    commands.dispatch_indirect(&counts == &offsets ? apply_in_place_ : apply_, NoArgs{},
+                               {plan_, counts, chunk_sums_, offsets}, plan_, 0);
 }
 
 void Scan::record(Commands& commands, const Buffer& counts, const Buffer& offsets,

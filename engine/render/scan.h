@@ -50,7 +50,7 @@ class Scan {
 
     std::uint32_t capacity_;
     std::uint32_t teams_per_group_;
-    Pipeline prepare_, reduce_, top_, apply_;
+    Pipeline prepare_, reduce_, top_, apply_, apply_in_place_;
     Buffer plan_;
     Buffer chunk_sums_;
 };

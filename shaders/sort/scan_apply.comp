@@ -1,6 +1,7 @@
 // Scan, step 4 of 4: offsets of every element from the offset of its chunk. One team
 // (scan_team.glsl) a chunk, no shared memory.
-// Reads counts [n], chunk_offsets [chunks]; writes offsets [n].
+// Reads counts [n], chunk_offsets [chunks]; writes offsets [n]. With IN_PLACE the counts are read where the offsets go,
+// through that one binding: two that are not declared Aliased must not reach one buffer.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -9,14 +10,18 @@
 #include "shaders/shared/scan_args.h"
 #include "shaders/sort/scan_team.glsl"
 
+layout(constant_id = 3) const bool IN_PLACE = false;
+
 layout(set = 0, binding = 0, scalar) readonly buffer Plan { ScanPlan plan; };
 layout(set = 0, binding = 1, scalar) readonly buffer Counts { uint counts[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer ChunkOffsets { uint chunk_offsets[]; };
-layout(set = 0, binding = 3, scalar) writeonly buffer Offsets { uint offsets[]; };
+layout(set = 0, binding = 3, scalar) buffer Offsets { uint offsets[]; };
+
+uint count_at(uint i) { return IN_PLACE ? offsets[i] : counts[i]; }
 
 void scan_by_thread(uint begin, uint end, uint prefix) {
     for (uint i = begin; i < end; ++i) {
-        const uint value = counts[i];
+        const uint value = count_at(i);
         offsets[i] = prefix;
         prefix += value;
     }
@@ -26,7 +31,7 @@ void scan_by_thread(uint begin, uint end, uint prefix) {
 void scan_by_subgroup(uint begin, uint end, uint prefix) {
     for (uint row = begin; row < end; row += gl_SubgroupSize) {
         const uint i = row + gl_SubgroupInvocationID;
-        const uint value = i < end ? counts[i] : 0;
+        const uint value = i < end ? count_at(i) : 0;
         const uint exclusive = subgroupExclusiveAdd(value);
         if (i < end) offsets[i] = prefix + exclusive;
         prefix += subgroupBroadcast(exclusive + value, gl_SubgroupSize - 1);
