@@ -185,6 +185,13 @@ TEST(Buffer, larger_than_the_device_allows_is_an_error) {
     EXPECT_NE(text.find("\"huge\""), std::string::npos) << text;
 }
 
+TEST(VulkanErrors, too_many_allocations_say_what_takes_them) {
+    const std::string text =
+        error_of([] { check_vulkan(VK_ERROR_TOO_MANY_OBJECTS, "buffer \"photo\""); });
+    EXPECT_NE(text.find("photo"), std::string::npos) << text;
+    EXPECT_NE(text.find("fewer photos"), std::string::npos) << text;
+}
+
 TEST(Faults, text_that_is_no_fault_is_an_error) {
     EXPECT_NE(error_of([] { parse_faults("oops"); }), "no error");
     EXPECT_NE(error_of([] { parse_faults("lost:0"); }), "no error");
