@@ -16,6 +16,9 @@ namespace darb {
 
 namespace {
 
+// Vulkan's header names it only with VK_ENABLE_BETA_EXTENSIONS.
+constexpr const char* kPortabilitySubset = "VK_KHR_portability_subset";
+
 bool validation_from_environment() {
     const char* value = std::getenv("DARB_VALIDATION");
     return value != nullptr && *value != '\0' && std::strcmp(value, "0") != 0;
@@ -132,6 +135,8 @@ void Device::State::create_device(const DeviceOptions& options) {
                         "--view.");
         extensions.push_back(name.c_str());
     }
+    // Must be enabled where it is offered. None of the features that it takes away is used here.
+    if (offers_extension(physical, kPortabilitySubset)) extensions.push_back(kPortabilitySubset);
     if (info.float_atomics) extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
 
     const float priority = 1;

@@ -98,6 +98,8 @@ Instance::Instance(bool validation, const std::vector<std::string>& extensions)
                         "Run without a window, or install a driver with window support.");
         names.push_back(name.c_str());
     }
+    const bool portable = contains(offered, VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME);
+    if (portable) names.push_back(VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME);
     const bool debug = contains(offered, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
     if (debug) names.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
     if (validation) names.push_back(VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME);
@@ -117,6 +119,8 @@ Instance::Instance(bool validation, const std::vector<std::string>& extensions)
     VkInstanceCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
     info.pApplicationInfo = &application;
+    // Else the loader leaves out drivers over another interface, such as MoltenVK.
+    if (portable) info.flags |= VK_INSTANCE_CREATE_ENUMERATE_PORTABILITY_BIT_KHR;
     info.enabledExtensionCount = static_cast<std::uint32_t>(names.size());
     info.ppEnabledExtensionNames = names.data();
     if (validation) {
