@@ -45,6 +45,7 @@ SplatModel in_style(const SplatModel& own, SplatStyle style) {
 
 SplatPicture::SplatPicture(Device& device)
     : device_(&device),
+      exchange_(device),
       commands_(device),
       depth_light_(device, "view_depth", {{"THREADS", VIEW_GROUP}}),
       no_photo_(device, "no photo", 4) {}
@@ -219,7 +220,6 @@ void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
     compiled_ |= is_halved && !upsample_;
     if (is_halved && !upsample_) upsample_.emplace(*device_);
     const gpu::CameraData data = camera_data(rendered, shown.origin(), display.near_plane);
-    const Buffer cameras = upload_cameras(*device_, {data});
     const int degree = std::min(display.sh_degree, shown.sh_degree());
     forward.before_blend = nullptr;
     glm::vec3 background = display.background;
@@ -234,13 +234,15 @@ void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
     forward.reserve(shown.count(), pairs, rendered.width, rendered.height);
     do {
         commands_.begin();
-        forward.record(commands_, shown, cameras, 0, data, degree, background);
+        exchange_.send(commands_, data);
+        forward.record(commands_, shown, exchange_.cameras(), 0, data, degree, background);
         const Buffer& image = is_halved
                                   ? upsample_->record(commands_, forward.image(), rendered, camera)
                                   : forward.image();
         record_display(forward, image, camera, display, photo);
+        exchange_.fetch(commands_, forward.status());
         commands_.submit_and_wait();
-        status_ = forward.read_status();
+        status_ = exchange_.status();
     } while (forward.make_room(status_));
     pass_times_ = commands_.pass_times();
     width_ = camera.width;

@@ -9,6 +9,7 @@
 
 #include "engine/core/image.h"
 #include "engine/render/forward.h"
+#include "engine/render/frame_exchange.h"
 #include "engine/render/upsample.h"
 #include "viewer/bounds.h"
 #include "viewer/display.h"
@@ -89,6 +90,7 @@ class SplatPicture {
     static ForwardOptions options_for(const Key& key);
 
     Device* device_;
+    FrameExchange exchange_;
     Commands commands_;
     Pipeline depth_light_;
     std::optional<Upsample> upsample_;  // made where a picture is rendered at half the size

@@ -45,10 +45,10 @@ Renderer::Renderer(Device& device, const SplatModel& model, const ForwardOptions
     : Renderer(device, model, frame_of(model, options)) {}
 
 Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy)
-    : device_(&device),
-      accuracy_(accuracy),
+    : accuracy_(accuracy),
       splats_(device, model, false),
       forward_(device, accuracy_.options),
+      exchange_(device),
       commands_(device) {
     if (accuracy_.halved) upsample_.emplace(device);
 }
@@ -59,7 +59,6 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
     const gpu::CameraData data = camera_data(rendered, splats_.origin(), near_plane);
     DARB_CHECK(!camera.lens.active || forward_.options().effects.lens, "a lens, not compiled in");
     camera_ = data;
-    const Buffer cameras = upload_cameras(*device_, {data});
     const int degree =
         sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
     const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
@@ -67,11 +66,13 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
     const Buffer* image = nullptr;
     for (;;) {
         commands_.begin();
-        forward_.record(commands_, splats_, cameras, 0, data, degree, background);
+        exchange_.send(commands_, data);
+        forward_.record(commands_, splats_, exchange_.cameras(), 0, data, degree, background);
         image = upsample_ ? &upsample_->record(commands_, forward_.image(), rendered, camera)
                           : &forward_.image();
+        exchange_.fetch(commands_, forward_.status());
         commands_.submit_and_wait();
-        status_ = forward_.read_status();
+        status_ = exchange_.status();
         if (!forward_.make_room(status_)) break;
     }
     pass_times_ = commands_.pass_times();

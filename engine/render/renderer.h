@@ -6,6 +6,7 @@
 #include "engine/core/image.h"
 #include "engine/render/accuracy.h"
 #include "engine/render/forward.h"
+#include "engine/render/frame_exchange.h"
 #include "engine/render/upsample.h"
 
 namespace darb {
@@ -37,11 +38,11 @@ class Renderer {
   private:
     Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy);
 
-    Device* device_;
     FrameAccuracy accuracy_;
     GpuSplats splats_;
     Forward forward_;
     std::optional<Upsample> upsample_;  // where the resolution is halved
+    FrameExchange exchange_;
     Commands commands_;
     gpu::FrameStatus status_{};
     gpu::CameraData camera_{};  // of the last render
