@@ -347,8 +347,9 @@ bool ViewerWindow::pump(double patience_s) {
         glfwWaitEventsTimeout(sleep);
     else
         glfwWaitEvents();
-    const bool woken = s.woken.exchange(false);
-    if (woken || due()) s.draw();
+    // Dirty, as after an event: a message that a load ends with takes frames to appear.
+    if (s.woken.exchange(false)) s.dirty = true;
+    if (due()) s.draw();
     return glfwWindowShouldClose(s.window.handle) == GLFW_FALSE;
 }
 

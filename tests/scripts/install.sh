@@ -15,7 +15,7 @@ block cpp >program/reconstruct.cpp
 
 cmake --install "$build" --prefix "$work/prefix" >/dev/null
 prefix/bin/darb --version
-cmake -S program -B out -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_CXX_COMPILER="${CXX:-c++}"
+cmake -G Ninja -S program -B out -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_CXX_COMPILER="${CXX:-c++}"
 cmake --build out
 out/reconstruct "$root/assets/scene" 30
 prefix/bin/darb info scene.ply
