@@ -219,8 +219,7 @@ void Trainer::launch(int iteration) {
 void Trainer::record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
                      const Buffer& loss) {
     const gpu::CameraData& data = camera_data_of(view);
-    const Buffer& cameras = divisor_ > 1 ? small_cameras_ : cameras_;
-    const Buffer& pixels_of_photo = divisor_ > 1 ? small_photos_[view] : photos_[view];
+    const Buffer &cameras = cameras_now(), &photo_pixels = pixels_of_photo(view);
     const auto index = static_cast<std::uint32_t>(view);
     const std::uint32_t pixels = data.width * data.height;
     const std::uint32_t photo = photo_of(view);
@@ -229,11 +228,10 @@ void Trainer::record(Commands& commands, int view, int iteration, int degree, co
     if (exposure_) exposure_->record(commands, forward_.image(), photo, pixels);
     const Buffer& compared = exposure_ ? exposure_->mapped() : forward_.image();
     if (scores(iteration))
-        score_->record(commands, forward_, backward_, compared, pixels_of_photo, d_image_,
+        score_->record(commands, forward_, backward_, compared, photo_pixels, d_image_,
                        splats_.count(), data, behind);
-    loss_.record(commands, compared, pixels_of_photo, d_image_, loss, 0,
-                 static_cast<int>(data.width), static_cast<int>(data.height), behind,
-                 options_.lambda_dssim);
+    loss_.record(commands, compared, photo_pixels, d_image_, loss, 0, static_cast<int>(data.width),
+                 static_cast<int>(data.height), behind, options_.lambda_dssim);
     if (exposure_) {
         const double t = std::clamp(double(iteration) / options_.iterations, 0.0, 1.0);
         const double rate = options_.exposure_lr_init *

@@ -161,7 +161,10 @@ class Trainer {
     bool scores(int iteration) const;
     void record_noise(Commands& commands, int iteration);
     void settle_resolution(int iteration);
+    // At the size that the photos have now.
     const gpu::CameraData& camera_data_of(int view) const;
+    const Buffer& cameras_now() const;
+    const Buffer& pixels_of_photo(int view) const;
     double position_rate(int iteration) const;
     glm::vec3 background_for(int iteration) const;
     MemoryDemand growth_demand() const;

@@ -70,6 +70,14 @@ const gpu::CameraData& Trainer::camera_data_of(int view) const {
     return divisor_ > 1 ? small_data_[view] : camera_data_[view];
 }
 
+const Buffer& Trainer::cameras_now() const {
+    return divisor_ > 1 ? small_cameras_ : cameras_;
+}
+
+const Buffer& Trainer::pixels_of_photo(int view) const {
+    return divisor_ > 1 ? small_photos_[view] : photos_[view];
+}
+
 // Both iterations under way end with the photos that they began with.
 void Trainer::settle_resolution(int iteration) {
     const int divisor = ramp_ ? ramp_divisor(options_, iteration, longest_side_) : 1;

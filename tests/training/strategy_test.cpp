@@ -28,6 +28,26 @@ TEST_P(EveryStrategy, a_resumed_run_equals_one_that_never_stopped) {
     expect_resumes(t, whole, {18, 30});
 }
 
+TEST(ResolutionRamp, results_tell_the_pixels_and_harmonics_that_were_trained) {
+    TinyTraining t = tiny_with(Strategy::budget, {.width = 210, .height = 60});
+    t.options.sh_degree = 1;
+    Trainer trainer = t.trainer();
+    std::vector<IterationResult> results;
+    trainer.on_result = [&](const IterationResult& r) { results.push_back(r); };
+    run_to(trainer, 20);
+    trainer.drain();
+    ASSERT_EQ(results.size(), 20U);
+    const auto is_whole = [&](const IterationResult& r) {
+        return std::ranges::any_of(t.dataset.views, [&](const View& v) {
+            return std::uint32_t(v.camera.width * v.camera.height) == r.pixels;
+        });
+    };
+    EXPECT_TRUE(is_whole(results.back()));
+    EXPECT_GT(results.front().pixels, 0U);
+    EXPECT_LT(3 * results.front().pixels, results.back().pixels);
+    EXPECT_EQ(results.back().rest_floats, 9);
+}
+
 TEST_P(EveryStrategy, held_out_picture_gets_closer_to_the_photo) {
     TinyTraining t = tiny_with(GetParam());
     t.options.iterations = 200;

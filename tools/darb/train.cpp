@@ -37,7 +37,7 @@ void print_passes(std::vector<ReportPass> passes) {
 
 void print_summary(const RunSummary& summary, const TrainFlags& flags) {
     fmt::print("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
-    if (!summary.evaluations.empty() && !summary.evaluations.back().views.empty()) {
+    if (!summary.evaluations.empty()) {
         const Evaluation& e = summary.evaluations.back();
         fmt::print("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
                    e.splats);
