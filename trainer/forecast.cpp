@@ -158,8 +158,8 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit) {
     if (options.strategy != Strategy::adc)
         return std::max(start, simulate_growth(options, start, limit).end);
-    const int first = std::max(options.densify_from, 0) / options.densify_interval;
-    const int last = std::max(options.densify_end() - 1, 0) / options.densify_interval;
+    const int first = options.densify_begin() / options.round_interval();
+    const int last = std::max(options.densify_end() - 1, 0) / options.round_interval();
     const int rounds = std::max(0, last - first);
     const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
     const double most = std::min(growth * start, static_cast<double>(limit));
@@ -188,7 +188,7 @@ double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& o
     if (options.strategy != Strategy::adc) return simulate_growth(options, start, end).mean;
     const double all = options.iterations;
     const double to = std::clamp<double>(options.densify_end(), 0, all);
-    const double from = std::clamp<double>(options.densify_from, 0, to);
+    const double from = std::clamp<double>(options.densify_begin(), 0, to);
     return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;
 }
 
@@ -233,7 +233,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     const std::uint32_t limit =
         std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);
-    f.demand.densifies = options.densify_end() > options.densify_from;
+    f.demand.densifies = options.densify_end() > options.densify_begin();
     settle_size(scratch, options, f.splats, 0, f);
     if (measure && f.demand.photo_pixels > 0) try {
             measure_both(scratch, dataset, start, options, f);

@@ -15,6 +15,9 @@ namespace darb {
 /// How the splats grow in number; see trainer/strategy.h.
 enum class Strategy { adc, mcmc, budget };
 
+constexpr int kPacedBelow = 4'000;  // iterations
+constexpr float kMostPace = 5;
+
 struct TrainOptions {
     int iterations = 30'000;
     std::uint64_t seed = 0;
@@ -45,7 +48,8 @@ struct TrainOptions {
     // else end before positions settle (fox at 200 px, after 2,500 of 4,000: 27.95 dB with, 27.81
     // without).
     float position_lr_init = 0, position_lr_final = 0;
-    float scale_lr = 5e-3f, rotation_lr = 1e-3f, opacity_lr = 0.05f;
+    // The three below 0: 0.005 and 0.001 times pace(), 0.05 times its root.
+    float scale_lr = -1, rotation_lr = -1, opacity_lr = -1;
     float sh_dc_lr = 2.5e-3f, sh_rest_lr = 1.25e-4f;
     // Over the second half the other rates fall to this share, log-linear; 3DGS keeps them. On
     // photos it steadies what is there: fox at 200 px, 4,000 iterations: 28.0 dB with 1, 29.1 with
@@ -53,10 +57,15 @@ struct TrainOptions {
     // with 0.1.
     double final_lr_share = 0.3;
 
-    // Density control. What is not adc is set by use_strategy. densify_until -1: half of the run,
-    // at most 15,000; mcmc: 5/6 of it, at most 25,000.
+    // Whether runs of fewer than kPacedBelow iterations learn shapes and opacities and grow faster;
+    // see pace().
+    bool paced = true;
+
+    // Density control. What is not adc is set by use_strategy. Below 0: rounds after 500 iterations
+    // and then every 100, over pace(), until half of the run, at most 15,000; mcmc: 5/6 of it, at
+    // most 25,000.
     Strategy strategy = Strategy::adc;
-    int densify_from = 500, densify_until = -1, densify_interval = 100;
+    int densify_from = -1, densify_until = -1, densify_interval = -1;
     float densify_grad_threshold = 2e-4f;  // NDC units
     float clone_split_extent = 0.01f;      // share of the scene extent
     // 3DGS prunes below 0.005, at an opacity rate of 0.025. These two leave 59,192 rather than
@@ -116,7 +125,18 @@ struct TrainOptions {
         if (largest_scale >= 0) return largest_scale;
         return length_scale() > 1 ? 1.0f : 0.0f;
     }
-    float scale_rate() const { return length_scale() > 1 ? 1.5f * scale_lr : scale_lr; }
+    /// A run that is shorter than kPacedBelow is that run in fast motion, at most kMostPace times.
+    float pace() const {
+        const float times = float(kPacedBelow) / static_cast<float>(std::max(iterations, 1));
+        return paced ? std::clamp(times, 1.0f, kMostPace) : 1.0f;
+    }
+    float scale_rate() const {
+        const float rate = scale_lr >= 0 ? scale_lr : 0.005f * pace();
+        return length_scale() > 1 ? 1.5f * rate : rate;
+    }
+    float rotation_rate() const { return rotation_lr >= 0 ? rotation_lr : 0.001f * pace(); }
+    /// The root of the pace: with the whole, fewer splats and less time, but 0.8 dB less.
+    float opacity_rate() const { return opacity_lr >= 0 ? opacity_lr : 0.05f * std::sqrt(pace()); }
     float position_lr_scale() const {
         return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(iterations, 1))));
     }
@@ -125,6 +145,13 @@ struct TrainOptions {
     }
     float position_lr_end() const {
         return position_lr_final > 0 ? position_lr_final : 1.6e-6f * position_lr_scale();
+    }
+    int densify_begin() const {
+        return densify_from >= 0 ? densify_from : static_cast<int>(std::lround(500 / pace()));
+    }
+    int round_interval() const {
+        if (densify_interval >= 0) return std::max(densify_interval, 1);
+        return static_cast<int>(std::lround(100 / pace()));
     }
     int densify_end() const {
         if (densify_until >= 0) return std::min(densify_until, iterations);

@@ -51,6 +51,7 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.position_lr_init = 1.6e-4f;
     options.position_lr_final = 1.6e-6f;
     options.opacity_lr = 0.025f;
+    options.paced = false;
     options.final_lr_share = 1;
     options.prune_opacity = 0.005f;
     options.prune_extent = 0.1f;
@@ -62,16 +63,16 @@ void use_3dgs_schedule(TrainOptions& options) {
 }
 
 bool refines_after(const TrainOptions& options, int iteration) {
-    return iteration > options.densify_from && iteration < options.densify_end() &&
-           iteration % options.densify_interval == 0;
+    return iteration > options.densify_begin() && iteration < options.densify_end() &&
+           iteration % options.round_interval() == 0;
 }
 
 bool resets_after(const TrainOptions& options, int iteration) {
     if (options.strategy != Strategy::adc || iteration <= 0) return false;
     const bool first_round_follows =
-        options.densify_from + options.densify_interval < options.densify_end();
+        options.densify_begin() + options.round_interval() < options.densify_end();
     const bool at_start = options.white_background && !options.random_background &&
-                          iteration == options.densify_from && first_round_follows;
+                          iteration == options.densify_begin() && first_round_follows;
     return at_start || (iteration % options.opacity_reset_interval == 0 &&
                         iteration <= options.last_opacity_reset());
 }
@@ -92,7 +93,7 @@ std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uin
         return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
     }
     if (options.strategy != Strategy::budget || count >= limit) return limit;
-    const int interval = options.densify_interval;
+    const int interval = options.round_interval();
     const int last = (options.densify_end() - 1) / interval * interval;
     const double rounds = std::max(1, (last - iteration) / interval + 1);  // this one counted
     const double stays = (rounds - 1) / rounds;
@@ -102,7 +103,8 @@ std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uin
 Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit) {
     double count = start, sum = 0;
     int since = 0;
-    for (int i = options.densify_interval; i < options.iterations; i += options.densify_interval) {
+    const int interval = options.round_interval();
+    for (int i = interval; i < options.iterations; i += interval) {
         if (!refines_after(options, i)) continue;
         sum += count * (i - since);
         since = i;

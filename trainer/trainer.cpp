@@ -158,8 +158,8 @@ AdamStep Trainer::rates(int iteration) const {
     AdamStep step;
     step.position = static_cast<float>(position_rate(iteration) * extent_);
     step.scale = options_.scale_rate() * late;
-    step.rotation = options_.rotation_lr * late;
-    step.opacity = options_.opacity_lr * late;
+    step.rotation = options_.rotation_rate() * late;
+    step.opacity = options_.opacity_rate() * late;
     step.sh_dc = options_.sh_dc_lr * late;
     step.sh_rest = options_.sh_rest_lr * late * (probe_views_.empty() ? 1.0f : kProbeRestRate);
     step = adam_step(step, iteration);

@@ -55,7 +55,7 @@ DensityResult Trainer::refine(int iteration, gpu::DensifyArgs args, std::uint32_
 // Evenly over the iterations between two rounds; with few, in each.
 bool Trainer::scores(int iteration) const {
     return score_ && probe_views_.empty() && iteration < options_.densify_end() &&
-           iteration % std::max(1, options_.densify_interval / kScoresPerRound) == 0;
+           iteration % std::max(1, options_.round_interval() / kScoresPerRound) == 0;
 }
 
 void Trainer::record_noise(Commands& commands, int iteration) {

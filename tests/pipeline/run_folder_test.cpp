@@ -131,7 +131,8 @@ TEST_F(RunFolder, schedule_of_3dgs_has_the_lengths_of_a_gaussian_for_every_kerne
     EXPECT_EQ(settings()["largest_scale"], 0);
     ASSERT_EQ(train(raised_cosine).code, 0);
     EXPECT_NEAR(settings()["length_scale"].get<double>(), 1.2816, 1e-4);
-    EXPECT_NEAR(settings()["scale_lr"].get<double>(), 0.0075, 1e-6);
+    EXPECT_NEAR(settings()["scale_lr"].get<double>(), 0.0375, 1e-6)
+        << "1.5 times, 5 for the length";
     EXPECT_EQ(settings()["largest_scale"], 1);
     ASSERT_EQ(train("--iterations 1 -q").code, 0);
     EXPECT_EQ(settings()["largest_scale"], 0) << "a Gaussian has none";

@@ -72,6 +72,7 @@ inline TinyTraining tiny_training(const TinyOptions& tiny = {}) {
     }
     TrainOptions& o = t.options;
     o.iterations = 60;
+    o.paced = false;
     o.seed = 5;
     o.kernel = KERNEL_RAISED_COSINE;
     o.sh_degree = 2;

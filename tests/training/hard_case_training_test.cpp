@@ -90,8 +90,8 @@ std::vector<double> losses_in_double(const Training& t, const check::HardCase& c
     const TrainOptions& o = t.options;
     const double rates[] = {o.position_lr_init * extent,
                             o.scale_rate(),
-                            o.rotation_lr,
-                            o.opacity_lr,
+                            o.rotation_rate(),
+                            o.opacity_rate(),
                             o.sh_dc_lr,
                             o.sh_rest_lr};
     std::array<std::vector<double>, kAttributeCount> value, m1, m2;

@@ -182,6 +182,47 @@ TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
     EXPECT_EQ(options.last_opacity_reset(), 3'000);
 }
 
+TEST(Pace, a_short_run_learns_and_grows_faster) {
+    TrainOptions options;
+    for (const int iterations : {30'000, 4'000}) {
+        options.iterations = iterations;
+        EXPECT_FLOAT_EQ(options.scale_rate(), 0.005f);
+        EXPECT_FLOAT_EQ(options.rotation_rate(), 0.001f);
+        EXPECT_FLOAT_EQ(options.opacity_rate(), 0.05f);
+        EXPECT_FALSE(refines_after(options, 500));
+        EXPECT_TRUE(refines_after(options, 600));
+    }
+    options.iterations = 1'000;
+    EXPECT_FLOAT_EQ(options.scale_rate(), 0.02f);
+    EXPECT_FLOAT_EQ(options.rotation_rate(), 0.004f);
+    EXPECT_FLOAT_EQ(options.opacity_rate(), 0.1f);
+    EXPECT_FALSE(refines_after(options, 125));
+    EXPECT_TRUE(refines_after(options, 150));
+    options.iterations = 1;
+    EXPECT_FLOAT_EQ(options.scale_rate(), 0.025f) << "five times at the most";
+    EXPECT_EQ(options.densify_begin(), 100);
+    EXPECT_EQ(options.round_interval(), 20);
+}
+
+TEST(Pace, is_not_for_what_is_given_nor_for_3dgs) {
+    TrainOptions given;
+    given.iterations = 1'000;
+    given.scale_lr = given.rotation_lr = given.opacity_lr = 0.01f;
+    given.densify_from = given.densify_interval = 30;
+    EXPECT_FLOAT_EQ(given.scale_rate(), 0.01f);
+    EXPECT_FLOAT_EQ(given.rotation_rate(), 0.01f);
+    EXPECT_FLOAT_EQ(given.opacity_rate(), 0.01f);
+    EXPECT_TRUE(refines_after(given, 60));
+    TrainOptions theirs;
+    theirs.iterations = 1'000;
+    use_3dgs_schedule(theirs);
+    EXPECT_FLOAT_EQ(theirs.scale_rate(), 0.005f);
+    EXPECT_FLOAT_EQ(theirs.rotation_rate(), 0.001f);
+    EXPECT_FLOAT_EQ(theirs.opacity_rate(), 0.025f);
+    EXPECT_EQ(theirs.densify_begin(), 500);
+    EXPECT_EQ(theirs.round_interval(), 100);
+}
+
 TEST(OpacityReset, only_adc_has_them) {
     TrainOptions options;
     EXPECT_TRUE(resets_after(options, 12'000));
@@ -219,9 +260,9 @@ TEST(GrowthTarget, follows_its_rule_to_the_limit) {
     EXPECT_EQ(growth_target(options, 600, 1000, 900), 1000U) << "never below what is there";
     EXPECT_EQ(options.densify_end(), 25'000);
     use_strategy(Strategy::budget, options);
-    const int last = options.densify_end() - options.densify_interval;
+    const int last = options.densify_end() - options.round_interval();
     EXPECT_EQ(growth_target(options, last, 1000, 5000), 5000U);
-    EXPECT_EQ(growth_target(options, last - options.densify_interval, 1000, 5000), 4000U)
+    EXPECT_EQ(growth_target(options, last - options.round_interval(), 1000, 5000), 4000U)
         << "a quarter of the gap is left for the last of two rounds";
     EXPECT_EQ(growth_target(options, 600, 7000, 5000), 5000U);
 }
@@ -236,6 +277,7 @@ TEST(GrowthTarget, the_forecast_knows_it) {
         EXPECT_GT(mean, 50'000);
         EXPECT_LT(mean, 100'000);
     }
+    options.paced = false;
     options.iterations = 1'200;  // one round of budget, which at most doubles
     EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 4'000U);
     options.iterations = 1'300;

@@ -286,7 +286,7 @@ TEST(Training, a_kernel_that_covers_less_has_longer_lengths) {
         own.options.prune_extent *= static_cast<float>(times);
         own.options.largest_scale = static_cast<float>(times);
         own.options.scale_weight /= static_cast<float>(times);
-        if (times > 1) own.options.scale_lr *= 1.5f;
+        if (times > 1) own.options.scale_lr = 1.5f * own.options.scale_rate();
         Trainer trainer = own.trainer();
         run_to(trainer, 40);
         EXPECT_GT(trainer.counters().cloned_or_split, 5U);

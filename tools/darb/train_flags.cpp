@@ -55,7 +55,7 @@ void add_schedule_flag(CLI::App& command, TrainFlags& f) {
                 f.schedule_effects = "+sh,-exposure,-antialias";
             },
             "3dgs: its rates, limits, resets and background, no regularisers, harmonics by the "
-            "iteration; options that are given beside it count")
+            "iteration, in runs of any length; options that are given beside it count")
         ->check(CLI::IsMember({"darb", "3dgs"}))
         ->default_str("darb");
 }
@@ -92,16 +92,17 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::PositiveNumber);
     command
         .add_option("--scaling-lr", t.scale_lr,
-                    "1.5 times with a kernel that covers less than a Gaussian, as raised_cosine")
-        ->capture_default_str()
+                    "default 0.005, times 4000 / iterations (at most 5) in shorter runs; 1.5 times "
+                    "with a kernel that covers less than a Gaussian, as raised_cosine")
         ->check(CLI::NonNegativeNumber);
-    for (auto [name, rate] :
-         {std::pair{"--rotation-lr", &t.rotation_lr}, {"--opacity-lr", &t.opacity_lr}})
-        command.add_option(name, *rate)->capture_default_str()->check(CLI::NonNegativeNumber);
+    command.add_option("--rotation-lr", t.rotation_lr, "default 0.001, likewise")
+        ->check(CLI::NonNegativeNumber);
+    command.add_option("--opacity-lr", t.opacity_lr, "default 0.05, times the root of that")
+        ->check(CLI::NonNegativeNumber);
     command
-        .add_option("--final-lr-share", t.final_lr_share,
-                    "over the second half of the run every rate but the position's falls to this "
-                    "share of itself, log-linear; 1: constant rates, as 3DGS")
+        .add_option(
+            "--final-lr-share", t.final_lr_share,
+            "share to which rates, the position's aside, fall over the second half; 1: as 3DGS")
         ->capture_default_str()
         ->check(CLI::Range(1e-6, 1.0));
     command

@@ -54,11 +54,13 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
     only_with("adc", command.add_option("--densify-grad-threshold", t.densify_grad_threshold), f)
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
-    command.add_option("--densification-interval", t.densify_interval)
-        ->capture_default_str()
+    command
+        .add_option("--densification-interval", t.densify_interval,
+                    "default 100; fewer in runs below 4,000 iterations, down to 20")
         ->check(CLI::PositiveNumber);
-    command.add_option("--densify-from-iter", t.densify_from)
-        ->capture_default_str()
+    command
+        .add_option("--densify-from-iter", t.densify_from,
+                    "default 500; sooner in runs below 4,000 iterations, down to 100")
         ->check(CLI::NonNegativeNumber);
     command.add_option("--densify-until-iter", t.densify_until,
                        "default: half of the run, at most 15,000; mcmc: 5/6 of it, at most 25,000");

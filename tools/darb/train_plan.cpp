@@ -109,7 +109,7 @@ void print_growth(const TrainOptions& options) {
         fmt::print(stderr,
                    "growth: none, it would end after {} iterations and begin after {}: a longer "
                    "run or --densify-from-iter changes that\n",
-                   options.densify_end(), options.densify_from);
+                   options.densify_end(), options.densify_begin());
 }
 
 }  // namespace
