@@ -11,7 +11,7 @@ namespace {
 constexpr std::pair<Strategy, std::string_view> kNames[] = {
     {Strategy::adc, "adc"}, {Strategy::mcmc, "mcmc"}, {Strategy::budget, "budget"}};
 
-constexpr double kGrowth = 1.05;  // of mcmc, a round
+constexpr double kGrowth = 1.05;  // of mcmc, a round, and more where that misses the limit
 constexpr std::size_t kPhotosThatBear = 50;
 
 }  // namespace
@@ -88,14 +88,15 @@ bool regularises_unseen(const TrainOptions& options, std::size_t photos, int ite
 
 std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uint32_t count,
                             std::uint32_t limit) {
-    if (options.strategy == Strategy::mcmc) {
-        const double grown = std::ceil(kGrowth * count);
-        return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
-    }
-    if (options.strategy != Strategy::budget || count >= limit) return limit;
     const int interval = options.round_interval();
     const int last = (options.densify_end() - 1) / interval * interval;
     const double rounds = std::max(1, (last - iteration) / interval + 1);  // this one counted
+    if (options.strategy == Strategy::mcmc) {
+        const double needed = std::pow(double(limit) / std::max(count, 1U), 1 / rounds);
+        const double grown = std::ceil(std::max(kGrowth, needed) * count);
+        return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
+    }
+    if (options.strategy != Strategy::budget || count >= limit) return limit;
     const double stays = (rounds - 1) / rounds;
     return limit - static_cast<std::uint32_t>((limit - count) * stays * stays);
 }
