@@ -227,6 +227,7 @@ std::string settings_text(const TrainOptions& o) {
                   {"prune_opacity", o.prune_opacity},
                   {"prune_extent", o.prune_extent},
                   {"largest_scale", o.scale_limit()},
+                  {"clearance", o.clearance},
                   {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
                   {"last_opacity_reset", o.last_opacity_reset()},
                   {"max_splats", o.max_splats},

@@ -94,6 +94,10 @@ struct TrainOptions {
     // scene is a veil before cameras that no photo was taken from. Below 0: as scale_limit says.
     float largest_scale = -1;
 
+    // Share of the way from a training camera to its nearest points within which splats fade, as
+    // nothing stands there: between two cameras they would be veils; 0: none does.
+    float clearance = 0.5f;
+
     // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
     // extents) in the loss. They take from splats what no photo holds up: a quarter fewer on
     // monstree at 200 px, at equal quality.

@@ -60,6 +60,7 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.random_background = false;
     options.lengths_by_area = false;
     options.largest_scale = 0;
+    options.clearance = 0;
 }
 
 bool refines_after(const TrainOptions& options, int iteration) {

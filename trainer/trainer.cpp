@@ -68,6 +68,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       background_(options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset)),
       reach_(scene_reach(dataset)),
+      nearest_(nearest_points(dataset)),
       next_probe_(std::max(options.sh_interval, 1)),
       splats_(device, start_model(start, options), true),
       forward_(device, forward_options(options)),
@@ -211,7 +212,9 @@ void Trainer::launch(int iteration) {
     flight.pixels = data.width * data.height;
     Commands& commands = flight.commands;
     commands.begin();
-    record(commands, view, iteration, degree_at(iteration), rates(iteration), flight.loss);
+    AdamStep step = rates(iteration);
+    step.clearance = static_cast<float>(options_.clearance * nearest_[view]);
+    record(commands, view, iteration, degree_at(iteration), step, flight.loss);
     commands.copy(forward_.status(), flight.status, sizeof(gpu::FrameStatus));
     commands.submit();
 }

@@ -181,6 +181,7 @@ class Trainer {
     TrainOptions options_;
     glm::vec3 background_;
     double extent_, reach_;           // of the scene
+    std::vector<double> nearest_;     // points, from each camera
     std::vector<std::string> names_;  // of all views
     std::vector<int> train_views_;    // ascending
     std::vector<int> order_;          // of train_views_ in this epoch

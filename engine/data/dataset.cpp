@@ -20,6 +20,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kHoldOutEvery = 8;
+constexpr double kStrayPoints = 0.01;  // the share that may lie before the others by mistake
+constexpr size_t kPointsLookedAt = 20'000;
 constexpr double kExtentMargin = 1.1;
 constexpr double kLeastExtent = 1e-9;        // world units: below, cameras stand in one place
 constexpr double kLeastShareOfDepth = 1e-3;  // of the distance to the points: below, likewise
@@ -134,15 +136,22 @@ void index_tracks(Dataset& dataset) {
     points.seen_begin = std::move(begin);
 }
 
-double median_distance(const PointCloud& points, const glm::dvec3& from) {
-    std::vector<double> distance(points.size());
-    for (size_t i = 0; i < points.size(); ++i)
-        distance[i] =
+// The distance that a share of the points is nearer than; of every step-th point.
+double distance_quantile(const PointCloud& points, const glm::dvec3& from, double share,
+                         size_t step = 1) {
+    std::vector<double> distance;
+    for (size_t i = 0; i < points.size(); i += step)
+        distance.push_back(
             glm::distance(from, glm::dvec3(points.position[3 * i], points.position[3 * i + 1],
-                                           points.position[3 * i + 2]));
-    const auto middle = distance.begin() + static_cast<std::ptrdiff_t>(distance.size() / 2);
-    std::nth_element(distance.begin(), middle, distance.end());
-    return *middle;
+                                           points.position[3 * i + 2])));
+    const auto nth =
+        distance.begin() + static_cast<std::ptrdiff_t>(double(distance.size()) * share);
+    std::nth_element(distance.begin(), nth, distance.end());
+    return *nth;
+}
+
+double median_distance(const PointCloud& points, const glm::dvec3& from) {
+    return distance_quantile(points, from, 0.5);
 }
 
 std::vector<glm::dvec3> training_centres(const Dataset& dataset) {
@@ -191,6 +200,16 @@ double scene_reach(const Dataset& dataset) {
     const std::vector<glm::dvec3> centres = training_centres(dataset);
     if (centres.empty() || dataset.points.size() == 0) return extent;
     return std::max(extent, median_distance(dataset.points, mean_of(centres)) / 2);
+}
+
+std::vector<double> nearest_points(const Dataset& dataset) {
+    std::vector<double> nearest(dataset.views.size(), 0);
+    if (dataset.points.size() == 0) return nearest;
+    const size_t step = dataset.points.size() / kPointsLookedAt + 1;
+    for (size_t v = 0; v < nearest.size(); ++v)
+        nearest[v] =
+            distance_quantile(dataset.points, dataset.views[v].camera.centre(), kStrayPoints, step);
+    return nearest;
 }
 
 }  // namespace darb

@@ -94,5 +94,8 @@ double scene_extent(const Dataset& dataset);
 /// What no splat need be larger than: the extent or, where photos are from nearly one place and it
 /// is small, half the median distance to the points.
 double scene_reach(const Dataset& dataset);
+/// For each view the distance from its camera to the nearest points, a hundredth of them aside; 0
+/// where there are no points.
+std::vector<double> nearest_points(const Dataset& dataset);
 
 }  // namespace darb

@@ -97,7 +97,8 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                             step.opacity_weight / n,
                                             step.scale_weight / (3.0f * n),
                                             step.regularise_unseen ? 1u : 0u,
-                                            step.largest_log_scale};
+                                            step.largest_log_scale,
+                                            step.clearance};
         const Groups g = groups_for(range.count);
         commands.dispatch(project_pipeline(sh_degree), args,
                           {cameras,

@@ -20,6 +20,7 @@ struct AdamStep {
     float opacity_weight = 0, scale_weight = 0;
     bool regularise_unseen = false;
     float largest_log_scale = std::numeric_limits<float>::max();  // none grows beyond it
+    float clearance = 0;  // world: splats nearer to the camera fade
 };
 /// rates: plain learning rates; t: the number of this step, from 1.
 AdamStep adam_step(const AdamStep& rates, int t);

@@ -54,6 +54,8 @@ const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 #include "optim/adam.glsl"
 #include "backward/project_gradient.glsl"
 
+const float FADING = 1.0;  // of a logit, in a frame: well above what Adam adds between two frames of a photo
+
 Partial sum_partials(uint i) {
     Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
     uint e = pair_begin[i];
@@ -114,7 +116,10 @@ void update_splat(uint i, SplatGradient g) {
     }
     rotation[i] = q;
     vec2 m = m_opacity[i];
-    opacity_logit[i] = adam_step(opacity_logit[i], m, g.opacity_logit, args.rate_opacity);
+    float logit = adam_step(opacity_logit[i], m, g.opacity_logit, args.rate_opacity);
+    const vec3 at = vec3(position[3u * i], position[3u * i + 1u], position[3u * i + 2u]);
+    if (length(from_centre(cameras[args.camera_index], at)) < args.clearance) logit -= FADING;
+    opacity_logit[i] = logit;
     m_opacity[i] = m;
     if (SH_DEGREE > 0) update_rest(i, g);
 }

@@ -21,6 +21,7 @@ struct ProjectBackwardArgs {
     float opacity_weight, scale_weight;
     uint regularise_unseen;
     float largest_log_scale;  // no scale grows beyond it (UPDATE = 1)
+    float clearance;          // world: splats nearer to the camera fade (UPDATE = 1)
 };
 
 // What density control does with a splat; see densify_decide.comp.
@@ -54,7 +55,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 60);
+static_assert(sizeof(ProjectBackwardArgs) == 64);
 }  // namespace darb::gpu
 #endif
 #endif

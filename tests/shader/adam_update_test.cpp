@@ -206,6 +206,33 @@ TEST(AdamUpdate, no_scale_grows_beyond_the_largest) {
     EXPECT_EQ(limited.moments, free.moments);
 }
 
+TEST(AdamUpdate, splats_beside_the_camera_fade) {
+    Training training(20);
+    const SplatModel& model = training.scene.model;
+    const PassState state = start_state(model);
+    AdamStep step = adam_step(kRates, 1);
+    const auto updated = [&] {
+        return run_backward_pass(model, training.scene.camera, 3, true, state, training.partials,
+                                 step);
+    };
+    const PassState free = updated();
+    const auto from_camera = [&](size_t i) {  // after the step
+        const std::vector<float>& p = free.parameters[kPosition];
+        return glm::distance(training.scene.camera.centre(),
+                             glm::dvec3(p[3 * i], p[3 * i + 1], p[3 * i + 2]));
+    };
+    std::vector<double> distances;
+    for (size_t i = 0; i < 20; ++i) distances.push_back(from_camera(i));
+    std::sort(distances.begin(), distances.end());
+    step.clearance = static_cast<float>((distances[9] + distances[10]) / 2);
+    PassState faded = updated();
+    for (size_t i = 0; i < 20; ++i)
+        EXPECT_NEAR(faded.parameters[kOpacity][i],
+                    free.parameters[kOpacity][i] - (from_camera(i) < step.clearance), 1e-5);
+    faded.parameters[kOpacity] = free.parameters[kOpacity];
+    EXPECT_EQ(faded, free) << "nothing else changes";
+}
+
 TEST(AdamUpdate, an_overflowed_frame_changes_nothing) {
     Training training;
     PassState state = training.update(start_state(training.scene.model), 1);

@@ -113,7 +113,8 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
                                         step.opacity_weight,
                                         step.scale_weight,
                                         step.regularise_unseen ? 1u : 0u,
-                                        step.largest_log_scale};
+                                        step.largest_log_scale,
+                                        step.clearance};
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);

@@ -221,6 +221,7 @@ TEST(Pace, is_not_for_what_is_given_nor_for_3dgs) {
     EXPECT_FLOAT_EQ(theirs.opacity_rate(), 0.025f);
     EXPECT_EQ(theirs.densify_begin(), 500);
     EXPECT_EQ(theirs.round_interval(), 100);
+    EXPECT_EQ(theirs.clearance, 0);
 }
 
 TEST(OpacityReset, only_adc_has_them) {

@@ -318,6 +318,22 @@ TEST(Training, no_scale_grows_beyond_the_largest) {
     EXPECT_LE(largest(0.1f), 0.1 * (1 + 1e-6));
 }
 
+TEST(Training, splats_beside_a_photo_fade_where_no_point_is_as_near) {
+    const auto opacity_beside_a_photo = [](float clearance) {
+        TinyTraining t = tiny_training();
+        t.options.clearance = clearance;
+        t.options.densify_until = 0;
+        SplatModel start = t.start();
+        const glm::dvec3 beside = t.dataset.views[1].camera.centre() * 0.9;  // points are around 0
+        for (int c = 0; c < 3; ++c) start.position[c] = static_cast<float>(beside[c]);
+        Trainer trainer(shared_device(), t.dataset, t.photos, start, t.options);
+        run_to(trainer, 40);
+        return trainer.model().opacity[0] - start.opacity[0];
+    };
+    EXPECT_LT(opacity_beside_a_photo(0.5f), -4);
+    EXPECT_GT(opacity_beside_a_photo(0), -4);
+}
+
 // A colour whose square is beyond float32: SSIM's windows there have no finite gradient.
 TEST(Training, more_bad_gradients_than_one_in_a_thousand_stop_the_run) {
     const TinyTraining t = tiny_training({.splats = 600});

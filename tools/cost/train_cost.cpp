@@ -56,6 +56,8 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         add("one background", [](TrainOptions& o) { o.random_background = false; });
     if (options.opacity_weight > 0 || options.scale_weight > 0)
         add("no regularisers", [](TrainOptions& o) { o.opacity_weight = o.scale_weight = 0; });
+    if (options.clearance > 0)
+        add("splats beside photos", [](TrainOptions& o) { o.clearance = 0; });
     if (options.pace() > 1)
         add("rates and rounds of a long run", [](TrainOptions& o) { o.paced = false; });
     TrainOptions late = options;

@@ -100,9 +100,8 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
     command.add_option("--opacity-lr", t.opacity_lr, "default 0.05, times the root of that")
         ->check(CLI::NonNegativeNumber);
     command
-        .add_option(
-            "--final-lr-share", t.final_lr_share,
-            "share to which rates, the position's aside, fall over the second half; 1: as 3DGS")
+        .add_option("--final-lr-share", t.final_lr_share,
+                    "rates but the position's fall to it over the second half; 1: as 3DGS")
         ->capture_default_str()
         ->check(CLI::Range(1e-6, 1.0));
     command

@@ -100,6 +100,12 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
             "Gaussian, as raised_cosine, else 0)")
         ->check(CLI::NonNegativeNumber);
     command
+        .add_option("--clearance", t.clearance,
+                    "share of the way from a training camera to its nearest points within which "
+                    "splats fade; 0: none does")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
+    command
         .add_option("--max-memory", t.max_memory_bytes,
                     "budget of device memory, as 2GB or 800MB: growth stops before it")
         ->transform(CLI::AsSizeValue(true));

@@ -46,5 +46,17 @@ TEST(SceneExtent, without_anything_to_go_by_is_1) {
     EXPECT_EQ(scene_extent(dataset), 1);
 }
 
+TEST(NearestPoints, are_those_of_each_camera_without_a_few_strays) {
+    Dataset dataset;
+    add_camera(dataset, {0, 0, 0});
+    add_camera(dataset, {0, 0, 1}, true);
+    EXPECT_EQ(nearest_points(dataset), (std::vector<double>{0, 0})) << "no points";
+    for (int i = 0; i < 300; ++i) add_point(dataset, {0, 0, 5 + 0.01 * i});
+    for (int i = 0; i < 2; ++i) add_point(dataset, {0, 0, 0.1});
+    const std::vector<double> nearest = nearest_points(dataset);
+    EXPECT_NEAR(nearest[0], 5, 0.05);
+    EXPECT_NEAR(nearest[1], 4, 0.05);
+}
+
 }  // namespace
 }  // namespace darb
