@@ -24,6 +24,7 @@ Dataset small_scene() {
 
 TEST(PredictSplats, without_density_control_stays_at_the_start) {
     TrainOptions options;
+    options.paced = false;
     options.iterations = 900;  // ends at 450, before it begins
     EXPECT_EQ(predict_splats(4'000, kManyPixels, options, kNoLimit), 4'000U);
     options.iterations = 30'000;
@@ -43,6 +44,7 @@ TEST(PredictSplats, is_bounded_by_pixels_start_and_limit) {
 
 TEST(PredictSplats, few_rounds_grow_less) {
     TrainOptions options;
+    options.paced = false;
     options.iterations = 1'300;
     const std::uint32_t one_round = predict_splats(4'000, kManyPixels, options, kNoLimit);
     options.iterations = 1'500;
