@@ -54,7 +54,7 @@ const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 #include "optim/adam.glsl"
 #include "backward/project_gradient.glsl"
 
-const float FADING = 1.0;  // of a logit, in a frame: well above what Adam adds between two frames of a photo
+const float FADING = 1.0;  // of a logit, in a frame: what Adam adds in 20 at most, so what many photos hold up stays
 
 Partial sum_partials(uint i) {
     Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
@@ -118,7 +118,8 @@ void update_splat(uint i, SplatGradient g) {
     vec2 m = m_opacity[i];
     float logit = adam_step(opacity_logit[i], m, g.opacity_logit, args.rate_opacity);
     const vec3 at = vec3(position[3u * i], position[3u * i + 1u], position[3u * i + 2u]);
-    if (length(from_centre(cameras[args.camera_index], at)) < args.clearance) logit -= FADING;
+    const float away = length(from_centre(cameras[args.camera_index], at));
+    if (UPDATE == 1 && away < args.clearance) logit -= FADING;
     opacity_logit[i] = logit;
     m_opacity[i] = m;
     if (SH_DEGREE > 0) update_rest(i, g);

@@ -231,6 +231,9 @@ TEST(AdamUpdate, splats_beside_the_camera_fade) {
                     free.parameters[kOpacity][i] - (from_camera(i) < step.clearance), 1e-5);
     faded.parameters[kOpacity] = free.parameters[kOpacity];
     EXPECT_EQ(faded, free) << "nothing else changes";
+    const PassState gradient =
+        run_backward_pass(model, training.scene.camera, 3, false, state, training.partials, step);
+    EXPECT_EQ(gradient.parameters, state.parameters) << "no update, no fading";
 }
 
 TEST(AdamUpdate, an_overflowed_frame_changes_nothing) {
