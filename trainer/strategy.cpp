@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace darb {
@@ -93,8 +94,9 @@ std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uin
     const int last = (options.densify_end() - 1) / interval * interval;
     const double rounds = std::max(1, (last - iteration) / interval + 1);  // this one counted
     if (options.strategy == Strategy::mcmc) {
+        const bool asked = options.max_splats != std::numeric_limits<std::uint32_t>::max();
         const double needed = std::pow(double(limit) / std::max(count, 1U), 1 / rounds);
-        const double grown = std::ceil(std::max(kGrowth, needed) * count);
+        const double grown = std::ceil((asked ? std::max(kGrowth, needed) : kGrowth) * count);
         return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
     }
     if (options.strategy != Strategy::budget || count >= limit) return limit;

@@ -261,6 +261,8 @@ TEST(GrowthTarget, follows_its_rule_to_the_limit) {
     EXPECT_EQ(growth_target(options, 600, 1000, 1020), 1020U);
     EXPECT_EQ(growth_target(options, 600, 1000, 900), 1000U) << "never below what is there";
     EXPECT_EQ(options.densify_end(), 25'000);
+    EXPECT_EQ(growth_target(options, 24'800, 1000, 4000), 1050U) << "nobody asked for a number";
+    options.max_splats = 4000;
     EXPECT_EQ(growth_target(options, 24'800, 1000, 4000), 2000U) << "two rounds are left";
     EXPECT_EQ(growth_target(options, 24'900, 1000, 4000), 4000U) << "this is the last";
     use_strategy(Strategy::budget, options);
