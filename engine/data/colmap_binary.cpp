@@ -37,7 +37,7 @@ ColmapCameras parse_colmap_cameras(std::span<const std::byte> file, const std::s
         lens.model = lens_model_name(model);
         if (lens.model.empty())
             throw Error(reader.where(), fmt::format("the camera model id {} is unknown", model),
-                        "Models 0 to 10, those of COLMAP 3.8, are read.");
+                        "Undistort with `colmap image_undistorter`, which writes PINHOLE.");
         lens.width = read_size(reader);
         lens.height = read_size(reader);
         for (int p = 0; p < lens_parameter_count(lens.model); ++p)

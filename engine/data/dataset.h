@@ -14,7 +14,7 @@
 
 namespace darb {
 
-/// Brown-Conrady, fisheye, ... : every camera model of COLMAP 3.8, as the source declares it.
+/// Brown-Conrady, fisheye, ... : the camera models of COLMAP that Lens knows, as declared.
 struct LensModel {
     std::string model = "PINHOLE";   // COLMAP's name
     std::vector<double> parameters;  // in COLMAP's order, px at full size

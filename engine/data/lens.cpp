@@ -12,13 +12,16 @@ namespace darb {
 
 namespace {
 
+constexpr std::string_view kPanorama = "EQUIRECTANGULAR";
+
 struct ModelRow {
     std::string_view name;
-    int parameters;
+    int parameters;  // 0: the model is not read
     bool one_focal;  // f, cx, cy rather than fx, fy, cx, cy
 };
 
-constexpr ModelRow kModels[kLensModelCount + 1] = {
+// By COLMAP's id.
+constexpr ModelRow kModels[] = {
     {"SIMPLE_PINHOLE", 3, true},
     {"PINHOLE", 4, false},
     {"SIMPLE_RADIAL", 4, true},
@@ -30,6 +33,13 @@ constexpr ModelRow kModels[kLensModelCount + 1] = {
     {"SIMPLE_RADIAL_FISHEYE", 4, true},
     {"RADIAL_FISHEYE", 5, true},
     {"THIN_PRISM_FISHEYE", 12, false},
+    {"RAD_TAN_THIN_PRISM_FISHEYE", 0, false},
+    {"SIMPLE_DIVISION", 0, true},
+    {"DIVISION", 0, false},
+    {"SIMPLE_FISHEYE", 3, true},
+    {"FISHEYE", 4, false},
+    {"EUCM", 0, false},
+    {kPanorama, 0, false},
     {kFourRadial, 10, false},  // no id of COLMAP's
 };
 
@@ -52,7 +62,8 @@ std::string_view parameter_name(const ModelRow& row, std::size_t i) {
 }  // namespace
 
 std::string_view lens_model_name(int id) {
-    return id >= 0 && id < kLensModelCount ? kModels[id].name : std::string_view{};
+    constexpr int kCount = std::size(kModels) - 1;  // without kFourRadial
+    return id >= 0 && id < kCount ? kModels[id].name : std::string_view{};
 }
 
 int lens_parameter_count(std::string_view model) {
@@ -74,6 +85,11 @@ void check_lens(const LensModel& lens, const std::string& where) {
     if (!row)
         throw Error(where, fmt::format("the camera model {} is unknown", lens.model),
                     "Export the cameras with one of COLMAP's models.");
+    if (row->parameters == 0)
+        throw Error(where, fmt::format("the camera model {} is not read", lens.model),
+                    lens.model == kPanorama
+                        ? "Cut the panoramas into perspective photos and run colmap on those."
+                        : "Undistort with `colmap image_undistorter`, which writes PINHOLE.");
     if (static_cast<int>(lens.parameters.size()) != row->parameters)
         throw Error(where,
                     fmt::format("{} has {} parameters, not {}", lens.model, row->parameters,

@@ -1,4 +1,5 @@
-// Lens: the camera models of COLMAP 3.8 as one function of a ray and its inverse.
+// Lens: the camera models of COLMAP 3.8, and the equidistant ones of later versions, as one
+// function of a ray and its inverse.
 // Every model is a pinhole after a distortion of the plane z = 1,
 //   w' = w (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6)
 //        + tangential (p1, p2) + thin prism (s1, s2),   r = |w|,
@@ -16,17 +17,16 @@
 
 namespace darb {
 
-constexpr int kLensModelCount = 11;
 /// nerfstudio's perspective camera, none of COLMAP's: fx fy cx cy k1 k2 p1 p2 k3 k4, of which all
 /// of k stand in the numerator.
 constexpr std::string_view kFourRadial = "FOUR_RADIAL";
-/// COLMAP's name of a model id, 0 to 10; empty for other ids.
+/// COLMAP's name of a model id, 0 to 17; empty for other ids. check_lens knows which are read.
 std::string_view lens_model_name(int id);
-/// -1 for an unknown name.
+/// -1 for an unknown name, 0 for a model that is not read.
 int lens_parameter_count(std::string_view model);
 
-/// Throws Error where the model is unknown, the parameter count is wrong, a parameter is not
-/// finite, a focal length is not positive, or the size is not between 1 and 100,000 px.
+/// Throws Error where the model is unknown or not read, the parameter count is wrong, a parameter
+/// is not finite, a focal length is not positive, or the size is not between 1 and 100,000 px.
 void check_lens(const LensModel& lens, const std::string& where);
 
 /// A fisheye (or FOV) whose photo reaches more than 60 degrees to some side, where a flat picture
