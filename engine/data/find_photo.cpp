@@ -1,8 +1,8 @@
-// Where a photo lies that a source names: names come from other systems, and folders of smaller
-// photos hold other formats.
+// Where a photo lies that a source names: names come from other systems, folders of smaller photos
+// hold other formats, and formats that are not read were converted.
 #include <algorithm>
 
-#include "engine/core/files.h"
+#include "engine/data/image_io.h"
 #include "engine/data/source.h"
 
 namespace darb {
@@ -14,18 +14,12 @@ namespace {
 constexpr const char* kExtensions[] = {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"};
 
 fs::path with_any_extension(const fs::path& path) {
-    if (fs::is_regular_file(path)) return path;
-    const bool usual =
-        has_extension(path, ".png") || has_extension(path, ".jpg") || has_extension(path, ".jpeg");
-    for (const char* extension : kExtensions) {
-        fs::path candidate = path;
-        if (usual)
-            candidate.replace_extension(extension);
-        else
-            candidate += extension;
-        if (fs::is_regular_file(candidate)) return candidate;
-    }
-    return {};
+    const bool is_there = fs::is_regular_file(path);
+    if (is_there && !is_foreign_picture_name(path)) return path;
+    const std::string stem = without_picture_extension(path).string();
+    for (const char* extension : kExtensions)
+        if (fs::path candidate = stem + extension; fs::is_regular_file(candidate)) return candidate;
+    return is_there ? path : fs::path();
 }
 
 }  // namespace

@@ -24,9 +24,14 @@ constexpr std::size_t kHeadBytes = std::size_t{1}
                                    << 18;  // EXIF and ICC come before the frame header
 constexpr const char* kReplace = "Replace the file by a PNG or JPEG that an image viewer opens.";
 
-// Of pictures that cameras are named after, read here or not.
-constexpr const char* kPictureExtensions[] = {".png", ".jpg",  ".jpeg", ".webp",
-                                              ".tif", ".tiff", ".bmp",  ".heic"};
+constexpr std::string_view kPhotoExtensions[] = {".png", ".jpg", ".jpeg"};
+constexpr std::string_view kForeignExtensions[] = {".webp", ".tif",  ".tiff",
+                                                   ".bmp",  ".heic", ".heif"};
+
+bool has_one_of(const std::filesystem::path& path, std::span<const std::string_view> extensions) {
+    return std::ranges::any_of(extensions,
+                               [&](std::string_view e) { return has_extension(path, e); });
+}
 
 const stbi_uc* raw(std::span<const std::byte> bytes) {
     return reinterpret_cast<const stbi_uc*>(bytes.data());
@@ -78,6 +83,19 @@ void append_bytes(void* context, void* data, int size) {
 }
 
 }  // namespace
+
+bool is_photo_name(const std::filesystem::path& path) {
+    return has_one_of(path, kPhotoExtensions);
+}
+
+bool is_foreign_picture_name(const std::filesystem::path& path) {
+    return has_one_of(path, kForeignExtensions);
+}
+
+std::filesystem::path without_picture_extension(const std::filesystem::path& path) {
+    const bool picture = is_photo_name(path) || is_foreign_picture_name(path);
+    return picture ? std::filesystem::path(path).replace_extension() : path;
+}
 
 ImageInfo read_image_info(const std::filesystem::path& path) {
     std::vector<std::byte> head(kHeadBytes);
@@ -159,10 +177,7 @@ void write_png(const std::filesystem::path& path, const ImageU8& image) {
 }
 
 std::string picture_name(const std::string& view_name, std::set<std::string>& used) {
-    std::string stem = view_name;
-    if (std::ranges::any_of(kPictureExtensions,
-                            [&](const char* e) { return has_extension(view_name, e); }))
-        stem = std::filesystem::path(view_name).replace_extension().string();
+    std::string stem = without_picture_extension(view_name).string();
     std::replace_if(
         stem.begin(), stem.end(), [](char c) { return c == '/' || c == '\\'; }, '_');
     if (stem.empty()) stem = "view";

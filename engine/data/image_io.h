@@ -19,6 +19,13 @@ struct ImageInfo {
     int orientation = 1;  // EXIF, 1 to 8
 };
 
+/// Whether the name ends as those of the pictures do that are read here: .png, .jpg, .jpeg.
+bool is_photo_name(const std::filesystem::path& path);
+/// Whether it ends as those of pictures do that are not (.webp, .tif, .heic, ...).
+bool is_foreign_picture_name(const std::filesystem::path& path);
+/// The path without either extension; as it is where it has none of them.
+std::filesystem::path without_picture_extension(const std::filesystem::path& path);
+
 constexpr int kExifOrientation = 0;  // turn as the file's EXIF says
 
 /// Reads the head of the file only. Throws Error naming the file where it is no PNG or JPEG.

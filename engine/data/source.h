@@ -35,7 +35,8 @@ std::filesystem::path tidy_path(const std::filesystem::path& path);
 std::string with_slashes(std::string name);
 
 /// folder / name as it is, else with slashes for backslashes, else with another of the usual
-/// extensions in place of its own (or added, where it has none of them); empty where there is none.
+/// extensions in place of its own (or added, where it is no picture's); so, too, where it is of a
+/// format that is not read, the file of another extension being one. Empty where there is none.
 std::filesystem::path find_photo(const std::filesystem::path& folder, const std::string& name);
 
 /// Pluralised count for notes: "1 photo", "3 photos".

@@ -224,6 +224,23 @@ TEST(ColmapProject, photos_are_found_by_backslashes_and_other_extensions) {
     EXPECT_EQ(dataset.views.at(0).mask, folder / "masks/left/a.png");
 }
 
+TEST(ColmapProject, photos_that_were_converted_are_found) {
+    const auto folder = test_folder();
+    std::vector<View> views(1);
+    views[0].camera = {.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
+    for (const char* extension : {".tif", ".TIFF", ".webp", ".bmp", ".HEIC"}) {
+        views[0].name = std::string("a") + extension;
+        write_colmap_binary(folder / "sparse/0", views, {});
+        write_file_atomic(folder / "images" / views[0].name, std::string("no PNG"));
+        EXPECT_NE(error_of([&] { load_dataset(folder); }).find("is no PNG"), std::string::npos);
+        write_png(folder / "images/a.png", ImageU8(8, 6, 3));
+        EXPECT_EQ(load_dataset(folder).views.at(0).photo, folder / "images/a.png") << extension;
+        std::filesystem::remove(folder / "images" / views[0].name);
+        EXPECT_EQ(load_dataset(folder).views.at(0).photo, folder / "images/a.png") << extension;
+        std::filesystem::remove(folder / "images/a.png");
+    }
+}
+
 TEST(PointCloudPly, colours_of_floats_are_up_to_1_or_up_to_255) {
     const auto colours = [](const std::string& prefix, const std::string& rows) {
         std::string text = "ply\nformat ascii 1.0\nelement vertex 2\n";
