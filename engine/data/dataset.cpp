@@ -97,6 +97,8 @@ Dataset load_source(const fs::path& path, const DatasetOptions& options) {
         return dataset;
     }
     if (transforms) return load_transforms(path, options);
+    if (const fs::path opensfm = path / "reconstruction.json"; fs::exists(opensfm))
+        return load_transforms(opensfm, options);  // says what it is
     throw Error(
         path.string(),
         "holds no cameras: neither a COLMAP model (sparse/0 with cameras and images, .bin or "

@@ -29,6 +29,14 @@ glm::dmat3 rotation_from_quaternion(glm::dvec4 wxyz, const std::string& where) {
     return glm::mat3_cast(glm::dquat(wxyz[0], wxyz[1], wxyz[2], wxyz[3]));
 }
 
+bool remove_scale(glm::dmat3& matrix) {
+    const double scale =
+        (glm::length(matrix[0]) + glm::length(matrix[1]) + glm::length(matrix[2])) / 3;
+    if (!(scale > 0) || !(std::abs(scale - 1) > kTolerance)) return false;
+    matrix /= scale;
+    return true;
+}
+
 glm::dmat3 checked_rotation(const glm::dmat3& matrix, const std::string& where) {
     if (!finite(matrix)) throw Error(where, "the pose holds NaN or infinity", kFixPose);
     const glm::dmat3 product = glm::transpose(matrix) * matrix;

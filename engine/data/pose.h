@@ -10,6 +10,10 @@ namespace darb {
 /// quaternion is zero or not finite.
 glm::dmat3 rotation_from_quaternion(glm::dvec4 wxyz, const std::string& where);
 
+/// Divides the columns by their mean length where that is not 1, to 1e-3; whether it was. What is
+/// then no rotation, checked_rotation refuses.
+bool remove_scale(glm::dmat3& matrix);
+
 /// The rotation nearest to `matrix`. Throws Error where an entry is not finite, the matrix is not
 /// orthonormal to 1e-3, or mirrors.
 glm::dmat3 checked_rotation(const glm::dmat3& matrix, const std::string& where);

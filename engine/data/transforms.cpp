@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -17,9 +20,15 @@ namespace {
 
 constexpr const char* kExport = "Correct the entry, or export the file again.";
 
+/// Some writers put numbers into strings.
 double to_number(const json& value, const char* key, const std::string& where) {
-    if (!value.is_number()) throw Error(where, fmt::format("{} is not a number", key), kExport);
-    return value.get<double>();
+    if (value.is_number()) return value.get<double>();
+    const std::string text = value.is_string() ? value.get<std::string>() : "";
+    double number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc{} || end != text.data() + text.size())
+        throw Error(where, fmt::format("{} is not a number", key), kExport);
+    return number;
 }
 
 void read_number(const json& object, const char* key, const std::string& where,
@@ -81,7 +90,8 @@ void read_intrinsics(const json& object, const std::string& where, TransformsInt
     to.is_fisheye = read_bool(object, "is_fisheye", where, to.is_fisheye);
 }
 
-void read_pose(const json& object, const std::string& where, TransformsFrame& frame) {
+/// Returns whether the rotation had a scale.
+bool read_pose(const json& object, const std::string& where, TransformsFrame& frame) {
     const auto matrix = object.find("transform_matrix");
     if (matrix == object.end() || !matrix->is_array() || matrix->size() < 3)
         throw Error(where, "has no transform_matrix of 4 x 4 or 3 x 4 numbers", kExport);
@@ -103,9 +113,11 @@ void read_pose(const json& object, const std::string& where, TransformsFrame& fr
     }
     camera_to_world[1] = -camera_to_world[1];
     camera_to_world[2] = -camera_to_world[2];
+    const bool scaled = remove_scale(camera_to_world);
     frame.rotation = glm::transpose(checked_rotation(camera_to_world, where));
     check_position(centre, where);
     frame.translation = -(frame.rotation * centre);
+    return scaled;
 }
 
 json parse_json(std::string_view text, const std::string& where) {
@@ -119,7 +131,8 @@ json parse_json(std::string_view text, const std::string& where) {
 
 /// COLMAP's name of a nerfstudio or instant-ngp camera.
 std::string model_name(const TransformsIntrinsics& in, const std::string& where) {
-    const std::string& name = in.camera_model;
+    std::string name = in.camera_model;
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
     if (name == "OPENCV_FISHEYE" || name == "FISHEYE" || (name.empty() && in.is_fisheye))
         return "OPENCV_FISHEYE";
     constexpr std::string_view kPerspective[] = {"",        "OPENCV",        "FULL_OPENCV",
@@ -134,7 +147,7 @@ std::string model_name(const TransformsIntrinsics& in, const std::string& where)
         const bool distorted = in.k[0] != 0 || in.k[1] != 0 || in.p1 != 0 || in.p2 != 0;
         return distorted ? "OPENCV" : "PINHOLE";
     }
-    throw Error(where, fmt::format("the camera_model {} cannot be read", name),
+    throw Error(where, fmt::format("the camera_model {} cannot be read", in.camera_model),
                 "Use perspective or fisheye photos (OPENCV, OPENCV_FISHEYE, PINHOLE).");
 }
 
@@ -142,6 +155,9 @@ std::string model_name(const TransformsIntrinsics& in, const std::string& where)
 
 TransformsFile parse_transforms(std::string_view text, const std::string& where) {
     const json root = parse_json(text, where);
+    if (root.is_array() && !root.empty() && root[0].is_object() && root[0].contains("shots"))
+        throw Error(where, "is a reconstruction of OpenSfM, which is not read",
+                    "Export it for COLMAP (opensfm export_colmap) and name that folder.");
     if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array())
         throw Error(where, "has no list named frames",
                     root.is_array()
@@ -168,7 +184,7 @@ TransformsFile parse_transforms(std::string_view text, const std::string& where)
         frame.mask_path = read_string(frames[i], "mask_path", record);
         frame.intrinsics = defaults;
         read_intrinsics(frames[i], record, frame.intrinsics);
-        read_pose(frames[i], record, frame);
+        file.scaled_poses += read_pose(frames[i], record, frame) ? 1 : 0;
         file.frames.push_back(std::move(frame));
     }
     return file;

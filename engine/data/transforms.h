@@ -36,11 +36,13 @@ struct TransformsFile {
     std::string ply_file_path;  // may be empty
     // nerfstudio's split, may be empty; val_filenames where test_filenames is empty.
     std::vector<std::string> test_filenames;
+    std::size_t scaled_poses = 0;  // whose rotation had a scale
 };
 
 /// transform_matrix is camera to world with OpenGL's camera axes (y up, looking down -z).
 /// nerfstudio's applied_transform has been applied by the writer to the frames and to the ply
-/// alike, so both stay in the file's frame. Throws Error(where and frame, reason).
+/// alike, so both stay in the file's frame. Numbers may be strings, and rotations have a scale.
+/// Throws Error(where and frame, reason).
 TransformsFile parse_transforms(std::string_view json, const std::string& where);
 
 /// The lens for a photo of width x height px, used where the file declares no size. Throws Error

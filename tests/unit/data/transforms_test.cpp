@@ -96,6 +96,55 @@ TEST(Transforms, k4_is_the_denominators_where_the_camera_is_full_opencv_alone) {
     EXPECT_EQ(lens_of(k + R"("k6": 6, )").model, "FULL_OPENCV");
 }
 
+TEST(Transforms, numbers_may_be_strings) {
+    const LensModel lens =
+        lens_of(R"("fl_x": "50.5", "w": "100", "h": 60, "k1": "-1e-2", "k2": "0", )");
+    EXPECT_EQ(lens.width, 100);
+    EXPECT_EQ(lens.parameters, (std::vector<double>{50.5, 50.5, 50, 30, -0.01, 0, 0, 0}));
+    for (const char* bad : {"", "5px", " 5", "five"})
+        EXPECT_NE(error_of([&] {
+                      lens_of(R"("fl_x": ")" + std::string(bad) + R"(", )");
+                  }).find("fl_x is not a number"),
+                  std::string::npos)
+            << bad;
+}
+
+TEST(Transforms, camera_models_may_be_in_lower_case) {
+    EXPECT_EQ(lens_of(R"("fl_x": 50, "k1": 1, "camera_model": "opencv", )").model, "OPENCV");
+    EXPECT_EQ(lens_of(R"("fl_x": 50, "camera_model": "OpenCV_fisheye", )").model, "OPENCV_FISHEYE");
+}
+
+TEST(Transforms, poses_with_a_uniform_scale_are_divided_by_it) {
+    const auto parsed = [](const std::string& rows) {
+        return parse_transforms(file("", R"({"file_path": "a", "transform_matrix": [)" + rows +
+                                             R"(,[0,0,0,1]]},)" + frame("b")),
+                                "t.json");
+    };
+    const TransformsFile half = parsed("[0,-0.5,0,1],[0.5,0,0,2],[0,0,0.5,3]");
+    const TransformsFile whole = parsed("[0,-1,0,1],[1,0,0,2],[0,0,1,3]");
+    EXPECT_EQ(half.scaled_poses, 1u);
+    EXPECT_EQ(whole.scaled_poses, 0u);
+    for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(glm::length(half.frames[0].rotation[c] - whole.frames[0].rotation[c]), 0,
+                    1e-12);
+    EXPECT_NEAR(glm::length(half.frames[0].translation - whole.frames[0].translation), 0, 1e-12);
+    for (const char* bad :
+         {"[0.5,0.2,0,1],[0,0.5,0,2],[0,0,0.5,3]", "[0.5,0,0,1],[0,0.6,0,2],[0,0,0.5,3]",
+          "[-0.5,0,0,1],[0,0.5,0,2],[0,0,0.5,3]", "[0,0,0,1],[0,0,0,2],[0,0,0,3]"})
+        EXPECT_FALSE(error_of([&] { parsed(bad); }).empty()) << bad;
+}
+
+TEST(Transforms, a_reconstruction_of_opensfm_is_named_as_what_it_is) {
+    const auto folder = test_folder();
+    write_file_atomic(folder / "reconstruction.json",
+                      std::string(R"([{"cameras": {}, "shots": {}, "points": {}}])"));
+    for (const auto& path : {folder, folder / "reconstruction.json"}) {
+        const std::string error = error_of([&] { load_dataset(path); });
+        EXPECT_NE(error.find("OpenSfM"), std::string::npos) << error;
+        EXPECT_NE(error.find("export_colmap"), std::string::npos) << error;
+    }
+}
+
 TEST(Transforms, val_filenames_are_the_test_set_where_there_is_no_other) {
     const auto names = [](const std::string& head) {
         return parse_transforms(file(head, frame("a")), "t.json").test_filenames;
@@ -108,7 +157,7 @@ TEST(Transforms, val_filenames_are_the_test_set_where_there_is_no_other) {
 
 TEST(Transforms, every_error_comes_with_a_remedy) {
     for (const std::string& text :
-         {file(R"("fl_x": "50", )", frame("a")), file(R"("camera_model": 5, )", frame("a")),
+         {file(R"("fl_x": "50 px", )", frame("a")), file(R"("camera_model": 5, )", frame("a")),
           file("", frame("a") + ",5"), file("", frame("a") + ",{}"),
           file("", R"({"file_path": "a"})"),
           file("", R"({"file_path": "a", "transform_matrix": [[1],[1],[1]]})")})
@@ -124,7 +173,8 @@ TEST(Transforms, bad_files_are_errors_that_name_the_frame) {
     EXPECT_NE(parse_error(file("", frame("a") + ",{}")).find("frame 2 of 2"), std::string::npos);
     EXPECT_NE(parse_error(file("", R"({"file_path": "a"})")).find("transform_matrix"),
               std::string::npos);
-    EXPECT_NE(parse_error(file(R"("fl_x": "50", )", frame("a"))).find("fl_x"), std::string::npos);
+    EXPECT_NE(parse_error(file(R"("fl_x": "50 px", )", frame("a"))).find("fl_x"),
+              std::string::npos);
     const auto with = [](const std::string& row) {
         return file("", R"({"file_path": "b.png", "transform_matrix": [)" + row +
                             ",[0,1,0,2],[0,0,1,3],[0,0,0,1]]}");
