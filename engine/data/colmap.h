@@ -32,6 +32,7 @@ struct ColmapModel {
     std::vector<ColmapImage> images;  // in file order
     PointCloud points;                // empty where the model has no points3D file
     std::size_t dropped_points = 0;   // NaN or infinite
+    std::string points_note;          // empty, or that they are those of a points3D.ply, a sentence
 };
 
 ColmapCameras parse_colmap_cameras(std::span<const std::byte> file, const std::string& where);
@@ -48,7 +49,12 @@ PointCloud parse_colmap_points_text(std::string_view file, const std::string& wh
 /// Whether the folder holds cameras and images, .bin or .txt.
 bool is_colmap_model(const std::filesystem::path& folder);
 
-/// Binary where both are there. Every image's camera exists and there is at least one image.
+/// Images of a model, for people: 0 where the file cannot be read.
+std::size_t count_colmap_images(const std::filesystem::path& folder);
+
+/// Binary where both are there. Every image's camera exists and there is at least one image. Points
+/// are those of the model, unless a points3D.ply beside them holds another number: somebody put it
+/// there, while 3DGS leaves one of the same points.
 ColmapModel read_colmap(const std::filesystem::path& folder);
 
 }  // namespace darb

@@ -1,6 +1,10 @@
 // A COLMAP model folder: picks binary or text, reads all three files, checks that they fit.
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <fstream>
+#include <utility>
+
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/colmap.h"
@@ -18,20 +22,46 @@ bool has_pair(const std::filesystem::path& folder, const char* extension) {
 void read_points(const std::filesystem::path& folder, ColmapModel& model) {
     const auto binary = folder / "points3D.bin", text = folder / "points3D.txt",
                ply = folder / "points3D.ply";
-    if (model.binary && std::filesystem::is_regular_file(binary))
+    const bool has_binary = model.binary && std::filesystem::is_regular_file(binary);
+    const bool has_own = has_binary || std::filesystem::is_regular_file(text);
+    if (has_binary)
         model.points =
             parse_colmap_points(read_file(binary), binary.string(), model.dropped_points);
-    else if (std::filesystem::is_regular_file(text))
+    else if (has_own)
         model.points =
             parse_colmap_points_text(read_text_file(text), text.string(), model.dropped_points);
-    else if (std::filesystem::is_regular_file(ply))
-        model.points = read_point_cloud_ply(ply, model.dropped_points);
+    if (!std::filesystem::is_regular_file(ply)) return;
+    std::size_t dropped = 0;
+    PointCloud points = read_point_cloud_ply(ply, dropped);
+    const std::size_t own = model.points.size() + model.dropped_points;
+    if (points.size() + dropped == own) return;
+    if (has_own)
+        model.points_note = fmt::format("{} was read, {} points, in place of the {} of {}.",
+                                        ply.string(), points.size() + dropped, own,
+                                        (has_binary ? binary : text).filename().string());
+    model.points = std::move(points);
+    model.dropped_points = dropped;
 }
 
 }  // namespace
 
 bool is_colmap_model(const std::filesystem::path& folder) {
     return has_pair(folder, ".bin") || has_pair(folder, ".txt");
+}
+
+std::size_t count_colmap_images(const std::filesystem::path& folder) {
+    if (has_pair(folder, ".bin")) {
+        std::uint64_t count = 0;  // the head of the file
+        std::ifstream file(folder / "images.bin", std::ios::binary);
+        file.read(reinterpret_cast<char*>(&count), sizeof count);
+        return file ? count : 0;
+    }
+    try {
+        const auto images = folder / "images.txt";
+        return parse_colmap_images_text(read_text_file(images), images.string()).size();
+    } catch (const Error&) {
+        return 0;
+    }
 }
 
 ColmapModel read_colmap(const std::filesystem::path& folder) {

@@ -1,10 +1,11 @@
 // A COLMAP project as a data set: model, photos and masks.
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <map>
 
 #include "engine/core/error.h"
 #include "engine/data/colmap.h"
+#include "engine/data/masks.h"
 #include "engine/data/source.h"
 
 namespace darb {
@@ -13,29 +14,46 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// NAME with another or a further extension, as colmap and its users name masks.
-fs::path find_mask(const fs::path& folder, const std::string& name) {
-    for (const std::string& one : {name, with_slashes(name)})
-        for (const fs::path& candidate :
-             {folder / (one + ".png"), folder / one, (folder / one).replace_extension(".png")})
-            if (fs::is_regular_file(candidate)) return candidate;
-    return {};
-}
-
-/// For a model folder given directly, photos may lie beside it or up to two folders above.
+/// Beside the model or above it, within root; for a model folder given directly (or the folder of
+/// models that it is in) up to two folders above that, too.
 fs::path find_images_folder(const fs::path& root, const fs::path& model_folder,
                             const DatasetOptions& options) {
-    const fs::path base = tidy_path(fs::absolute(root));
-    for (const fs::path& parent :
-         {base, base.parent_path(), base.parent_path().parent_path(),
-          tidy_path(fs::absolute(model_folder)).parent_path().parent_path()})
+    const fs::path base = tidy_path(fs::absolute(root)),
+                   model = tidy_path(fs::absolute(model_folder));
+    std::vector<fs::path> parents{base};
+    if (model == base || model == base / "0")
+        parents.insert(parents.end(), {base.parent_path(), base.parent_path().parent_path()});
+    for (fs::path folder = model; folder != base; folder = folder.parent_path())
+        parents.push_back(folder);
+    for (const fs::path& parent : parents)
         if (fs::is_directory(parent / options.images_folder)) return parent / options.images_folder;
-    if (options.require_photos)
-        throw Error((root / options.images_folder).string(), "the folder of the photos is missing",
-                    options.images_folder == "images"
-                        ? "Put the photos there, or name their folder with --images."
-                        : "Use --images images with -r 2, 4 or 8 to scale at load.");
-    return root / options.images_folder;
+    if (!options.require_photos) return root / options.images_folder;
+    const std::string scaled = scaled_images(base);
+    throw Error((root / options.images_folder).string(), "the folder of the photos is missing",
+                options.images_folder != "images" && fs::is_directory(base / "images")
+                    ? "Use --images images with -r 2, 4 or 8 to scale at load."
+                : scaled.empty() ? "Put the photos there, or name their folder with --images."
+                                 : fmt::format("Put the photos there, or take those of another "
+                                               "size with --images {}.",
+                                               scaled));
+}
+
+/// What else a mapper made beside the model 0: pieces that do not hang together with it.
+void note_siblings(const fs::path& model_folder, std::size_t photos, Dataset& dataset) {
+    if (model_folder.filename() != "0") return;
+    std::map<fs::path, std::size_t> others;
+    for (const fs::directory_entry& entry : fs::directory_iterator(model_folder.parent_path()))
+        if (entry.path() != model_folder && is_colmap_model(entry.path()))
+            others[entry.path()] = count_colmap_images(entry.path());
+    if (others.empty()) return;
+    std::string list;
+    for (const auto& [path, count] : others)
+        list += fmt::format("{}{} of {}", list.empty() ? "" : ", ", path.filename().string(),
+                            counted(count, "photo"));
+    dataset.notes.push_back(
+        fmt::format("{}, of {}, was read; other pieces of the reconstruction lie beside it: {}. To "
+                    "use one, name its folder.",
+                    model_folder.string(), counted(photos, "photo"), list));
 }
 
 void check_photos(const std::vector<View>& views, const fs::path& model_folder) {
@@ -47,7 +65,8 @@ void check_photos(const std::vector<View>& views, const fs::path& model_folder) 
         throw Error(first->photo.string(),
                     fmt::format("the photo is missing, and with it {} of the {} that {} lists",
                                 missing, views.size(), model_folder.string()),
-                    "Put the photos back, or name their folder with --images.");
+                    "Put the photos back, name their folder with --images, or take them out of the "
+                    "model with colmap image_deleter.");
 }
 
 }  // namespace
@@ -59,38 +78,27 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     dataset.root = root;
     dataset.source = model.binary ? "COLMAP binary" : "COLMAP text";
     const fs::path images = find_images_folder(root, model_folder, options);
-    const fs::path masks = images.parent_path() / "masks";
-    const bool has_masks = fs::is_directory(masks);
-    std::size_t without_mask = 0;
     for (const ColmapImage& image : model.images) {
         View view;
         view.name = image.name;
         view.source_id = image.id;
         view.photo = find_photo(images, image.name);
         if (view.photo.empty()) view.photo = images / image.name;
-        if (has_masks) view.mask = find_mask(masks, image.name);
-        without_mask += view.mask.empty() ? 1 : 0;
         view.lens = model.cameras.at(image.camera_id);
         view.camera.rotation = image.rotation;
         view.camera.translation = image.translation;
         dataset.views.push_back(std::move(view));
     }
     if (options.require_photos) check_photos(dataset.views, model_folder);
+    add_masks(images.parent_path(), options, dataset);
     dataset.points = std::move(model.points);
+    if (!model.points_note.empty()) dataset.notes.push_back(model.points_note);
     if (model.dropped_points > 0)
         dataset.notes.push_back(fmt::format("{} with NaN or infinity were dropped.",
                                             counted(model.dropped_points, "point")));
     if (dataset.points.size() == 0 && options.require_photos)
         dataset.notes.push_back("There are no sparse points; training starts from random ones.");
-    if (has_masks && without_mask > 0)
-        dataset.notes.push_back(fmt::format("{}: {} of {} photos have none.", masks.string(),
-                                            without_mask, dataset.views.size()));
-    const fs::path second = model_folder.parent_path() / "1";
-    if (model_folder.filename() == "0" && is_colmap_model(second))
-        dataset.notes.push_back(
-            fmt::format("{} was read; {} and any further model are other pieces "
-                        "of the reconstruction.",
-                        model_folder.string(), second.string()));
+    note_siblings(model_folder, dataset.views.size(), dataset);
     return dataset;
 }
 

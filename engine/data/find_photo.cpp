@@ -34,6 +34,17 @@ std::string with_slashes(std::string name) {
     return name;
 }
 
+std::string scaled_images(const fs::path& folder) {
+    std::string first;
+    std::error_code none;  // no such folder: no entries
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, none)) {
+        const std::string name = entry.path().filename().string();
+        if (name.starts_with("images_") && entry.is_directory() && (first.empty() || name < first))
+            first = name;
+    }
+    return first;
+}
+
 fs::path find_photo(const fs::path& folder, const std::string& name) {
     fs::path found = with_any_extension(folder / name);
     if (found.empty() && name.find('\\') != std::string::npos)

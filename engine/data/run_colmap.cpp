@@ -5,11 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
-#include <fstream>
 #include <map>
 #include <memory>
 
@@ -78,23 +76,15 @@ std::string output_of(const std::string& command) {
     return text;
 }
 
-/// Images of a model, from the head of images.bin; none where it cannot be read.
-std::uint64_t image_count(const fs::path& model) {
-    std::uint64_t count = 0;
-    std::ifstream file(model / "images.bin", std::ios::binary);
-    file.read(reinterpret_cast<char*>(&count), sizeof count);
-    return file ? count : 0;
-}
-
 /// Folder name of the model with the most images, which the mapper need not number 0; the first of
 /// equals. Empty where there is none.
 std::string largest_model(const fs::path& sparse,
                           const std::function<void(std::string_view)>& progress) {
-    std::map<std::string, std::uint64_t> models;
+    std::map<std::string, std::size_t> models;
     std::error_code ignored;
     for (const fs::directory_entry& entry : fs::directory_iterator(sparse, ignored))
         if (is_colmap_model(entry.path()))
-            models[entry.path().filename().string()] = image_count(entry.path());
+            models[entry.path().filename().string()] = count_colmap_images(entry.path());
     if (models.empty()) return {};
     const auto best =
         std::max_element(models.begin(), models.end(),

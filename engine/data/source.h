@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "engine/data/dataset.h"
 
@@ -38,6 +39,12 @@ std::string with_slashes(std::string name);
 /// extensions in place of its own (or added, where it is no picture's); so, too, where it is of a
 /// format that is not read, the file of another extension being one. Empty where there is none.
 std::filesystem::path find_photo(const std::filesystem::path& folder, const std::string& name);
+
+/// The usual folder of photos, as it begins their names in transforms.json.
+constexpr std::string_view kImages = "images/";
+
+/// The first folder images_* in `folder`, images_2 or the like; empty where there is none.
+std::string scaled_images(const std::filesystem::path& folder);
 
 /// Pluralised count for notes: "1 photo", "3 photos".
 std::string counted(std::size_t count, const char* noun);

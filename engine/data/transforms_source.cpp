@@ -6,6 +6,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "engine/data/masks.h"
 #include "engine/data/point_cloud_ply.h"
 #include "engine/data/source.h"
 #include "engine/data/transforms.h"
@@ -18,7 +19,9 @@ namespace {
 
 constexpr int kSyntheticSize = 800;  // px, of NeRF synthetic; only where no photo tells
 
-constexpr std::string_view kImages = "images/";
+// Of the sparse points where ply_file_path is absent: of 3DGS, BlenderNeRF and nerfstudio.
+constexpr const char* kPointFiles[] = {"points3d.ply", "points3D.ply", "sparse_pc.ply",
+                                       "pointcloud.ply"};
 
 /// "./train/r_2" and ".\train\r_2" to "train/r_2".
 std::string plain_name(const std::string& file_path) {
@@ -32,17 +35,31 @@ std::string asked_name(const std::string& name, const DatasetOptions& options) {
     return name;
 }
 
-/// The lens; a file without a size takes the turned photo's.
-void set_lens(const TransformsFrame& frame, const std::string& where, View& view) {
+bool in_pixels(const TransformsIntrinsics& in) {
+    return in.fl_x || in.fl_y || in.cx || in.cy;
+}
+
+/// The lens; a file without a size takes that of its own photo, turned, whichever is loaded.
+void set_lens(const TransformsFrame& frame, const fs::path& json, const DatasetOptions& options,
+              View& view) {
+    const std::string where = fmt::format("{} ({})", json.string(), frame.file_path);
     int width = kSyntheticSize, height = kSyntheticSize;
     if ((!frame.intrinsics.w || !frame.intrinsics.h) && fs::is_regular_file(view.photo)) {
-        const ImageInfo info = read_image_info(view.photo);
-        view.orientation = info.orientation;
+        fs::path own = view.photo;
+        if (asked_name(view.name, options) != view.name && in_pixels(frame.intrinsics))
+            own = find_photo(json.parent_path(), view.name);
+        if (own.empty())
+            throw Error(where,
+                        fmt::format("its camera is in pixels of {}, which is missing, and declares "
+                                    "no size",
+                                    view.name),
+                        "Add w and h to the file, or put those photos back.");
+        const ImageInfo info = read_image_info(own);
+        view.orientation = read_image_info(view.photo).orientation;
         width = info.orientation >= 5 ? info.height : info.width;
         height = info.orientation >= 5 ? info.width : info.height;
     }
-    view.lens = lens_from_transforms(frame.intrinsics, width, height,
-                                     fmt::format("{} ({})", where, frame.file_path));
+    view.lens = lens_from_transforms(frame.intrinsics, width, height, where);
 }
 
 struct Skipped {
@@ -51,16 +68,25 @@ struct Skipped {
     std::size_t in_images = 0;  // of all frames, those under images/
 };
 
+/// What the files declare beside frames.
+struct Declared {
+    std::string ply;
+    bool masks = false;  // of some frame
+    std::size_t scaled_poses = 0;
+};
+
 void add_frames(const fs::path& json, bool is_test, const DatasetOptions& options, Dataset& dataset,
-                Skipped& skipped, std::string& ply) {
+                Skipped& skipped, Declared& declared) {
     const TransformsFile file = parse_transforms(read_text_file(json), json.string());
-    if (ply.empty()) ply = file.ply_file_path;
+    if (declared.ply.empty()) declared.ply = file.ply_file_path;
+    declared.scaled_poses += file.scaled_poses;
     const fs::path root = json.parent_path();
     std::set<std::string> test_names;
     for (const std::string& name : file.test_filenames) test_names.insert(plain_name(name));
     for (const TransformsFrame& frame : file.frames) {
         View view;
         view.name = plain_name(frame.file_path);
+        declared.masks |= !frame.mask_path.empty();
         skipped.in_images += view.name.starts_with(kImages) ? 1 : 0;
         const std::string name = asked_name(view.name, options);
         const fs::path wanted = root / name;
@@ -81,7 +107,7 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
             throw Error(fmt::format("{} ({})", json.string(), frame.file_path),
                         fmt::format("its mask {} is missing", view.mask.string()),
                         "Put the mask back or remove mask_path.");
-        set_lens(frame, json.string(), view);
+        set_lens(frame, json, options, view);
         view.camera.rotation = frame.rotation;
         view.camera.translation = frame.translation;
         view.is_test = is_test || test_names.contains(view.name);
@@ -91,7 +117,9 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
 
 void add_points(const fs::path& root, const std::string& ply, const DatasetOptions& options,
                 Dataset& dataset) {
-    const fs::path path = ply.empty() ? root / "points3D.ply" : root / ply;
+    fs::path path = root / (ply.empty() ? kPointFiles[0] : ply);
+    for (const char* name : kPointFiles)
+        if (ply.empty() && !fs::is_regular_file(path)) path = root / name;
     if (!fs::is_regular_file(path)) {
         if (!options.require_photos) return;  // only cameras are wanted
         dataset.notes.push_back(
@@ -103,6 +131,10 @@ void add_points(const fs::path& root, const std::string& ply, const DatasetOptio
     }
     std::size_t dropped = 0;
     dataset.points = read_point_cloud_ply(path, dropped);
+    if (ply.empty())
+        dataset.notes.push_back(fmt::format("{} with the sparse points was read: {}.",
+                                            path.filename().string(),
+                                            counted(dataset.points.size(), "point")));
     if (dropped > 0)
         dataset.notes.push_back(
             fmt::format("{} with NaN or infinity were dropped.", counted(dropped, "point")));
@@ -113,7 +145,7 @@ void add_points(const fs::path& root, const std::string& ply, const DatasetOptio
 Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
     Dataset dataset;
     Skipped skipped;
-    std::string ply;
+    Declared declared;
     dataset.root = fs::is_directory(path) ? path : path.parent_path();
     fs::path json = path;
     if (fs::is_directory(path)) {
@@ -121,25 +153,31 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
         json = path / (split ? "transforms_train.json" : "transforms.json");
     }
     dataset.source = json.filename().string();
-    add_frames(json, false, options, dataset, skipped, ply);
+    add_frames(json, false, options, dataset, skipped, declared);
     if (fs::is_directory(path) && json.filename() == "transforms_train.json") {
         const bool has_test = fs::exists(path / "transforms_test.json");
         const bool has_val = fs::exists(path / "transforms_val.json");
         if (has_test || has_val)
             add_frames(path / (has_test ? "transforms_test.json" : "transforms_val.json"), true,
-                       options, dataset, skipped, ply);
+                       options, dataset, skipped, declared);
         if (has_test && has_val)
             dataset.notes.push_back(
                 "transforms_val.json was not read: transforms_test.json is the "
                 "test set.");
     }
-    if (dataset.views.empty())
+    if (dataset.views.empty()) {
+        const std::string scaled = scaled_images(dataset.root);
         throw Error(json.string(),
                     skipped.count == 0
                         ? "lists no frames"
                         : fmt::format("none of its {} photos is there, the first being {}",
                                       skipped.count, skipped.first),
-                    "Put the photos where file_path says, relative to the file.");
+                    "Put the photos where file_path says, relative to the file" +
+                        (scaled.empty() ? "."
+                                        : fmt::format(", or take those of another size with "
+                                                      "--images {}.",
+                                                      scaled)));
+    }
     if (skipped.count > 0)
         dataset.notes.push_back(
             fmt::format("Skipped: {} whose photo is missing, the first being {}.",
@@ -149,7 +187,11 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
             fmt::format("--images {} has no effect: no file_path in {} begins with images/. Use "
                         "-r to scale.",
                         options.images_folder, json.filename().string()));
-    add_points(dataset.root, ply, options, dataset);
+    if (declared.scaled_poses > 0)
+        dataset.notes.push_back(fmt::format("The scale of the rotation was removed: {}.",
+                                            counted(declared.scaled_poses, "pose")));
+    if (!declared.masks) add_masks(dataset.root, options, dataset);
+    add_points(dataset.root, declared.ply, options, dataset);
     return dataset;
 }
 

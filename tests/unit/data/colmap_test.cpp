@@ -135,6 +135,7 @@ TEST(ColmapBinary, model_that_does_not_fit_together_is_an_error) {
     const std::string missing = error_of([&] { load_dataset(folder); });
     EXPECT_NE(missing.find("a.png"), std::string::npos);
     EXPECT_NE(missing.find("the photo is missing"), std::string::npos) << missing;
+    EXPECT_NE(missing.find("colmap image_deleter"), std::string::npos) << missing;
     std::filesystem::remove(folder / "images");
     EXPECT_NE(error_of([&] { load_dataset(folder); }).find("images"), std::string::npos);
     EXPECT_NE(error_of([&] { load_dataset(folder / "nowhere"); }).find("exist"), std::string::npos);
@@ -199,10 +200,6 @@ TEST(ColmapProject, masks_are_found_beside_a_folder_named_with_a_slash) {
     DatasetOptions options;
     options.images_folder = "images_2/";
     EXPECT_EQ(load_dataset(folder, options).views.at(0).mask, folder / "masks/a.png");
-    std::filesystem::rename(folder / "masks/a.png", folder / "masks/other.png");
-    const std::vector<std::string> notes = load_dataset(folder).notes;
-    ASSERT_EQ(notes.size(), 1u);
-    EXPECT_NE(notes[0].find("1 of 1 photos have none"), std::string::npos) << notes[0];
 }
 
 TEST(ColmapProject, model_folders_are_read_with_and_without_a_slash) {
@@ -239,6 +236,74 @@ TEST(ColmapProject, photos_that_were_converted_are_found) {
         EXPECT_EQ(load_dataset(folder).views.at(0).photo, folder / "images/a.png") << extension;
         std::filesystem::remove(folder / "images/a.png");
     }
+}
+
+TEST(ColmapProject, photos_above_the_folder_are_taken_for_a_model_named_itself_alone) {
+    const auto folder = write_project(camera_file(), image_file(), point_file()),
+               inner = folder / "in";
+    std::filesystem::create_directories(inner);
+    for (const char* model : {"sparse/0", "sparse"}) {
+        std::filesystem::remove_all(inner / "sparse");
+        std::filesystem::create_directories((inner / model).parent_path());
+        std::filesystem::copy(folder / "sparse/0", inner / model);
+        EXPECT_NE(error_of([&] { load_dataset(inner); }).find((inner / "images").string()),
+                  std::string::npos);
+    }
+    std::filesystem::create_directories(folder / "other");
+    std::filesystem::copy(folder / "sparse/0", folder / "other/0");
+    EXPECT_EQ(load_dataset(folder / "other/0").views.at(0).photo, folder / "images/a.png");
+    EXPECT_EQ(load_dataset(folder / "other").views.at(0).photo, folder / "images/a.png");
+}
+
+TEST(ColmapProject, smaller_photos_alone_are_named_in_the_remedy) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    std::filesystem::rename(folder / "images", folder / "images_4");
+    const std::string error = error_of([&] { load_dataset(folder); });
+    EXPECT_NE(error.find("--images images_4"), std::string::npos) << error;
+}
+
+TEST(ColmapProject, other_pieces_of_a_reconstruction_are_noted_with_their_photos) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    View view;
+    view.camera = {.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
+    for (const char* name : {"1", "2"}) {
+        view.name = "a.png";
+        std::vector<View> views(name[0] == '1' ? 5 : 2, view);
+        write_colmap_binary(folder / "sparse" / name, views, {});
+    }
+    write_file_atomic(folder / "sparse/3/cameras.txt", "1 PINHOLE 8 6 20 20 4 3\n");
+    write_file_atomic(folder / "sparse/3/images.txt", "1 1 0 0 0 0 0 0 1 a.png\n\n");
+    const Dataset dataset = load_dataset(folder);
+    ASSERT_EQ(dataset.notes.size(), 1u);
+    for (const char* part : {"sparse/0, of 1 photo,", "1 of 5 photos", "2 of 2 photos",
+                             "3 of 1 photo", "name its folder"})
+        EXPECT_NE(dataset.notes[0].find(part), std::string::npos)
+            << part << ": " << dataset.notes[0];
+    EXPECT_EQ(load_dataset(folder / "sparse/1").views.size(), 5u);
+}
+
+TEST(ColmapProject, a_ply_of_other_points_outranks_those_of_the_model) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    const auto write_ply = [&](std::size_t count) {
+        std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(count) + "\n";
+        for (const char* name : {"x", "y", "z"})
+            text += "property float " + std::string(name) + "\n";
+        text += "end_header\n";
+        for (std::size_t i = 0; i < count; ++i) text += "5 0 9\n";
+        write_file_atomic(folder / "sparse/0/points3D.ply", text);
+    };
+    write_ply(1);  // as 3DGS writes it from the model
+    const Dataset own = load_dataset(folder);
+    EXPECT_EQ(own.points.position.at(0), 1e6 + 0.25);
+    EXPECT_EQ(own.points.seen_by.size(), 1u);
+    EXPECT_TRUE(own.notes.empty());
+    write_ply(3);
+    const Dataset replaced = load_dataset(folder);
+    EXPECT_EQ(replaced.points.size(), 3u);
+    EXPECT_TRUE(replaced.points.seen_by.empty());
+    ASSERT_EQ(replaced.notes.size(), 1u);
+    EXPECT_NE(replaced.notes[0].find("points3D.ply was read, 3 points"), std::string::npos)
+        << replaced.notes[0];
 }
 
 TEST(PointCloudPly, colours_of_floats_are_up_to_1_or_up_to_255) {

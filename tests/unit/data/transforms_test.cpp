@@ -307,6 +307,45 @@ TEST(TransformsSource, it_stands_in_for_a_colmap_model_whose_photos_are_missing)
     EXPECT_EQ(load_dataset(folder, cameras_only).views.at(0).camera.fx, 20);
 }
 
+TEST(TransformsSource, points_lie_under_the_names_that_other_programs_give_them) {
+    for (const char* name : {"points3d.ply", "points3D.ply", "sparse_pc.ply", "pointcloud.ply"}) {
+        const auto folder = test_folder();
+        write_png(folder / "train/0.png", ImageU8(8, 8, 3));
+        write_file_atomic(folder / "transforms_train.json",
+                          file(R"("fl_x": 10, )", frame("train/0")));
+        write_file_atomic(folder / name,
+                          std::string("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                                      "property float y\nproperty float z\nend_header\n1 2 3\n"));
+        const Dataset dataset = load_dataset(folder);
+        EXPECT_EQ(dataset.points.size(), 1u) << name;
+        ASSERT_EQ(dataset.notes.size(), 1u);
+        EXPECT_NE(dataset.notes[0].find(name), std::string::npos) << dataset.notes[0];
+    }
+}
+
+TEST(TransformsSource, smaller_photos_get_the_lens_of_those_that_the_file_names) {
+    const auto folder = test_folder();
+    const auto write = [&](const std::string& head) {
+        write_file_atomic(folder / "transforms.json", file(head, frame("images/a.png")));
+    };
+    write_png(folder / "images/a.png", ImageU8(8, 6, 3));
+    write_png(folder / "images_2/a.png", ImageU8(4, 3, 3));
+    write(R"("fl_x": 10, "cx": 4, "cy": 3, )");
+    DatasetOptions half;
+    half.images_folder = "images_2";
+    const Camera camera = load_dataset(folder, half).views.at(0).camera;
+    EXPECT_EQ(camera.width, 4);
+    EXPECT_EQ(camera.fx, 5);
+    EXPECT_EQ(camera.cx, 2);
+    std::filesystem::remove_all(folder / "images");
+    const std::string error = error_of([&] { load_dataset(folder, half); });
+    EXPECT_NE(error.find("images/a.png"), std::string::npos) << error;
+    EXPECT_NE(error.find("Add w and h"), std::string::npos) << error;
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("--images images_2"), std::string::npos);
+    write(R"("camera_angle_x": 1.5707963267948966, )");
+    EXPECT_NEAR(load_dataset(folder, half).views.at(0).camera.fx, 2, 1e-12);
+}
+
 TEST(TransformsSource, cameras_alone_do_without_photos_that_cannot_be_used) {
     const auto folder = test_folder();
     write_file_atomic(folder / "a.webp", std::string("RIFF"));

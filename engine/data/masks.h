@@ -1,0 +1,21 @@
+// Masks that lie beside the photos, by the names that COLMAP, RealityCapture and people give them.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+/// FOLDER/masks or, where it holds no pictures, FOLDER/mask; empty where neither does.
+std::filesystem::path masks_folder(const std::filesystem::path& folder);
+
+/// Gives every view its mask in masks_folder(folder), with a note where some have none: of the
+/// photo's name, a leading "images/" left out or not, with the extension of a picture in place of
+/// the photo's or added to it, after ".mask" or not. Throws Error where no view has one and photos
+/// are asked for.
+void add_masks(const std::filesystem::path& folder, const DatasetOptions& options,
+               Dataset& dataset);
+
+}  // namespace darb
