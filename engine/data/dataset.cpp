@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -54,26 +55,56 @@ Dataset load_model(const fs::path& path, const fs::path& model, const DatasetOpt
     return dataset;
 }
 
+// What the views of a transforms file say that those of a COLMAP model of the same photos do not;
+// empty where they say nothing more.
+std::string what_it_adds(const Dataset& transforms, const Dataset& model) {
+    const auto file = [](const fs::path& path) {
+        return path.empty() ? path : fs::absolute(path).lexically_normal();
+    };
+    std::map<fs::path, fs::path> masks;
+    for (const View& view : model.views) masks[file(view.photo)] = file(view.mask);
+    std::size_t known = 0;
+    bool masked = false, split = false;
+    for (const View& view : transforms.views) {
+        const auto at = masks.find(file(view.photo));
+        known += at != masks.end() ? 1 : 0;
+        masked |= at != masks.end() && !view.mask.empty() && at->second != file(view.mask);
+        split |= view.is_test;
+    }
+    if (known < transforms.views.size())
+        return fmt::format("that lacks {} of its {} photos", transforms.views.size() - known,
+                           transforms.views.size());
+    if (known < model.views.size())
+        return fmt::format("it leaves out {} of the model's {} photos", model.views.size() - known,
+                           model.views.size());
+    return masked ? "that lacks its masks" : split ? "that lacks its split" : "";
+}
+
 // The model that nerfstudio leaves below its transforms.json, which names the photos as COLMAP saw
 // them. Which of the two it is depends on the photos alone, so that cameras without photos
 // (require_photos false) are those that were trained on.
 Dataset load_nerfstudio(const fs::path& path, const fs::path& model, DatasetOptions options) {
     const bool require_photos = std::exchange(options.require_photos, true);
+    std::optional<Dataset> transforms;
+    try {
+        transforms = load_transforms(path, options);
+    } catch (const Error&) {  // then it is the model, or nothing
+    }
     std::string reason;
     try {
-        return load_model(path, model, options);
+        Dataset dataset = load_model(path, model, options);
+        if (transforms) reason = what_it_adds(*transforms, dataset);
+        if (reason.empty()) return dataset;
     } catch (const Error& error) {
         reason = fmt::format("{} {}", error.where, error.reason);
     }
-    try {
-        Dataset dataset = load_transforms(path, options);
-        dataset.notes.push_back(
-            fmt::format("{} was read in place of {}: {}.", dataset.source, model.string(), reason));
-        return dataset;
-    } catch (const Error&) {
+    if (!transforms) {
         options.require_photos = require_photos;
         return load_model(path, model, options);  // says what is wrong with it
     }
+    transforms->notes.push_back(
+        fmt::format("{} was read in place of {}: {}.", transforms->source, model.string(), reason));
+    return std::move(*transforms);
 }
 
 Dataset load_source(const fs::path& path, const DatasetOptions& options) {

@@ -69,8 +69,9 @@ struct Dataset {
 
 /// DATASET is a COLMAP project folder (sparse/0, sparse, 0, colmap/sparse/0, or the model files
 /// themselves), a folder with transforms.json or transforms_train.json, or a .json path. Where both
-/// are there, the COLMAP model is read, unless it cannot be, as where its photos are missing; a
-/// note says which. Throws Error naming file and record.
+/// are there, the COLMAP model is read, unless it cannot be, as where its photos are missing, or is
+/// that of nerfstudio and the file has masks, a split or a choice of photos that it lacks; a note
+/// says which. Throws Error naming file and record.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo, RGBA with straight alpha (255 where the file has none; a mask multiplies alpha),

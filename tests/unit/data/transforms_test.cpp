@@ -307,6 +307,39 @@ TEST(TransformsSource, it_stands_in_for_a_colmap_model_whose_photos_are_missing)
     EXPECT_EQ(load_dataset(folder, cameras_only).views.at(0).camera.fx, 20);
 }
 
+// What makes the transforms file say more than the COLMAP model beside it.
+TEST(TransformsSource, it_outranks_a_colmap_model_that_lacks_its_masks_split_or_choice) {
+    const auto folder = test_folder();
+    std::vector<View> views(3);
+    for (std::size_t i = 0; i < 3; ++i) {
+        views[i].name = std::to_string(i) + ".png";
+        views[i].camera = {.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
+        write_png(folder / "images" / views[i].name, ImageU8(8, 6, 3));
+    }
+    write_png(folder / "all.png", ImageU8(8, 6, 1));
+    write_colmap_binary(folder / "colmap/sparse/0", views, {});
+    const std::string head = R"("fl_x": 10, )", split = R"("test_filenames": ["images/1.png"], )";
+    const std::string two = frame("./images/0.png") + "," + frame("images/1.png");
+    const std::string three = two + "," + frame("images/2.png");
+    const std::string masked = two + "," + frame("images/2.png", R"("mask_path": "all.png", )");
+    struct Case {
+        std::string text, reason;
+    };
+    for (const Case& c : {Case{file(head, three), ""}, Case{file(head, masked), "masks"},
+                          Case{file(head + split, three), "split"},
+                          Case{file(head, two), "1 of the model's 3 photos"}}) {
+        write_file_atomic(folder / "transforms.json", c.text);
+        const Dataset dataset = load_dataset(folder);
+        EXPECT_EQ(dataset.views.at(0).camera.fx, c.reason.empty() ? 20 : 10) << c.reason;
+        std::string notes;
+        for (const std::string& note : dataset.notes) notes += note + "\n";
+        EXPECT_NE(notes.find(c.reason.empty() ? "sparse/0 was read" : "transforms.json was read"),
+                  std::string::npos)
+            << notes;
+        EXPECT_NE(notes.find(c.reason), std::string::npos) << notes;
+    }
+}
+
 TEST(TransformsSource, points_lie_under_the_names_that_other_programs_give_them) {
     for (const char* name : {"points3d.ply", "points3D.ply", "sparse_pc.ply", "pointcloud.ply"}) {
         const auto folder = test_folder();
