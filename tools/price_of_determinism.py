@@ -61,7 +61,7 @@ def build_atomics():
 
 
 def train(darb, folder):
-    subprocess.run([darb, "train", os.path.join(ROOT, "assets/scene"), "-o", folder, "-q", "--iterations", "300",
+    subprocess.run([darb, "train", os.path.join(ROOT, "assets/scene"), "-o", folder, "-q", "--eval", "--iterations", "300",
                     "--densify-until-iter", "0", "--test-iterations", "300", "--save-iterations", "300"],
                    check=True, stdout=subprocess.DEVNULL)
     with open(os.path.join(folder, "metrics.json"), encoding="utf-8") as file:

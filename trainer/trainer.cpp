@@ -98,7 +98,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     }
     if (train_views_.empty())
         throw Error(dataset.root.string(), "no photo is left to train on",
-                    "Every view is held out; train without --eval or add photos.");
+                    "Every view is held out: add photos, or leave out --eval of darb train.");
     cameras_ = upload_cameras(device, camera_data_);
     d_image_ = Buffer(device, "d_image", pixels * 12);
     if (options_.antialias) {

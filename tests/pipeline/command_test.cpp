@@ -203,6 +203,16 @@ TEST(Command, train_without_a_report_writes_none) {
     EXPECT_TRUE(fs::exists(out / "report.html"));
 }
 
+TEST(Command, train_holds_out_with_eval_alone) {
+    const std::string train = fmt::format("train {} -o {} -r 8 --iterations 1 --no-report ", kScene,
+                                          (scratch() / "all").string());
+    const Outcome all = darb(train), held_out = darb(train + "--eval");
+    EXPECT_NE(all.err.find("48 photos to train on, 0 held out"), std::string::npos) << all.err;
+    EXPECT_NE(all.err.find("own test views, 8, are trained on"), std::string::npos) << all.err;
+    EXPECT_NE(held_out.err.find("40 photos to train on, 8 held out"), std::string::npos);
+    EXPECT_EQ(held_out.err.find("are trained on"), std::string::npos) << held_out.err;
+}
+
 TEST(Command, train_begins_with_a_forecast) {
     const Outcome o = darb(
         fmt::format("train {} -o {} -r 4 --iterations 1", kScene, (scratch() / "one").string()));

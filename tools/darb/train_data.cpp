@@ -129,8 +129,15 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags) {
 
 Dataset load_training_data(const TrainFlags& flags) {
     const fs::path photos = photos_without_cameras(flags.dataset, flags.data.images_folder);
-    return photos.empty() ? load_dataset(flags.dataset, flags.data)
-                          : load_through_colmap(photos, flags);
+    Dataset dataset = photos.empty() ? load_dataset(flags.dataset, flags.data)
+                                     : load_through_colmap(photos, flags);
+    if (flags.data.hold_out) return dataset;
+    size_t own_test = 0;
+    for (View& view : dataset.views) own_test += std::exchange(view.is_test, false) ? 1 : 0;
+    if (own_test > 0)
+        dataset.notes.push_back(fmt::format(
+            "The data set's own test views, {}, are trained on; --eval holds them out.", own_test));
+    return dataset;
 }
 
 }  // namespace darb

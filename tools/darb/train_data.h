@@ -6,10 +6,11 @@
 
 namespace darb {
 
-/// Loads flags.dataset. A folder of PNG and JPEG files (itself, or its --images folder) without
-/// sparse, sparse/0 or transforms*.json goes through the installed COLMAP into OUT/colmap first;
-/// what is there from an earlier run over the same photos is used again. Throws Error as
-/// load_dataset and run_colmap do, and where OUT lies among the photos.
+/// Loads flags.dataset, every view of it to train on unless flags.data.hold_out. A folder of PNG
+/// and JPEG files (itself, or its --images folder) without sparse, sparse/0 or transforms*.json
+/// goes through the installed COLMAP into OUT/colmap first; what is there from an earlier run over
+/// the same photos is used again. Throws Error as load_dataset and run_colmap do, and where OUT
+/// lies among the photos.
 Dataset load_training_data(const TrainFlags& flags);
 
 }  // namespace darb
