@@ -294,6 +294,24 @@ TEST_F(PhotosCommand, colmap_runs_once_for_the_same_photos) {
     EXPECT_NE(other.err.find("other photos"), std::string::npos) << other.err;
 }
 
+TEST_F(PhotosCommand, photos_are_found_in_folders_below_and_files_of_a_dot_are_not) {
+    fs::create_directories(photos() / "left");
+    for (const char* name : {"view_00.png", "view_01.png", "view_02.png"})
+        fs::rename(photos() / name, photos() / "left" / name);
+    write_file_atomic(photos() / "left/._view_00.png", std::string("no PNG"));
+    const Outcome o = with_path("/nowhere", train());
+    EXPECT_NE(o.err.find("apt install colmap"), std::string::npos) << o.err;
+    fs::create_directories(photos() / "set/sparse");
+    expect_refused({{train(), "set/sparse is below"}});
+}
+
+TEST_F(PhotosCommand, pictures_that_are_not_read_are_counted) {
+    fs::remove_all(photos());
+    for (const char* name : {"a.HEIC", "b.heic", "images/c.webp"})
+        write_file_atomic(photos() / name, std::string("picture"));
+    expect_refused({{train(), "2 .heic, 1 .webp"}, {train(), "Convert them to PNG or JPEG"}});
+}
+
 TEST_F(PhotosCommand, output_among_the_photos_is_refused) {
     expect_refused({{"train " + photos().string() + " -o " + (photos() / "out").string(),
                      "lies among the photos"}});
