@@ -117,13 +117,15 @@ std::vector<std::string> colmap_commands(const ColmapRun& run) {
     const std::string colmap = "QT_QPA_PLATFORM=offscreen colmap ";
     const std::string database = quoted(run.workspace / "database.db");
     const std::string photos = quoted(run.photos);
+    const std::string masks =
+        run.masks.empty() ? "" : " --ImageReader.mask_path " + quoted(run.masks);
     const char* part = run.new_names ? "Feature" : "Sift";
     // OPENCV: phones and consumer cameras; the undistorter turns it into a pinhole.
     return {
         fmt::format("{}feature_extractor --database_path {} --image_path {} "
                     "--ImageReader.single_camera {} --ImageReader.camera_model OPENCV "
-                    "--{}Extraction.use_gpu 0",
-                    colmap, database, photos, run.single_camera ? 1 : 0, part),
+                    "--{}Extraction.use_gpu 0{}",
+                    colmap, database, photos, run.single_camera ? 1 : 0, part, masks),
         fmt::format("{}{}_matcher --database_path {} --{}Matching.use_gpu 0", colmap,
                     run.sequential ? "sequential" : "exhaustive", database, part),
         fmt::format("{}mapper --database_path {} --image_path {} --output_path {}", colmap,

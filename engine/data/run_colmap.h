@@ -10,13 +10,14 @@
 namespace darb {
 
 struct ColmapRun {
-    std::filesystem::path photos;     // a folder of PNG and JPEG files
-    std::filesystem::path workspace;  // made where missing; holds the data set afterwards
-    bool sequential = false;          // neighbours in name order only: for video frames
-    bool single_camera = true;        // all photos by one camera at one zoom
-    int max_image_size = 1600;        // px, of the undistorted photos
-    bool new_names = false;           // of the GPU options, in newer versions of COLMAP
-    std::string model = "0";          // of the models that the mapper makes, the one to go on with
+    std::filesystem::path photos;      // a folder of PNG and JPEG files
+    std::filesystem::path workspace;   // made where missing; holds the data set afterwards
+    std::filesystem::path masks = {};  // a folder: no features where they are black; may be empty
+    bool sequential = false;           // neighbours in name order only: for video frames
+    bool single_camera = true;         // all photos by one camera at one zoom
+    int max_image_size = 1600;         // px, of the undistorted photos
+    bool new_names = false;            // of the GPU options, in newer versions of COLMAP
+    std::string model = "0";           // of the models that the mapper makes, the one to go on with
 };
 
 /// The shell commands, in order: feature_extractor, matcher, mapper, image_undistorter.

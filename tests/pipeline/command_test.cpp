@@ -312,6 +312,19 @@ TEST_F(PhotosCommand, pictures_that_are_not_read_are_counted) {
     expect_refused({{train(), "2 .heic, 1 .webp"}, {train(), "Convert them to PNG or JPEG"}});
 }
 
+TEST_F(PhotosCommand, masks_beside_the_photos_go_to_colmap_with_a_note) {
+    write_file_atomic(scratch() / "masks/view_00.png.png", std::string("mask"));
+    const std::string masks = (scratch() / "masks").string();
+    EXPECT_NE(with_path("/nowhere", train()).err.find("--ImageReader.mask_path '" + masks + "'"),
+              std::string::npos);
+    const Outcome o = with_path((scratch() / "bin").string() + ":/usr/bin:/bin",
+                                fmt::format("train {}/ -o {} --iterations 1", photos().string(),
+                                            (scratch() / "with_masks").string()));
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("The masks in " + masks), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("--images photos"), std::string::npos) << o.err;
+}
+
 TEST_F(PhotosCommand, output_among_the_photos_is_refused) {
     expect_refused({{"train " + photos().string() + " -o " + (photos() / "out").string(),
                      "lies among the photos"}});

@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/colmap.h"
+#include "engine/data/masks.h"
 #include "engine/data/run_colmap.h"
 #include "tools/darb/photo_folder.h"
 
@@ -37,15 +38,29 @@ void show(std::string_view line) {
     if (!step && terminal) fmt::print(stderr, "\r{}\033[K", line.substr(0, kShownColumns));
 }
 
+// Undistorting leaves the masks behind; darb straightens them with the photos where it loads both.
+std::string masks_note(const ColmapRun& run, const fs::path& project) {
+    const std::string images = run.photos.filename().string();
+    return fmt::format(
+        "The masks in {} served COLMAP alone, those of names like {}: to train with them, copy "
+        "{} (the largest, where there are several) to {} and name {} as the data set{}.",
+        run.masks.string(), "photo.jpg.png", (run.workspace / "sparse" / "0").string(),
+        (project / "sparse" / "0").string(), project.string(),
+        images == "images" ? "" : ", with --images " + images);
+}
+
 Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags) {
     check_output(photos, flags.run.output);
     ColmapRun run;
     run.photos = fs::absolute(photos / "").lexically_normal().parent_path();
+    const fs::path project = run.photos.parent_path();
+    run.masks = masks_folder(project);
     run.workspace = flags.run.output / "colmap";
     run.sequential = flags.sequential;
     if (flags.data.resolution != -1) run.max_image_size = kAnySize;
     const PhotoList list = list_photos(run.photos);
-    const std::string made_from = fmt::format("at most {} px\n{}", run.max_image_size, list.text);
+    std::string made_from = fmt::format("at most {} px\n{}", run.max_image_size, list.text);
+    if (!run.masks.empty()) made_from += "masks " + run.masks.string() + "\n";
     run.single_camera = list.one_size;
     const fs::path list_file = run.workspace / "photos.txt", dense = run.workspace / "dense";
     if (fs::exists(list_file) && read_text_file(list_file) != made_from)
@@ -63,6 +78,7 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags) {
                          fmt::format("COLMAP found the cameras of {} of {} photos; {} is the data "
                                      "set with them.",
                                      dataset.views.size(), list.count, dense.string()));
+    if (!run.masks.empty()) dataset.notes.push_back(masks_note(run, project));
     return dataset;
 }
 
