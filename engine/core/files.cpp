@@ -1,6 +1,7 @@
 #include "engine/core/files.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -39,10 +40,25 @@ Container read_whole(const std::filesystem::path& path) {
     return content;
 }
 
-[[noreturn]] void fail_write(const std::filesystem::path& path, const std::filesystem::path& temp) {
+/// PATH.tmp, or PATH.1.tmp and so on where that is somebody's.
+struct Temporary {
+    explicit Temporary(const std::filesystem::path& target) {
+        for (int number = 0; file.fd < 0; ++number) {
+            path = target;
+            if (number > 0) path += "." + std::to_string(number);
+            path += ".tmp";
+            file.fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+            if (file.fd < 0 && errno != EEXIST) return;
+        }
+    }
+    std::filesystem::path path;
+    Descriptor file;
+};
+
+[[noreturn]] void fail_write(const std::filesystem::path& path, const Temporary& temp) {
     const std::string reason = std::strerror(errno);
     std::error_code ignored;
-    std::filesystem::remove(temp, ignored);
+    if (temp.file.fd >= 0) std::filesystem::remove(temp.path, ignored);
     throw Error(path.string(), "cannot be written: " + reason,
                 "Free space or choose another folder; the previous file, if any, is intact.");
 }
@@ -90,13 +106,14 @@ void write_file_atomic(const std::filesystem::path& name, std::span<const std::b
         return write_to_stream(name, bytes);
     const bool link = std::filesystem::is_symlink(name, ignored);
     const std::filesystem::path path = link ? std::filesystem::weakly_canonical(name) : name;
-    std::filesystem::path temp = path;
-    temp += ".tmp";
-    Descriptor file{::open(temp.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
-    if (file.fd < 0) fail_write(path, temp);
-    if (!write_all(file.fd, bytes)) fail_write(path, temp);
-    if (::fsync(file.fd) != 0 && errno != EINVAL && errno != EROFS) fail_write(path, temp);
-    if (::rename(temp.c_str(), path.c_str()) != 0) fail_write(path, temp);
+    const Temporary temp(path);
+    if (temp.file.fd < 0) fail_write(path, temp);
+    const std::filesystem::file_status old = std::filesystem::status(path, ignored);
+    if (std::filesystem::is_regular_file(old))
+        ::fchmod(temp.file.fd, static_cast<mode_t>(old.permissions()));
+    if (!write_all(temp.file.fd, bytes)) fail_write(path, temp);
+    if (::fsync(temp.file.fd) != 0 && errno != EINVAL && errno != EROFS) fail_write(path, temp);
+    if (::rename(temp.path.c_str(), path.c_str()) != 0) fail_write(path, temp);
 }
 
 void write_file_atomic(const std::filesystem::path& path, std::string_view text) {

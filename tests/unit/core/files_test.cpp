@@ -153,6 +153,25 @@ TEST_F(Files, Write_on_a_read_only_disk_names_file_and_reason) {
     EXPECT_EQ(file_count(), 0u);
 }
 
+TEST_F(Files, Write_leaves_a_file_that_has_the_name_of_its_temporary_one) {
+    write_file_atomic(folder / "x.bin.tmp", "of the user");
+    write_file_atomic(folder / "x.bin", "text");
+    EXPECT_EQ(read_text_file(folder / "x.bin"), "text");
+    EXPECT_EQ(read_text_file(folder / "x.bin.tmp"), "of the user");
+    EXPECT_EQ(file_count(), 2u) << "a temporary file was left";
+}
+
+TEST_F(Files, Write_keeps_the_permissions_of_the_old_file_and_gives_a_new_one_the_usual_ones) {
+    const auto mode = [&] { return fs::status(folder / "x.bin").permissions(); };
+    const mode_t before = ::umask(027);
+    write_file_atomic(folder / "x.bin", "new");
+    ::umask(before);
+    EXPECT_EQ(mode(), fs::perms(0640));
+    fs::permissions(folder / "x.bin", fs::perms(0606));
+    write_file_atomic(folder / "x.bin", "text");
+    EXPECT_EQ(mode(), fs::perms(0606));
+}
+
 TEST_F(Files, Write_through_a_link_changes_the_file_that_it_points_to) {
     write_file_atomic(folder / "target", "old");
     fs::create_symlink("target", folder / "link");
