@@ -231,7 +231,7 @@ bool is_compressed_ply(const PlyHeader& header) {
 }
 
 SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader& header,
-                                const std::string& where, std::size_t* dropped,
+                                const std::string& where, PlyFacts* facts,
                                 const ReadProgress& progress) {
     const PlyElement& vertex = *header.find("vertex");
     const PlyElement& chunk = *header.find("chunk");
@@ -247,7 +247,8 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
         columns[i] = column_of(vertex, kPacked[i], PlyType::uint32, "uint", where);
     const std::vector<Chunk> chunks = read_chunks(file, header, where);
     SplatModel model;
-    read_ply_comments(header, where, model);
+    PlyFacts said;
+    read_ply_comments(header, where, model, said.notes);
     model.resize(vertex.count);
     const PlyRow row = [&](std::size_t i, const double* values) {
         std::array<std::uint32_t, 4> packed{};
@@ -257,8 +258,8 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
     };
     read_ply_rows(file, header, vertex, where, row, progress);
     if (const PlyElement* sh = header.find("sh")) read_sh(file, header, *sh, where, model);
-    const std::size_t gone = drop_non_finite(model);
-    if (dropped) *dropped = gone;
+    said.dropped = drop_non_finite(model);
+    if (facts) *facts = std::move(said);
     return model;
 }
 

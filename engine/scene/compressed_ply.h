@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/scene/ply.h"
 #include "engine/scene/ply_table.h"
 #include "engine/scene/splat_model.h"
 
@@ -21,7 +22,7 @@ bool is_compressed_ply(const PlyHeader& header);
 
 /// Same contract as parse_ply (ply.h), which calls it.
 SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader& header,
-                                const std::string& where, std::size_t* dropped,
+                                const std::string& where, PlyFacts* facts,
                                 const ReadProgress& progress = {});
 
 /// Splats in Morton order, so that those of a chunk lie close together. Per chunk, the error of a

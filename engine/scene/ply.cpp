@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <cstring>
-#include <string_view>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
@@ -14,6 +12,7 @@
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/infinite_values.h"
 #include "engine/scene/ply_comments.h"
+#include "engine/scene/ply_dialects.h"
 #include "engine/scene/ply_table.h"
 #include "engine/scene/splat_shapes.h"
 
@@ -21,51 +20,7 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kRestOfDegree3 = 45, kRestOfDegree4 = 72;
-
-/// Column of every parameter in the vertex element.
-struct Columns {
-    std::array<int, 3> position{}, dc{}, scale{};
-    std::array<int, 4> rotation{};
-    int opacity = 0;
-    std::vector<int> rest;  // in file order: channel-major
-};
-
-int need(const PlyElement& vertex, const std::string& name, const std::string& where) {
-    const int column = vertex.find(name);
-    if (column < 0 || vertex.properties[static_cast<std::size_t>(column)].is_list)
-        throw Error(where, fmt::format("element vertex lacks the property {}", name),
-                    "A splat scene is needed, not a point cloud or mesh.");
-    return column;
-}
-
-Columns find_columns(const PlyElement& vertex, const std::string& where) {
-    Columns columns;
-    for (int i = 0; i < 3; ++i) {
-        columns.position[i] = need(vertex, std::string(1, "xyz"[i]), where);
-        columns.dc[i] = need(vertex, fmt::format("f_dc_{}", i), where);
-        columns.scale[i] = need(vertex, fmt::format("scale_{}", i), where);
-    }
-    for (int i = 0; i < 4; ++i) columns.rotation[i] = need(vertex, fmt::format("rot_{}", i), where);
-    columns.opacity = need(vertex, "opacity", where);
-    for (int i = 0; vertex.find(fmt::format("f_rest_{}", i)) >= 0; ++i)
-        columns.rest.push_back(need(vertex, fmt::format("f_rest_{}", i), where));
-    const std::size_t count = columns.rest.size();
-    if (count == kRestOfDegree4) {  // the last band of each channel is left out
-        std::vector<int> kept;
-        for (std::size_t i = 0; i < count; ++i)
-            if (i % (kRestOfDegree4 / 3) < kRestOfDegree3 / 3) kept.push_back(columns.rest[i]);
-        columns.rest = std::move(kept);
-    } else if (count != 0 && count != 9 && count != 24 && count != kRestOfDegree3) {
-        throw Error(
-            where,
-            fmt::format("has {} f_rest properties; SH degree 0 to 4 has 0, 9, 24, 45, 72", count),
-            "Export the scene again with whole bands.");
-    }
-    return columns;
-}
-
-bool all_finite(const double* values, const Columns& columns) {
+bool all_finite(const double* values, const PlyColumns& columns) {
     // float32 range is what the model stores.
     const auto value = [&](int column) { return static_cast<float>(values[column]); };
     const auto good = [&](int column) { return std::isfinite(value(column)); };
@@ -78,7 +33,8 @@ bool all_finite(const double* values, const Columns& columns) {
     return finite;
 }
 
-void store_splat(const double* values, const Columns& columns, std::size_t at, SplatModel& model) {
+void store_splat(const double* values, const PlyColumns& columns, std::size_t at,
+                 SplatModel& model) {
     for (std::size_t i = 0; i < 3; ++i) {
         model.sh_dc[at * 3 + i] = static_cast<float>(values[columns.dc[i]]);
         model.log_scale[at * 3 + i] =
@@ -126,42 +82,46 @@ std::byte* put(std::byte* to, const T* values, std::size_t count) {
 
 }  // namespace
 
-bool has_degree_4(const PlyElement& vertex) {
-    return vertex.find(fmt::format("f_rest_{}", kRestOfDegree4 - 1)) >= 0 &&
-           vertex.find(fmt::format("f_rest_{}", kRestOfDegree4)) < 0;
-}
-
-SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
-                     std::size_t* dropped, const ReadProgress& progress) {
+SplatModel parse_ply(std::span<const std::byte> file, const std::string& where, PlyFacts* facts,
+                     const ReadProgress& progress) {
     const PlyHeader header = parse_ply_header(file, where);
     const PlyElement* vertex = header.find("vertex");
     if (!vertex) throw Error(where, "has no element vertex", "A splat scene is needed.");
     if (is_compressed_ply(header))
-        return parse_compressed_ply(file, header, where, dropped, progress);
-    const Columns columns = find_columns(*vertex, where);
+        return parse_compressed_ply(file, header, where, facts, progress);
+    const PlyColumns columns = find_ply_columns(*vertex, where);
     check_ply_size(file, header, *vertex, where);
 
     SplatModel model;
+    PlyFacts said;
     model.sh_degree = static_cast<int>(std::lround(std::sqrt(columns.rest.size() / 3 + 1))) - 1;
-    read_ply_comments(header, where, model);
+    read_ply_comments(header, where, model, said.notes);
     model.resize(vertex->count);
-    std::vector<double> positions;
+    std::vector<double> positions, translated;
     positions.reserve(vertex->count * 3);
     std::size_t kept = 0;
-    const PlyRow row = [&](std::size_t, const double* values) {
+    bool has_normals = false;
+    const PlyRow row = [&](std::size_t, const double* read) {
+        const double* values = translate_row(columns, read, translated);
+        for (const int column : columns.normal) has_normals |= values[column] != 0;
         if (!all_finite(values, columns)) return;
         for (const int column : columns.position) positions.push_back(values[column]);
         store_splat(values, columns, kept++, model);
     };
     read_ply_rows(file, header, *vertex, where, row, progress);
-    if (dropped) *dropped = vertex->count - kept;
+    if (facts) {
+        const std::vector<std::string> notes = ply_notes(columns, has_normals);
+        said.notes.insert(said.notes.end(), notes.begin(), notes.end());
+        said.dropped = vertex->count - kept;
+        *facts = std::move(said);
+    }
     model.resize(kept);
     set_positions(positions, model);
     return model;
 }
 
-SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped) {
-    return parse_ply(read_file(path), path.string(), dropped);
+SplatModel read_ply(const std::filesystem::path& path) {
+    return parse_ply(read_file(path), path.string());
 }
 
 std::vector<std::byte> encode_ply(const SplatModel& model) {

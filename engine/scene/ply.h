@@ -14,21 +14,23 @@
 
 namespace darb {
 
+/// What a file says besides its splats.
+struct PlyFacts {
+    std::size_t dropped = 0;         // splats with NaN or infinity
+    std::vector<std::string> notes;  // what was left out or is not as in 3DGS, a sentence each
+};
+
 /// Reads by property name: any order, any type, SH degree 0 to 4 (of which the last band is left
-/// out, see has_degree_4), normals ignored, other elements
-/// skipped; compressed PLY too (compressed_ply.h); ascii and binary of both byte orders. A splat
-/// with a NaN or infinite parameter is dropped, but for what infinite_values.h keeps; *dropped
-/// (where given) is their count. Without
-/// comments: gaussian, psi, default. Positions as set_positions has them. Throws Error naming the
-/// file, the record and the reason.
-SplatModel read_ply(const std::filesystem::path& path, std::size_t* dropped = nullptr);
+/// out), the dialects of ply_dialects.h, other elements skipped; compressed PLY too
+/// (compressed_ply.h); ascii and binary of both byte orders. A splat with a NaN or infinite
+/// parameter is dropped, but for what infinite_values.h keeps. Without comments: gaussian, psi,
+/// default. Positions as set_positions has them. Throws Error naming the file, the record and the
+/// reason.
+SplatModel read_ply(const std::filesystem::path& path);
 /// The same from memory; `where` stands for the file name in errors.
 /// progress as read_ply_rows takes it.
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
-                     std::size_t* dropped = nullptr, const ReadProgress& progress = {});
-
-/// 72 f_rest properties: harmonics of degree 4, one more than a model holds.
-bool has_degree_4(const PlyElement& vertex);
+                     PlyFacts* facts = nullptr, const ReadProgress& progress = {});
 
 /// Little-endian float32; x y z are double where float32 does not resolve them (origin_for_float32:
 /// scenes at map coordinates). A file that was read without recentring is written back bit-equal in

@@ -51,10 +51,11 @@ SplatModel load_ply(Bytes bytes, const std::string& where, SplatFile& file,
         throw Error(where, "is a point cloud: its vertices have no opacity, scale and rotation",
                     "darb train starts from it where it lies beside the cameras; a viewer shows it "
                     "as points.");
-    const PlyElement* vertex = header.find("vertex");
-    if (vertex && has_degree_4(*vertex))
-        file.notes.push_back("harmonics of degree 4 were left out");
-    return parse_ply(bytes, where, &file.dropped, progress);
+    PlyFacts facts;
+    SplatModel model = parse_ply(bytes, where, &facts, progress);
+    file.dropped = facts.dropped;
+    file.notes = facts.notes;
+    return model;
 }
 
 SplatModel load_spz(Bytes bytes, const std::string& where, SplatFile& file) {

@@ -21,8 +21,8 @@ std::span<const std::byte> bytes_of(const std::string& text) {
     return std::as_bytes(std::span(text.data(), text.size()));
 }
 
-SplatModel parse(const std::string& text, std::size_t* dropped = nullptr) {
-    return parse_ply(bytes_of(text), "test.ply", dropped);
+SplatModel parse(const std::string& text, PlyFacts* facts = nullptr) {
+    return parse_ply(bytes_of(text), "test.ply", facts);
 }
 
 std::string error_of(const std::string& text) {
@@ -108,11 +108,11 @@ TEST(Ply, ascii_is_read) {
 }
 
 TEST(Ply, ascii_numbers_beyond_double_are_infinite_and_those_below_it_0) {
-    std::size_t dropped = 0;
+    PlyFacts facts;
     const std::string row = " 2 3 .1 .2 .3 1e999 -5 -6 -7 1 0 0 0.5\n";
     const SplatModel model =
-        parse(ascii_file("3", "1e-999" + row + "-1e999" + row + "1e999" + row), &dropped);
-    EXPECT_EQ(dropped, 2u);
+        parse(ascii_file("3", "1e-999" + row + "-1e999" + row + "1e999" + row), &facts);
+    EXPECT_EQ(facts.dropped, 2u);
     ASSERT_EQ(model.size(), 1u);
     EXPECT_EQ(model.position[0], 0.f);
     EXPECT_EQ(model.opacity[0], OPACITY_LOGIT_LIMIT);
@@ -180,16 +180,15 @@ TEST(Ply, splats_with_nan_or_infinity_are_dropped_and_counted) {
     SplatModel model = random_model(1, 5);
     model.position[3] = std::numeric_limits<float>::quiet_NaN();
     model.sh_rest[3 * 9 + 4] = std::numeric_limits<float>::infinity();
-    std::size_t dropped = 0;
-    const SplatModel read = parse_ply(encode_ply(model), "memory", &dropped);
-    EXPECT_EQ(dropped, 2u);
+    PlyFacts facts;
+    const SplatModel read = parse_ply(encode_ply(model), "memory", &facts);
+    EXPECT_EQ(facts.dropped, 2u);
     ASSERT_EQ(read.size(), 3u);
     EXPECT_EQ(read.opacity,
               (std::vector<float>{model.opacity[0], model.opacity[2], model.opacity[4]}));
     EXPECT_EQ(read.sh_rest.size(), 27u);
-    std::size_t none = 9;
-    EXPECT_EQ(parse(ascii_file("1", "nan" + kAsciiRow.substr(1)), &none).size(), 0u);
-    EXPECT_EQ(none, 1u);
+    EXPECT_EQ(parse(ascii_file("1", "nan" + kAsciiRow.substr(1)), &facts).size(), 0u);
+    EXPECT_EQ(facts.dropped, 1u);
 }
 
 // PLYs expanded from formats with a byte of opacity hold the logit of 255, +inf.
@@ -198,14 +197,14 @@ TEST(Ply, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
     SplatModel model = random_model(0, 4);
     model.opacity = {kInfinity, -kInfinity, 1, std::numeric_limits<float>::quiet_NaN()};
     model.log_scale[7] = -kInfinity;
-    std::size_t dropped = 0;
-    const SplatModel read = parse_ply(encode_ply(model), "memory", &dropped);
-    EXPECT_EQ(dropped, 1u) << "NaN alone";
+    PlyFacts facts;
+    const SplatModel read = parse_ply(encode_ply(model), "memory", &facts);
+    EXPECT_EQ(facts.dropped, 1u) << "NaN alone";
     EXPECT_EQ(read.opacity, (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 1}));
     ASSERT_EQ(read.log_scale.size(), 9u);
     EXPECT_EQ(read.log_scale[7], -LOG_SCALE_LIMIT);
     model.log_scale[7] = kInfinity;
-    EXPECT_EQ(parse_ply(encode_ply(model), "memory", &dropped).size(), 2u);
+    EXPECT_EQ(parse_ply(encode_ply(model), "memory", &facts).size(), 2u);
 }
 
 TEST(Ply, truncated_anywhere_is_an_error_that_names_the_file) {
@@ -299,10 +298,10 @@ TEST(Ply, real_scenes_round_trip_bit_equal) {
         {"fixtures/minimal_formats/test-splat.3-points-from-train.ply", 3}};
     for (const auto& [name, count] : scenes) {
         const std::vector<std::byte> file = read_file(*folder / name);
-        std::size_t dropped = 0;
-        const SplatModel model = parse_ply(file, name, &dropped);
-        EXPECT_EQ(model.size() + dropped, count) << name;
-        EXPECT_EQ(dropped, 0u) << name;
+        PlyFacts facts;
+        const SplatModel model = parse_ply(file, name, &facts);
+        EXPECT_EQ(model.size() + facts.dropped, count) << name;
+        EXPECT_EQ(facts.dropped, 0u) << name;
         const std::vector<std::byte> again = encode_ply(model);
         expect_same(parse_ply(again, name), model);
         if (count == 3) continue;  // has normals

@@ -1,0 +1,151 @@
+#include "engine/scene/ply_dialects.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "engine/core/error.h"
+#include "engine/scene/quantise.h"
+#include "shaders/shared/limits.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::size_t kRestOfDegree3 = 45, kRestOfDegree4 = 72;
+constexpr std::size_t kMostNamed = 8;  // properties, in a note
+
+/// -1 where there is none of that name, or a list.
+int find_value(const PlyElement& vertex, std::string_view name) {
+    const int column = vertex.find(name);
+    return column < 0 || vertex.properties[static_cast<std::size_t>(column)].is_list ? -1 : column;
+}
+
+int need(const PlyElement& vertex, const std::string& name, const std::string& where) {
+    const int column = find_value(vertex, name);
+    if (column < 0)
+        throw Error(where, fmt::format("element vertex lacks the property {}", name),
+                    "A splat scene is needed, not a point cloud or mesh.");
+    return column;
+}
+
+bool has_colour_bytes(const PlyElement& vertex) {
+    return vertex.find("f_dc_0") < 0 &&
+           std::ranges::all_of(std::array{"red", "green", "blue"}, [&](const char* name) {
+               const int column = find_value(vertex, name);
+               return column >= 0 &&
+                      vertex.properties[static_cast<std::size_t>(column)].type == PlyType::uint8;
+           });
+}
+
+void find_harmonics(const PlyElement& vertex, const std::string& where, PlyColumns& columns) {
+    for (int i = 0; vertex.find(fmt::format("f_rest_{}", i)) >= 0; ++i)
+        columns.rest.push_back(need(vertex, fmt::format("f_rest_{}", i), where));
+    const std::size_t count = columns.rest.size();
+    if (count == kRestOfDegree4) {  // the last band of each channel is left out
+        std::vector<int> kept;
+        for (std::size_t i = 0; i < count; ++i)
+            if (i % (kRestOfDegree4 / 3) < kRestOfDegree3 / 3) kept.push_back(columns.rest[i]);
+        columns.rest = std::move(kept);
+        columns.notes.emplace_back("harmonics of degree 4 were left out");
+    } else if (count != 0 && count != 9 && count != 24 && count != kRestOfDegree3) {
+        throw Error(
+            where,
+            fmt::format("has {} f_rest properties; SH degree 0 to 4 has 0, 9, 24, 45, 72", count),
+            "Export the scene again with whole bands.");
+    }
+}
+
+/// Names; harmonics have a note of their own.
+std::vector<std::string> unread_properties(const PlyElement& vertex, const PlyColumns& columns) {
+    std::vector<int> read = columns.normal;
+    read.insert(read.end(), {columns.opacity, columns.filter});
+    for (const auto& of : {columns.position, columns.dc, columns.scale})
+        read.insert(read.end(), of.begin(), of.end());
+    read.insert(read.end(), columns.rotation.begin(), columns.rotation.end());
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < vertex.properties.size(); ++i)
+        if (const std::string& name = vertex.properties[i].name;
+            std::ranges::count(read, static_cast<int>(i)) == 0 && !name.starts_with("f_rest_"))
+            names.push_back(name);
+    return names;
+}
+
+/// ln sqrt(s^2 + f^2), without overflow.
+double log_of_blurred(double log_scale, double filter) {
+    const double a = 2 * log_scale, b = 2 * std::log(std::abs(filter));
+    return (std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)))) / 2;
+}
+
+/// As Mip-Splatting draws: s'^2 = s^2 + f^2, opacity' = opacity * product of s / s'.
+void apply_filter(const PlyColumns& columns, double* row) {
+    double shrink = 0;  // -ln of the product
+    for (const int column : columns.scale) {
+        const double log_scale = limit_infinite_log_scale(static_cast<float>(row[column]));
+        row[column] = log_of_blurred(log_scale, row[columns.filter]);
+        shrink += row[column] - log_scale;
+    }
+    double& logit = row[columns.opacity];
+    logit = -shrink - std::log(std::exp(-logit) - std::expm1(-shrink));
+}
+
+}  // namespace
+
+PlyColumns find_ply_columns(const PlyElement& vertex, const std::string& where) {
+    PlyColumns columns;
+    columns.count = vertex.properties.size();
+    columns.dc_is_byte = has_colour_bytes(vertex);
+    const char* const colours[] = {"red", "green", "blue"};
+    for (int i = 0; i < 3; ++i) {
+        columns.position[i] = need(vertex, std::string(1, "xyz"[i]), where);
+        columns.dc[i] =
+            need(vertex, columns.dc_is_byte ? colours[i] : fmt::format("f_dc_{}", i), where);
+        if (const int normal = find_value(vertex, fmt::format("n{}", "xyz"[i])); normal >= 0)
+            columns.normal.push_back(normal);
+    }
+    for (int i = 0; i < 4; ++i) columns.rotation[i] = need(vertex, fmt::format("rot_{}", i), where);
+    columns.opacity = need(vertex, "opacity", where);
+    for (int i = 0; i < 2; ++i) columns.scale[i] = need(vertex, fmt::format("scale_{}", i), where);
+    if (vertex.find("scale_2") < 0) {
+        columns.scale[2] = static_cast<int>(columns.count);
+        columns.notes.emplace_back("has no scale_2, as scenes of 2DGS: splats have no thickness");
+    } else {
+        columns.scale[2] = need(vertex, "scale_2", where);
+    }
+    columns.filter = find_value(vertex, "filter_3D");
+    if (columns.filter >= 0)
+        columns.notes.emplace_back("filter_3D (Mip-Splatting) is now part of scales and opacities");
+    find_harmonics(vertex, where, columns);
+    columns.unread = unread_properties(vertex, columns);
+    return columns;
+}
+
+std::vector<std::string> ply_notes(const PlyColumns& columns, bool has_normals) {
+    std::vector<std::string> notes = columns.notes, names = columns.unread;
+    if (has_normals) names.insert(names.begin(), "normals");
+    if (names.empty()) return notes;
+    const std::size_t named = std::min(names.size(), kMostNamed);
+    notes.push_back(fmt::format(
+        "left out, as nothing here uses them: {}{}",
+        fmt::join(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(named), ", "),
+        names.size() > named ? fmt::format(" and {} others", names.size() - named) : ""));
+    return notes;
+}
+
+const double* translate_row(const PlyColumns& columns, const double* values,
+                            std::vector<double>& row) {
+    const bool as_3dgs = columns.scale[2] < static_cast<int>(columns.count);
+    if (as_3dgs && !columns.dc_is_byte && columns.filter < 0) return values;
+    row.assign(values, values + columns.count);
+    row.push_back(-LOG_SCALE_LIMIT);  // of the axis that the file may lack
+    double* at = row.data();
+    if (columns.dc_is_byte)
+        for (const int column : columns.dc) at[column] = dc_of_colour(at[column] / 255);
+    if (columns.filter >= 0) apply_filter(columns, at);
+    return at;
+}
+
+}  // namespace darb
