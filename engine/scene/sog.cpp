@@ -167,6 +167,11 @@ void check_version(const json& meta, const std::string& where) {
                     "Convert it with PlayCanvas's splat-transform first.");
 }
 
+/// By the format, or as splat-transform tags it.
+bool is_antialiased(const json& meta) {
+    return meta.value("antialias", json()) == true || meta.value("model", json()) == "antialiased";
+}
+
 SplatModel decode(const json& meta, const SogPart& part, const std::string& where,
                   std::size_t stored, SogFacts* facts) {
     check_version(meta, where);
@@ -178,7 +183,7 @@ SplatModel decode(const json& meta, const SogPart& part, const std::string& wher
         throw Error(where + ", meta.json", fmt::format("declares {} splats", scene.count),
                     kCopyAgain);
     check_expansion(stored, scene.count * kSplatBytes, where);
-    scene.model.antialias = meta.value("antialias", false);
+    scene.model.antialias = is_antialiased(meta);
     scene.model.resize(scene.count);
     if (scene.count > 0) {
         read_means(scene);

@@ -61,10 +61,27 @@ std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::
     return bytes;
 }
 
+/// Of a scene that has to be unpacked first; empty where there is none.
+std::string packed_scene(zip_t* archive) {
+    for (zip_int64_t i = 0; i < zip_get_num_entries(archive, 0); ++i)
+        if (const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0))
+            for (const char* extension : {".ply", ".splat", ".spz"})
+                if (has_extension(name, extension)) return name;
+    return {};
+}
+
 }  // namespace
 
 SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where) {
-    return [archive = open_archive(zip, where), size = zip.size(), where](const std::string& name) {
+    const std::shared_ptr<zip_t> archive = open_archive(zip, where);
+    if (zip_name_locate(archive.get(), "meta.json", 0) < 0) {
+        const std::string scene = packed_scene(archive.get());
+        throw Error(where,
+                    "is a zip and no SOG scene: it has no meta.json" +
+                        (scene.empty() ? "" : ", and holds " + scene),
+                    scene.empty() ? "Name a splat file." : "Unpack it and name that file.");
+    }
+    return [archive, size = zip.size(), where](const std::string& name) {
         return read_entry(archive.get(), name, size, where);
     };
 }

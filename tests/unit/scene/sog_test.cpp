@@ -135,6 +135,31 @@ TEST(Sog, without_harmonics_the_degree_is_0) {
     EXPECT_EQ(kRead(zip_of(sample_parts(meta))).size(), 0u);
 }
 
+TEST(Sog, anti_aliasing_goes_by_either_name) {
+    const auto antialias = [](const char* key, const json& value) {
+        json meta = sample_meta();
+        meta.erase("antialias");
+        meta[key] = value;
+        return kRead(zip_of(sample_parts(meta))).antialias;
+    };
+    EXPECT_TRUE(antialias("model", "antialiased"));
+    EXPECT_FALSE(antialias("model", "default"));
+    EXPECT_FALSE(antialias("model", nullptr));
+    EXPECT_FALSE(antialias("antialias", nullptr));
+    EXPECT_FALSE(antialias("antialias", false));
+}
+
+TEST(Sog, a_zip_of_something_else_is_named_as_such) {
+    Parts parts;
+    append_text("text", parts["readme.txt"]);
+    std::string error = error_of([&] { kRead(zip_of(parts)); });
+    EXPECT_NE(error.find("no SOG scene"), std::string::npos) << error;
+    append_text("ply", parts["scene/point_cloud.ply"]);
+    error = error_of([&] { kRead(zip_of(parts)); });
+    EXPECT_NE(error.find("holds scene/point_cloud.ply"), std::string::npos) << error;
+    EXPECT_NE(error.find("Unpack it"), std::string::npos) << error;
+}
+
 TEST(Sog, null_in_a_codebook_drops_the_splats_that_use_it_alone) {
     json meta = sample_meta();
     meta["scales"]["codebook"][1] = nullptr;  // the second splat's
