@@ -88,7 +88,7 @@ std::vector<std::byte> encode_dot_splat(const SplatModel& model) {
                                         double{q[2]} * q[2] + double{q[3]} * q[3]);
         for (std::size_t k = 0; k < 3; ++k) {
             const float values[2] = {static_cast<float>(p[static_cast<int>(k)]),
-                                     std::exp(model.log_scale[3 * i + k])};
+                                     std::exp(drawn_log_scale(model.log_scale[3 * i + k]))};
             std::memcpy(record + 4 * k, &values[0], 4);
             std::memcpy(record + 12 + 4 * k, &values[1], 4);
             record[24 + k] = std::byte{nearest_byte(255 * colour_of_dc(model.sh_dc[3 * i + k]))};

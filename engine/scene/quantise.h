@@ -29,6 +29,12 @@ inline std::uint8_t byte_of_logit(double logit) {
     return nearest_byte(255 / (1 + std::exp(-logit)));
 }
 
+/// As the passes clamp it.
+inline float drawn_log_scale(float log_scale) {
+    constexpr auto kMost = static_cast<float>(LOG_SCALE_LIMIT);
+    return std::clamp(log_scale, -kMost, kMost);
+}
+
 /// Colour in [0, 1] of a dc coefficient.
 inline double colour_of_dc(double dc) {
     return 0.5 + kShBand0 * dc;

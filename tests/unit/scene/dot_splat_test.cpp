@@ -62,6 +62,14 @@ TEST(DotSplat, splats_without_sense_are_dropped_and_counted) {
     EXPECT_EQ(model.position[3], 7.f);
 }
 
+TEST(DotSplat, scales_beyond_what_is_drawn_are_written_as_drawn) {
+    SplatModel model = sample_model(0, 2);
+    model.log_scale[0] = 100;
+    const SplatModel read = kRead(encode_dot_splat(model));
+    ASSERT_EQ(read.size(), 2u);
+    EXPECT_NEAR(read.log_scale[0], 20, 1e-5);
+}
+
 TEST(DotSplat, lengths_that_32_does_not_divide_are_refused) {
     const FileBytes file = encode_dot_splat(sample_model(0, 3));
     for (size_t length = 0; length <= file.size(); ++length) {
