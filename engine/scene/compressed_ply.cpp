@@ -2,13 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <numbers>
-#include <numeric>
 
 #include "engine/core/error.h"
+#include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply_comments.h"
 #include "engine/scene/quantise.h"
@@ -106,6 +108,7 @@ float sh_of_byte(double byte) {
 void read_sh(std::span<const std::byte> file, const PlyHeader& header, const PlyElement& sh,
              const std::string& where, SplatModel& model) {
     const std::size_t rest = sh.properties.size(), per_channel = rest / 3;
+    if (rest == 0) return;  // gsplat's degree 0
     if (rest != 9 && rest != 24 && rest != 45)
         throw Error(where,
                     fmt::format("element sh has {} properties; degree 1, 2, 3 has 9, 24, 45", rest),
@@ -140,8 +143,7 @@ std::array<float, 9> bounded_numbers(const SplatModel& model, std::size_t i) {
     std::array<float, 9> values{};
     for (std::size_t a = 0; a < 3; ++a) {
         values[a] = static_cast<float>(p[static_cast<int>(a)]);
-        values[3 + a] = std::clamp(model.log_scale[3 * i + a], -static_cast<float>(LOG_SCALE_LIMIT),
-                                   static_cast<float>(LOG_SCALE_LIMIT));
+        values[3 + a] = drawn_log_scale(model.log_scale[3 * i + a]);
         values[6 + a] = static_cast<float>(colour_of_dc(model.sh_dc[3 * i + a]));
     }
     return values;
@@ -167,27 +169,6 @@ std::array<std::uint32_t, 4> pack_splat(const SplatModel& model, std::size_t i,
         part(6, 8) << 24 | part(7, 8) << 16 | part(8, 8) << 8 | byte_of_logit(model.opacity[i])};
 }
 
-/// 10 bits of each axis, interleaved.
-std::vector<std::uint32_t> morton_order(const SplatModel& model) {
-    glm::dvec3 low(1e300), high(-1e300);
-    for (std::size_t i = 0; i < model.size(); ++i) {
-        low = glm::min(low, position_of(model, i));
-        high = glm::max(high, position_of(model, i));
-    }
-    std::vector<std::uint32_t> codes(model.size()), order(model.size());
-    for (std::size_t i = 0; i < model.size(); ++i) {
-        const glm::dvec3 p = position_of(model, i);
-        for (int axis = 0; axis < 3; ++axis) {
-            const std::uint32_t unit = to_unit(p[axis], low[axis], high[axis], 10);
-            for (int bit = 0; bit < 10; ++bit) codes[i] |= ((unit >> bit) & 1u) << (3 * bit + axis);
-        }
-    }
-    std::iota(order.begin(), order.end(), 0u);
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return codes[a] < codes[b]; });
-    return order;
-}
-
 Chunk bounds_of(const SplatModel& model, std::span<const std::uint32_t> splats) {
     Chunk chunk;
     chunk.low = chunk.high = bounded_numbers(model, splats[0]);
@@ -199,6 +180,28 @@ Chunk bounds_of(const SplatModel& model, std::span<const std::uint32_t> splats) 
         }
     }
     return chunk;
+}
+
+using UseChunk = std::function<void(std::span<const std::uint32_t> splats, const Chunk& chunk)>;
+
+void for_each_chunk(const SplatModel& model, std::span<const std::uint32_t> order,
+                    const UseChunk& use) {
+    for (std::size_t begin = 0; begin < order.size(); begin += kChunk) {
+        const auto splats = order.subspan(begin, std::min(kChunk, order.size() - begin));
+        use(splats, bounds_of(model, splats));
+    }
+}
+
+/// How far the rounding within its chunk moves a splat, world.
+double shift_of(const SplatModel& model, std::size_t i, const Chunk& chunk) {
+    const std::array<float, 9> values = bounded_numbers(model, i);
+    const auto unit = unpack_11_10_11(pack_splat(model, i, chunk)[0]);
+    double square = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const double off = chunk.low[a] * (1 - unit[a]) + chunk.high[a] * unit[a] - values[a];
+        square += off * off;
+    }
+    return std::sqrt(square);
 }
 
 std::string make_header(const SplatModel& model) {
@@ -263,21 +266,45 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
     return model;
 }
 
+std::vector<std::string> compressed_ply_losses(const SplatModel& model) {
+    std::vector<std::string> losses;
+    if (const std::size_t count = count_outside(model.sh_rest, -4, 4); count > 0)
+        losses.push_back(
+            fmt::format("{} coefficients of harmonics outside -4 to 4 are cut to it", count));
+    std::size_t count = 0;
+    double farthest = 0;
+    for_each_chunk(model, chunk_order(model, kChunk),
+                   [&](std::span<const std::uint32_t> splats, const Chunk& chunk) {
+                       for (const std::uint32_t i : splats) {
+                           const double shift = shift_of(model, i, chunk);
+                           const float* s = &model.log_scale[3 * std::size_t{i}];
+                           if (shift <= std::exp(drawn_log_scale(std::max({s[0], s[1], s[2]}))))
+                               continue;
+                           ++count;
+                           farthest = std::max(farthest, shift);
+                       }
+                   });
+    if (count > 0)
+        losses.push_back(
+            fmt::format("{} splats move by more than their own size, by up to {:.3g}, as {} share "
+                        "the bounds of "
+                        "their positions: --crop leaves out what lies far off",
+                        count, farthest, kChunk));
+    return losses;
+}
+
 std::vector<std::byte> encode_compressed_ply(const SplatModel& model) {
     check_splat_shapes(model);
-    const std::vector<std::uint32_t> order = morton_order(model);
+    const std::vector<std::uint32_t> order = chunk_order(model, kChunk);
     const std::string header = make_header(model);
     const auto text = std::as_bytes(std::span(header.data(), header.size()));
     std::vector<std::byte> file(text.begin(), text.end()), packed;
-    for (std::size_t begin = 0; begin < order.size(); begin += kChunk) {
-        const std::span<const std::uint32_t> splats(order.data() + begin,
-                                                    std::min(kChunk, order.size() - begin));
-        const Chunk chunk = bounds_of(model, splats);
+    for_each_chunk(model, order, [&](std::span<const std::uint32_t> splats, const Chunk& chunk) {
         for (std::size_t first = 0; first < 9; first += 3)
             for (const std::array<float, 9>* end : {&chunk.low, &chunk.high})
                 for (std::size_t i = first; i < first + 3; ++i) append((*end)[i], file);
         for (const std::uint32_t i : splats) append(pack_splat(model, i, chunk), packed);
-    }
+    });
     const auto rest = static_cast<std::size_t>(model.rest_count());
     for (const std::uint32_t i : order)
         for (std::size_t c = 0; c < rest; ++c) {

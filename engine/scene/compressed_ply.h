@@ -25,10 +25,14 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
                                 const std::string& where, PlyFacts* facts,
                                 const ReadProgress& progress = {});
 
-/// Splats in Morton order, so that those of a chunk lie close together. Per chunk, the error of a
-/// position is at most its size / 4094 (y: 2046), of a log scale the range / 4094 (2046), of a
-/// colour the range / 510, of opacity 1/510, of a quaternion's component 7e-4, of a harmonic 1/32
-/// within [-4, 4], beyond which it is cut. Comments keep kernel, footprint and render mode.
+/// Splats that lie close together share a chunk, whatever lies far off. Per
+/// chunk, the error of a position is at most its size / 4094 (y: 2046), of a log scale the range /
+/// 4094 (2046), of a colour the range / 510, of opacity 1/510, of a quaternion's component 7e-4, of
+/// a harmonic 1/32 within [-4, 4], beyond which it is cut. Comments keep kernel, footprint and
+/// render mode.
 std::vector<std::byte> encode_compressed_ply(const SplatModel& model);
+/// Harmonics that are cut, and splats that move by more than their largest standard deviation; a
+/// sentence each. As long as encode_compressed_ply takes.
+std::vector<std::string> compressed_ply_losses(const SplatModel& model);
 
 }  // namespace darb

@@ -51,14 +51,6 @@ void store_splat(const double* values, const PlyColumns& columns, std::size_t at
     }
 }
 
-bool needs_double(const SplatModel& model) {
-    if (model.origin == glm::dvec3(0.0)) return false;
-    std::vector<double> positions(model.position.begin(), model.position.end());
-    for (std::size_t i = 0; i < positions.size(); ++i)
-        positions[i] += model.origin[static_cast<int>(i % 3)];
-    return origin_for_float32(positions) != glm::dvec3(0.0);
-}
-
 std::string make_header(const SplatModel& model, bool double_positions) {
     std::string text = fmt::format("ply\nformat binary_little_endian 1.0\n{}element vertex {}\n",
                                    ply_comments(model), model.size());
@@ -124,9 +116,17 @@ SplatModel read_ply(const std::filesystem::path& path) {
     return parse_ply(read_file(path), path.string());
 }
 
+bool needs_double_positions(const SplatModel& model) {
+    if (model.origin == glm::dvec3(0.0)) return false;
+    std::vector<double> positions(model.position.begin(), model.position.end());
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        positions[i] += model.origin[static_cast<int>(i % 3)];
+    return origin_for_float32(positions) != glm::dvec3(0.0);
+}
+
 std::vector<std::byte> encode_ply(const SplatModel& model) {
     check_splat_shapes(model);
-    const bool doubles = needs_double(model);
+    const bool doubles = needs_double_positions(model);
     const std::string header = make_header(model, doubles);
     const std::size_t rest = static_cast<std::size_t>(model.rest_count()), per_channel = rest / 3;
     const std::size_t row = 3 * (doubles ? 8 : 4) + (3 + 3 + rest + 8) * 4;

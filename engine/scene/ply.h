@@ -32,9 +32,10 @@ SplatModel read_ply(const std::filesystem::path& path);
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
                      PlyFacts* facts = nullptr, const ReadProgress& progress = {});
 
-/// Little-endian float32; x y z are double where float32 does not resolve them (origin_for_float32:
-/// scenes at map coordinates). A file that was read without recentring is written back bit-equal in
-/// its values.
+/// Whether float32 does not resolve them (origin_for_float32: scenes at map coordinates).
+bool needs_double_positions(const SplatModel& model);
+/// Little-endian float32, x y z double where needed. A file that was read without recentring is
+/// written back bit-equal in its values.
 void write_ply(const std::filesystem::path& path, const SplatModel& model);
 std::vector<std::byte> encode_ply(const SplatModel& model);
 

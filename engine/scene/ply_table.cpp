@@ -283,6 +283,7 @@ void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
                     const PlyElement& element, const std::string& where) {
     std::uint64_t left = file.size() - header.data_begin;
     for (const PlyElement& candidate : header.elements) {
+        if (candidate.properties.empty() && &candidate != &element) continue;
         const std::uint64_t row = least_row_bytes(candidate, header.format);
         // The last ascii row may lack its line break.
         const std::uint64_t slack = header.format == PlyFormat::ascii ? 1 : 0;
@@ -303,6 +304,7 @@ void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
     check_ply_size(file, header, element, where);
     RowReader reader(file, header, where);
     for (const PlyElement& candidate : header.elements) {
+        if (candidate.properties.empty()) continue;  // of any number of rows
         std::vector<double> values(candidate.properties.size());
         const bool wanted = &candidate == &element;
         for (std::size_t i = 0; i < candidate.count; ++i) {

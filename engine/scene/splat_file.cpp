@@ -145,6 +145,9 @@ SplatModel parse_splats(Bytes bytes, const std::string& where, SplatFile* file,
     if (looks_like_zip(bytes)) return load_sog(bytes, where, facts);
     if (lower(where).ends_with(".splat") || looks_like_dot_splat(bytes))
         return load_dot_splat(bytes, where, facts);
+    if (fs::path(where).filename() == "lod-meta.json")
+        throw Error(where, "describes a streamed SOG scene, in levels of detail, which is not read",
+                    "Name the folder of one of its parts, which has a meta.json.");
     throw Error(
         where,
         bytes.empty() ? "is empty" : "is no splat file: no PLY, compressed PLY, .splat, SPZ or SOG",
@@ -170,9 +173,17 @@ std::optional<SplatFormat> format_to_write(const fs::path& path) {
     return std::nullopt;
 }
 
-std::vector<std::string> losses_of(SplatFormat format, const SplatModel& scene) {
+std::vector<std::string> losses_of(SplatFormat format, const SplatModel& scene,
+                                   const std::string& where) {
     std::vector<std::string> losses;
-    if (format == SplatFormat::ply) return losses;
+    if (format == SplatFormat::ply) {
+        if (const glm::dvec3 to_0 = 0.0 - scene.origin; needs_double_positions(scene))
+            losses.push_back(fmt::format(
+                "positions are written as double, which few other programs read, as float32 does "
+                "not resolve them: --translate {},{},{} brings the scene to 0",
+                to_0.x, to_0.y, to_0.z));
+        return losses;
+    }
     SplatModel model = scene;
     if (const std::size_t count = drop_unwritable(format, model); count > 0)
         losses.push_back(
@@ -197,17 +208,14 @@ std::vector<std::string> losses_of(SplatFormat format, const SplatModel& scene) 
             count > 0)
             losses.push_back(fmt::format("{} colours outside 0 to 1 are cut to it", count));
     }
-    if (format == SplatFormat::compressed_ply)
-        if (const std::size_t count = count_outside(model.sh_rest, -4, 4); count > 0)
-            losses.push_back(
-                fmt::format("{} coefficients of harmonics outside -4 to 4 are cut to it", count));
-    if (format == SplatFormat::spz) {
-        const std::vector<std::string> cut = spz_losses(model);
-        losses.insert(losses.end(), cut.begin(), cut.end());
-    } else if (model.origin != glm::dvec3(0.0)) {
+    const std::vector<std::string> cut = format == SplatFormat::spz ? spz_losses(model, where)
+                                         : format == SplatFormat::compressed_ply
+                                             ? compressed_ply_losses(model)
+                                             : std::vector<std::string>{};
+    losses.insert(losses.end(), cut.begin(), cut.end());
+    if (format != SplatFormat::spz && model.origin != glm::dvec3(0.0))
         losses.push_back(
             fmt::format("{} has no place for double positions: they are rounded to float32", name));
-    }
     return losses;
 }
 
@@ -217,18 +225,19 @@ std::size_t drop_unwritable(SplatFormat format, SplatModel& model) {
            keep_splats([&](std::size_t i) { return has_rotation(model, i); }, model);
 }
 
-std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model) {
+std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model,
+                                     const std::string& where) {
     DARB_CHECK(format != SplatFormat::sog);
     if (format == SplatFormat::ply) return encode_ply(model);
     SplatModel kept = model;
     drop_unwritable(format, kept);
     if (format == SplatFormat::compressed_ply) return encode_compressed_ply(kept);
     if (format == SplatFormat::dot_splat) return encode_dot_splat(kept);
-    return encode_spz(kept);
+    return encode_spz(kept, where);
 }
 
 void save_splats(const fs::path& path, SplatFormat format, const SplatModel& model) {
-    write_file_atomic(path, encode_splats(format, model));
+    write_file_atomic(path, encode_splats(format, model, path.string()));
 }
 
 }  // namespace darb

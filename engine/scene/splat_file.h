@@ -46,13 +46,16 @@ bool is_point_cloud(std::span<const std::byte> bytes);
 
 /// What a name asks for when writing: .compressed.ply, .ply, .splat, .spz; nothing for others.
 std::optional<SplatFormat> format_to_write(const std::filesystem::path& path);
-/// What of this scene the format has no place for, a sentence each. Throws as encode_splats does.
-std::vector<std::string> losses_of(SplatFormat format, const SplatModel& model);
+/// What of this scene the format has no place for, and what of it other programs may not read, a
+/// sentence each. Throws as encode_splats does.
+std::vector<std::string> losses_of(SplatFormat format, const SplatModel& model,
+                                   const std::string& where = "scene");
 /// Drops what is left out of all formats but PLY: splats with NaN or infinity, and those without a
 /// rotation, which are not drawn, and would be where a file holds no other length than 1.
 std::size_t drop_unwritable(SplatFormat format, SplatModel& model);
-/// All but sog, after drop_unwritable.
-std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model);
+/// All but sog, after drop_unwritable. `where` stands for the file name in errors.
+std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model,
+                                     const std::string& where = "scene");
 /// Through write_file_atomic.
 void save_splats(const std::filesystem::path& path, SplatFormat format, const SplatModel& model);
 

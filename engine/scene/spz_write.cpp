@@ -42,13 +42,13 @@ double largest_coordinate(const SplatModel& model) {
     return largest;
 }
 
-int choose_fractional_bits(const SplatModel& model) {
+int choose_fractional_bits(const SplatModel& model, const std::string& where) {
     const double largest = largest_coordinate(model);
     if (largest == 0) return kUsualBits;
     const int exponent = std::ilogb(largest);  // 2^exponent <= largest < 2^(exponent + 1)
     const int fitting = kSteps - 1 - exponent;
     if (fitting < 0)
-        throw Error("SPZ", fmt::format("positions reach {:g}, beyond 24 bits", largest),
+        throw Error(where, fmt::format("positions reach {:g}, beyond the 24 bits of SPZ", largest),
                     "Move the scene to the origin with --translate, or write a PLY.");
     return std::min({fitting, std::max(kUsualBits, kLeastSteps - exponent), kSteps});
 }
@@ -99,7 +99,7 @@ std::array<Stream, 6> pack(const SplatModel& model, int fractional_bits) {
 
 }  // namespace
 
-std::vector<std::string> spz_losses(const SplatModel& model) {
+std::vector<std::string> spz_losses(const SplatModel& model, const std::string& where) {
     std::vector<std::string> losses;
     if (const std::size_t count = count_outside(model.log_scale, kLeastLogScale - kHalfLogScale,
                                                 kMostLogScale + kHalfLogScale);
@@ -121,7 +121,7 @@ std::vector<std::string> spz_losses(const SplatModel& model) {
         losses.push_back(
             fmt::format("{} coefficients of harmonics outside {} to {:.2f} are cut to it", count,
                         kLeastHarmonic, kMostHarmonic));
-    if (const int bits = choose_fractional_bits(model); bits < kUsualBits)
+    if (const int bits = choose_fractional_bits(model, where); bits < kUsualBits)
         losses.push_back(fmt::format(
             "positions reach {:g}: all are rounded to steps of {:g}; --crop leaves out what lies "
             "far off",
@@ -129,11 +129,11 @@ std::vector<std::string> spz_losses(const SplatModel& model) {
     return losses;
 }
 
-std::vector<std::byte> encode_spz(const SplatModel& scene) {
+std::vector<std::byte> encode_spz(const SplatModel& scene, const std::string& where) {
     check_splat_shapes(scene);
     SplatModel model = scene;
     transform_splats({1, kToRightUpBack, glm::dvec3(0.0)}, model);
-    const int fractional_bits = choose_fractional_bits(model);
+    const int fractional_bits = choose_fractional_bits(model, where);
     Stream toc, packed;
     std::uint8_t streams = 0;
     for (const Stream& stream : pack(model, fractional_bits)) {

@@ -1,5 +1,9 @@
 #include "engine/scene/compressed_ply.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply.h"
 #include "tests/support/splat_files.h"
@@ -77,6 +81,26 @@ TEST(CompressedPly, without_bounds_of_colour_they_are_0_to_1) {
     EXPECT_NEAR(model.sh_dc[0], 0.5 / 0.28209479, 1e-5);
 }
 
+// gsplat writes the element at degree 0, too.
+TEST(CompressedPly, harmonics_without_properties_are_degree_0) {
+    const FileBytes file = one_splat(true, false);
+    const std::string text(reinterpret_cast<const char*>(file.data()), file.size());
+    for (const char* before : {"end_header", "element vertex"})
+        for (const char* count : {"1", "18446744073709551615"}) {
+            std::string changed = text;
+            changed.insert(changed.find(before), fmt::format("element sh {}\n", count));
+            FileBytes bytes;
+            append_text(changed, bytes);
+            EXPECT_EQ(error_of([&] {
+                          const SplatModel model = kRead(bytes);
+                          EXPECT_EQ(model.sh_degree, 0);
+                          EXPECT_EQ(model.position[0], 1.f);
+                      }),
+                      "no error")
+                << before << " " << count;
+        }
+}
+
 /// The splat of `written` nearest to each of `model`.
 size_t nearest(const SplatModel& model, size_t i, const SplatModel& written) {
     size_t best = 0;
@@ -137,6 +161,36 @@ TEST(CompressedPly, no_splats_and_equal_splats_round_trip) {
         values->insert(values->end(), values->begin(), values->end());
     const SplatModel read = kRead(encode_compressed_ply(model));
     EXPECT_EQ(read.position, model.position);  // the bounds are exact
+}
+
+/// Median distance of the splats to those that are read back.
+double median_shift(const SplatModel& model) {
+    const SplatModel read = kRead(encode_compressed_ply(model));
+    std::vector<double> shifts;
+    for (size_t i = 0; i < model.size(); ++i)
+        shifts.push_back(
+            glm::distance(position_of(model, i), position_of(read, nearest(model, i, read))));
+    std::nth_element(shifts.begin(), shifts.begin() + shifts.size() / 2, shifts.end());
+    return shifts[shifts.size() / 2];
+}
+
+TEST(CompressedPly, splats_far_off_coarsen_their_own_chunks_alone) {
+    SplatModel model = sample_model(0, 5000);
+    const double alone = median_shift(model);
+    for (size_t i = 0; i < 3; ++i) model.position[4 * i] = i == 1 ? -1e9f : 1e6f;  // each axis
+    EXPECT_LT(median_shift(model), 1.2 * alone);
+}
+
+TEST(CompressedPly, splats_that_move_by_more_than_their_size_are_counted) {
+    SplatModel model = sample_model(0, 2000);
+    EXPECT_TRUE(compressed_ply_losses(model).empty());
+    model.position[0] = 1e6f;
+    const std::vector<std::string> losses = compressed_ply_losses(model);
+    ASSERT_EQ(losses.size(), 1u);
+    const auto moved = std::stoul(losses[0]);
+    EXPECT_GT(moved, 20u) << losses[0];
+    EXPECT_LT(moved, 256u) << losses[0];
+    EXPECT_NE(losses[0].find("--crop"), std::string::npos) << losses[0];
 }
 
 TEST(CompressedPly, truncated_or_damaged_is_an_error) {

@@ -44,6 +44,13 @@ TEST(SplatFile, other_content_is_refused_by_name) {
               std::string::npos);
 }
 
+TEST(SplatFile, streamed_sog_is_refused_by_name) {
+    FileBytes bytes;
+    append_text(R"({"lodLevels": 2, "filenames": ["0_0/meta.json"]})", bytes);
+    EXPECT_NE(error_of([&] { parse_splats(bytes, "x/lod-meta.json"); }).find("streamed SOG"),
+              std::string::npos);
+}
+
 TEST(SplatFile, a_point_cloud_is_named_as_one) {
     const std::string text =
         "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
@@ -138,6 +145,25 @@ TEST(SplatFile, what_lies_outside_the_ranges_of_spz_is_counted) {
          "lies far off")};
     ASSERT_EQ(losses.size(), std::size(expected));
     for (size_t i = 0; i < losses.size(); ++i) EXPECT_EQ(losses[i], expected[i]);
+}
+
+TEST(SplatFile, double_positions_of_a_ply_are_said_with_a_remedy) {
+    SplatModel model = sample_model(0, 5);
+    model.origin = {450012, 0, -5000012};
+    const std::vector<std::string> losses = losses_of(SplatFormat::ply, model);
+    ASSERT_EQ(losses.size(), 1u);
+    EXPECT_NE(losses[0].find("double"), std::string::npos) << losses[0];
+    EXPECT_NE(losses[0].find("--translate -450012,0,5000012"), std::string::npos) << losses[0];
+}
+
+TEST(SplatFile, positions_beyond_spz_name_the_file) {
+    SplatModel model = sample_model(0, 2);
+    model.position[0] = 1e9f;
+    const fs::path path = fs::path(testing::TempDir()) / "far.spz";
+    for (const std::string& error :
+         {error_of([&] { save_splats(path, SplatFormat::spz, model); }),
+          error_of([&] { losses_of(SplatFormat::spz, model, path.string()); })})
+        EXPECT_EQ(error.find(path.string() + ": positions reach 1e+09"), 0u) << error;
 }
 
 constexpr SplatFormat kQuantised[] = {SplatFormat::compressed_ply, SplatFormat::dot_splat,
