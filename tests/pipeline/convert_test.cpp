@@ -1,10 +1,14 @@
 // darb convert and darb info on scenes of every format: what is written, what is said, and pictures
 // of the same object in two formats.
 
+#include <sys/stat.h>
+
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <thread>
 
+#include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
 #include "engine/data/point_cloud_ply.h"
 #include "engine/data/point_splats.h"
@@ -154,6 +158,59 @@ TEST(Convert, bad_options_are_refused) {
                     {"convert " + ply + to + "--kernel sinc", "--kernel"},
                     {"convert " + ply + to + "--prune-opacity 2", "--prune-opacity"}});
     EXPECT_FALSE(fs::exists(out("x.ply")));
+}
+
+TEST(Convert, what_is_read_is_not_written_over) {
+    const std::string run = out("run"), inner = run + "/point_cloud/iteration_7/point_cloud.ply",
+                      ply = scene_file("kept.ply", sample_model(0, 3)), sog = out("sog"),
+                      data = out("data"), photo = data + "/a.png";
+    save_splats(inner, SplatFormat::ply, sample_model(0, 3));
+    ImageU8 picture;
+    picture.width = picture.height = 8;
+    picture.channels = 3;
+    picture.data.resize(8 * 8 * 3);
+    write_png(photo, picture);
+    write_file_atomic(data + "/transforms.json",
+                      R"({"camera_angle_x": 0.7, "frames": [{"file_path": "a.png",
+                      "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]}]})");
+    std::map<std::string, std::vector<std::byte>> before;
+    for (const std::string& file : {inner, ply, sog + "/meta.json", sog + "/a.webp", photo}) {
+        if (!fs::exists(file)) write_file_atomic(file, "{}");
+        before[file] = read_file(file);
+    }
+    fs::create_symlink(ply, out("link.ply"));
+    const auto over = [](const std::string& command) {
+        return BadCommand{command, "is what is read"};
+    };
+    expect_refused(
+        {over("convert " + run + " " + inner + " --scale 2"),
+         over("convert " + out("link.ply") + " " + ply), over("info " + ply + " --json " + ply),
+         over("info " + run + " --json " + inner),
+         over("info " + sog + " --json " + sog + "/meta.json"),
+         over("info " + sog + "/meta.json --json " + sog + "/a.webp"),
+         over("eval " + ply + " none --json " + ply), over("cost " + ply + " --html " + ply),
+         over("render " + ply + " --cameras " + data + " -o " + data)});
+    for (const auto& [file, bytes] : before) EXPECT_EQ(read_file(file), bytes) << file;
+}
+
+TEST(Convert, a_pipe_takes_the_scene_and_stderr_what_is_said) {
+    const std::string ply = scene_file("piped.ply", sample_model(0, 30)), pipe = out("pipe.ply");
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    std::vector<std::byte> got;
+    std::jthread reader([&] { got = read_file(pipe); });
+    const Outcome o = darb("convert " + ply + " " + pipe + " --crop 0,-9,-9,9,9,9");
+    reader.join();
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(o.out, "");
+    EXPECT_NE(o.err.find("--crop: "), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find(fmt::format("{} bytes", got.size())), std::string::npos) << o.err;
+    EXPECT_GT(parse_splats(got, "pipe").size(), 0u);
+}
+
+TEST(Convert, a_streamed_sog_is_named_as_one) {
+    write_file_atomic(out("lod-meta.json"), R"({"lodLevels": 2})");
+    for (const char* command : {"info ", "render -o none --cameras none "})
+        expect_refused({{command + out("lod-meta.json"), "streamed SOG"}});
 }
 
 TEST(Convert, info_writes_a_file_and_names_the_format) {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/scene/gaussian_scene.h"
 #include "tools/cost/views.h"
 #include "tools/darb/commands.h"
@@ -36,45 +37,52 @@ std::vector<View> views_around(const SplatModel& scene) {
     return views;
 }
 
-void print_difference(const char* what, const SplatModel& scene, const SplatModel& other,
-                      const ConvertFlags& flags) {
+/// Where the scene goes through a pipe, which may be stdout, all that is said goes to stderr.
+std::FILE* stream_beside(const std::filesystem::path& output) {
+    return std::filesystem::exists(output) && !std::filesystem::is_regular_file(output) ? stderr
+                                                                                        : stdout;
+}
+
+void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
+                      const SplatModel& other, const ConvertFlags& flags) {
     const std::vector<View> views =
         flags.cameras.empty() ? views_around(scene) : open_cameras(flags.cameras);
     if (views.empty())
         throw Error(flags.cameras.string(), "holds no cameras", "Name another list or data set.");
     const SceneDifference d = compare_scenes(scene, other, views, flags.device);
-    fmt::print("{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what, d.mean_psnr_db,
-               views.size(), d.worst_psnr_db, d.worst_view);
+    fmt::print(say, "{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what,
+               d.mean_psnr_db, views.size(), d.worst_psnr_db, d.worst_view);
 }
 
 int convert(const ConvertFlags& flags) {
-    std::error_code none;  // one of the two is not there
-    if (std::filesystem::equivalent(flags.input, flags.output, none))
-        throw Error(flags.output.string(), "is what is read", "Name another file to write.");
+    for (const auto& input : {flags.input, flags.cameras}) keep_input(input, flags.output);
     const std::optional<SplatFormat> format = format_to_write(flags.output);
     if (!format)
         throw Error(flags.output.string(), "names no format that can be written",
                     "Let it end in .ply, .compressed.ply, .splat or .spz.");
     SplatModel model = load_scene(flags.input);
-    edit_scene(flags.edits, model);
+    std::FILE* const say = stream_beside(flags.output);
+    edit_scene(flags.edits, model, say);
     if (flags.kernel == "gaussian" && model.kernel != KERNEL_GAUSSIAN) {
         GaussianEquivalent fit{};
         const SplatModel gaussians = as_gaussians(model, false, &fit);
-        fmt::print(
-            "kernel {} to gaussian: covariance x {:.4f}, opacity x {:.4f}, profile off by "
-            "{:.2f} % (relative L2)\n",
-            kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
-        print_difference("renders of both kernels", model, gaussians, flags);
+        fmt::print(say,
+                   "kernel {} to gaussian: covariance x {:.4f}, opacity x {:.4f}, profile off by "
+                   "{:.2f} % (relative L2)\n",
+                   kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
+        print_difference(say, "renders of both kernels", model, gaussians, flags);
         model = gaussians;
     }
-    for (const std::string& loss : losses_of(*format, model))
+    for (const std::string& loss : losses_of(*format, model, flags.output.string()))
         fmt::print(stderr, "warning: {}: {}\n", flags.output.string(), loss);
     drop_unwritable(*format, model);
-    save_splats(flags.output, *format, model);
-    fmt::print("{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
-               model.size(), std::filesystem::file_size(flags.output));
+    const std::vector<std::byte> file = encode_splats(*format, model, flags.output.string());
+    write_file_atomic(flags.output, file);
+    fmt::print(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
+               model.size(), file.size());
     if (flags.compare)
-        print_difference("the file against the scene", model, load_splats(flags.output), flags);
+        print_difference(say, "the file against the scene", model,
+                         parse_splats(file, flags.output.string()), flags);
     return 0;
 }
 
@@ -94,8 +102,9 @@ void add_convert(CLI::App& app, Action& action) {
                      "renders of both differ")
         ->check(CLI::IsMember({"gaussian"}));
     add_edit_options(*command, flags->edits);
-    command->add_flag("--compare", flags->compare,
-                      "read the file again and print how far its renders differ from the scene's");
+    command->add_flag(
+        "--compare", flags->compare,
+        "read what was written and print how far its renders differ from the scene's");
     command->add_option("--cameras", flags->cameras,
                         "cameras of the comparisons, as darb render takes them (default: 8 around "
                         "the scene)");

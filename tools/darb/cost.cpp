@@ -49,6 +49,8 @@ int cost(const CostFlags& flags) {
     if (!flags.train.empty()) return train_cost(flags);
     if (flags.scene.empty())
         throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
+    for (const std::string& input : {flags.scene, flags.dataset})
+        for (const auto& output : {flags.json, flags.html}) keep_input(input, output);
     const Extent extent = extent_of(flags);
     const SplatModel model = load_scene(flags.scene);
     if (model.size() == 0)

@@ -66,6 +66,7 @@ void print_table(const Evaluation& evaluation) {
 }
 
 int eval(EvalFlags flags) {
+    for (const auto& input : {flags.scene, flags.dataset}) keep_input(input, flags.json);
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
     const EffectChoice choice =

@@ -23,10 +23,12 @@ struct InfoFlags {
 bool is_dataset(const std::filesystem::path& path) {
     if (is_sog_folder(path)) return false;
     if (std::filesystem::is_directory(path)) return !std::filesystem::exists(path / "point_cloud");
-    return has_extension(path, ".json") && path.filename() != "meta.json";
+    return has_extension(path, ".json") && path.filename() != "meta.json" &&
+           path.filename() != "lod-meta.json";
 }
 
 int info(const InfoFlags& flags) {
+    keep_input(flags.path, flags.json);
     const bool dataset = is_dataset(flags.path);
     const nlohmann::json facts =
         dataset ? dataset_info(flags.path, flags.data) : scene_info(find_scene(flags.path));

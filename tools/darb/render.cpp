@@ -66,6 +66,12 @@ int render(RenderFlags flags) {
     const bool is_list = !views.empty() && views[0].photo.empty();
     if (is_list)
         for (View& view : views) scale_camera(view.camera, flags.data.resolution);
+    std::vector<std::filesystem::path> files;
+    std::set<std::string> used;
+    for (const View& view : views) {
+        files.push_back(flags.output / picture_name(view.name, used));
+        keep_input(view.photo, files.back());
+    }
     DeviceOptions device_options;
     device_options.select = flags.device;
     Device device(device_options);
@@ -79,7 +85,6 @@ int render(RenderFlags flags) {
         check_frame(device, view.camera.width, view.camera.height, view.name);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.crowds());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
-    std::set<std::string> used;
     DepthFiles depths(flags.depth);
     std::vector<double> frame_ms;
     for (const View& view : views) {
@@ -89,7 +94,7 @@ int render(RenderFlags flags) {
             std::chrono::steady_clock::now() - start;
         frame_ms.push_back(ms.count());
         plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
-        const auto file = flags.output / picture_name(view.name, used);
+        const auto& file = files[frame_ms.size() - 1];
         write_png(file, to_8bit(image));
         if (plan.on(EFFECT_DEPTH)) depths.write(file, renderer.render_depth());
     }

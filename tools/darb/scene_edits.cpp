@@ -47,23 +47,23 @@ Similarity similarity_of(const SceneEdits& edits) {
     return similarity;
 }
 
-void report_dropped(const char* option, size_t count) {
-    if (count > 0) fmt::print("{}: {} splats left out\n", option, count);
+void report_dropped(std::FILE* say, const char* option, size_t count) {
+    if (count > 0) fmt::print(say, "{}: {} splats left out\n", option, count);
 }
 
 }  // namespace
 
-void edit_scene(const SceneEdits& edits, SplatModel& model) {
+void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say) {
     const Similarity similarity = similarity_of(edits);
     if (similarity.scale != 1 || similarity.turn != glm::dmat3(1.0) ||
         similarity.translation != glm::dvec3(0.0))
         transform_splats(similarity, model);
     if (!edits.crop.empty()) {
         const std::vector<double> v = numbers("--crop", edits.crop, 6);
-        report_dropped("--crop", crop_splats({v[0], v[1], v[2]}, {v[3], v[4], v[5]}, model));
+        report_dropped(say, "--crop", crop_splats({v[0], v[1], v[2]}, {v[3], v[4], v[5]}, model));
     }
     if (edits.prune_opacity > 0)
-        report_dropped("--prune-opacity", prune_opacity(edits.prune_opacity, model));
+        report_dropped(say, "--prune-opacity", prune_opacity(edits.prune_opacity, model));
     limit_sh_degree(edits.max_sh, model);
 }
 

@@ -18,7 +18,7 @@ struct SceneEdits {
 
 void add_edit_options(CLI::App& app, SceneEdits& edits);
 
-/// Prints how many splats go. Throws Error naming the option that cannot be read.
-void edit_scene(const SceneEdits& edits, SplatModel& model);
+/// Prints to `say` how many splats go. Throws Error naming the option that cannot be read.
+void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say);
 
 }  // namespace darb

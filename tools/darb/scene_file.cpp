@@ -17,6 +17,10 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kPrefix = "iteration_";
+// What a folder is read by.
+constexpr const char* kDescriptions[] = {
+    "meta.json",       "metrics.json",          "cameras.json",
+    "transforms.json", "transforms_train.json", "transforms_test.json"};
 
 // -1 where the folder is not named iteration_N.
 long iteration_of(const fs::path& folder) {
@@ -39,15 +43,13 @@ long last_iteration(const fs::path& output) {
     return at != metrics.end() && at->is_number_integer() ? at->get<long>() : -1;
 }
 
-}  // namespace
-
-fs::path find_scene(const fs::path& path) {
-    if (!fs::is_directory(path) || is_sog_folder(path)) return path;
+// The scene where the run of an output folder ended; empty where there is none.
+fs::path scene_of_run(const fs::path& output) {
     fs::path found;
     long latest = -1;
-    const long own = last_iteration(path);
+    const long own = last_iteration(output);
     std::error_code none;  // no such folder: no entries
-    for (const fs::directory_entry& entry : fs::directory_iterator(path / "point_cloud", none)) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(output / "point_cloud", none)) {
         const long iteration = iteration_of(entry.path());
         const fs::path scene = entry.path() / "point_cloud.ply";
         if (iteration < 0 || !fs::is_regular_file(scene)) continue;
@@ -55,6 +57,14 @@ fs::path find_scene(const fs::path& path) {
         latest = iteration;
         found = scene;
     }
+    return found;
+}
+
+}  // namespace
+
+fs::path find_scene(const fs::path& path) {
+    if (!fs::is_directory(path) || is_sog_folder(path)) return path;
+    const fs::path found = scene_of_run(path);
     if (found.empty())
         throw Error(path.string(),
                     "is a folder without point_cloud/iteration_N/point_cloud.ply and without the "
@@ -66,6 +76,20 @@ fs::path find_scene(const fs::path& path) {
 bool is_scene(const fs::path& path) {
     if (fs::is_regular_file(path)) return path.extension() != ".json";
     return fs::exists(path / "point_cloud") || fs::exists(path / "meta.json");
+}
+
+void keep_input(const fs::path& input, const fs::path& output) {
+    if (input.empty() || output.empty()) return;
+    const auto is_output = [&](const fs::path& file) {
+        std::error_code none;  // one of the two is not there
+        return fs::equivalent(file, output, none);
+    };
+    bool read = is_output(input) || is_output(scene_of_run(input));
+    for (const char* name : kDescriptions) read = read || is_output(input / name);
+    const fs::path sog = input.filename() == "meta.json" ? input.parent_path() : input;
+    if (has_extension(output, ".webp") && is_sog_folder(sog))
+        read = read || is_output(sog / output.filename());
+    if (read) throw Error(output.string(), "is what is read", "Name another file to write.");
 }
 
 SplatModel load_scene(const fs::path& path, SplatFile* facts) {

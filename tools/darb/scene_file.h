@@ -15,6 +15,10 @@ bool is_scene(const std::filesystem::path& path);
 /// SOG scene either.
 std::filesystem::path find_scene(const std::filesystem::path& path);
 
+/// Throws Error where writing `output` would replace a file that `input` names: a scene, a run, a
+/// SOG folder, a data set, a list of cameras, a photo. Either may be empty.
+void keep_input(const std::filesystem::path& input, const std::filesystem::path& output);
+
 /// load_splats of find_scene(path), with a warning on stderr for what was dropped or left out.
 SplatModel load_scene(const std::filesystem::path& path, SplatFile* facts = nullptr);
 
