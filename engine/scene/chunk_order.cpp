@@ -40,7 +40,7 @@ std::size_t part_far(const SplatModel& model, Splats splats) {
     };
     const auto near = static_cast<std::size_t>(std::ranges::count_if(splats, is_near));
     if (near < splats.size() / 2) return splats.size();
-    std::ranges::stable_partition(splats, is_near);
+    std::stable_partition(splats.begin(), splats.end(), is_near);
     return near;
 }
 
