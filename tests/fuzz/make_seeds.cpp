@@ -69,6 +69,18 @@ std::string ascii_ply(const SplatModel& model) {
     return text;
 }
 
+/// Colours in bytes, no third scale, a blur of its own: ply_dialects.h.
+std::string dialects_ply() {
+    std::string text =
+        "ply\nformat ascii 1.0\ncomment antialiased 1\nelement vertex 1\n"
+        "property float x\nproperty float y\nproperty float z\nproperty float nx\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    for (const char* name :
+         {"opacity", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3", "filter_3D"})
+        text += fmt::format("property float {}\n", name);
+    return text + "end_header\n1 2 3 0 255 128 0 0.5 -1 -2 1 0 0 0 0.01\n";
+}
+
 /// Versions 1 to 3 before gzip: a header of 16 bytes, the attributes, an extension record.
 FileBytes old_spz(std::uint32_t version, int degree) {
     FileBytes file = bytes_of("NGSP");
@@ -142,6 +154,7 @@ void make_scenes(const fs::path& corpus) {
         }
     }
     add_scene(corpus, "ply", "ascii", bytes_of(ascii_ply(sample_model(0))));
+    add_scene(corpus, "ply", "dialects", bytes_of(dialects_ply()));
     add_scene(corpus, "dot_splat", "scene.splat",
               encode_splats(SplatFormat::dot_splat, sample_model(0)));
     for (const bool harmonics : {false, true})
