@@ -192,7 +192,9 @@ TEST_F(WindowTest, A_hundred_dropped_scenes_leave_no_memory_behind_slow) {
     }
     ASSERT_GT(after_some, 0u);
     // One scene of 300 splats is 71 kB on the host and as much on the device: 80 would be 11 MB.
-    EXPECT_LT(program_->resident_bytes(), after_some + 6'000'000);
+    // The last ones may still be on their way out.
+    EXPECT_TRUE(eventually([&] { return program_->resident_bytes() < after_some + 6'000'000; }))
+        << program_->resident_bytes() << " bytes for " << after_some;
     EXPECT_TRUE(program_->running()) << log("view.log");
 }
 
