@@ -1,23 +1,25 @@
 #!/usr/bin/env bash
 # The strategies adc, mcmc and budget side by side on data sets: the time that each takes to adc's final PSNR on
-# held-out views, and its final PSNR at adc's number of splats, which is the budget of the two others; and where adc and
-# budget end in a run of a share of the iterations, whose rates and growth are made for it.
-#   tools/strategies.sh [-o OUT] [-n ITERATIONS] [-s "SEED..."] [-e EVALUATIONS] [-p PERCENT] SET...
+# held-out views, and its final PSNR at adc's number of splats, which is the budget of the two others. STRATEGY_P is a run
+# of P percent of the iterations, whose rates and growth are made for it.
+#   tools/strategies.sh [-o OUT] [-n ITERATIONS] [-s "SEED..."] [-e EVALUATIONS] [-t "STRATEGY[_P]..."] SET...
 #                       [-- options of darb train...]
-# Default: -o strategies -n 30000 -s 0 -e 30 -p 40. Runs lie in OUT/SET/STRATEGY/seedN: finished ones are kept, one that
-# was interrupted goes on. Times are those of training alone; run it on a quiet machine. DARB= names another command.
+# Default: -o strategies -n 30000 -s 0 -e 30 -t "adc_40 mcmc budget budget_60"; adc is always there. Runs lie in
+# OUT/SET/STRATEGY/seedN: finished ones are kept, one that was interrupted goes on. Times are those of training alone;
+# run it on a quiet machine. Beside the table all evaluations go to OUT/strategies.json. DARB= names another command.
 set -euo pipefail
 
 usage() { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 fail() { echo "strategies.sh: $*" >&2; exit 2; }
-out=strategies iterations=30000 seeds=0 evaluations=30 percent=40 sets=() options=()
+out=strategies iterations=30000 seeds=0 evaluations=30 sets=() options=()
+strategies="adc_40 mcmc budget budget_60"
 while [[ $# -gt 0 ]]; do
     case $1 in
         -o) out=${2:?} ;;
         -n) iterations=${2:?} ;;
         -s) seeds=${2:?} ;;
         -e) evaluations=${2:?} ;;
-        -p) percent=${2:?} ;;
+        -t) strategies=${2:?} ;;
         --) shift; options=("$@"); break ;;
         -*) usage ;;
         *) sets+=("$1"); shift; continue ;;
@@ -32,9 +34,16 @@ darb=${DARB:-$(cd "$(dirname "$0")/.." && pwd)/build/darb}
 names=("${sets[@]%/}")
 [[ $(printf '%s\n' "${names[@]##*/}" | sort -u | wc -l) == "${#sets[@]}" ]] || fail "two data sets of one name"
 
-[[ $percent -ge 1 && $percent -le 99 ]] || fail "-p $percent is no share in percent of a whole run"
-short=$((iterations * percent / 100))
-[[ $short -ge $evaluations ]] || fail "-p $percent: fewer iterations than evaluations"
+length() { # STRATEGY[_P]
+    local percent=100
+    [[ $1 != *_* ]] || percent=${1#*_}
+    echo $((iterations * percent / 100))
+}
+for strategy in $strategies; do
+    [[ $strategy =~ ^(adc|mcmc|budget)(_[1-9][0-9]*)?$ && $strategy != adc ]] ||
+        fail "-t $strategy: none of adc_P, mcmc, mcmc_P, budget, budget_P"
+    [[ $(length "$strategy") -ge $evaluations ]] || fail "-t $strategy: fewer iterations than evaluations"
+done
 
 value() { # FILE KEY
     python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))[sys.argv[2]])' "$1" "$2"
@@ -61,22 +70,22 @@ for set in "${sets[@]}"; do
     for seed in $seeds; do
         folder=$out/$(basename "$set")
         run "$set" "$folder/adc/seed$seed" "$iterations" --seed "$seed" --strategy adc
-        run "$set" "$folder/adc_$percent/seed$seed" "$short" --seed "$seed" --strategy adc
         splats=$(value "$folder/adc/seed$seed/metrics.json" splats)
-        for strategy in mcmc budget; do
-            run "$set" "$folder/$strategy/seed$seed" "$iterations" --seed "$seed" --strategy "$strategy" \
-                --budget "$splats"
+        for strategy in $strategies; do
+            budget=()
+            [[ $strategy == adc_* ]] || budget=(--budget "$splats")
+            run "$set" "$folder/$strategy/seed$seed" "$(length "$strategy")" --seed "$seed" \
+                --strategy "${strategy%_*}" "${budget[@]}"
         done
-        run "$set" "$folder/budget_$percent/seed$seed" "$short" --seed "$seed" --strategy budget --budget "$splats"
     done
 done
 
-python3 - "$out" "$iterations" "$seeds" "$percent" "${sets[@]}" <<'PYTHON'
+python3 - "$out" "$iterations" "$seeds" "adc $strategies" "${sets[@]}" <<'PYTHON'
 import json
 import os
 import sys
 
-out, iterations, seeds, percent, sets = sys.argv[1], int(sys.argv[2]), sys.argv[3].split(), sys.argv[4], sys.argv[5:]
+out, iterations, seeds, strategies, sets = sys.argv[1], sys.argv[2], sys.argv[3].split(), sys.argv[4].split(), sys.argv[5:]
 
 
 def time_to(evaluations, psnr):
@@ -96,26 +105,30 @@ def mean(values):
     return sum(values) / len(values)
 
 
-print(f"\n{iterations} iterations, {percent} % of them where the name says so, seeds {' '.join(seeds)}: means over the seeds, "
+print(f"\n{iterations} iterations, P % of them where the name ends in _P, seeds {' '.join(seeds)}: means over the seeds, "
       "times in s of training alone\n")
-print("| set | strategy | splats | PSNR dB | SSIM | whole run | to adc's final PSNR | seeds that got there |")
-print("|---|---|---|---|---|---|---|---|")
-for name in sets:
-    rows = {}
-    for strategy in ("adc", f"adc_{percent}", "mcmc", "budget", f"budget_{percent}"):
+print("| set | strategy | splats | PSNR dB, lowest to highest | SSIM | whole run | share of adc's time | "
+      "to adc's final PSNR | seeds that got there |")
+print("|---|---|---|---|---|---|---|---|---|")
+kept = []
+for name in (os.path.basename(s.rstrip("/")) for s in sets):
+    adc = None
+    for strategy in strategies:
+        runs = []
         for seed in seeds:
-            path = os.path.join(out, os.path.basename(name.rstrip("/")), strategy, f"seed{seed}", "metrics.json")
-            metrics = json.load(open(path))
-            goal = rows["adc"][len(rows.get(strategy, []))]["psnr_db"] if strategy != "adc" else None
-            last = metrics["evaluations"][-1]
-            rows.setdefault(strategy, []).append({
-                "splats": metrics["splats"], "psnr_db": last["psnr_db"], "ssim": last["ssim"],
-                "seconds": metrics["seconds"],
-                "to": time_to(metrics["evaluations"], last["psnr_db"] if goal is None else goal)})
-    for strategy, runs in rows.items():
-        there = [r["to"] for r in runs if r["to"] is not None]
-        to = f"{mean(there):.1f}" if there else "-"
-        print(f"| {os.path.basename(name.rstrip('/'))} | {strategy} | {mean([r['splats'] for r in runs]):.0f} | "
-              f"{mean([r['psnr_db'] for r in runs]):.2f} | {mean([r['ssim'] for r in runs]):.4f} | "
-              f"{mean([r['seconds'] for r in runs]):.1f} | {to} | {len(there)} of {len(runs)} |")
+            metrics = json.load(open(os.path.join(out, name, strategy, f"seed{seed}", "metrics.json")))
+            runs.append({"set": name, "strategy": strategy, "seed": int(seed),
+                         **{key: metrics[key] for key in ("iteration", "splats", "seconds", "evaluations")}})
+        kept += runs
+        psnr = [r["evaluations"][-1]["psnr_db"] for r in runs]
+        seconds = mean([r["seconds"] for r in runs])
+        adc = adc or (psnr, seconds)
+        there = [t for t in map(time_to, (r["evaluations"] for r in runs), adc[0]) if t is not None]
+        print(f"| {name} | {strategy} | {mean([r['splats'] for r in runs]):.0f} | "
+              f"{mean(psnr):.2f}, {min(psnr):.2f} to {max(psnr):.2f} | "
+              f"{mean([r['evaluations'][-1]['ssim'] for r in runs]):.4f} | {seconds:.1f} | "
+              f"{100 * seconds / adc[1]:.0f} % | {f'{mean(there):.1f}' if there else '-'} | "
+              f"{len(there)} of {len(runs)} |")
+with open(os.path.join(out, "strategies.json"), "w") as file:
+    json.dump({"iterations": int(iterations), "runs": kept}, file, indent=1)
 PYTHON
