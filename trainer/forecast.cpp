@@ -94,7 +94,7 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     placeholder.origin = model.origin;
     Trainer trainer(device, few, grey_photos(few.views), placeholder, options);
     Trainer::State state;
-    state.iteration = options.sh_degree * std::max(options.sh_interval, 1);
+    state.iteration = options.sh_degree * options.degree_interval();
     state.model = model;
     state.moments.resize(kAttributeCount);
     trainer.restore(state);
@@ -167,12 +167,9 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
     return std::max(start, static_cast<std::uint32_t>(std::min(wanted, most)));
 }
 
-// Probes on the photos of five small data sets admitted degree 0 or 1 and never 2.
-ColourDegrees predict_degrees(const TrainOptions& options) {
-    if (!options.probe_sh) return {options.sh_degree, options.sh_degree};
-    const int interval = std::max(options.sh_interval, 1);
-    const int trials = (options.iterations - 1) / interval;  // the first at the interval
-    return {std::min({1, options.sh_degree, trials}), std::min({2, options.sh_degree, trials})};
+int predict_degree(const TrainOptions& options) {
+    if (!options.probe_sh) return options.sh_degree;
+    return std::min(options.sh_degree, (options.iterations - 1) / options.degree_interval());
 }
 
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
@@ -225,10 +222,8 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     SplatModel start = initial_model(dataset, options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
-    const ColourDegrees degrees = predict_degrees(options);
-    start.sh_degree = degrees.end;
+    start.sh_degree = f.demand.sh_degree = predict_degree(options);
     start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
-    f.demand.sh_degree = degrees.most;
     f.start_splats = static_cast<std::uint32_t>(start.size());
     const std::uint32_t limit =
         std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));

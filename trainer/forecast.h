@@ -27,12 +27,8 @@ struct Forecast {
 std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit);
 
-/// The degree of colour that a run is expected to end with, and the most that its buffers hold on
-/// the way: with options.probe_sh one more is on trial.
-struct ColourDegrees {
-    int end = 0, most = 0;
-};
-ColourDegrees predict_degrees(const TrainOptions& options);
+/// The degree of colour that a run ends with, where options.probe_sh does not refuse the first.
+int predict_degree(const TrainOptions& options);
 
 /// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
 /// end with, from the same start.

@@ -357,8 +357,9 @@ void Run::report_probes() {
         log_.probe(trainer_.iteration(), p);
         const std::string reason = !std::isnan(p.gain_db)
                                        ? fmt::format("{:+.3f} dB on photos set aside", p.gain_db)
-                                   : p.admitted ? "too few photos to set some aside"
-                                                : "--max-memory has no room for it";
+                                   : p.admitted && p.degree > 1 ? "follows the first"
+                                   : p.admitted                 ? "too few photos to set some aside"
+                                                                : "--max-memory has no room for it";
         progress_.note(fmt::format("iteration {}: colour of degree {} {} ({})", p.iteration,
                                    p.degree, p.admitted ? "admitted" : "refused", reason));
     }

@@ -52,7 +52,7 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.position_lr_init = 1.6e-4f;
     options.position_lr_final = 1.6e-6f;
     options.opacity_lr = 0.025f;
-    options.paced = false;
+    options.paced = options.sh_rest_hastens = false;
     options.final_lr_share = 1;
     options.prune_opacity = 0.005f;
     options.prune_extent = 0.1f;

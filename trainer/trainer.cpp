@@ -16,9 +16,9 @@ namespace darb {
 
 namespace {
 
-// While a probe runs, times the rate of the view-dependent part: what it trains is thrown away, so
-// that it may look far ahead.
-constexpr float kProbeRestRate = 8;
+// While a probe runs, the rate of the view-dependent part over that of the other, at least: what it
+// trains is thrown away, so that it may look far ahead.
+constexpr float kProbeRestRate = 0.4f;
 constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
 // More splats than this share with a gradient that is not finite: something is broken.
@@ -69,7 +69,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       extent_(scene_extent(dataset)),
       reach_(scene_reach(dataset)),
       nearest_(nearest_points(dataset)),
-      next_probe_(std::max(options.sh_interval, 1)),
+      next_probe_(options.degree_interval()),
       splats_(device, start_model(start, options), true),
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options), BackwardResult::update),
@@ -118,7 +118,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
 
 int Trainer::degree_at(int iteration) const {
     if (options_.probe_sh) return splats_.sh_degree();
-    return std::min(options_.sh_degree, iteration / std::max(options_.sh_interval, 1));
+    return std::min(options_.sh_degree, iteration / options_.degree_interval());
 }
 
 int Trainer::sh_degree() const {
@@ -162,7 +162,8 @@ AdamStep Trainer::rates(int iteration) const {
     step.rotation = options_.rotation_rate() * late;
     step.opacity = options_.opacity_rate() * late;
     step.sh_dc = options_.sh_dc_lr * late;
-    step.sh_rest = options_.sh_rest_lr * late * (probe_views_.empty() ? 1.0f : kProbeRestRate);
+    const float on_trial = probe_views_.empty() ? 0 : kProbeRestRate * options_.sh_dc_lr;
+    step.sh_rest = std::max(options_.sh_rest_rate(), on_trial) * late;
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight =

@@ -86,8 +86,8 @@ class Trainer {
     /// What a probe for view-dependent colour found.
     struct Probe {
         int iteration = 0, degree = 0;  // degree: the one on trial
-        // On the photos set aside; NaN where nothing was measured: too few photos, which admits the
-        // degree, or no room for it within max_memory_bytes, which refuses it.
+        // On the photos set aside; NaN where nothing was measured: too few photos or a degree above
+        // the first, which admits it, or no room for it within max_memory_bytes, which refuses it.
         double gain_db = 0;
         bool admitted = false;
     };

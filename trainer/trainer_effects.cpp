@@ -13,8 +13,8 @@ namespace darb {
 
 namespace {
 
-constexpr double kProbeGain_db = 0.05;   // that a degree must bring
-constexpr int kProbeIterations = 120;    // of each arm
+constexpr double kProbeGain_db = 0.05;   // that the first degree must bring
+constexpr float kProbeIterations = 120;  // of each arm, over the pace
 constexpr std::size_t kFewestViews = 8;  // fewer photos leave none to set aside: the schedule holds
 constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 
@@ -66,7 +66,8 @@ double Trainer::probe_arm(const State& start, int degree, const std::vector<int>
     State state = start;
     set_degree(state, degree);
     restore(state);
-    for (int i = 0; i < kProbeIterations; ++i) {
+    const auto iterations = std::lround(kProbeIterations / options_.pace());
+    for (long i = 0; i < iterations; ++i) {
         launch(++iteration_);
         settle(flights_[(iteration_ + 1) & 1]);
     }
@@ -106,7 +107,7 @@ void Trainer::probe_degree() {
     State before = state();
     Probe probe{iteration_, degree + 1, std::numeric_limits<double>::quiet_NaN(),
                 has_room_for_degree(degree + 1)};
-    if (probe.admitted && train_views_.size() >= kFewestViews) {
+    if (probe.admitted && degree == 0 && train_views_.size() >= kFewestViews) {
         std::vector<int> aside, rest;
         for (std::size_t i = 0; i < train_views_.size(); ++i) {
             const bool out = i % kAsideEvery == kAsideEvery / 2 && aside.size() < kMostAside;
@@ -126,7 +127,7 @@ void Trainer::probe_degree() {
         on_result = listener;
     }
     if (probe.admitted) set_degree(before, degree + 1);
-    const int interval = std::max(options_.sh_interval, 1);
+    const int interval = options_.degree_interval();
     before.next_probe =
         probe.admitted ? before.iteration + interval : 2 * std::max(before.iteration, 1);
     // Not while opacities come back from a reset.

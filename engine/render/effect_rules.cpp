@@ -320,8 +320,8 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
                          const EffectChoice& choice, int kernel) {
     EffectPlan plan;
     plan.row(EFFECT_VIEW_COLOUR) = {sh_degree > 0, false, sh_degree, 0.05,
-                                    fmt::format("up to degree {}, each admitted where a probe on "
-                                                "photos set aside gains 0.05 dB",
+                                    fmt::format("up to degree {}, once a probe on photos set "
+                                                "aside gains 0.05 dB by the first",
                                                 sh_degree)};
     plan.row(EFFECT_ANTIALIAS) = antialias_rule(dataset, kernel);
     plan.row(EFFECT_EXPOSURE) = exposure_rule(dataset, photos);

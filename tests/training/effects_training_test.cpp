@@ -63,6 +63,22 @@ TEST(SphericalHarmonicsProbe, colours_that_change_with_the_view_admit_a_degree) 
     EXPECT_GT(largest, 1e-3) << "the bands are meant to be trained after they were admitted";
 }
 
+TEST(SphericalHarmonicsProbe, the_degrees_above_the_first_follow_it) {
+    ProbeCase t = training_of(0.25f);
+    t.options.sh_degree = 3;
+    t.options.sh_interval = 50;
+    Trainer trainer = t.trainer();
+    for (int i = 0; i < 160; ++i) trainer.step();
+    ASSERT_EQ(trainer.probes().size(), 3u);
+    EXPECT_GT(trainer.probes()[0].gain_db, 0.05);
+    for (int i = 1; i < 3; ++i) {
+        EXPECT_TRUE(trainer.probes()[i].admitted);
+        EXPECT_EQ(trainer.probes()[i].iteration, 50 * (i + 1));
+        EXPECT_TRUE(std::isnan(trainer.probes()[i].gain_db)) << "nothing is measured";
+    }
+    EXPECT_EQ(trainer.sh_degree(), 3);
+}
+
 // Tiny memory: all that is there, and less than a degree more takes.
 TEST(SphericalHarmonicsProbe, a_degree_without_room_is_refused_unmeasured) {
     ProbeCase t = training_of(0.25f);

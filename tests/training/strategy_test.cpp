@@ -190,10 +190,12 @@ TEST(Pace, a_short_run_learns_and_grows_faster) {
         EXPECT_FLOAT_EQ(options.scale_rate(), 0.005f);
         EXPECT_FLOAT_EQ(options.rotation_rate(), 0.001f);
         EXPECT_FLOAT_EQ(options.opacity_rate(), 0.05f);
+        EXPECT_EQ(options.degree_interval(), 1'000);
         EXPECT_FALSE(refines_after(options, 500));
         EXPECT_TRUE(refines_after(options, 600));
     }
     options.iterations = 1'000;
+    EXPECT_EQ(options.degree_interval(), 250);
     EXPECT_FLOAT_EQ(options.scale_rate(), 0.02f);
     EXPECT_FLOAT_EQ(options.rotation_rate(), 0.004f);
     EXPECT_FLOAT_EQ(options.opacity_rate(), 0.1f);
@@ -205,11 +207,27 @@ TEST(Pace, a_short_run_learns_and_grows_faster) {
     EXPECT_EQ(options.round_interval(), 20);
 }
 
+TEST(Pace, colours_that_change_with_the_view_learn_faster_the_shorter_the_run) {
+    TrainOptions options;
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(), 1.25e-4f);
+    options.iterations = 7'500;
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(), 2.5e-4f);
+    options.iterations = 3'333;  // 3 times by the length, 1.2 times by the pace
+    EXPECT_NEAR(options.sh_rest_rate(), 1.25e-4 * 3.6, 1e-7);
+    options.iterations = 1'000;
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(), options.sh_dc_lr) << "the rate of the others at most";
+    use_3dgs_schedule(options);
+    options.sh_dc_lr = 0.002f;
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(), 0.0001f);
+}
+
 TEST(Pace, is_not_for_what_is_given_nor_for_3dgs) {
     TrainOptions given;
     given.iterations = 1'000;
     given.scale_lr = given.rotation_lr = given.opacity_lr = 0.01f;
     given.densify_from = given.densify_interval = 30;
+    given.sh_interval = 700;
+    EXPECT_EQ(given.degree_interval(), 700);
     EXPECT_FLOAT_EQ(given.scale_rate(), 0.01f);
     EXPECT_FLOAT_EQ(given.rotation_rate(), 0.01f);
     EXPECT_FLOAT_EQ(given.opacity_rate(), 0.01f);
@@ -222,6 +240,7 @@ TEST(Pace, is_not_for_what_is_given_nor_for_3dgs) {
     EXPECT_FLOAT_EQ(theirs.opacity_rate(), 0.025f);
     EXPECT_EQ(theirs.densify_begin(), 500);
     EXPECT_EQ(theirs.round_interval(), 100);
+    EXPECT_EQ(theirs.degree_interval(), 1'000);
     EXPECT_EQ(theirs.clearance, 0);
 }
 

@@ -62,7 +62,6 @@ void finish_train_flags(TrainFlags& f) {
     if (f.train.footprint == Footprint::exact && !has_exact_footprint(f.train.kernel))
         throw Error(fmt::format("--pulses {}", f.pulses), "goes with the footprint psi only",
                     "Leave --footprint out, or use one pulse.");
-    f.train.sh_rest_lr = f.train.sh_dc_lr / 20.0f;
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())
             list->assign(std::begin(kStandardEvaluations), std::end(kStandardEvaluations));
