@@ -27,6 +27,7 @@ template <class State, class Visit>
 void for_each_array(State& state, Visit visit) {
     for (int a = 0; a < kAttributeCount; ++a) visit(attribute_values(state.model, a));
     for (int a = 0; a < kAttributeCount; ++a) visit(state.moments[a]);
+    visit(state.rest_sum);
     visit(state.gradient_sum);
     visit(state.smoothing);
     visit(state.exposure);
@@ -51,6 +52,7 @@ Json header_of(const Checkpoint& c) {
                 {"smoothing", c.state.smoothing.size()},
                 {"exposure", c.state.exposure.size()},
                 {"error_shares", c.state.error_shares.size()},
+                {"rest_sum", c.state.rest_sum.size()},
                 {"splats", m.size()},
                 {"sh_degree", m.sh_degree},
                 {"kernel", kernel_name(m.kernel)},
@@ -153,7 +155,7 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     if (header_bytes > file.size() - kHeadBytes) throw fail("truncated in the header");
     const auto* text = reinterpret_cast<const char*>(file.data() + kHeadBytes);
     Checkpoint c;
-    std::uint64_t splats = 0, smoothing = 0, exposure = 0, shares = 0;
+    std::uint64_t splats = 0, smoothing = 0, exposure = 0, shares = 0, rest = 0;
     try {
         const Json header = Json::parse(text, text + header_bytes);
         read_header(header, c, where);
@@ -161,15 +163,17 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
         smoothing = header.at("smoothing").get<std::uint64_t>();
         exposure = header.at("exposure").get<std::uint64_t>();
         shares = header.value("error_shares", std::uint64_t{0});  // absent in earlier files
+        rest = header.value("rest_sum", std::uint64_t{0});
+        const auto rest_floats = static_cast<std::uint64_t>(c.state.model.rest_count());
         if ((smoothing != 0 && smoothing != splats) || exposure > kMaxSplats ||
-            (shares != 0 && shares != 2 * splats))
+            (shares != 0 && shares != 2 * splats) || (rest != 0 && rest != rest_floats * splats))
             throw fail("the header's sizes make no sense");
     } catch (const Json::exception& e) {
         throw fail(std::string("the header cannot be read: ") + e.what());
     }
     const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
     const std::uint64_t floats =
-        splats * floats_per_splat(c.state.model) + smoothing + exposure + shares;
+        splats * floats_per_splat(c.state.model) + smoothing + exposure + shares + rest;
     const std::uint64_t expected = floats * sizeof(float);
     if (payload.size() != expected)
         throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
@@ -180,6 +184,7 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     c.state.smoothing.resize(smoothing);
     c.state.exposure.resize(exposure);
     c.state.error_shares.resize(shares);
+    c.state.rest_sum.resize(rest);
     size_t at = 0;
     for_each_array(c.state, [&](std::vector<float>& values) {
         if (!values.empty())
@@ -217,7 +222,8 @@ std::string settings_text(const TrainOptions& o) {
                   {"scale_lr", o.scale_rate()},
                   {"rotation_lr", o.rotation_rate()},
                   {"opacity_lr", o.opacity_rate()},
-                  {"sh_lr", {o.sh_dc_lr, o.sh_rest_rate()}},
+                  {"sh_lr", {o.sh_dc_lr, o.sh_rest_rate(o.sh_rest_every)}},
+                  {"sh_rest_every", o.sh_rest_every},
                   {"final_lr_share", o.final_lr_share},
                   {"densify_from", o.densify_begin()},
                   {"densify_until", o.densify_end()},

@@ -82,7 +82,8 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     bytes += Backward::device_bytes(size);
     MemoryPlan plan;
     plan.parameters = GpuSplats::parameter_bytes(demand.splats, demand.sh_degree);
-    plan.moments = moment_bytes(demand.splats, demand.sh_degree, false);
+    plan.moments = moment_bytes(demand.splats, demand.sh_degree, false) +
+                   rest_sum_bytes(demand.splats, demand.sh_degree, demand.rest_sum);
     plan.frame = bytes.splats;
     plan.pairs = bytes.pairs;
     plan.photos = demand.photo_pixels * 4;
@@ -97,7 +98,7 @@ std::uint64_t round_peak(const Device& device, const MemoryDemand& demand, std::
                          std::uint32_t after) {
     const MemoryPlan plan = plan_resident(device, demand);
     return plan.resident() - plan.parameters - plan.moments +
-           round_bytes(before, after, demand.sh_degree);
+           round_bytes(before, after, demand.sh_degree, demand.rest_sum);
 }
 
 MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand) {
@@ -133,6 +134,7 @@ std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
 
 void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand) {
     demand.sh_degree = options.sh_degree;
+    demand.rest_sum = options.sh_rest_every > 1;
     demand.frame = forward_options(options);
     std::uint32_t training = 0;
     for (const View& view : views) {

@@ -18,6 +18,7 @@ struct MemoryDemand {
     std::uint64_t splats = 0;  // N
     std::uint64_t pairs = 0;   // K that the buffers hold
     int sh_degree = 3;         // of the buffers
+    bool rest_sum = false;     // harmonics make a step in some iterations only
     bool densifies = true;     // density control runs at this N
     ForwardOptions frame;
     std::uint64_t room_splats = 0;       // N that the frame's buffers hold, where there were more

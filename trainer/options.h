@@ -56,6 +56,9 @@ struct TrainOptions {
     // up to that of the first: they come late in a run. Miku plush at 200 px, two seeds: after
     // 4,000 iterations 28.68 and 28.61 dB with, 28.40 and 28.13 without.
     bool sh_rest_hastens = true;
+    // These bands make a step in every so many iterations, of their mean gradient, at the root of
+    // as many times the rate: what Adam reads and writes for them is most of what it moves.
+    int sh_rest_every = 1;
     // Over the second half the other rates fall to this share, log-linear; 3DGS keeps them. On
     // photos it steadies what is there: fox at 200 px, 4,000 iterations: 28.0 dB with 1, 29.1 with
     // 0.1. A rendered scene without noise loses a little: 31.17 dB with 1, 30.98 with 0.3, 30.76
@@ -154,8 +157,10 @@ struct TrainOptions {
     float haste() const {
         return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(iterations, 1))));
     }
-    float sh_rest_rate() const {
-        const float times = sh_rest_hastens ? haste() * pace() : 1.0f;
+    /// Of steps of the mean of so many iterations.
+    float sh_rest_rate(int every) const {
+        const float hastened = sh_rest_hastens ? haste() * pace() : 1.0f;
+        const float times = hastened * std::sqrt(static_cast<float>(every));
         return sh_dc_lr * std::min(1.0f, times / 20);
     }
     float position_lr_start() const {

@@ -37,6 +37,7 @@ void use_strategy(Strategy strategy, TrainOptions& options) {
     options.prune_opacity = adc.prune_opacity;
     options.opacity_decay = adc.opacity_decay;
     options.resolution_ramp = adc.resolution_ramp;
+    options.sh_rest_every = adc.sh_rest_every;
     if (strategy == Strategy::mcmc) {  // its authors' values
         options.initial_opacity = 0.5f;
         options.initial_scale = 0.1f;
@@ -45,6 +46,7 @@ void use_strategy(Strategy strategy, TrainOptions& options) {
     if (strategy == Strategy::budget) {
         options.opacity_decay = 0.01f;
         options.resolution_ramp = true;
+        options.sh_rest_every = 16;
     }
 }
 

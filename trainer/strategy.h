@@ -16,8 +16,8 @@ std::string_view strategy_name(Strategy strategy);
 std::optional<Strategy> strategy_from_name(std::string_view name);
 
 /// Sets options.strategy and what it has other defaults for: the opacity and the scale at the
-/// start, the opacity below which a splat goes, its decay, the resolution ramp. adc: those of
-/// TrainOptions.
+/// start, the opacity below which a splat goes, its decay, the resolution ramp, how often harmonics
+/// make a step. adc: those of TrainOptions.
 void use_strategy(Strategy strategy, TrainOptions& options);
 
 /// What 3DGS does where the defaults depart from it (ARCHITECTURE says why they do): constant rates

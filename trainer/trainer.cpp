@@ -70,7 +70,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       reach_(scene_reach(dataset)),
       nearest_(nearest_points(dataset)),
       next_probe_(options.degree_interval()),
-      splats_(device, start_model(start, options), true),
+      splats_(device, start_model(start, options), true, options.sh_rest_every > 1),
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options), BackwardResult::update),
       loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height),
@@ -162,8 +162,9 @@ AdamStep Trainer::rates(int iteration) const {
     step.rotation = options_.rotation_rate() * late;
     step.opacity = options_.opacity_rate() * late;
     step.sh_dc = options_.sh_dc_lr * late;
+    step.rest_every = probe_views_.empty() ? options_.sh_rest_every : 1;
     const float on_trial = probe_views_.empty() ? 0 : kProbeRestRate * options_.sh_dc_lr;
-    step.sh_rest = std::max(options_.sh_rest_rate(), on_trial) * late;
+    step.sh_rest = std::max(options_.sh_rest_rate(step.rest_every), on_trial) * late;
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight =
@@ -402,6 +403,8 @@ Trainer::State Trainer::state() {
         s.moments.push_back(floats ? splats_.moments(a).download<float>(floats)
                                    : std::vector<float>{});
     }
+    const size_t rest = size_t{splats_.count()} * splats_.stride(kShRest);
+    if (splats_.has_rest_sum() && rest > 0) s.rest_sum = splats_.rest_sum().download<float>(rest);
     s.gradient_sum = backward_.gradient_sum()
                          ? backward_.gradient_sum().download<float>(size_t{splats_.count()} * 2)
                          : std::vector<float>(size_t{splats_.count()} * 2);
@@ -412,7 +415,7 @@ Trainer::State Trainer::state() {
 void Trainer::restore(const State& s) {
     drain();
     splats_ = GpuSplats();  // first, so that there are never two
-    splats_ = GpuSplats(*device_, s.model, true);
+    splats_ = GpuSplats(*device_, s.model, true, options_.sh_rest_every > 1);
     forward_.set_sh_stored(s.model.sh_degree);
     backward_.set_sh_stored(s.model.sh_degree);
     if (s.next_probe > 0) next_probe_ = s.next_probe;
@@ -423,6 +426,7 @@ void Trainer::restore(const State& s) {
     if (exposure_ && !s.exposure.empty()) exposure_->restore(s.exposure);
     for (int a = 0; a < kAttributeCount; ++a)
         if (!s.moments[a].empty()) splats_.moments(a).upload(s.moments[a]);
+    if (!s.rest_sum.empty()) splats_.rest_sum().upload(s.rest_sum);
     backward_.reserve(splats_.count(), 0);
     if (!s.gradient_sum.empty()) backward_.gradient_sum().upload(s.gradient_sum);
     iteration_ = s.iteration;

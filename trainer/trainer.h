@@ -124,6 +124,7 @@ class Trainer {
         std::vector<float> error_shares;  // [N][2] ErrorScore, or empty
         SplatModel model;
         std::vector<std::vector<float>> moments;
+        std::vector<float> rest_sum;      // [N][stride of kShRest]; empty where there is none
         std::vector<float> gradient_sum;  // [N][2]
         TrainCounters counters;
     };

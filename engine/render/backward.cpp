@@ -9,16 +9,24 @@
 namespace darb {
 
 AdamStep adam_step(const AdamStep& rates, int t) {
-    const double correction1 = 1.0 - std::pow(0.9, t);
-    const double correction2 = 1.0 - std::pow(0.999, t);
-    const auto scaled = [&](float rate) { return static_cast<float>(rate / correction1); };
-    return {scaled(rates.position),
-            scaled(rates.scale),
-            scaled(rates.rotation),
-            scaled(rates.opacity),
-            scaled(rates.sh_dc),
-            scaled(rates.sh_rest),
-            static_cast<float>(1.0 / std::sqrt(correction2))};
+    const auto correction1 = [](int steps) { return 1.0 - std::pow(0.9, steps); };
+    const auto correction2 = [](int steps) { return std::sqrt(1.0 - std::pow(0.999, steps)); };
+    const auto scaled = [&](float rate) { return static_cast<float>(rate / correction1(t)); };
+    AdamStep step = rates;
+    step.position = scaled(rates.position);
+    step.scale = scaled(rates.scale);
+    step.rotation = scaled(rates.rotation);
+    step.opacity = scaled(rates.opacity);
+    step.sh_dc = scaled(rates.sh_dc);
+    step.sh_rest = scaled(rates.sh_rest);
+    step.inverse_sqrt_correction2 = static_cast<float>(1.0 / correction2(t));
+    if (rates.rest_every > 1) {
+        step.rest = t % rates.rest_every == 0 ? REST_APPLY : REST_GATHER;
+        const int steps = std::max(t / rates.rest_every, 1);
+        step.sh_rest = static_cast<float>(rates.sh_rest / correction1(steps) * correction2(steps) /
+                                          correction2(t));
+    }
+    return step;
 }
 
 Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
@@ -39,8 +47,8 @@ void Backward::set_sh_stored(int degree) {
     options_.sh_stored = degree;
 }
 
-Pipeline& Backward::project_pipeline(int sh_degree) {
-    const auto found = project_.find(sh_degree);
+Pipeline& Backward::project_pipeline(int sh_degree, int rest) {
+    const auto found = project_.find({sh_degree, rest});
     if (found != project_.end()) return found->second;
     SpecConstants constants = kernel_constants(options_);
     constants["THREADS"] = SPLAT_GROUP;
@@ -49,7 +57,9 @@ Pipeline& Backward::project_pipeline(int sh_degree) {
     add_constants(options_.effects, constants);
     constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(blend_.window_pairs());
     constants["UPDATE"] = result_ == BackwardResult::update ? 1 : 0;
-    return project_.emplace(sh_degree, Pipeline(*device_, "project_backward", constants))
+    constants["REST"] = rest;
+    return project_
+        .emplace(std::pair(sh_degree, rest), Pipeline(*device_, "project_backward", constants))
         .first->second;
 }
 
@@ -76,6 +86,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                       const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
                       const AdamStep& step) {
     DARB_CHECK(splats.has_moments() && forward.options().store_for_backward, "set up for training");
+    DARB_CHECK(step.rest == REST_EACH || splats.has_rest_sum(), "nothing to gather in");
     commands.pass("blend backward");
     blend_.record(commands, forward, d_image, data, background);
 
@@ -98,9 +109,10 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                             step.scale_weight / (3.0f * n),
                                             step.regularise_unseen ? 1u : 0u,
                                             step.largest_log_scale,
-                                            step.clearance};
+                                            step.clearance,
+                                            1.0f / static_cast<float>(step.rest_every)};
         const Groups g = groups_for(range.count);
-        commands.dispatch(project_pipeline(sh_degree), args,
+        commands.dispatch(project_pipeline(sh_degree, step.rest), args,
                           {cameras,
                            splats.parameters(kPosition),
                            splats.parameters(kLogScale),
@@ -124,7 +136,8 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                            blend_.rest(),
                            gradient_sum_,
                            forward.status(),
-                           splats.smoothing()},
+                           splats.smoothing(),
+                           splats.rows(splats.rest_sum(), range)},
                           g.x, g.y);
     }
 }

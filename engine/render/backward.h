@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "engine/render/blend_backward.h"
 #include "engine/render/forward.h"
@@ -21,6 +22,10 @@ struct AdamStep {
     bool regularise_unseen = false;
     float largest_log_scale = std::numeric_limits<float>::max();  // none grows beyond it
     float clearance = 0;  // world: splats nearer to the camera fade
+    // Harmonics above the first band make a step in every so many iterations, of the mean gradient
+    // of these; more than 1 takes splats that hold such means.
+    int rest_every = 1;
+    int rest = REST_EACH;  // what that is in this iteration, REST_*
 };
 /// rates: plain learning rates; t: the number of this step, from 1.
 AdamStep adam_step(const AdamStep& rates, int t);
@@ -63,13 +68,13 @@ class Backward {
 
   private:
     static BufferList<Backward> splat_buffers(std::uint64_t splats);
-    Pipeline& project_pipeline(int sh_degree);
+    Pipeline& project_pipeline(int sh_degree, int rest);
 
     Device* device_;
     ForwardOptions options_;
     BackwardResult result_;
     BlendBackward blend_;
-    std::map<int, Pipeline> project_;
+    std::map<std::pair<int, int>, Pipeline> project_;  // by degree and REST_*
     std::uint32_t splat_capacity_ = 0;
     Buffer gradient_sum_;
 };

@@ -48,9 +48,10 @@ std::uint64_t GpuSplats::parameter_bytes(std::uint64_t count, int sh_degree) {
     return bytes;
 }
 
-GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments)
+GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments, bool with_rest_sum)
     : count_(static_cast<std::uint32_t>(model.size())),
-      binding_bytes_(device.info().max_storage_buffer_bytes) {
+      binding_bytes_(device.info().max_storage_buffer_bytes),
+      has_rest_sum_(with_rest_sum) {
     header_.sh_degree = model.sh_degree;
     header_.kernel = model.kernel;
     header_.footprint = model.footprint;
@@ -69,6 +70,10 @@ GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments)
         moments_[a] = Buffer(device, std::string("moments of ") + kNames[a], 2 * bytes);
         if (bytes > 0) moments_[a].upload(std::vector<float>(2 * values.size(), 0.0f));
     }
+    if (!with_moments) return;
+    const size_t sums = with_rest_sum ? model.sh_rest.size() : 0;
+    rest_sum_ = Buffer(device, "sum of sh_rest", sums * sizeof(float));
+    if (sums > 0) rest_sum_.upload(std::vector<float>(sums, 0.0f));
 }
 
 SplatModel GpuSplats::download() const {
@@ -86,7 +91,7 @@ std::vector<SplatRange> GpuSplats::ranges() const {
 
 BufferRange GpuSplats::rows(const Buffer& of_rest, const SplatRange& range) const {
     const std::uint32_t stride = strides_[kShRest];
-    if (stride == 0) return of_rest;
+    if (stride == 0 || (&of_rest == &rest_sum_ && !has_rest_sum_)) return of_rest;
     const std::uint64_t floats = &of_rest == &moments_[kShRest] ? stride * 2 : stride;
     return {of_rest, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
 }

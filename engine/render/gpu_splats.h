@@ -17,8 +17,10 @@ enum Attribute { kPosition, kLogScale, kRotation, kOpacity, kShDc, kShRest, kAtt
 class GpuSplats {
   public:
     GpuSplats() = default;
-    /// Uploads the model. with_moments adds two floats for each parameter, set to zero.
-    GpuSplats(Device& device, const SplatModel& model, bool with_moments);
+    /// Uploads the model. with_moments adds two floats for each parameter, set to zero,
+    /// with_rest_sum one for each of the harmonics above the first band.
+    GpuSplats(Device& device, const SplatModel& model, bool with_moments,
+              bool with_rest_sum = false);
 
     /// Everything back to the host; kernel, footprint, origin and degree as given at the start.
     SplatModel download() const;
@@ -37,6 +39,10 @@ class GpuSplats {
     const Buffer& parameters(int attribute) const { return parameters_[attribute]; }
     Buffer& moments(int attribute) { return moments_[attribute]; }
     const Buffer& moments(int attribute) const { return moments_[attribute]; }
+
+    /// [N][stride of kShRest], where has_rest_sum(): gradients since their last step.
+    Buffer& rest_sum() { return rest_sum_; }
+    bool has_rest_sum() const { return has_rest_sum_; }
 
     /// [N] deviation of the 3D smoothing filter, world units; one unused word where no effect needs
     /// it.
@@ -67,6 +73,8 @@ class GpuSplats {
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> parameters_;
     std::array<Buffer, kAttributeCount> moments_;  // [N][stride][2]: first, second
+    bool has_rest_sum_ = false;
+    Buffer rest_sum_;
     Buffer smoothing_;
 };
 

@@ -17,6 +17,7 @@ layout(constant_id = 0) const uint THREADS = 64;
 layout(constant_id = 1) const int SH_DEGREE = 0;
 layout(constant_id = 2) const int SH_STORED = 0;
 layout(constant_id = 3) const int UPDATE = 1;
+layout(constant_id = 4) const int REST = REST_EACH;
 
 layout(push_constant, scalar) uniform Push { ProjectBackwardArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
@@ -38,6 +39,7 @@ layout(set = 0, binding = 20, scalar) readonly buffer PartialRest { float partia
 layout(set = 0, binding = 21, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
 layout(set = 0, binding = 22, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 23, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
+layout(set = 0, binding = 24, scalar) buffer RestSum { float rest_sum[]; };  // as sh_rest, but with REST_EACH
 
 const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
 const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
@@ -86,9 +88,16 @@ void update_rest(uint i, SplatGradient g) {
     for (int k = 0; k < SH_USED; ++k) {
         for (uint c = 0u; c < 3u; ++c) {
             const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u + c;
-            vec2 m = m_rest[at];
-            sh_rest[at] = adam_step(sh_rest[at], m, basis[k] * g.colour[c], args.rate_rest);
-            m_rest[at] = m;
+            float gradient = basis[k] * g.colour[c];
+            if (REST != REST_EACH) {
+                gradient = rest_sum[at] + gradient * args.rest_share;
+                rest_sum[at] = REST == REST_GATHER ? gradient : 0.0;
+            }
+            if (REST != REST_GATHER) {
+                vec2 m = m_rest[at];
+                sh_rest[at] = adam_step(sh_rest[at], m, gradient, args.rate_rest);
+                m_rest[at] = m;
+            }
         }
     }
 }
@@ -122,7 +131,7 @@ void update_splat(uint i, SplatGradient g) {
     if (UPDATE == 1 && away < args.clearance) logit -= FADING;
     opacity_logit[i] = logit;
     m_opacity[i] = m;
-    if (SH_DEGREE > 0) update_rest(i, g);
+    if (SH_DEGREE > 0 && (REST != REST_GATHER || pair_count[i] > 0u)) update_rest(i, g);
 }
 
 void main() {

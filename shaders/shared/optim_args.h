@@ -22,7 +22,14 @@ struct ProjectBackwardArgs {
     uint regularise_unseen;
     float largest_log_scale;  // no scale grows beyond it (UPDATE = 1)
     float clearance;          // world: splats nearer to the camera fade (UPDATE = 1)
+    float rest_share;         // of an iteration's gradient in the mean that a step is made of
 };
+
+// When the harmonics above the first band make a step: in this iteration, of its own gradient; not
+// in this one, whose gradient is gathered; in this one, of the mean of what was gathered.
+#define REST_EACH 0
+#define REST_GATHER 1
+#define REST_APPLY 2
 
 // What density control does with a splat; see densify_decide.comp.
 #define DENSIFY_KEEP 0
@@ -55,7 +62,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 64);
+static_assert(sizeof(ProjectBackwardArgs) == 68);
 }  // namespace darb::gpu
 #endif
 #endif

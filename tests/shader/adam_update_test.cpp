@@ -94,6 +94,43 @@ TEST(AdamUpdate, late_steps_match_double) {
     }
 }
 
+// The other attributes step each time, as without.
+TEST(AdamUpdate, harmonics_step_every_fourth_time_of_the_mean_gradient) {
+    constexpr int kEvery = 4;
+    Training training;
+    PassState state = start_state(training.scene.model);
+    const size_t n = state.parameters[kShRest].size();
+    std::vector<double> x(state.parameters[kShRest].begin(), state.parameters[kShRest].end());
+    std::vector<double> first(n), second(n), mean(n);
+    for (int t = 1; t <= 3 * kEvery; ++t) {
+        training.partials = Partials::random(50, 200 + static_cast<std::uint64_t>(t));
+        for (int a = 0; a < kAttributeCount; ++a)
+            attribute_values(training.scene.model, a) = state.parameters[a];
+        const auto gradient = stored_gradients(training.gradient(state))[kShRest];
+        for (size_t i = 0; i < n; ++i) mean[i] += double(gradient[i]) / kEvery;
+        AdamStep rates = kRates;
+        rates.rest_every = kEvery;
+        const PassState after =
+            run_backward_pass(training.scene.model, training.scene.camera, 3, true, state,
+                              training.partials, adam_step(rates, t));
+        const PassState same = training.update(state, t);
+        for (int a = 0; a < kShRest; ++a) EXPECT_EQ(after.parameters[a], same.parameters[a]);
+        if (t % kEvery != 0) {
+            EXPECT_EQ(after.parameters[kShRest], state.parameters[kShRest]) << t;
+            EXPECT_EQ(after.moments[kShRest], state.moments[kShRest]) << t;
+        } else {
+            reference::adam_step<double>(x, mean, first, second, rate_of(kShRest), t / kEvery);
+            for (size_t i = 0; i < n; ++i)
+                EXPECT_NEAR(after.parameters[kShRest][i], x[i],
+                            1e-4 * rate_of(kShRest) + 2e-7 * std::abs(x[i]))
+                    << i << ", step " << t;
+            mean.assign(n, 0.0);
+            EXPECT_EQ(after.rest_sum, std::vector<float>(n, 0.0f));
+        }
+        state = after;
+    }
+}
+
 TEST(AdamUpdate, unseen_splats_decay_and_move_on) {
     Training training(20);
     training.partials.count.assign(20, 0);

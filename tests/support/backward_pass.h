@@ -46,10 +46,11 @@ struct Partials {
 struct PassState {
     std::array<std::vector<float>, kAttributeCount> parameters;
     std::array<std::vector<float>, kAttributeCount> moments;  // [N][stride][2]
+    std::vector<float> rest_sum;                              // as the harmonics
     std::vector<glm::vec2> gradient_sum;
     gpu::FrameStatus status;
     bool operator==(const PassState& o) const {
-        return parameters == o.parameters && moments == o.moments &&
+        return parameters == o.parameters && moments == o.moments && rest_sum == o.rest_sum &&
                gradient_sum == o.gradient_sum &&
                std::memcmp(&status, &o.status, sizeof status) == 0;
     }
@@ -61,6 +62,7 @@ inline PassState start_state(const SplatModel& model) {
         s.parameters[a] = attribute_values(model, a);
         s.moments[a].assign(s.parameters[a].size() * 2, 0.0f);
     }
+    s.rest_sum.assign(model.sh_rest.size(), 0.0f);
     s.gradient_sum.assign(model.size(), glm::vec2(0));
     s.status = {};
     return s;
@@ -78,6 +80,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = model.sh_degree;
     constants["UPDATE"] = update ? 1 : 0;
+    constants["REST"] = step.rest;
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);
     std::vector<float> sums, rest;
@@ -98,7 +101,8 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     const GuardedBuffer count(device, "pair count", partials.count),
         begin(device, "pair begin", partials.begin), sum(device, "partials", sums),
         rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
-        status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters);
+        status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters),
+        rest_sum(device, "rest sum", b.rest_sum);
     const gpu::ProjectBackwardArgs args{0,
                                         n,
                                         0,
@@ -114,15 +118,16 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
                                         step.scale_weight,
                                         step.regularise_unseen ? 1u : 0u,
                                         step.largest_log_scale,
-                                        step.clearance};
+                                        step.clearance,
+                                        1.0f / static_cast<float>(step.rest_every)};
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);
-    commands.dispatch(
-        pipeline, args,
-        {cameras, p[0],  p[1],  p[2], p[3], p[4], p[5], m[0], m[1],  m[2],     m[3],   m[4],
-         m[5],    count, begin, sum,  sum,  sum,  sum,  sum,  rests, gradient, status, smoothing},
-        g.x, g.y);
+    commands.dispatch(pipeline, args,
+                      {cameras, p[0], p[1],  p[2],     p[3],   p[4],      p[5],    m[0], m[1],
+                       m[2],    m[3], m[4],  m[5],     count,  begin,     sum,     sum,  sum,
+                       sum,     sum,  rests, gradient, status, smoothing, rest_sum},
+                      g.x, g.y);
     commands.submit_and_wait();
     PassState after;
     for (int a = 0; a < kAttributeCount; ++a) {
@@ -132,6 +137,8 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
         after.moments[a] = m[a].read<float>();
     }
     EXPECT_TRUE(gradient.intact() && status.intact() && sum.intact() && rests.intact());
+    EXPECT_TRUE(rest_sum.intact());
+    after.rest_sum = rest_sum.read<float>();
     after.gradient_sum = gradient.read<glm::vec2>();
     after.status = status.read<gpu::FrameStatus>()[0];
     return after;

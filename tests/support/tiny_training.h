@@ -104,6 +104,7 @@ inline testing::AssertionResult same_state(Trainer& a, Trainer& b) {
         if (one.moments[attribute] != two.moments[attribute])
             return testing::AssertionFailure() << "moments of " << attribute_name(attribute);
     }
+    if (one.rest_sum != two.rest_sum) return testing::AssertionFailure() << "sums of harmonics";
     if (one.gradient_sum != two.gradient_sum) return testing::AssertionFailure() << "gradient sums";
     return testing::AssertionSuccess();
 }

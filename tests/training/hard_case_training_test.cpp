@@ -93,7 +93,7 @@ std::vector<double> losses_in_double(const Training& t, const check::HardCase& c
                             o.rotation_rate(),
                             o.opacity_rate(),
                             o.sh_dc_lr,
-                            o.sh_rest_rate()};
+                            o.sh_rest_rate(1)};
     std::array<std::vector<double>, kAttributeCount> value, m1, m2;
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& from = attribute_values(model, a);

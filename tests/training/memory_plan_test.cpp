@@ -87,7 +87,7 @@ TEST(MemoryPlan, checkpoints_of_buckets_are_met_to_the_byte) {
 
 TEST(MemoryPlan, strategies_are_met_to_the_byte) {
     for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
-        TrainOptions options = options_of(0);
+        TrainOptions options = options_of(2);
         use_strategy(strategy, options);
         options.densify_until = 0;
         options.iterations = 10;
@@ -129,7 +129,10 @@ TEST(MemoryPlan, the_peak_of_density_control_is_met) {
     options.densify_grad_threshold = 1e-5f;
     options.prune_opacity = 0.1f;  // some go in every round, so that buffers are made anew
     options.max_splats = 9'000;
-    compare_with_run(small_scene(), options, 3);
+    for (const int every : {1, 4}) {
+        options.sh_rest_every = every;
+        compare_with_run(small_scene(), options, 3);
+    }
 }
 
 TEST(MemoryPlan, the_peak_of_a_degree_added_on_the_way_is_met) {
@@ -142,7 +145,10 @@ TEST(MemoryPlan, the_peak_of_a_degree_added_on_the_way_is_met) {
     few.views.resize(6);  // too few photos for a trial: each degree is admitted
     few.points.seen_begin.clear();
     few.points.seen_by.clear();
-    compare_with_run(few, options, 2);
+    for (const int every : {1, 2}) {
+        options.sh_rest_every = every;
+        compare_with_run(few, options, 2);
+    }
 }
 
 // Measuring the device at the start is neither part of the peak nor of the budget.

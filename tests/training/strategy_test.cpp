@@ -25,6 +25,10 @@ TEST_P(EveryStrategy, a_resumed_run_equals_one_that_never_stopped) {
     run_to(whole, 42);
     EXPECT_GT(whole.splat_count(), 60U) << "growth must take part";
     EXPECT_LE(whole.splat_count(), 90U);
+    const auto gathered = [](const Trainer::State& s) {
+        return std::ranges::any_of(s.rest_sum, [](float sum) { return sum != 0; });
+    };
+    EXPECT_EQ(gathered(whole.state()), GetParam() == Strategy::budget) << "harmonics take part";
     expect_resumes(t, whole, {18, 30});
 }
 
@@ -209,16 +213,17 @@ TEST(Pace, a_short_run_learns_and_grows_faster) {
 
 TEST(Pace, colours_that_change_with_the_view_learn_faster_the_shorter_the_run) {
     TrainOptions options;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(), 1.25e-4f);
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), 1.25e-4f);
     options.iterations = 7'500;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(), 2.5e-4f);
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), 2.5e-4f);
     options.iterations = 3'333;  // 3 times by the length, 1.2 times by the pace
-    EXPECT_NEAR(options.sh_rest_rate(), 1.25e-4 * 3.6, 1e-7);
+    EXPECT_NEAR(options.sh_rest_rate(1), 1.25e-4 * 3.6, 1e-7);
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(4), 2 * options.sh_rest_rate(1));
     options.iterations = 1'000;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(), options.sh_dc_lr) << "the rate of the others at most";
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), options.sh_dc_lr) << "the rate of the others at most";
     use_3dgs_schedule(options);
     options.sh_dc_lr = 0.002f;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(), 0.0001f);
+    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), 0.0001f);
 }
 
 TEST(Pace, is_not_for_what_is_given_nor_for_3dgs) {

@@ -212,17 +212,21 @@ TEST(Training, a_device_of_small_bindings_trains_the_same_bits) {
     TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 700});
     t.options.sh_degree = 3;
     t.options.sh_interval = 5;
-    Trainer whole = t.trainer();
-    ::setenv("DARB_FAULT", "binding:163840", 1);
-    Device narrow;
-    ::unsetenv("DARB_FAULT");
-    Trainer parts(narrow, t.dataset, t.photos, t.start(), t.options);
-    ASSERT_GT(parts.splats().ranges().size(), 1U);
-    run_to(whole, 45);
-    run_to(parts, 45);
-    EXPECT_GT(parts.splats().ranges().size(), 1U);
-    EXPECT_GT(parts.counters().cloned_or_split, 10U);
-    EXPECT_TRUE(same_state(whole, parts));
+    for (const int every : {1, 4}) {
+        t.options.sh_rest_every = every;
+        Trainer whole = t.trainer();
+        ::setenv("DARB_FAULT", "binding:163840", 1);
+        Device narrow;
+        ::unsetenv("DARB_FAULT");
+        Trainer parts(narrow, t.dataset, t.photos, t.start(), t.options);
+        ASSERT_GT(parts.splats().ranges().size(), 1U);
+        run_to(whole, 45);
+        run_to(parts, 45);
+        EXPECT_GT(parts.splats().ranges().size(), 1U);
+        EXPECT_GT(parts.counters().cloned_or_split, 10U);
+        EXPECT_TRUE(same_state(whole, parts));
+        EXPECT_EQ(whole.state().rest_sum.empty(), every == 1);
+    }
 }
 
 // So are the sums of pairs, window by window.

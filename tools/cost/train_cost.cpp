@@ -43,7 +43,7 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         if (options.probe_sh || degree < options.sh_degree)
             add(fmt::format("sh degree {} by the iteration", degree), [degree](TrainOptions& o) {
                 o.sh_degree = degree;
-                o.sh_interval = std::max(1, std::min(o.sh_interval, o.iterations / 8));
+                o.sh_interval = std::max(1, std::min(o.degree_interval(), o.iterations / 8));
                 o.probe_sh = false;
             });
     add(options.antialias ? "without antialias" : "with antialias",
@@ -52,6 +52,10 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         [](TrainOptions& o) { o.exposure = !o.exposure; });
     add(options.resolution_ramp ? "without resolution ramp" : "with resolution ramp",
         [](TrainOptions& o) { o.resolution_ramp = !o.resolution_ramp; });
+    if (options.sh_degree > 0)
+        add(options.sh_rest_every > 1 ? "harmonics step in every iteration"
+                                      : "harmonics step in every 16th",
+            [](TrainOptions& o) { o.sh_rest_every = o.sh_rest_every > 1 ? 1 : 16; });
     if (options.random_background)
         add("one background", [](TrainOptions& o) { o.random_background = false; });
     if (options.opacity_weight > 0 || options.scale_weight > 0)

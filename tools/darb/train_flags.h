@@ -27,6 +27,7 @@ struct TrainFlags {
     std::string kernel = "gaussian", strategy = "adc";
     std::string schedule = "darb";   // or 3dgs
     std::string resolution_ramp;     // on, off, or empty: as the strategy has it
+    int sh_rest_every = 0;           // 0: as the strategy has it
     std::string strategy_note;       // what plan_strategy decided, for people
     bool own_prune_opacity = false;  // --prune-opacity was given
     // Options that were given and the strategies that know them.

@@ -44,6 +44,11 @@ void add_strategy_flags(CLI::App& command, TrainFlags& f) {
                     "on: the first tenth of the run sees photos of a quarter of their sides, the "
                     "next fifth of half; default: on with budget")
         ->check(CLI::IsMember({"on", "off"}));
+    command
+        .add_option("--sh-rest-every", f.sh_rest_every,
+                    "harmonics above the first band make a step in every so many iterations, of "
+                    "the mean gradient of these; default: 1, with budget 16")
+        ->check(CLI::Range(1, 1'000));
 }
 
 }  // namespace
@@ -129,6 +134,7 @@ void finish_strategy(TrainFlags& f) {
                         fmt::format("Leave it out; it goes with --strategy {}.", strategies));
         if (name == "--opacity-decay") f.train.opacity_decay = given.opacity_decay;
     }
+    if (f.sh_rest_every > 0) f.train.sh_rest_every = f.sh_rest_every;
     if (!f.resolution_ramp.empty()) f.train.resolution_ramp = f.resolution_ramp == "on";
 }
 

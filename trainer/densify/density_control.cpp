@@ -117,6 +117,8 @@ void DensityControl::move(GpuSplats& splats, const Buffer& sources, std::uint32_
         if (stride == 0) continue;
         gather(sources, count, stride, false, splats.parameters(a));
         if (splats.has_moments()) gather(sources, count, stride * 2, true, splats.moments(a));
+        if (a == kShRest && splats.has_rest_sum())
+            gather(sources, count, stride, true, splats.rest_sum());
     }
     splats.set_count(count);
 }

@@ -30,6 +30,17 @@ TEST(Roofline, work_grows_with_the_counts) {
     EXPECT_FALSE(pass_work("no such pass", counts));
 }
 
+TEST(Roofline, harmonics_that_step_seldom_move_less) {
+    FrameCounts counts{1000, 800, 5000, 10'000, 24};
+    const PassWork each = *pass_work("project backward", counts);
+    counts.rest_every = 16;
+    const PassWork seldom = *pass_work("project backward", counts);
+    // Of 1,000 splats three loads and stores of 24 floats; the sum's of those seen, and at a step.
+    EXPECT_DOUBLE_EQ(each.bytes - seldom.bytes,
+                     1000 * 24 * 24 * (1 - 1.0 / 16) - (800 + 1000.0 / 16) * 8 * 24);
+    EXPECT_EQ(each.fma, seldom.fma);
+}
+
 TEST(Roofline, share_is_that_of_the_slower_rate) {
     const DeviceRates rates{1e9, 1e10};
     EXPECT_DOUBLE_EQ(roofline_share({1e6, 1e6}, rates, 2.0), 0.5);
