@@ -95,6 +95,8 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     Trainer trainer(device, few, grey_photos(few.views), placeholder, options);
     Trainer::State state;
     state.iteration = options.sh_degree * options.degree_interval();
+    if (const int every = options.sh_rest_every; every > 1)  // both ways of a step run at first
+        state.iteration += every - 1 - state.iteration % every;
     state.model = model;
     state.moments.resize(kAttributeCount);
     trainer.restore(state);
@@ -102,7 +104,8 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     trainer.on_result = [&](const IterationResult& r) {
         result.pairs = std::max<std::uint64_t>(result.pairs, r.pairs);
     };
-    timed_steps(trainer, static_cast<int>(few.views.size()));  // compiles, and grows the buffers
+    // Compiles, and grows the buffers.
+    timed_steps(trainer, std::max(2, static_cast<int>(few.views.size())));
     result.ms = timed_steps(trainer, kIterations);
     return result;
 }
@@ -222,7 +225,11 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     SplatModel start = initial_model(dataset, options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
-    start.sh_degree = f.demand.sh_degree = predict_degree(options);
+    f.demand.sh_degree = predict_degree(options);
+    start.sh_degree = f.demand.sh_degree;  // of the times
+    if (options.probe_sh)
+        start.sh_degree =
+            std::min(start.sh_degree, options.iterations / 2 / options.degree_interval());
     start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
     f.start_splats = static_cast<std::uint32_t>(start.size());
     const std::uint32_t limit =

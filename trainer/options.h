@@ -17,6 +17,7 @@ enum class Strategy { adc, mcmc, budget };
 
 constexpr int kPacedBelow = 4'000;  // iterations
 constexpr float kMostPace = 5;
+constexpr float kMostHaste = 10;
 
 struct TrainOptions {
     int iterations = 30'000;
@@ -25,7 +26,7 @@ struct TrainOptions {
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
     Accuracy accuracy;     // footprint and SH degree aside: they are the two here
-    int sh_degree = 3;     // one more every sh_interval iterations
+    int sh_degree = 3;     // one more every degree_interval() iterations
     int sh_interval = -1;  // below 0: 1,000 over pace()
     // false: a degree is added at each interval. true: the first only where a probe on training
     // photos set aside gains kProbeGain_db, tried again after as many iterations as before. Probes
@@ -52,9 +53,8 @@ struct TrainOptions {
     // The three below 0: 0.005 and 0.001 times pace(), 0.05 times its root.
     float scale_lr = -1, rotation_lr = -1, opacity_lr = -1;
     float sh_dc_lr = 2.5e-3f;
-    // Whether the rate of the other bands, a twentieth of it, is multiplied by haste() and pace(),
-    // up to that of the first: they come late in a run. Miku plush at 200 px, two seeds: after
-    // 4,000 iterations 28.68 and 28.61 dB with, 28.40 and 28.13 without.
+    // Whether the rate of the other bands, a twentieth of it, is multiplied by 30,000 / iterations,
+    // at most kMostHaste: they come late in a run. ARCHITECTURE has what that brings.
     bool sh_rest_hastens = true;
     // These bands make a step in every so many iterations, of their mean gradient, at the root of
     // as many times the rate: what Adam reads and writes for them is most of what it moves.
@@ -65,8 +65,8 @@ struct TrainOptions {
     // with 0.1.
     double final_lr_share = 0.3;
 
-    // Whether runs of fewer than kPacedBelow iterations learn shapes and opacities and grow faster;
-    // see pace().
+    // Whether runs of fewer than kPacedBelow iterations learn shapes and opacities, grow, and come
+    // to their degrees of colour faster; see pace().
     bool paced = true;
 
     // Density control. What is not adc is set by use_strategy. Below 0: rounds after 500 iterations
@@ -159,8 +159,8 @@ struct TrainOptions {
     }
     /// Of steps of the mean of so many iterations.
     float sh_rest_rate(int every) const {
-        const float hastened = sh_rest_hastens ? haste() * pace() : 1.0f;
-        const float times = hastened * std::sqrt(static_cast<float>(every));
+        float times = std::sqrt(static_cast<float>(every));
+        if (sh_rest_hastens) times *= std::min(haste() * haste(), kMostHaste);
         return sh_dc_lr * std::min(1.0f, times / 20);
     }
     float position_lr_start() const {

@@ -132,7 +132,8 @@ void Trainer::probe_degree() {
     before.next_probe =
         probe.admitted ? before.iteration + interval : 2 * std::max(before.iteration, 1);
     // Not while opacities come back from a reset.
-    if (resets_after(options_, before.next_probe)) before.next_probe += (interval + 1) / 2;
+    if (before.model.sh_degree == 0 && resets_after(options_, before.next_probe))
+        before.next_probe += (interval + 1) / 2;
     restore(before);
     probes_.push_back(probe);
 }

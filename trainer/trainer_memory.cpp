@@ -2,6 +2,7 @@
 // plans so far, and how many splats a budget leaves room for.
 #include <algorithm>
 
+#include "trainer/forecast.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -57,8 +58,9 @@ MemoryDemand Trainer::growth_demand() const {
         demand.small_pixels = std::max(demand.small_pixels, demand_.small_pixels);
         most *= static_cast<std::uint64_t>(divisor_);
     }
-    if (options_.probe_sh)  // the next degree on trial is to have room
-        demand.sh_degree = std::min(demand.sh_degree + 1, options_.sh_degree);
+    if (options_.probe_sh)  // what is on trial is to have room, and what follows it
+        demand.sh_degree =
+            demand.sh_degree == 0 ? std::min(1, options_.sh_degree) : predict_degree(options_);
     demand.room_splats = 0;
     demand.pairs = std::max(4 * demand.splats, most + most / 2);
     demand.pairs += demand.pairs / 2;

@@ -112,7 +112,8 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                             step.clearance,
                                             1.0f / static_cast<float>(step.rest_every)};
         const Groups g = groups_for(range.count);
-        commands.dispatch(project_pipeline(sh_degree, step.rest), args,
+        const int rest = sh_degree > 0 ? step.rest : REST_EACH;  // nothing to step at degree 0
+        commands.dispatch(project_pipeline(sh_degree, rest), args,
                           {cameras,
                            splats.parameters(kPosition),
                            splats.parameters(kLogScale),

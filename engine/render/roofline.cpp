@@ -82,10 +82,11 @@ std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
         return PassWork{c.pairs * (kPairBytes + 2 * kPartialBytes) + c.pixels * 20,
                         samples * kBlendBackwardFma};
     if (pass == "project backward") {  // parameters and two moments, read and written, or the sum
-        const double sums = c.rest_every > 1 ? (c.visible + c.splats / c.rest_every) * 8 * rest : 0;
-        return PassWork{
-            c.splats * (24 * (14 + rest / c.rest_every) + 16) + sums + c.pairs * kPartialBytes,
-            c.visible * (kProjectBackwardFma + 3 * kShFma * rest)};
+        const double steps = 1 / c.rest_every;
+        const double sums =
+            c.rest_every > 1 ? (c.visible * (1 - steps) + c.splats * steps) * 8 * rest : 0;
+        return PassWork{c.splats * (24 * (14 + rest * steps) + 16) + sums + c.pairs * kPartialBytes,
+                        c.visible * (kProjectBackwardFma + 3 * kShFma * rest)};
     }
     return std::nullopt;
 }

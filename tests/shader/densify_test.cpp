@@ -19,6 +19,7 @@ using reference::DensityAction;
 struct Generation {
     SplatModel model;
     std::array<std::vector<float>, kAttributeCount> moments;
+    std::vector<float> rest_sum;
 };
 
 constexpr std::uint32_t kNoLimit = 0xffffffff;
@@ -47,13 +48,17 @@ struct Population {
     Generation run(const gpu::DensifyArgs& args, DensityResult& result,
                    int kernel = KERNEL_GAUSSIAN, std::uint32_t max_splats = kNoLimit) const {
         Device& device = shared_device();
-        GpuSplats splats(device, model, true);
+        GpuSplats splats(device, model, true, true);
         for (int a = 0; a < kAttributeCount; ++a) splats.moments(a).upload(moments_before(a));
+        const std::vector<float> ones(model.sh_rest.size(), 1.0f);
+        if (!ones.empty()) splats.rest_sum().upload(ones);
         Buffer sums(device, "gradient sum", std::max<size_t>(model.size(), 1) * 8);
         if (!gradient_sum.empty()) sums.upload(gradient_sum);
         DensityControl density(device, kernel);
         result = density.run(splats, sums, args, max_splats);
-        Generation g{splats.download(), {}};
+        Generation g{splats.download(), {}, {}};
+        const size_t rest = g.model.size() * stride(kShRest);
+        if (rest > 0) g.rest_sum = splats.rest_sum().download<float>(rest);
         for (int a = 0; a < kAttributeCount; ++a)
             g.moments[a] = splats.moments(a).download<float>(g.model.size() * stride(a) * 2);
         return g;
@@ -127,6 +132,9 @@ void expect_generation(const Population& before, const std::vector<Source>& sour
                 for (size_t m = 0; m < 2; ++m)
                     ASSERT_EQ(after.moments[a][2 * at + m], old ? moments[2 * source + m] : 0)
                         << where << " moment " << m;
+                if (a == kShRest) {
+                    ASSERT_EQ(after.rest_sum[at], old ? 1 : 0) << where << " sum";
+                }
             }
         }
     }

@@ -69,11 +69,15 @@ TEST(MortonOrder, everything_of_a_splat_moves_as_a_stable_sort_says) {
         for (size_t a = 0; a < 3; ++a) model.position[3 * (600 + i) + a] = model.position[a];
     model.position[3 * 5] = 1e6f;  // outside of the grid
     model.position[3 * 6 + 1] = std::numeric_limits<float>::quiet_NaN();
-    GpuSplats splats(shared_device(), model, true);
+    GpuSplats splats(shared_device(), model, true, true);
     for (int a = 0; a < kAttributeCount; ++a)
         splats.moments(a).upload(numbered(model.size() * splats.stride(a) * 2));
+    const size_t rest = splats.stride(kShRest);
+    ASSERT_GT(rest, 0U);
+    splats.rest_sum().upload(numbered(model.size() * rest));
     put_in_order(splats);
     ASSERT_EQ(splats.count(), model.size());
+    const auto sums = splats.rest_sum().download<float>(model.size() * rest);
     const SplatModel got = splats.download();
     const std::vector<size_t> order = expected_order(model);
     ASSERT_FALSE(std::is_sorted(order.begin(), order.end()));
@@ -89,6 +93,9 @@ TEST(MortonOrder, everything_of_a_splat_moves_as_a_stable_sort_says) {
                     << attribute_name(a) << " of " << i << ": " << value << ", not " << wanted;
                 ASSERT_EQ(moments[2 * (i * stride + c)],
                           static_cast<float>(2 * (order[i] * stride + c)));
+                if (a == kShRest) {
+                    ASSERT_EQ(sums[i * stride + c], static_cast<float>(order[i] * stride + c));
+                }
             }
     }
 }

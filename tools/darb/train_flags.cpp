@@ -106,7 +106,7 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::Range(1e-6, 1.0));
     command
         .add_option("--feature-lr", t.sh_dc_lr,
-                    "of the colour; its view-dependent part learns at a 20th")
+                    "of the first band; the others learn at a 20th, in short runs faster")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
 }
