@@ -21,8 +21,8 @@ DeviceRates measure_rates(Device& device);
 struct FrameCounts {
     double splats = 0, visible = 0, pairs = 0, pixels = 0;
     double rest_floats = 0;  // of a splat in the buffers: 3 ((d + 1)^2 - 1) at SH degree d
-    double rest_every = 1;   // iterations between steps of these, as AdamStep::rest_every
     double evaluated = 0;    // splat-pixels of blending; 0: estimated from the pairs
+    double rest_every = 1;   // iterations between steps of these floats, as AdamStep::rest_every
 };
 
 struct PassWork {
