@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "engine/render/effect_plan.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
@@ -13,8 +14,7 @@ namespace darb {
 
 namespace {
 
-constexpr double kProbeGain_db = 0.05;   // that the first degree must bring
-constexpr float kProbeIterations = 120;  // of each arm, over the pace
+constexpr float kProbeIterations = 150;  // of each arm, over the root of the pace
 constexpr std::size_t kFewestViews = 8;  // fewer photos leave none to set aside: the schedule holds
 constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 
@@ -67,7 +67,7 @@ double Trainer::probe_arm(const State& start, int degree, const std::vector<int>
     State state = start;
     set_degree(state, degree);
     restore(state);
-    const auto iterations = std::lround(kProbeIterations / options_.pace());
+    const auto iterations = std::lround(kProbeIterations / std::sqrt(options_.pace()));
     for (long i = 0; i < iterations; ++i) {
         launch(++iteration_);
         settle(flights_[(iteration_ + 1) & 1]);
@@ -121,7 +121,7 @@ void Trainer::probe_degree() {
         probe_views_ = rest;
         const double without = probe_arm(before, degree, aside);
         probe.gain_db = probe_arm(before, degree + 1, aside) - without;
-        probe.admitted = probe.gain_db >= kProbeGain_db;
+        probe.admitted = probe.gain_db >= kDegreeGain_db;
         probe_views_.clear();
         pass_totals_ = totals;
         timed_iterations_ = timed;
