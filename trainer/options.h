@@ -29,7 +29,7 @@ struct TrainOptions {
     int sh_degree = 3;     // one more every degree_interval() iterations
     int sh_interval = -1;  // below 0: 1,000 over pace()
     // false: a degree is added at each interval. true: the first only where a probe on training
-    // photos set aside gains kDegreeGain_db, tried again after as many iterations as before. Probes
+    // photos set aside gains, tried again after as many iterations as before. Probes
     // of a few iterations refuse the others wrongly: without them the shipped scene has 31.62 dB
     // after 4,000, with them 32.20.
     bool probe_sh = false;

@@ -16,9 +16,8 @@ namespace darb {
 
 namespace {
 
-// While a probe runs, the rate of the view-dependent part over that of the other, at least: what it
-// trains is thrown away, so that it may look far ahead.
-constexpr float kProbeRestRate = 0.4f;
+// While a probe runs, the rate of the view-dependent part over that of the other.
+constexpr float kProbeRestRate = 0.2f;
 constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
 // More splats than this share with a gradient that is not finite: something is broken.
@@ -162,9 +161,15 @@ AdamStep Trainer::rates(int iteration) const {
     step.rotation = options_.rotation_rate() * late;
     step.opacity = options_.opacity_rate() * late;
     step.sh_dc = options_.sh_dc_lr * late;
-    step.rest_every = probe_views_.empty() ? options_.sh_rest_every : 1;
-    const float on_trial = probe_views_.empty() ? 0 : kProbeRestRate * options_.sh_dc_lr;
-    step.sh_rest = std::max(options_.sh_rest_rate(step.rest_every), on_trial) * late;
+    step.rest_every = options_.sh_rest_every;
+    step.sh_rest = options_.sh_rest_rate(step.rest_every) * late;
+    if (!probe_views_.empty()) {
+        step.rest_every = 1;
+        step.sh_rest = kProbeRestRate * options_.sh_dc_lr;
+        for (float* rate : {&step.position, &step.scale, &step.rotation, &step.opacity, &step.sh_dc,
+                            &step.sh_rest})
+            *rate *= probe_rate_;
+    }
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight =

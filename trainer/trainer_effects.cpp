@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "engine/render/effect_plan.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
@@ -62,13 +61,15 @@ void Trainer::set_degree(State& state, int degree) {
     if (splats_.has_rest_sum()) state.rest_sum = widen(state.rest_sum, 1);
 }
 
-// Mean PSNR over the photos set aside after some iterations on the others.
+// Mean PSNR over the photos set aside after some iterations on the others. All rates fall to
+// nothing in its second half: what is left to tell the arms apart is not which photo came last.
 double Trainer::probe_arm(const State& start, int degree, const std::vector<int>& aside) {
     State state = start;
     set_degree(state, degree);
     restore(state);
     const auto iterations = std::lround(kProbeIterations / std::sqrt(options_.pace()));
     for (long i = 0; i < iterations; ++i) {
+        probe_rate_ = std::min(1.0f, 2 * static_cast<float>(iterations - i) / float(iterations));
         launch(++iteration_);
         settle(flights_[(iteration_ + 1) & 1]);
     }
@@ -121,7 +122,7 @@ void Trainer::probe_degree() {
         probe_views_ = rest;
         const double without = probe_arm(before, degree, aside);
         probe.gain_db = probe_arm(before, degree + 1, aside) - without;
-        probe.admitted = probe.gain_db >= kDegreeGain_db;
+        probe.admitted = probe.gain_db > 0;
         probe_views_.clear();
         pass_totals_ = totals;
         timed_iterations_ = timed;

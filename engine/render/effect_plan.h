@@ -75,9 +75,6 @@ struct RenderOutputs {
 EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& views,
                           const RenderOutputs& outputs, const EffectChoice& choice = {});
 
-/// What the first degree of view-dependent colour must bring on photos set aside to be trained.
-inline constexpr double kDegreeGain_db = 0.02;
-
 /// For training. photos: as load_photos gives them, for the exposure's rule; empty: that effect is
 /// off. The degree of view-dependent colour is found while training: see TrainOptions::probe_sh.
 /// kernel: a row of engine/kernels; all but the Gaussian call for anti-aliasing where the data set

@@ -319,10 +319,10 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
 EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& photos, int sh_degree,
                          const EffectChoice& choice, int kernel) {
     EffectPlan plan;
-    plan.row(EFFECT_VIEW_COLOUR) = {sh_degree > 0, false, sh_degree, kDegreeGain_db,
-                                    fmt::format("up to degree {}, once a probe on photos set "
-                                                "aside gains {} dB by the first",
-                                                sh_degree, kDegreeGain_db)};
+    plan.row(EFFECT_VIEW_COLOUR) = {
+        sh_degree > 0, false, sh_degree, 0,
+        fmt::format("up to degree {}, once a probe on photos set aside gains by the first",
+                    sh_degree)};
     plan.row(EFFECT_ANTIALIAS) = antialias_rule(dataset, kernel);
     plan.row(EFFECT_EXPOSURE) = exposure_rule(dataset, photos);
     plan.row(EFFECT_OFF_CENTRE) = centre_rule(dataset.views);
