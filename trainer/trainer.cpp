@@ -16,7 +16,7 @@ namespace darb {
 
 namespace {
 
-// While a probe runs, the rate of the view-dependent part over that of the other.
+// While a probe runs, the rate of the bands above the first over that of the first.
 constexpr float kProbeRestRate = 0.2f;
 constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
 
@@ -165,7 +165,7 @@ AdamStep Trainer::rates(int iteration) const {
     step.sh_rest = options_.sh_rest_rate(step.rest_every) * late;
     if (!probe_views_.empty()) {
         step.rest_every = 1;
-        step.sh_rest = kProbeRestRate * options_.sh_dc_lr;
+        step.sh_rest = kProbeRestRate * step.sh_dc;
         for (float* rate : {&step.position, &step.scale, &step.rotation, &step.opacity, &step.sh_dc,
                             &step.sh_rest})
             *rate *= probe_rate_;

@@ -190,7 +190,7 @@ class Trainer {
     int next_probe_;
     std::vector<Probe> probes_;
     std::vector<int> probe_views_;  // not empty while a probe runs: the views it trains on
-    float probe_rate_ = 1;          // of the rates while a probe runs
+    float probe_rate_ = 1;          // share of all rates while a probe runs
 
     GpuSplats splats_;
     Forward forward_;
