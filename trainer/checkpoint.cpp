@@ -32,6 +32,7 @@ void for_each_array(State& state, Visit visit) {
     visit(state.smoothing);
     visit(state.exposure);
     visit(state.error_shares);
+    for (auto& values : state.mean) visit(values);
 }
 
 std::uint32_t checksum(std::span<const std::byte> bytes) {
@@ -53,6 +54,7 @@ Json header_of(const Checkpoint& c) {
                 {"exposure", c.state.exposure.size()},
                 {"error_shares", c.state.error_shares.size()},
                 {"rest_sum", c.state.rest_sum.size()},
+                {"averaged", c.state.averaged},
                 {"splats", m.size()},
                 {"sh_degree", m.sh_degree},
                 {"kernel", kernel_name(m.kernel)},
@@ -86,6 +88,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     m.kernel = *kernel;
     m.footprint = *footprint;
     m.antialias = h.at("antialias").get<bool>();
+    c.state.averaged = h.value("averaged", 0u);  // absent in earlier files
     for (int a = 0; a < 3; ++a) m.origin[a] = h.at("origin").at(a).get<double>();
     c.seconds = h.at("seconds").get<double>();
     c.settings = h.at("settings").get<std::string>();
@@ -103,9 +106,9 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     n.culled = h.at("culled").get<decltype(n.culled)>();
 }
 
-std::uint64_t floats_per_splat(const SplatModel& m) {
-    const std::uint64_t parameters = 14 + static_cast<std::uint64_t>(m.rest_count());
-    return parameters * 3 + 2;
+std::uint64_t floats_per_splat(const Trainer::State& s) {
+    const std::uint64_t parameters = 14 + static_cast<std::uint64_t>(s.model.rest_count());
+    return parameters * (s.averaged > 0 ? 4 : 3) + 2;
 }
 
 void size_arrays(Checkpoint& c, std::uint64_t splats) {
@@ -114,6 +117,9 @@ void size_arrays(Checkpoint& c, std::uint64_t splats) {
     for (int a = 0; a < kAttributeCount; ++a)
         c.state.moments[a].resize(attribute_values(c.state.model, a).size() * 2);
     c.state.gradient_sum.resize(splats * 2);
+    if (c.state.averaged == 0) return;
+    for (int a = 0; a < kAttributeCount; ++a)
+        c.state.mean.emplace_back(attribute_values(c.state.model, a).size());
 }
 
 }  // namespace
@@ -173,7 +179,7 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     }
     const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
     const std::uint64_t floats =
-        splats * floats_per_splat(c.state.model) + smoothing + exposure + shares + rest;
+        splats * floats_per_splat(c.state) + smoothing + exposure + shares + rest;
     const std::uint64_t expected = floats * sizeof(float);
     if (payload.size() != expected)
         throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
@@ -224,7 +230,9 @@ std::string settings_text(const TrainOptions& o) {
                   {"opacity_lr", o.opacity_rate()},
                   {"sh_lr", {o.sh_dc_lr, o.sh_rest_rate(o.sh_rest_every)}},
                   {"sh_rest_every", o.sh_rest_every},
-                  {"final_lr_share", o.final_lr_share},
+                  {"position_lr_falls", o.position_falls_for()},
+                  {"final_lr_share", o.last_share()},
+                  {"average_begin", o.average_begin()},
                   {"densify_from", o.densify_begin()},
                   {"densify_until", o.densify_end()},
                   {"densify_interval", o.round_interval()},

@@ -236,6 +236,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
         std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);
     f.demand.densifies = options.densify_end() > options.densify_begin();
+    f.demand.averages = options.averages();
     settle_size(scratch, options, f.splats, 0, f);
     if (measure && f.demand.photo_pixels > 0) try {
             measure_both(scratch, dataset, start, options, f);

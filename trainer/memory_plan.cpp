@@ -107,6 +107,7 @@ MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand) {
         const auto n = static_cast<std::uint32_t>(demand.splats);
         plan.densify = round_peak(device, demand, n, n) - plan.resident();
     }
+    if (demand.averages) plan.average = plan.parameters;
     if (!device.info().unified_memory)
         plan.staging = Buffer::staging_bytes(moment_bytes(demand.splats, demand.sh_degree, true));
     return plan;

@@ -3,6 +3,7 @@
 // will come to is another matter, see forecast.h.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct MemoryDemand {
     int sh_degree = 3;         // of the buffers
     bool rest_sum = false;     // harmonics make a step in some iterations only
     bool densifies = true;     // density control runs at this N
+    bool averages = false;     // the run ends with a mean of the splats
     ForwardOptions frame;
     std::uint64_t room_splats = 0;       // N that the frame's buffers hold, where there were more
     std::uint32_t list_segments = 1;     // as FrameSize
@@ -45,14 +47,15 @@ struct MemoryPlan {
     std::uint64_t photos = 0;   // ground truth
     std::uint64_t images = 0;   // picture, its gradient, what the passes share
     std::uint64_t effects = 0;  // of per-photo exposure, of the 3D filter and of the strategy
-    // For a moment, beyond the rest: while density control runs; while host and device copy.
-    std::uint64_t densify = 0, staging = 0;
+    // For a time, beyond the rest: while density control runs; after it, the mean of the last
+    // iterations, and while host and device copy.
+    std::uint64_t densify = 0, average = 0, staging = 0;
 
-    /// What is there between iterations.
+    /// What is there between iterations, before the mean is.
     std::uint64_t resident() const {
         return parameters + moments + frame + pairs + photos + images + effects;
     }
-    std::uint64_t total() const { return resident() + (densify > staging ? densify : staging); }
+    std::uint64_t total() const { return resident() + std::max(densify, average + staging); }
 };
 
 /// resident() is what Device::allocated_bytes says of a Trainer at this demand, to the byte;

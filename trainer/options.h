@@ -59,11 +59,15 @@ struct TrainOptions {
     // These bands make a step in every so many iterations, of their mean gradient, at the root of
     // as many times the rate: what Adam reads and writes for them is most of what it moves.
     int sh_rest_every = 1;
-    // Over the second half the other rates fall to this share, log-linear; 3DGS keeps them. On
-    // photos it steadies what is there: fox at 200 px, 4,000 iterations: 28.0 dB with 1, 29.1 with
-    // 0.1. A rendered scene without noise loses a little: 31.17 dB with 1, 30.98 with 0.3, 30.76
-    // with 0.1.
-    double final_lr_share = 0.3;
+    // From this share of the run on, once density control is over, the mean of the splats is taken,
+    // and the run ends with it; 1: never, as 3DGS. See iterate_average.h.
+    double average_from = 0.85;
+    // The position's rate falls for this share of the run and stays. Below 0: for the whole, as
+    // 3DGS, but where a mean settles what large steps scatter; the noise of mcmc falls with it.
+    double position_lr_falls = -1;
+    // Over the second half the other rates fall to this share, log-linear. Below 0: not, as 3DGS,
+    // where the run ends with a mean, else to 0.3.
+    double final_lr_share = -1;
 
     // Whether runs of fewer than kPacedBelow iterations learn shapes and opacities, grow, and come
     // to their degrees of colour faster; see pace().
@@ -180,6 +184,23 @@ struct TrainOptions {
         if (densify_until >= 0) return std::min(densify_until, iterations);
         if (strategy == Strategy::mcmc) return std::min(iterations / 6 * 5, 25'000);
         return std::min(iterations / 2, 15'000);
+    }
+    /// The mean takes in what iterations beyond this one leave, where average_after() says so.
+    int average_begin() const {
+        return std::max(static_cast<int>(average_from * iterations), densify_end());
+    }
+    bool averages() const { return average_begin() < iterations; }
+    double position_falls_for() const {
+        if (position_lr_falls >= 0) return position_lr_falls;
+        return averages() && strategy != Strategy::mcmc ? 0.35 : 1.0;
+    }
+    double last_share() const {
+        if (final_lr_share > 0) return final_lr_share;
+        return averages() ? 1.0 : 0.3;
+    }
+    bool average_after(int iteration) const {
+        const int interval = std::clamp(iterations / 160, 1, 10);
+        return iteration > average_begin() && (iterations - iteration) % interval == 0;
     }
     /// The last iteration of adc that ends with an opacity reset; 0: there is none.
     int last_opacity_reset() const {

@@ -55,7 +55,7 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.position_lr_final = 1.6e-6f;
     options.opacity_lr = 0.025f;
     options.paced = options.sh_rest_hastens = false;
-    options.final_lr_share = 1;
+    options.final_lr_share = options.average_from = 1;
     options.prune_opacity = 0.005f;
     options.prune_extent = 0.1f;
     options.late_resets = true;

@@ -76,6 +76,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
             LossOptions{.use_alpha = options.alpha,
                         .use_mask = options.alpha && dataset.alpha_is_mask}),
       density_(device, options.kernel),
+      average_(device),
       flights_{Flight(device), Flight(device)} {
     if (options_.max_memory_bytes > 0) device.set_memory_budget(options_.max_memory_bytes);
     add_photos(dataset.views, options, demand_);
@@ -146,15 +147,15 @@ glm::vec3 Trainer::background_for(int iteration) const {
 }
 
 double Trainer::position_rate(int iteration) const {
-    const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
+    const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0,
+                                options_.position_falls_for());
     return std::exp((1 - t) * std::log(options_.position_lr_start()) +
                     t * std::log(options_.position_lr_end()));
 }
 
 AdamStep Trainer::rates(int iteration) const {
     const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
-    const auto late =
-        static_cast<float>(std::pow(options_.final_lr_share, std::max(0.0, 2 * t - 1)));
+    const auto late = static_cast<float>(std::pow(options_.last_share(), std::max(0.0, 2 * t - 1)));
     AdamStep step;
     step.position = static_cast<float>(position_rate(iteration) * extent_);
     step.scale = options_.scale_rate() * late;
@@ -193,6 +194,17 @@ void Trainer::step() {
     settle(flights_[(iteration_ + 1) & 1]);
     smoothing_stale_ |= iteration_ % kFilterInterval == 0;
     refresh_smoothing();
+    if (options_.average_after(iteration_)) settle_average();
+}
+
+// The last iteration leaves the mean itself.
+void Trainer::settle_average() {
+    drain();
+    average_.add(splats_);
+    planned_bytes_ = planned_bytes();
+    if (iteration_ < options_.iterations) return;
+    average_.swap(splats_);
+    average_.clear();
 }
 
 void Trainer::drain() {
@@ -362,7 +374,9 @@ void Trainer::density_control(int iteration) {
 
 SplatModel Trainer::model() {
     drain();
+    average_.swap(splats_);
     const SplatModel model = splats_.download();
+    average_.swap(splats_);
     if (!smoothing_ || model.size() == 0) return model;
     return bake_smoothing(model, splats_.smoothing().download<float>(model.size()));
 }
@@ -383,12 +397,13 @@ ImageF Trainer::render(const Camera& camera) {
     Commands& commands = flights_[0].commands;
     const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
     forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
-    for (;;) {
+    average_.swap(splats_);
+    do {
         commands.begin();
         forward_.record(commands, splats_, cameras, 0, data, sh_degree(), background_);
         commands.submit_and_wait();
-        if (!forward_.make_room(forward_.read_status(), [this] { reserve_backward(); })) break;
-    }
+    } while (forward_.make_room(forward_.read_status(), [this] { reserve_backward(); }));
+    average_.swap(splats_);
     return planes_to_image(
         forward_.image().download<float>(size_t(camera.width) * camera.height * 3), camera.width,
         camera.height);
@@ -413,6 +428,8 @@ Trainer::State Trainer::state() {
     s.gradient_sum = backward_.gradient_sum()
                          ? backward_.gradient_sum().download<float>(size_t{splats_.count()} * 2)
                          : std::vector<float>(size_t{splats_.count()} * 2);
+    s.mean = average_.state(splats_);
+    s.averaged = average_.count();
     s.counters = counters_;
     return s;
 }
@@ -434,6 +451,7 @@ void Trainer::restore(const State& s) {
     if (!s.rest_sum.empty()) splats_.rest_sum().upload(s.rest_sum);
     backward_.reserve(splats_.count(), 0);
     if (!s.gradient_sum.empty()) backward_.gradient_sum().upload(s.gradient_sum);
+    average_.restore(s.mean, s.averaged);
     iteration_ = s.iteration;
     counters_ = s.counters;
     if (score_) {

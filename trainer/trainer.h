@@ -22,6 +22,7 @@
 #include "trainer/densify/mcmc.h"
 #include "trainer/densify/morton_order.h"
 #include "trainer/exposure.h"
+#include "trainer/iterate_average.h"
 #include "trainer/memory_plan.h"
 #include "trainer/options.h"
 #include "trainer/resolution_ramp.h"
@@ -78,7 +79,9 @@ class Trainer {
     /// replaced by density control.
     const GpuSplats& splats() const { return splats_; }
     int sh_degree() const;  // in use at the current iteration
-    SplatModel model();     // as a file holds it: the smoothing filter worked in; drains
+    /// As a file holds it: the mean where the run has come to it, the smoothing filter worked in.
+    /// Drains.
+    SplatModel model();
 
     /// The exposure of each training photo by the view's name; empty where it is off. Drains.
     std::map<std::string, ColourMap> exposures();
@@ -93,7 +96,7 @@ class Trainer {
     };
     const std::vector<Probe>& probes() const { return probes_; }
 
-    /// A picture of the current splats, RGB not clamped. Drains.
+    /// A picture of model(), RGB not clamped. Drains.
     ImageF render(const Camera& camera);
     /// Behind the splats where pictures are compared: black or white.
     glm::vec3 background() const { return background_; }
@@ -124,8 +127,10 @@ class Trainer {
         std::vector<float> error_shares;  // [N][2] ErrorScore, or empty
         SplatModel model;
         std::vector<std::vector<float>> moments;
-        std::vector<float> rest_sum;      // [N][stride of kShRest]; empty where there is none
-        std::vector<float> gradient_sum;  // [N][2]
+        std::vector<float> rest_sum;           // [N][stride of kShRest]; empty where there is none
+        std::vector<float> gradient_sum;       // [N][2]
+        std::vector<std::vector<float>> mean;  // IterateAverage::state()
+        std::uint32_t averaged = 0;            // its count
         TrainCounters counters;
     };
     State state();  // drains
@@ -172,6 +177,7 @@ class Trainer {
     std::uint64_t bytes_to_plan() const;
     std::uint32_t splats_within_memory() const;
     bool has_room_for_degree(int degree) const;
+    void settle_average();
     void settle_order();                    // after a round of density control
     void note_memory();                     // into planned_bytes_, what is held now
     void note_round(std::uint32_t before);  // the same of a round of density control just over
@@ -197,9 +203,10 @@ class Trainer {
     Backward backward_;
     Loss loss_;
     DensityControl density_;
-    std::optional<Mcmc> mcmc_;                  // Strategy::mcmc
-    std::optional<ErrorScore> score_;           // Strategy::budget
-    std::optional<MortonOrder> morton_;         // options.morton_order
+    std::optional<Mcmc> mcmc_;           // Strategy::mcmc
+    std::optional<ErrorScore> score_;    // Strategy::budget
+    std::optional<MortonOrder> morton_;  // options.morton_order
+    IterateAverage average_;
     bool smoothing_stale_ = true;               // splats came or went
     Buffer train_cameras_;                      // options.antialias
     std::optional<SmoothingFilter> smoothing_;  // options.antialias

@@ -59,6 +59,8 @@ void Trainer::set_degree(State& state, int degree) {
     model.sh_rest = widen(model.sh_rest, 1);
     state.moments[kShRest] = widen(state.moments[kShRest], 2);
     if (splats_.has_rest_sum()) state.rest_sum = widen(state.rest_sum, 1);
+    state.mean.clear();  // it begins anew
+    state.averaged = 0;
 }
 
 // Mean PSNR over the photos set aside after some iterations on the others. All rates fall to

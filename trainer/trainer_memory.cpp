@@ -17,6 +17,7 @@ MemoryDemand Trainer::memory_demand() const {
     demand.cooperates = size.cooperates;
     demand.sh_degree = splats_.sh_degree();
     demand.densifies = false;
+    demand.averages = average_.count() > 0;
     demand.small_pixels = 0;
     for (const Buffer& photo : small_photos_) demand.small_pixels += photo.bytes() / 4;
     demand.small_cameras = static_cast<std::uint32_t>(small_data_.size());
@@ -67,6 +68,7 @@ MemoryDemand Trainer::growth_demand() const {
     demand.list_segments = counters_.longest_list > LIST_SEGMENT ? 2 : demand_.list_segments;
     demand.cooperates = demand_.cooperates || counters_.huge_splats > 0;
     demand.densifies = true;
+    demand.averages = options_.averages();
     return demand;
 }
 
@@ -88,6 +90,7 @@ bool Trainer::has_room_for_degree(int degree) const {
     if (options_.max_memory_bytes == 0) return true;
     MemoryDemand demand = memory_demand();
     demand.sh_degree = degree;
+    demand.averages = options_.averages();
     return plan_memory(*device_, demand).total() <= bytes_to_plan();
 }
 

@@ -1,4 +1,5 @@
-// Arguments of the projection backward with its fused Adam step, and of density control.
+// Arguments of the projection backward with its fused Adam step, of density control and of the mean
+// of iterates.
 #ifndef DARB_OPTIM_ARGS_H
 #define DARB_OPTIM_ARGS_H
 
@@ -54,6 +55,11 @@ struct GatherArgs {
     uint from_first, from_count;
     uint stride;     // floats per splat of this attribute
     uint clear_new;  // 1: zero for new splats (moments), 0: copy
+};
+
+struct AverageArgs {
+    uint count;   // floats
+    float share;  // of the value in the mean
 };
 
 struct ResetOpacityArgs {

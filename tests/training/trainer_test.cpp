@@ -52,7 +52,86 @@ TEST(Training, a_resumed_run_equals_one_that_never_stopped) {
     t.options.white_background = true;  // over a fixed background: resets opacities once more
     Trainer whole = t.trainer();
     run_to(whole, 60);
-    expect_resumes(t, whole, {1, 19, 20, 25, 33, 59});
+    expect_resumes(t, whole, {1, 19, 20, 25, 33, 52, 59});
+}
+
+/// The mean over iterations of what `raw` left, a run without a mean, in double.
+class MeanOfRun {
+  public:
+    void add(const SplatModel& model) {
+        ++count_;
+        for (int a = 0; a < kAttributeCount; ++a) {
+            const std::vector<float>& values = attribute_values(model, a);
+            sum_[a].resize(values.size());
+            for (size_t i = 0; i < values.size(); ++i) sum_[a][i] += double(values[i]);
+        }
+    }
+    void expect_near(const SplatModel& model) const {
+        for (int a = 0; a < kAttributeCount; ++a) {
+            const std::vector<float>& values = attribute_values(model, a);
+            ASSERT_EQ(values.size(), sum_[a].size());
+            for (size_t i = 0; i < values.size(); ++i) {
+                const double mean = sum_[a][i] / count_;
+                ASSERT_NEAR(values[i], mean, 2e-6 * (1 + std::abs(mean)))
+                    << attribute_name(a) << " " << i << " of " << count_ << " iterations";
+            }
+        }
+    }
+
+  private:
+    int count_ = 0;
+    std::array<std::vector<double>, kAttributeCount> sum_;
+};
+
+TEST(Training, ends_with_the_mean_of_its_last_iterations) {
+    TinyTraining t = tiny_training();
+    t.options.average_from = 1;
+    Trainer raw = t.trainer();
+    t.options.average_from = 0.9;
+    Trainer whole = t.trainer();
+    run_to(raw, 54);
+    run_to(whole, 54);
+    EXPECT_TRUE(same_state(raw, whole)) << "before the mean begins";
+    MeanOfRun mean;
+    while (raw.iteration() < 60) {
+        SCOPED_TRACE(raw.iteration());
+        EXPECT_EQ(whole.state().model.position, raw.state().model.position) << "it only looks on";
+        raw.step();
+        whole.step();
+        mean.add(raw.state().model);
+        const SplatModel shown = whole.model();
+        mean.expect_near(shown);
+        const Camera& camera = t.dataset.views[0].camera;
+        const ImageF picture = whole.render(camera);
+        EXPECT_EQ(picture.data, Renderer(shared_device(), shown).render(camera).data);
+        if (raw.iteration() > 55) {
+            EXPECT_NE(picture.data, raw.render(camera).data);
+        }
+    }
+    mean.expect_near(whole.state().model);
+    EXPECT_EQ(whole.state().averaged, 0U) << "the run is over";
+    EXPECT_NE(raw.model().position, whole.model().position);
+}
+
+TEST(Training, the_mean_begins_anew_where_a_degree_is_added) {
+    TinyTraining t = tiny_training();
+    t.options.probe_sh = true;  // too few photos for a trial: each degree is admitted
+    t.options.sh_interval = 28;
+    t.options.average_from = 1;
+    Trainer raw = t.trainer();
+    t.options.average_from = 0;  // from the end of density control on
+    Trainer whole = t.trainer();
+    run_to(raw, 56);
+    run_to(whole, 56);
+    EXPECT_EQ(whole.state().averaged, 6U);
+    MeanOfRun mean;
+    while (raw.iteration() < 60) {
+        raw.step();
+        whole.step();
+        mean.add(raw.state().model);
+    }
+    EXPECT_EQ(whole.model().sh_degree, 2);
+    mean.expect_near(whole.model());
 }
 
 TEST(Training, looking_at_pictures_meanwhile_changes_nothing) {

@@ -84,31 +84,6 @@ void add_schedule_flags(CLI::App& command, TrainFlags& f) {
     command.add_option("--lambda-dssim", t.lambda_dssim, "weight of 1 - SSIM in the loss")
         ->capture_default_str()
         ->check(CLI::Range(0.0, 1.0));
-    command
-        .add_option("--position-lr-init", t.position_lr_init,
-                    "default 1.6e-4, times sqrt(30000 / iterations) in shorter runs")
-        ->check(CLI::PositiveNumber);
-    command.add_option("--position-lr-final", t.position_lr_final, "default 1.6e-6, likewise")
-        ->check(CLI::PositiveNumber);
-    command
-        .add_option("--scaling-lr", t.scale_lr,
-                    "default 0.005, times 4000 / iterations (at most 5) in shorter runs; 1.5 times "
-                    "with a kernel that covers less than a Gaussian, as raised_cosine")
-        ->check(CLI::NonNegativeNumber);
-    command.add_option("--rotation-lr", t.rotation_lr, "default 0.001, likewise")
-        ->check(CLI::NonNegativeNumber);
-    command.add_option("--opacity-lr", t.opacity_lr, "default 0.05, times the root of that")
-        ->check(CLI::NonNegativeNumber);
-    command
-        .add_option("--final-lr-share", t.final_lr_share,
-                    "rates but the position's fall to it over the second half; 1: as 3DGS")
-        ->capture_default_str()
-        ->check(CLI::Range(1e-6, 1.0));
-    command
-        .add_option("--feature-lr", t.sh_dc_lr,
-                    "of the first band; the others learn at a 20th, in short runs faster")
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
 }
 
 }  // namespace
@@ -117,6 +92,7 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     add_schedule_flag(command, f);
     add_data_flags(command, f);
     add_schedule_flags(command, f);
+    add_rate_flags(command, f);
     add_density_flags(command, f);
     command
         .add_option(

@@ -42,6 +42,8 @@ struct TrainFlags {
 /// Adds every option to the subcommand; values land in flags, which must outlive the parse.
 void add_train_flags(CLI::App& command, TrainFlags& flags);
 
+/// The part of it that concerns learning rates.
+void add_rate_flags(CLI::App& command, TrainFlags& flags);
 /// The part of it that concerns density control.
 void add_density_flags(CLI::App& command, TrainFlags& flags);
 /// --strategy and what goes with it to options: defaults of the strategy, then what was given.

@@ -36,6 +36,9 @@ class CheckpointFile : public testing::Test {
             c.state.moments.push_back(moments);
         }
         c.state.gradient_sum.assign(splats * 2, 0.5f);
+        for (int a = 0; a < kAttributeCount; ++a)
+            c.state.mean.emplace_back(attribute_values(c.state.model, a).size(), 0.25f);
+        c.state.averaged = 6;
         c.state.counters = {1, 8, 9, 10, 11, 2, 3, 4, {5, 6, 7}};
         c.settings = settings_text({});
         c.dataset = "0123456789abcdef";
@@ -77,6 +80,8 @@ TEST_F(CheckpointFile, what_is_written_comes_back) {
         for (int a = 0; a < kAttributeCount; ++a)
             EXPECT_EQ(attribute_values(back.state.model, a), attribute_values(c.state.model, a));
         EXPECT_EQ(back.state.moments, c.state.moments);
+        EXPECT_EQ(back.state.mean, c.state.mean);
+        EXPECT_EQ(back.state.averaged, 6U);
         EXPECT_EQ(back.state.gradient_sum, c.state.gradient_sum);
         EXPECT_EQ(back.state.model.origin, c.state.model.origin);
         EXPECT_EQ(back.state.model.kernel, KERNEL_SINC);

@@ -1,0 +1,76 @@
+#include "trainer/iterate_average.h"
+
+#include <string>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/render/groups.h"
+#include "shaders/shared/optim_args.h"
+
+namespace darb {
+
+IterateAverage::IterateAverage(Device& device)
+    : device_(&device),
+      commands_(device),
+      average_(device, "average", SpecConstants{{"THREADS", SPLAT_GROUP}}) {}
+
+void IterateAverage::add(const GpuSplats& splats) {
+    const float share = 1.0f / static_cast<float>(++count_);
+    commands_.begin();
+    commands_.pass("average");
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const Buffer& value = splats.parameters(a);
+        const std::uint64_t stride = splats.stride(a), floats = splats.count() * stride;
+        if (count_ == 1)
+            mean_[a] = Buffer(*device_, std::string("mean of ") + attribute_name(a), floats * 4);
+        if (floats == 0) continue;
+        DARB_CHECK(mean_[a].bytes() == floats * 4, "{}: {} bytes, {} floats", attribute_name(a),
+                   mean_[a].bytes(), floats);
+        if (count_ == 1) {
+            commands_.copy(value, mean_[a], floats * 4);
+            continue;
+        }
+        for (const SplatRange& range : splats.ranges()) {
+            const std::uint64_t first = range.first * stride * 4, bytes = range.count * stride * 4;
+            const gpu::AverageArgs args{static_cast<std::uint32_t>(range.count * stride), share};
+            const Groups g = groups_for(args.count);
+            commands_.dispatch(average_, args,
+                               {BufferRange{value, first, bytes}, {mean_[a], first, bytes}}, g.x,
+                               g.y);
+        }
+    }
+    commands_.submit_and_wait();
+}
+
+void IterateAverage::swap(GpuSplats& splats) {
+    if (count_ == 0) return;
+    for (int a = 0; a < kAttributeCount; ++a) std::swap(splats.parameters(a), mean_[a]);
+}
+
+void IterateAverage::clear() {
+    count_ = 0;
+    mean_ = {};
+}
+
+std::vector<std::vector<float>> IterateAverage::state(const GpuSplats& splats) const {
+    std::vector<std::vector<float>> state;
+    if (count_ == 0) return state;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const size_t floats = size_t{splats.count()} * splats.stride(a);
+        state.push_back(floats ? mean_[a].download<float>(floats) : std::vector<float>{});
+    }
+    return state;
+}
+
+void IterateAverage::restore(const std::vector<std::vector<float>>& state, std::uint32_t count) {
+    clear();
+    if (state.empty()) return;
+    count_ = count;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        mean_[a] = Buffer(*device_, std::string("mean of ") + attribute_name(a),
+                          state[a].size() * sizeof(float));
+        if (!state[a].empty()) mean_[a].upload(state[a]);
+    }
+}
+
+}  // namespace darb
