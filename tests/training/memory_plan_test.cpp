@@ -99,6 +99,28 @@ TEST(MemoryPlan, strategies_are_met_to_the_byte) {
     }
 }
 
+TEST(MemoryPlan, the_mean_of_the_last_iterations_is_met_to_the_byte) {
+    TrainOptions options = options_of(2);
+    options.iterations = 10;
+    options.average_from = 0.5;
+    const Dataset dataset = small_scene();
+    Device device;
+    Trainer trainer(device, dataset, load_photos(dataset.views), initial_model(dataset, options),
+                    options);
+    for (int i = 1; i <= 10; ++i) {
+        trainer.step();
+        trainer.drain();
+        const MemoryPlan plan = plan_memory(device, trainer.memory_demand());
+        EXPECT_EQ(plan.average > 0, i > 5 && i < 10) << i;
+        EXPECT_EQ(plan.resident() + plan.average, device.allocated_bytes()) << i;
+    }
+    EXPECT_EQ(trainer.planned_bytes(), device.peak_bytes());
+    MemoryDemand grows = trainer.memory_demand();
+    grows.averages = true;
+    const MemoryPlan later = plan_memory(device, grows);
+    EXPECT_EQ(later.total(), later.resident() + std::max(later.densify, later.average));
+}
+
 TEST(MemoryPlan, no_splats_are_met_to_the_byte) {
     compare_to_the_byte(options_of(1), 0);
 }

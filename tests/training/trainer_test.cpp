@@ -83,8 +83,15 @@ class MeanOfRun {
     std::array<std::vector<double>, kAttributeCount> sum_;
 };
 
-TEST(Training, ends_with_the_mean_of_its_last_iterations) {
+/// With or without a mean, the same rates.
+TinyTraining with_rates_given() {
     TinyTraining t = tiny_training();
+    t.options.position_lr_falls = t.options.final_lr_share = 0.5;
+    return t;
+}
+
+TEST(Training, ends_with_the_mean_of_its_last_iterations) {
+    TinyTraining t = with_rates_given();
     t.options.average_from = 1;
     Trainer raw = t.trainer();
     t.options.average_from = 0.9;
@@ -113,8 +120,31 @@ TEST(Training, ends_with_the_mean_of_its_last_iterations) {
     EXPECT_NE(raw.model().position, whole.model().position);
 }
 
+TEST(Training, rates_fall_where_no_mean_settles_what_they_scatter) {
+    TrainOptions o;
+    EXPECT_TRUE(o.averages());
+    EXPECT_EQ(o.average_begin(), 25'500);
+    EXPECT_EQ(o.last_share(), 1);
+    EXPECT_LT(o.position_falls_for(), 0.5);
+    for (const int after : {25'501, 25'509, 25'511, 29'999}) EXPECT_FALSE(o.average_after(after));
+    for (const int after : {25'510, 29'990, 30'000}) EXPECT_TRUE(o.average_after(after));
+    o.strategy = Strategy::mcmc;
+    EXPECT_EQ(o.position_falls_for(), 1) << "with the noise";
+    EXPECT_EQ(o.last_share(), 1);
+    o = {};
+    o.densify_until = o.iterations;  // splats come until the end
+    EXPECT_FALSE(o.averages());
+    EXPECT_FALSE(o.average_after(o.iterations));
+    EXPECT_LT(o.last_share(), 0.5);
+    EXPECT_EQ(o.position_falls_for(), 1);
+    o.final_lr_share = 0.75;
+    o.position_lr_falls = 0.25;
+    EXPECT_EQ(o.last_share(), 0.75);
+    EXPECT_EQ(o.position_falls_for(), 0.25);
+}
+
 TEST(Training, the_mean_begins_anew_where_a_degree_is_added) {
-    TinyTraining t = tiny_training();
+    TinyTraining t = with_rates_given();
     t.options.probe_sh = true;  // too few photos for a trial: each degree is admitted
     t.options.sh_interval = 28;
     t.options.average_from = 1;
