@@ -9,20 +9,28 @@
 
 namespace darb {
 
+namespace {
+std::string mean_name(int attribute) {
+    return std::string("mean of ") + attribute_name(attribute);
+}
+}  // namespace
+
 IterateAverage::IterateAverage(Device& device)
     : device_(&device),
       commands_(device),
       average_(device, "average", SpecConstants{{"THREADS", SPLAT_GROUP}}) {}
 
 void IterateAverage::add(const GpuSplats& splats) {
+    if (count_ == 0)
+        for (int a = 0; a < kAttributeCount; ++a)
+            mean_[a] = Buffer(*device_, mean_name(a),
+                              std::uint64_t{splats.count()} * splats.stride(a) * 4);
     const float share = 1.0f / static_cast<float>(++count_);
     commands_.begin();
     commands_.pass("average");
     for (int a = 0; a < kAttributeCount; ++a) {
         const Buffer& value = splats.parameters(a);
         const std::uint64_t stride = splats.stride(a), floats = splats.count() * stride;
-        if (count_ == 1)
-            mean_[a] = Buffer(*device_, std::string("mean of ") + attribute_name(a), floats * 4);
         if (floats == 0) continue;
         DARB_CHECK(mean_[a].bytes() == floats * 4, "{}: {} bytes, {} floats", attribute_name(a),
                    mean_[a].bytes(), floats);
@@ -67,8 +75,7 @@ void IterateAverage::restore(const std::vector<std::vector<float>>& state, std::
     if (state.empty()) return;
     count_ = count;
     for (int a = 0; a < kAttributeCount; ++a) {
-        mean_[a] = Buffer(*device_, std::string("mean of ") + attribute_name(a),
-                          state[a].size() * sizeof(float));
+        mean_[a] = Buffer(*device_, mean_name(a), state[a].size() * sizeof(float));
         if (!state[a].empty()) mean_[a].upload(state[a]);
     }
 }

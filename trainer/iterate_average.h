@@ -17,7 +17,8 @@ class IterateAverage {
     explicit IterateAverage(Device& device);
 
     /// Takes in the splats as they are, of the count and degree of those before or after clear().
-    /// The queue must be idle.
+    /// The queue must be idle. Throws Error where the device has no room for the first; to be
+    /// cleared then.
     void add(const GpuSplats& splats);
     /// How many it is the mean of.
     std::uint32_t count() const { return count_; }

@@ -96,7 +96,7 @@ class Run {
     std::string other_way() const;
     void report_troubles();
     void report_resolution();
-    void report_growth();
+    void report_memory();
     void report_probes();
     double seconds() const {
         return seconds_ +
@@ -125,6 +125,7 @@ class Run {
     IterationResult latest_;
     size_t told_probes_ = 0;
     std::uint32_t told_by_memory_ = 0, told_by_pairs_ = 0;  // the splats at which growth stopped
+    bool told_no_mean_ = false;
     int told_divisor_ = 1;
     double seconds_ = 0;
     bool running_ = false;
@@ -309,7 +310,7 @@ void Run::train(const std::atomic<bool>* stop) {
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         trainer_.step();
         report_resolution();
-        report_growth();
+        report_memory();
         report_probes();
         const int i = trainer_.iteration();
         const bool last = i == options_.iterations;
@@ -336,7 +337,13 @@ void Run::report_resolution() {
                        : fmt::format("iteration {}: photos at 1/{} of their sides", i, divisor));
 }
 
-void Run::report_growth() {
+void Run::report_memory() {
+    if (trainer_.mean_left_out() && !std::exchange(told_no_mean_, true)) {
+        progress_.note(
+            "no device memory is left for the mean of the last iterations: the run ends without; "
+            "with --average-from 1 rates fall instead");
+        log_.mean_left_out(trainer_.iteration());
+    }
     const auto tell = [&](std::uint32_t splats, std::uint32_t& told, const char* limit,
                           const std::string& reason) {
         if (splats == told) return;

@@ -171,6 +171,10 @@ void RunLog::growth_stopped(int iteration, const char* limit, std::uint32_t spla
            {"splats", splats}});
 }
 
+void RunLog::mean_left_out(int iteration) {
+    write({{"event", "mean_left_out"}, {"iteration", iteration}});
+}
+
 void RunLog::failure(int iteration, const std::string& what) {
     write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
 }

@@ -44,6 +44,8 @@ class RunLog {
     void probe(int iteration, const Trainer::Probe& probe);
     /// What limits the growth, "memory" or "pairs", and at how many splats.
     void growth_stopped(int iteration, const char* limit, std::uint32_t splats);
+    /// There was no room for the mean that the run was to end with.
+    void mean_left_out(int iteration);
     /// What ended the run before its time.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);

@@ -197,10 +197,18 @@ void Trainer::step() {
     if (options_.average_after(iteration_)) settle_average();
 }
 
-// The last iteration leaves the mean itself.
+// The last iteration leaves the mean itself. Where there is no room for one the run goes on
+// without.
 void Trainer::settle_average() {
     drain();
-    average_.add(splats_);
+    try {
+        average_.add(splats_);
+    } catch (const Error&) {
+        if (average_.count() > 0) throw;
+        average_.clear();
+        mean_left_out_ = true;
+        return;
+    }
     planned_bytes_ = planned_bytes();
     if (iteration_ < options_.iterations) return;
     average_.swap(splats_);

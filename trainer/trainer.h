@@ -113,6 +113,8 @@ class Trainer {
     std::uint32_t stopped_by_memory() const { return stopped_by_memory_; }
     /// The same where frames came near the pairs that the device's bindings hold.
     std::uint32_t stopped_by_pairs() const { return stopped_by_pairs_; }
+    /// Whether the device had no room for the mean that the run was to end with.
+    bool mean_left_out() const { return mean_left_out_; }
     /// What plan_memory() asks for what the trainer holds now.
     MemoryDemand memory_demand() const;
     /// The peak that the plans for all it held so far come to; Device::peak_bytes measures it.
@@ -207,6 +209,7 @@ class Trainer {
     std::optional<ErrorScore> score_;    // Strategy::budget
     std::optional<MortonOrder> morton_;  // options.morton_order
     IterateAverage average_;
+    bool mean_left_out_ = false;
     bool smoothing_stale_ = true;               // splats came or went
     Buffer train_cameras_;                      // options.antialias
     std::optional<SmoothingFilter> smoothing_;  // options.antialias

@@ -60,6 +60,27 @@ TEST(Limits, growth_stops_before_the_memory_budget) {
     EXPECT_LE(device.peak_bytes(), t.options.max_memory_bytes);
 }
 
+/// A budget that holds all but the mean: what is trained is not lost to it.
+TEST(Limits, a_run_without_room_for_its_mean_ends_without) {
+    TinyTraining t = tiny_training();
+    t.options.densify_until = 0;
+    Device roomy_device, narrow_device;
+    t.options.average_from = 0.5;
+    Trainer roomy(roomy_device, t.dataset, t.photos, t.start(), t.options);
+    run_to(roomy, 30);
+    t.options.max_memory_bytes = roomy_device.allocated_bytes() + 1024;
+    Trainer narrow(narrow_device, t.dataset, t.photos, t.start(), t.options);
+    run_to(roomy, 59);
+    run_to(narrow, 60);
+    EXPECT_FALSE(roomy.mean_left_out());
+    EXPECT_TRUE(narrow.mean_left_out());
+    EXPECT_EQ(narrow.state().averaged, 0U);
+    EXPECT_LE(narrow_device.peak_bytes(), t.options.max_memory_bytes);
+    roomy.step();
+    EXPECT_NE(roomy.model().position, narrow.model().position);
+    EXPECT_EQ(roomy.state().moments, narrow.state().moments) << "the same training";
+}
+
 // The buffers of one that is resumed grow in other steps.
 TEST(Limits, a_run_in_a_memory_budget_is_resumed_to_the_same_bits) {
     TinyTraining t = growing({.splats = 300});
