@@ -163,7 +163,7 @@ TEST_F(RunFolder, without_held_out_photos_there_is_no_evaluation) {
     EXPECT_EQ(json::parse(read_text_file(folder_ / "metrics.json"))["evaluations"].size(), 0U);
 }
 
-TEST_F(RunFolder, the_plan_knows_the_kernel) {
+TEST_F(RunFolder, the_plan_knows_the_kernel_slow) {
     const auto antialias = [&](const char* options) {
         EXPECT_EQ(train(std::string("--iterations 1 -q ") + options).code, 0);
         return settings()["effects"]["antialias"].get<bool>();
