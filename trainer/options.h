@@ -108,7 +108,7 @@ struct TrainOptions {
 
     // Share of the way from a training camera to its nearest points within which splats fade, as
     // nothing stands there: between two cameras they would be veils; 0: none does.
-    float clearance = 0.5f;
+    float clearance = 0.6f;
 
     // Regularisers of 3DGS-MCMC: weights of the mean opacity and of the mean scale (in scene
     // extents) in the loss. They take from splats what no photo holds up: a quarter fewer on
