@@ -294,7 +294,7 @@ std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU
 void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
                      const TrainOptions& options, const Dataset& dataset,
                      const std::string& fingerprint) {
-    const Json before = Json::parse(checkpoint.settings, nullptr, false);
+    Json before = Json::parse(checkpoint.settings, nullptr, false);
     Json now = Json::parse(settings_text(options));
     const std::string strategy = before.is_object() ? before.value("strategy", "adc") : "adc";
     if (strategy != strategy_name(options.strategy))
@@ -302,8 +302,11 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
                     fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
                                 strategy_name(options.strategy)),
                     "Repeat the strategy of that run, or start without --resume.");
-    for (const char* option : {"resolution_ramp", "morton_order"})
-        if (before.is_object() && before.contains(option)) now.emplace(option, false);
+    for (const char* option : {"resolution_ramp", "morton_order"})  // there where they are on
+        if (before.is_object() && (before.contains(option) || now.contains(option))) {
+            before.emplace(option, false);
+            now.emplace(option, false);
+        }
     std::string differences;
     for (const auto& [name, value] : now.items())
         if (!before.is_object() || !before.contains(name) || before[name] != value)

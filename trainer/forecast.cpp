@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/render/gpu_splats.h"
 #include "engine/render/tuning.h"
 #include "trainer/initial_model.h"
+#include "trainer/resolution_ramp.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
@@ -130,6 +133,26 @@ void settle_size(const Device& device, const TrainOptions& options, std::uint32_
     demand_for(f.splats);
 }
 
+// What the ramp's smaller photos save, at the count at the start: it grows little while they last.
+double seconds_saved(Device& device, Dataset few, const SplatModel& start,
+                     const TrainOptions& options, int longest_side, double full_ms) {
+    std::map<int, int> iterations;  // by divisor
+    for (int i = 1; i <= options.iterations; ++i) {
+        const int divisor = ramp_divisor(options, i, longest_side);
+        if (divisor == 1) break;
+        ++iterations[divisor];
+    }
+    double saved_ms = 0;
+    const std::vector<View> views = few.views;
+    for (const auto& [divisor, count] : iterations) {
+        for (std::size_t v = 0; v < views.size(); ++v)
+            few.views[v].camera = divided(views[v].camera, divisor);
+        const double ms = measure_training(device, few, start, options).ms;
+        saved_ms += count * std::max(0.0, full_ms - ms);
+    }
+    return saved_ms / 1e3;
+}
+
 // Times and pairs of the forecast, from the count at the start and one near that at the end.
 void measure_both(Device& device, const Dataset& dataset, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
@@ -152,7 +175,9 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
     }
     const double share = (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
                          std::max(1.0, double(f.splats) - f.start_splats);
-    f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
+    f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3 -
+                seconds_saved(device, few, start, options,
+                              std::max(f.demand.width, f.demand.height), f.start_ms);
 }
 
 }  // namespace
@@ -220,11 +245,17 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
     return model;
 }
 
+std::uint64_t forecast_bytes(const Device& device, const Forecast& forecast) {
+    return std::max(plan_memory(device, forecast.demand).total(), forecast.ramp_bytes);
+}
+
 Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
                            bool measure) {
     SplatModel start = initial_model(dataset, options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
+    const std::uint64_t small_pixels = std::exchange(f.demand.small_pixels, 0);
+    const std::uint32_t small_cameras = std::exchange(f.demand.small_cameras, 0);
     f.demand.sh_degree = predict_degree(options);
     start.sh_degree = f.demand.sh_degree;  // of the times
     if (options.probe_sh)
@@ -242,6 +273,17 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
             measure_both(scratch, dataset, start, options, f);
         } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
         }
+    if (small_cameras > 0) {  // they are gone before the run has come to its mean count
+        MemoryDemand early = f.demand;
+        const double mean = mean_splats(f.start_splats, f.splats, options);
+        early.splats = static_cast<std::uint64_t>(mean);
+        early.pairs = static_cast<std::uint64_t>(double(f.demand.pairs) * mean /
+                                                 std::max(1.0, double(f.splats)));
+        early.small_pixels = small_pixels;
+        early.small_cameras = small_cameras;
+        early.averages = false;
+        f.ramp_bytes = plan_memory(scratch, early).total();
+    }
     return f;
 }
 

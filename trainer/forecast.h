@@ -20,7 +20,11 @@ struct Forecast {
     // At the end. Exact is what the plan makes of it; splats, pairs and degree are as uncertain as
     // the constants in the .cpp.
     MemoryDemand demand;
+    std::uint64_t ramp_bytes = 0;  // device memory while the ramp's smaller photos are there, too
 };
+
+/// Device memory of a run as forecast, at its most.
+std::uint64_t forecast_bytes(const Device& device, const Forecast& forecast);
 
 /// Splats at the end, from those at the start and the pixels of all training photos: a rule of
 /// thumb, see the constants in the .cpp. limit: what the device and options.max_splats allow.

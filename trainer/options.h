@@ -100,7 +100,7 @@ struct TrainOptions {
     float noise_lr = 5e5f;    // mcmc: noise on positions, over the rate of positions
     float opacity_decay = 0;  // budget: share of its opacity that a splat loses in a round
     // The first iterations see smaller photos; see trainer/resolution_ramp.h.
-    bool resolution_ramp = false;
+    bool resolution_ramp = true;
 
     // Share of scene_reach beyond which no scale grows; 0: no limit. A splat that outgrows the
     // scene is a veil before cameras that no photo was taken from. Below 0: as scale_limit says.

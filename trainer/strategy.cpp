@@ -36,7 +36,6 @@ void use_strategy(Strategy strategy, TrainOptions& options) {
     options.initial_scale = adc.initial_scale;
     options.prune_opacity = adc.prune_opacity;
     options.opacity_decay = adc.opacity_decay;
-    options.resolution_ramp = adc.resolution_ramp;
     options.sh_rest_every = adc.sh_rest_every;
     if (strategy == Strategy::mcmc) {  // its authors' values
         options.initial_opacity = 0.5f;
@@ -45,7 +44,6 @@ void use_strategy(Strategy strategy, TrainOptions& options) {
     }
     if (strategy == Strategy::budget) {
         options.opacity_decay = 0.01f;
-        options.resolution_ramp = true;
         options.sh_rest_every = 16;
     }
 }
@@ -60,7 +58,7 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.prune_extent = 0.1f;
     options.late_resets = true;
     options.opacity_weight = options.scale_weight = 0;
-    options.random_background = false;
+    options.random_background = options.resolution_ramp = false;
     options.lengths_by_area = false;
     options.largest_scale = 0;
     options.clearance = 0;

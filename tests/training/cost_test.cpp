@@ -193,7 +193,7 @@ TEST(TrainCost, prices_every_setting_of_training) {
         }
     }
     EXPECT_EQ(names.size(), result.rows.size());
-    EXPECT_TRUE(names.contains("with resolution ramp"));
+    EXPECT_TRUE(names.contains("without resolution ramp"));
     EXPECT_TRUE(names.contains("late opacity resets"));
     EXPECT_TRUE(names.contains("splats beside photos"));
     EXPECT_TRUE(names.contains("rates and rounds of a long run"));

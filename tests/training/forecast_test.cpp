@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -16,9 +17,9 @@ namespace {
 constexpr std::uint32_t kNoLimit = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint64_t kManyPixels = 1'000'000'000;
 
-Dataset small_scene() {
+Dataset small_scene(int divisor = 4) {  // at 4 its photos are too small for the ramp
     DatasetOptions options;
-    options.resolution = 4;
+    options.resolution = divisor;
     return load_dataset(std::filesystem::path(DARB_SOURCE_DIR) / "assets" / "scene", options);
 }
 
@@ -113,6 +114,26 @@ TEST(Forecast, stays_within_the_memory_budget) {
     EXPECT_LT(tight.splats, free.splats);
     EXPECT_GT(tight.start_ms, 0);
     EXPECT_GT(tight.seconds, 0);
+}
+
+TEST(Forecast, counts_the_smaller_photos_while_they_are_there) {
+    Device scratch;
+    TrainOptions options;
+    options.densify_until = 0;
+    const Dataset dataset = small_scene(1);
+    const Forecast f = forecast_training(scratch, dataset, options, false);
+    std::uint64_t small_pixels = 0;
+    for (const View& view : dataset.views)
+        if (!view.is_test)
+            small_pixels += std::uint64_t(view.camera.width / 2) * (view.camera.height / 2);
+    const MemoryPlan end = plan_memory(scratch, f.demand);
+    EXPECT_EQ(f.demand.small_pixels, 0U);
+    EXPECT_GE(f.ramp_bytes, end.resident() + 4 * small_pixels);
+    EXPECT_LT(f.ramp_bytes, end.resident() + 5 * small_pixels);
+    EXPECT_EQ(forecast_bytes(scratch, f), std::max(f.ramp_bytes, end.total()));
+    options.resolution_ramp = false;
+    EXPECT_EQ(forecast_training(scratch, dataset, options, false).ramp_bytes, 0U);
+    EXPECT_EQ(forecast_training(scratch, small_scene(), {}, false).ramp_bytes, 0U);
 }
 
 TEST(Forecast, without_measuring_has_no_time) {

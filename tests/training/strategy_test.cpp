@@ -101,10 +101,23 @@ TEST(Strategy, another_one_cannot_resume) {
                 << what;
         }
     }
-    TinyTraining ramp = tiny_training();
-    ramp.options.resolution_ramp = true;
-    const Checkpoint checkpoint{{}, settings_text(ramp.options), "", 0};
-    EXPECT_THROW(check_resumable(checkpoint, "file", adc.options, adc.dataset, ""), Error);
+}
+
+TEST(Strategy, a_run_resumes_with_the_photos_that_it_saw) {
+    TinyTraining with = tiny_training(), without = tiny_training();
+    without.options.resolution_ramp = false;
+    for (const auto& [then, now] : {std::pair{&with, &without}, std::pair{&without, &with}}) {
+        const Checkpoint checkpoint{{}, settings_text(then->options), "", 0};
+        const std::string differs =
+            fmt::format("resolution_ramp: {} then, {} now", then == &with, now == &with);
+        try {
+            check_resumable(checkpoint, "file", now->options, now->dataset, "");
+            FAIL() << "no error";
+        } catch (const Error& e) {
+            EXPECT_NE(std::string(e.what()).find(differs), std::string::npos) << e.what();
+        }
+        EXPECT_NO_THROW(check_resumable(checkpoint, "file", then->options, then->dataset, ""));
+    }
 }
 
 TEST(Strategy, adc_has_the_settings_that_it_always_had) {
@@ -314,9 +327,9 @@ TEST(GrowthTarget, the_forecast_knows_it) {
 }
 
 TEST(ResolutionRamp, divisors_follow_the_run_and_the_size_of_the_photos) {
-    TrainOptions options;
-    EXPECT_EQ(ramp_divisor(options, 1, 1600), 1);
-    options.resolution_ramp = true;
+    TrainOptions options, theirs;
+    use_3dgs_schedule(theirs);
+    EXPECT_EQ(ramp_divisor(theirs, 1, 1600), 1);
     EXPECT_EQ(ramp_divisor(options, 1, 1600), 4);
     EXPECT_EQ(ramp_divisor(options, 3'000, 1600), 4);
     EXPECT_EQ(ramp_divisor(options, 3'001, 1600), 2);
@@ -346,7 +359,6 @@ TEST(ResolutionRamp, a_divided_camera_sees_the_same) {
 
 TEST(ResolutionRamp, serves_adc_too_and_ends_at_the_full_size) {
     TinyTraining t = tiny_training({.width = 400, .height = 32});
-    t.options.resolution_ramp = true;
     t.options.iterations = 20;
     Trainer trainer = t.trainer();
     std::vector<int> divisors;

@@ -52,6 +52,7 @@ GrowthPoint iteration(Device& device, std::uint32_t splats, int width, const Sam
     options.sh_degree = kShDegree;
     options.alpha = false;
     options.densify_until = 0;
+    options.resolution_ramp = false;
     Trainer trainer(device, dataset, photos, random_scene(splats, kShDegree), options);
     return point_of(measure_steps(trainer, 2, sampling), splats, width);
 }

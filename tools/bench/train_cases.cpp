@@ -34,6 +34,7 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     TrainOptions train;
     train.iterations = kScheduled;
+    train.resolution_ramp = false;  // what is measured are steps of whole photos
     if (options.plan_training) options.plan_training(dataset, photos, train);
     train.densify_until = std::min(one.after, train.densify_end());
     Trainer trainer(device, dataset, photos, initial_model(dataset, train), train);

@@ -78,6 +78,7 @@ Measured measure_training(const DeviceOptions& device_options, const Dataset& da
     apply_plan(plan, planned);
     planned.probe_sh = false;
     planned.densify_until = 0;
+    planned.resolution_ramp = false;
     planned.sh_interval = 1;  // every band is in use after a few steps
     Trainer trainer(device, few, photos, initial_model(few, planned), planned);
     std::vector<double> ms;

@@ -42,7 +42,7 @@ void add_strategy_flags(CLI::App& command, TrainFlags& f) {
     command
         .add_option("--resolution-ramp", f.resolution_ramp,
                     "on: the first tenth of the run sees photos of a quarter of their sides, the "
-                    "next fifth of half; default: on with budget")
+                    "next fifth of half, never below 100 px (default: on)")
         ->check(CLI::IsMember({"on", "off"}));
     command
         .add_option("--sh-rest-every", f.sh_rest_every,

@@ -37,7 +37,6 @@ std::string about(std::uint32_t count) {
     return fmt::format("about {}", std::uint64_t{(count + unit / 2) / unit} * unit);
 }
 
-// The forecast measures full-sized photos: a run with a resolution ramp takes less.
 std::string time_text(const Forecast& f, const TrainOptions& options) {
     const int iterations = options.iterations;
     const bool grows = f.splats > f.start_splats;
@@ -47,9 +46,8 @@ std::string time_text(const Forecast& f, const TrainOptions& options) {
             "{} iterations{}, {} splats at the end", iterations,
             f.start_ms > 0 ? fmt::format(", {:.1f} ms each at first", f.start_ms) : "", end);
     const std::string later = grows ? fmt::format(", {:.1f} ms at {}", f.end_ms, end) : "";
-    return fmt::format("{} {} for {} iterations, {:.1f} ms each at {} splats{}",
-                       options.resolution_ramp ? "at most" : "about", format_duration(f.seconds),
-                       iterations, f.start_ms, f.start_splats, later);
+    return fmt::format("about {} for {} iterations, {:.1f} ms each at {} splats{}",
+                       format_duration(f.seconds), iterations, f.start_ms, f.start_splats, later);
 }
 
 // Exact where the counts come true; the counts are a rule of thumb, so what a splat takes is said,
@@ -63,7 +61,8 @@ std::string memory_text(const Device& device, const Forecast& f, int most_degree
     colourful.sh_degree = most_degree;
     const double all = bytes(f.demand), fixed = bytes(empty);
     std::string text =
-        fmt::format("{} of device memory ({} and {:.0f} bytes a splat", format_bytes(all),
+        fmt::format("{} of device memory ({} and {:.0f} bytes a splat",
+                    format_bytes(static_cast<double>(forecast_bytes(device, f))),
                     format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.demand.splats)));
     if (most_degree > f.demand.sh_degree)
         text += fmt::format("; {} where the photos call for colour of degree {}",
@@ -96,7 +95,7 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     scratch.set_variants(device.variants());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
-    const std::uint64_t bytes = plan_memory(device, f.demand).total();
+    const std::uint64_t bytes = forecast_bytes(device, f);
     fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train),
                memory_text(device, f, flags.train.sh_degree));
     print_advice(device, dataset, f, bytes);
