@@ -184,7 +184,7 @@ TrainOptions plain_options() {
     options.iterations = 400;
     options.densify_until = 0;
     options.sh_degree = 0;
-    options.random_background = false;
+    options.random_background = options.resolution_ramp = false;
     return options;
 }
 

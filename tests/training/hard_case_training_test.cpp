@@ -46,7 +46,7 @@ Training training_of(const check::HardCase& c) {
     o.footprint = c.scene.model.footprint;
     o.sh_degree = c.scene.model.sh_degree;
     o.sh_interval = 1;
-    o.random_background = false;
+    o.random_background = o.resolution_ramp = false;
     o.position_lr_init = o.position_lr_final = 1e-3f;
     o.final_lr_share = 1;
     o.opacity_weight = o.scale_weight = 0;

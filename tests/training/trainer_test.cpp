@@ -179,6 +179,7 @@ TEST(Training, looking_at_pictures_meanwhile_changes_nothing) {
 /// Wide splats and a close-up, so that one view wants more pairs than the first room of 1,024.
 TinyTraining overflowing() {
     TinyTraining t = tiny_training({.width = 320, .height = 200, .splats = 24, .close_up = 3});
+    t.options.resolution_ramp = false;
     t.options.densify_grad_threshold = 2e-4f;
     t.options.iterations = 30;
     return t;
