@@ -223,6 +223,7 @@ std::string settings_text(const TrainOptions& o) {
                     {"exposure_lr", {o.exposure_lr_init, o.exposure_lr_final}}}},
                   {"white_background", o.white_background},
                   {"random_background", o.random_background},
+                  {"resolution_ramp", o.resolution_ramp},
                   {"lambda_dssim", o.lambda_dssim},
                   {"position_lr", {o.position_lr_start(), o.position_lr_end()}},
                   {"scale_lr", o.scale_rate()},
@@ -256,7 +257,6 @@ std::string settings_text(const TrainOptions& o) {
     if (o.length_scale() != 1) settings["length_scale"] = o.length_scale();
     if (o.strategy == Strategy::mcmc) settings["noise_lr"] = o.noise_lr;
     if (o.strategy == Strategy::budget) settings["opacity_decay"] = o.opacity_decay;
-    if (o.resolution_ramp) settings["resolution_ramp"] = true;
     if (o.morton_order) settings["morton_order"] = true;
     return settings.dump();
 }
@@ -295,25 +295,24 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
                      const TrainOptions& options, const Dataset& dataset,
                      const std::string& fingerprint) {
     Json before = Json::parse(checkpoint.settings, nullptr, false);
-    Json now = Json::parse(settings_text(options));
-    const std::string strategy = before.is_object() ? before.value("strategy", "adc") : "adc";
+    if (!before.is_object()) before = Json::object();
+    const Json now = Json::parse(settings_text(options));
+    const std::string strategy = before.value("strategy", "adc");
     if (strategy != strategy_name(options.strategy))
         throw Error(path.string(),
                     fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
                                 strategy_name(options.strategy)),
                     "Repeat the strategy of that run, or start without --resume.");
-    for (const char* option : {"resolution_ramp", "morton_order"})  // there where they are on
-        if (before.is_object() && (before.contains(option) || now.contains(option))) {
-            before.emplace(option, false);
-            now.emplace(option, false);
-        }
+    Json both = before;
+    both.update(now);
     std::string differences;
-    for (const auto& [name, value] : now.items())
-        if (!before.is_object() || !before.contains(name) || before[name] != value)
-            differences += fmt::format(
-                " {}: {} then, {} now;", name,
-                before.is_object() && before.contains(name) ? before[name].dump() : "unknown",
-                value.dump());
+    for (const auto& [name, value] : both.items()) {
+        const auto in = [&name](const Json& settings) {
+            return settings.contains(name) ? settings[name].dump() : "not given";
+        };
+        if (in(before) != in(now))
+            differences += fmt::format(" {}: {} then, {} now;", name, in(before), in(now));
+    }
     if (!differences.empty())
         throw Error(path.string(), "was written with other settings:" + differences,
                     "Repeat the options of that run, or start without --resume.");

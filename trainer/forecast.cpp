@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -133,24 +132,16 @@ void settle_size(const Device& device, const TrainOptions& options, std::uint32_
     demand_for(f.splats);
 }
 
-// What the ramp's smaller photos save, at the count at the start: it grows little while they last.
-double seconds_saved(Device& device, Dataset few, const SplatModel& start,
-                     const TrainOptions& options, int longest_side, double full_ms) {
-    std::map<int, int> iterations;  // by divisor
-    for (int i = 1; i <= options.iterations; ++i) {
-        const int divisor = ramp_divisor(options, i, longest_side);
-        if (divisor == 1) break;
-        ++iterations[divisor];
+// The ramp's smaller photos, at the count at the start: it grows little while they last.
+void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
+                  const TrainOptions& options, Forecast& f) {
+    for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height))) {
+        Dataset smaller = few;
+        for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
+        const double ms = measure_training(device, smaller, start, options).ms;
+        f.ramp_ms.push_back(std::min(ms, f.start_ms));
+        f.seconds -= step.iterations * (f.start_ms - f.ramp_ms.back()) / 1e3;
     }
-    double saved_ms = 0;
-    const std::vector<View> views = few.views;
-    for (const auto& [divisor, count] : iterations) {
-        for (std::size_t v = 0; v < views.size(); ++v)
-            few.views[v].camera = divided(views[v].camera, divisor);
-        const double ms = measure_training(device, few, start, options).ms;
-        saved_ms += count * std::max(0.0, full_ms - ms);
-    }
-    return saved_ms / 1e3;
 }
 
 // Times and pairs of the forecast, from the count at the start and one near that at the end.
@@ -175,9 +166,8 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
     }
     const double share = (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
                          std::max(1.0, double(f.splats) - f.start_splats);
-    f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3 -
-                seconds_saved(device, few, start, options,
-                              std::max(f.demand.width, f.demand.height), f.start_ms);
+    f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
+    measure_ramp(device, few, start, options, f);
 }
 
 }  // namespace
@@ -245,10 +235,6 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
     return model;
 }
 
-std::uint64_t forecast_bytes(const Device& device, const Forecast& forecast) {
-    return std::max(plan_memory(device, forecast.demand).total(), forecast.ramp_bytes);
-}
-
 Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
                            bool measure) {
     SplatModel start = initial_model(dataset, options);
@@ -273,6 +259,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
             measure_both(scratch, dataset, start, options, f);
         } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
         }
+    f.bytes = plan_memory(scratch, f.demand).total();
     if (small_cameras > 0) {  // they are gone before the run has come to its mean count
         MemoryDemand early = f.demand;
         const double mean = mean_splats(f.start_splats, f.splats, options);
@@ -282,7 +269,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
         early.small_pixels = small_pixels;
         early.small_cameras = small_cameras;
         early.averages = false;
-        f.ramp_bytes = plan_memory(scratch, early).total();
+        f.bytes = std::max(f.bytes, plan_memory(scratch, early).total());
     }
     return f;
 }

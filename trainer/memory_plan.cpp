@@ -16,7 +16,6 @@ namespace darb {
 
 namespace {
 
-constexpr double kLastSmall = 0.3;  // share of a run: the resolution ramp's last smaller photos
 constexpr std::uint64_t kFewest = 1024;  // splats and pairs that Forward and Backward make room for
 
 FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
@@ -157,11 +156,10 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
     }
     demand.relocates = options.strategy == Strategy::mcmc;
     demand.scores = options.strategy == Strategy::budget;
-    const int divisor = ramp_divisor(options, static_cast<int>(kLastSmall * options.iterations),
-                                     std::max(demand.width, demand.height));
-    if (divisor == 1) return;
+    const std::vector<RampStep> steps = ramp_steps(options, std::max(demand.width, demand.height));
+    if (steps.empty()) return;
     for (const View& view : views) {
-        const Camera small = divided(view.camera, divisor);
+        const Camera small = divided(view.camera, steps.back().divisor);  // the largest
         if (!view.is_test) demand.small_pixels += std::uint64_t(small.width) * small.height;
     }
     demand.small_cameras = demand.views;

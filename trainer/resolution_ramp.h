@@ -14,8 +14,16 @@
 
 namespace darb {
 
-/// What the sides of the photos are divided by in an iteration (from 1): 4, 2 or 1. longest_side:
-/// of all photos, px.
+struct RampStep {
+    int divisor;     // of the photos' sides
+    int iterations;  // how many see photos of this size
+};
+
+/// The steps that begin a run, smallest photos first; none without options.resolution_ramp.
+/// longest_side: of all photos, px.
+std::vector<RampStep> ramp_steps(const TrainOptions& options, int longest_side);
+
+/// What the sides of the photos are divided by in an iteration (from 1): 1 after the last step.
 int ramp_divisor(const TrainOptions& options, int iteration, int longest_side);
 
 /// The camera of a photo whose sides are divided and rounded: it sees the same.

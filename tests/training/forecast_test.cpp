@@ -120,6 +120,7 @@ TEST(Forecast, counts_the_smaller_photos_while_they_are_there) {
     Device scratch;
     TrainOptions options;
     options.densify_until = 0;
+    options.average_from = 1;  // a mean at the end would take more
     const Dataset dataset = small_scene(1);
     const Forecast f = forecast_training(scratch, dataset, options, false);
     std::uint64_t small_pixels = 0;
@@ -128,12 +129,22 @@ TEST(Forecast, counts_the_smaller_photos_while_they_are_there) {
             small_pixels += std::uint64_t(view.camera.width / 2) * (view.camera.height / 2);
     const MemoryPlan end = plan_memory(scratch, f.demand);
     EXPECT_EQ(f.demand.small_pixels, 0U);
-    EXPECT_GE(f.ramp_bytes, end.resident() + 4 * small_pixels);
-    EXPECT_LT(f.ramp_bytes, end.resident() + 5 * small_pixels);
-    EXPECT_EQ(forecast_bytes(scratch, f), std::max(f.ramp_bytes, end.total()));
+    EXPECT_GE(f.bytes, end.resident() + 4 * small_pixels);
+    EXPECT_LT(f.bytes, end.resident() + 5 * small_pixels);
+    EXPECT_GT(f.bytes, end.total());
     options.resolution_ramp = false;
-    EXPECT_EQ(forecast_training(scratch, dataset, options, false).ramp_bytes, 0U);
-    EXPECT_EQ(forecast_training(scratch, small_scene(), {}, false).ramp_bytes, 0U);
+    EXPECT_EQ(forecast_training(scratch, dataset, options, false).bytes, end.total());
+}
+
+TEST(Forecast, counts_the_time_that_smaller_photos_save) {
+    Device scratch;
+    TrainOptions options;
+    options.densify_until = 0;
+    const Forecast f = forecast_training(scratch, small_scene(1), options);
+    ASSERT_EQ(f.ramp_ms.size(), 1U);  // half the sides, for 9,000 of 30,000
+    EXPECT_LE(f.ramp_ms[0], f.start_ms);
+    EXPECT_NEAR(f.seconds, 21 * f.start_ms + 9 * f.ramp_ms[0], 1e-6 * f.seconds);
+    EXPECT_TRUE(forecast_training(scratch, small_scene(), options).ramp_ms.empty());
 }
 
 TEST(Forecast, without_measuring_has_no_time) {

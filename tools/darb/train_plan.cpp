@@ -60,21 +60,19 @@ std::string memory_text(const Device& device, const Forecast& f, int most_degree
     empty.splats = empty.pairs = 0;
     colourful.sh_degree = most_degree;
     const double all = bytes(f.demand), fixed = bytes(empty);
-    std::string text =
-        fmt::format("{} of device memory ({} and {:.0f} bytes a splat",
-                    format_bytes(static_cast<double>(forecast_bytes(device, f))),
-                    format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.demand.splats)));
+    std::string text = fmt::format("{} of device memory ({} and {:.0f} bytes a splat",
+                                   format_bytes(static_cast<double>(f.bytes)), format_bytes(fixed),
+                                   (all - fixed) / std::max(1.0, double(f.demand.splats)));
     if (most_degree > f.demand.sh_degree)
         text += fmt::format("; {} where the photos call for colour of degree {}",
                             format_bytes(bytes(colourful)), most_degree);
     return text + ")";
 }
 
-void print_advice(const Device& device, const Dataset& dataset, const Forecast& f,
-                  std::uint64_t bytes) {
+void print_advice(const Device& device, const Dataset& dataset, const Forecast& f) {
     const auto budget =
         static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(device.info().heap_bytes));
-    const bool too_large = bytes > budget;
+    const bool too_large = f.bytes > budget;
     if (!too_large && f.seconds < kLongSeconds) return;
     std::string advice;
     if (const auto r = smaller_resolution(dataset.views))
@@ -95,10 +93,9 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     scratch.set_variants(device.variants());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
-    const std::uint64_t bytes = forecast_bytes(device, f);
     fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train),
                memory_text(device, f, flags.train.sh_degree));
-    print_advice(device, dataset, f, bytes);
+    print_advice(device, dataset, f);
 }
 
 void print_growth(const TrainOptions& options) {
