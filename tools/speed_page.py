@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the tables of docs/speed.md from results of `darb bench`: every case with its dearest passes and their shares of
+"""Writes the tables of docs/speed.md from results of `darb bench`: every case with its most expensive passes and their shares of
 the roofline, and, where there is one of `darb bench --growth`, time against splats, pixels and pairs.
 
     tools/speed_page.py          from assets/results/bench_lavapipe.json and growth_lavapipe.json
@@ -23,7 +23,7 @@ def cases_table(report):
     context = report["context"]
     lines = [f"{context['driver']}, {context['num_cpus']} cores; {context['note']}; commit {context['commit']}; copies "
              f"{context['copy_bytes_per_s'] / 1e9:.1f} GB/s, {context['fma_per_s'] / 1e9:.1f} billion multiply-adds a second.",
-             "", "| case | ms (quartiles) | share | the dearest passes: ms, share of the roofline | times native |",
+             "", "| case | ms (quartiles) | share | the most expensive passes: ms, share of the roofline | times native |",
              "|---|---|---|---|---|"]
     for case in report["benchmarks"]:
         passes = sorted(case.get("passes", {}).items(), key=lambda p: -p[1]["median"])[:SHOWN]

@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.." || exit 1
 all_steps="setup style release unit gpu clang sanitize fuzz sync"
 usage() {
     cat <<TEXT
-usage: tools/test.sh [full | quick | STEP...]      (default: full)
+usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all but long)
   setup      install missing packages (tools/setup.sh)
   style      include arrows, length caps, clang-format (tools/check_style.sh)
   release    build with gcc, warnings are errors
@@ -17,6 +17,7 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full)
   sanitize   unit tests and the quick tests of pipelines of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   sync       unit tests and the quick device tests under Vulkan synchronization validation
+  long       device tests that take longer than a commit may: minutes
   quick      = setup style release unit
 TEXT
 }
@@ -28,7 +29,7 @@ case "${1:-full}" in
     *) steps=$* ;;
 esac
 for step in $steps; do
-    [[ " $all_steps " == *" $step "* ]] || { usage >&2; exit 2; }
+    [[ " $all_steps long " == *" $step "* ]] || { usage >&2; exit 2; }
 done
 
 jobs=$(nproc)
@@ -37,8 +38,10 @@ logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 
 # Device tests start their own threads, one per core, so two at a time are plenty.
-# Cases whose name ends in _slow run in the gpu step alone, as do those that look at SPIR-V or at other vector widths.
-gpu_alone='_slow(/|$)|^PassSpirv|_at_vector_width_'
+# Cases whose name ends in _slow run in the gpu step alone, as do those that look at SPIR-V or at other vector widths;
+# those in _long in the step of that name.
+long='_long(/|$)'
+gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
@@ -71,7 +74,8 @@ do_style() { tools/check_style.sh; }
 do_release() { build release; }
 do_clang() { build asan; }
 do_unit() { run_ctest build -L '^unit$'; }
-do_gpu() { run_ctest build -LE '^unit$'; }
+do_gpu() { run_ctest build -LE '^unit$' -E "$long"; }
+do_long() { run_ctest build -R "$long"; }
 do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
         run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone" --timeout 300
@@ -88,7 +92,7 @@ for step in $steps; do
         continue
     fi
     case $step in
-        unit | gpu | sanitize | sync) # counted case by case
+        unit | gpu | sanitize | sync | long) # counted case by case
             "do_$step"
             status=$?
             ;;
@@ -108,7 +112,7 @@ done
 for step in ${failures[@]+"${failures[@]}"}; do
     echo "=== $step, what failed:"
     case $step in
-        unit | gpu | sanitize | sync) grep -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step" | head -120 ;;
+        unit | gpu | sanitize | sync | long) grep -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step" | head -120 ;;
         *) tail -n 60 "$logs/$step" ;;
     esac
 done

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
@@ -132,14 +131,14 @@ void settle_size(const Device& device, const TrainOptions& options, std::uint32_
     demand_for(f.splats);
 }
 
-// The ramp's smaller photos, at the count at the start: it grows little while they last.
+// The ramp's smaller photos, at the count at the start: the more it grows while they last, the more
+// they save beyond that.
 void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
     for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height))) {
         Dataset smaller = few;
         for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
-        const double ms = measure_training(device, smaller, start, options).ms;
-        f.ramp_ms.push_back(std::min(ms, f.start_ms));
+        f.ramp_ms.push_back(measure_training(device, smaller, start, options).ms);
         f.seconds -= step.iterations * (f.start_ms - f.ramp_ms.back()) / 1e3;
     }
 }
@@ -168,6 +167,37 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
                          std::max(1.0, double(f.splats) - f.start_splats);
     f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
     measure_ramp(device, few, start, options, f);
+}
+
+// Splats in the last iteration with smaller photos, at most: adc's grow evenly while density
+// control runs.
+std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Forecast& f) {
+    if (options.strategy != Strategy::adc) return f.splats;
+    double last = 0;
+    for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height)))
+        last += step.iterations;
+    const double rounds = std::max(1, options.densify_end() - options.densify_begin());
+    const double share = std::clamp((last - options.densify_begin()) / rounds, 0.0, 1.0);
+    return static_cast<std::uint64_t>(f.start_splats + share * (f.splats - f.start_splats));
+}
+
+void settle_peak(const Device& device, const TrainOptions& options, std::uint64_t small_pixels,
+                 std::uint32_t small_cameras, Forecast& f) {
+    f.peak = f.demand;
+    if (small_cameras == 0) return;
+    MemoryDemand early = f.demand;
+    early.small_pixels = small_pixels;
+    early.small_cameras = small_cameras;
+    early.averages = false;
+    early.splats = splats_with_smaller_photos(options, f);
+    const double pairs_per_splat = double(f.demand.pairs) / std::max(1.0, double(f.splats));
+    early.pairs = static_cast<std::uint64_t>(pairs_per_splat * double(early.splats));
+    if (options.max_memory_bytes > 0)  // growth stops before it
+        early.splats =
+            std::min(early.splats,
+                     std::max<std::uint64_t>(splats_within(device, early, options.max_memory_bytes),
+                                             f.start_splats));
+    if (plan_memory(device, early).total() > plan_memory(device, f.demand).total()) f.peak = early;
 }
 
 }  // namespace
@@ -240,8 +270,9 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     SplatModel start = initial_model(dataset, options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
-    const std::uint64_t small_pixels = std::exchange(f.demand.small_pixels, 0);
-    const std::uint32_t small_cameras = std::exchange(f.demand.small_cameras, 0);
+    const std::uint64_t small_pixels = f.demand.small_pixels;
+    const std::uint32_t small_cameras = f.demand.small_cameras;
+    f.demand.small_pixels = f.demand.small_cameras = 0;  // none at the end
     f.demand.sh_degree = predict_degree(options);
     start.sh_degree = f.demand.sh_degree;  // of the times
     if (options.probe_sh)
@@ -259,18 +290,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
             measure_both(scratch, dataset, start, options, f);
         } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
         }
-    f.bytes = plan_memory(scratch, f.demand).total();
-    if (small_cameras > 0) {  // they are gone before the run has come to its mean count
-        MemoryDemand early = f.demand;
-        const double mean = mean_splats(f.start_splats, f.splats, options);
-        early.splats = static_cast<std::uint64_t>(mean);
-        early.pairs = static_cast<std::uint64_t>(double(f.demand.pairs) * mean /
-                                                 std::max(1.0, double(f.splats)));
-        early.small_pixels = small_pixels;
-        early.small_cameras = small_cameras;
-        early.averages = false;
-        f.bytes = std::max(f.bytes, plan_memory(scratch, early).total());
-    }
+    settle_peak(scratch, options, small_pixels, small_cameras, f);
     return f;
 }
 

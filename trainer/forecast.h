@@ -17,12 +17,14 @@ struct Forecast {
     std::uint32_t start_splats = 0;
     std::uint32_t splats = 0;         // at the end, within options.max_memory_bytes
     double start_ms = 0, end_ms = 0;  // an iteration at these counts; 0: not measured
-    std::vector<double> ramp_ms;      // one of each of ramp_steps(), at the count at the start
+    std::vector<double> ramp_ms;      // of each of ramp_steps(), at the count at the start, as far
+                                      // as they were measured
     double seconds = 0;               // of the whole run; 0: not measured
     // At the end. Exact is what the plan makes of it; splats, pairs and degree are as uncertain as
     // the constants in the .cpp.
     MemoryDemand demand;
-    std::uint64_t bytes = 0;  // of device memory, at its most: then, or with the smaller photos
+    // Where the run needs most memory: at the end, or while the ramp's smaller photos are there.
+    MemoryDemand peak;
 };
 
 /// Splats at the end, from those at the start and the pixels of all training photos: a rule of

@@ -67,6 +67,11 @@ void Progress::note(const std::string& line) {
     fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K\n" : "{}\n"), line);
 }
 
+void Progress::new_pace(int iteration) {
+    first_ = iteration;
+    start_ = Clock::now();
+}
+
 void Progress::leave_out(double seconds) {
     start_ += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }

@@ -17,6 +17,8 @@ class Progress {
     void update(const IterationResult& result, const Device& device);
     /// A line of its own (evaluation, saved file), leaving the bar intact.
     void note(const std::string& line);
+    /// From this iteration on they take another time: rate and time left count from here.
+    void new_pace(int iteration);
     /// So many seconds were no training: a pause.
     void leave_out(double seconds);
     void finish();

@@ -331,6 +331,7 @@ void Run::report_resolution() {
     if (divisor == told_divisor_) return;
     told_divisor_ = divisor;
     const int i = trainer_.iteration();
+    progress_.new_pace(i);
     log_.resolution(i, divisor);
     progress_.note(divisor == 1
                        ? fmt::format("iteration {}: photos at their full size", i)

@@ -16,13 +16,13 @@ std::string_view strategy_name(Strategy strategy);
 std::optional<Strategy> strategy_from_name(std::string_view name);
 
 /// Sets options.strategy and what it has other defaults for: the opacity and the scale at the
-/// start, the opacity below which a splat goes, its decay, the resolution ramp, how often harmonics
-/// make a step. adc: those of TrainOptions.
+/// start, the opacity below which a splat goes, its decay, how often harmonics make a step. adc:
+/// those of TrainOptions.
 void use_strategy(Strategy strategy, TrainOptions& options);
 
 /// What 3DGS does where the defaults depart from it (ARCHITECTURE says why they do): constant rates
 /// but the position's, those of its paper, pruning below 0.005, no regularisers, one background,
-/// the same lengths for every kernel, no largest scale.
+/// the same lengths for every kernel, no largest scale, whole photos from the start, no mean.
 /// Effects are not part of it: 3DGS has harmonics by the iteration, +sh, and neither anti-aliasing
 /// nor exposure.
 void use_3dgs_schedule(TrainOptions& options);

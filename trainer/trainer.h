@@ -169,6 +169,8 @@ class Trainer {
     bool scores(int iteration) const;
     void record_noise(Commands& commands, int iteration);
     void settle_resolution(int iteration);
+    void use_whole_photos();
+    void use_smaller_photos(int divisor);
     // At the size that the photos have now.
     const gpu::CameraData& camera_data_of(int view) const;
     const Buffer& cameras_now() const;

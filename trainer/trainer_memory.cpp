@@ -91,6 +91,7 @@ bool Trainer::has_room_for_degree(int degree) const {
     MemoryDemand demand = memory_demand();
     demand.sh_degree = degree;
     demand.averages = options_.averages();
+    if (divisor_ > 1) demand.small_pixels = std::max(demand.small_pixels, demand_.small_pixels);
     return plan_memory(*device_, demand).total() <= bytes_to_plan();
 }
 

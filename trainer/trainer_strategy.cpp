@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cfloat>
 
+#include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
@@ -78,16 +79,30 @@ const Buffer& Trainer::pixels_of_photo(int view) const {
     return divisor_ > 1 ? small_photos_[view] : photos_[view];
 }
 
-// Both iterations under way end with the photos that they began with.
+// Both iterations under way end with the photos that they began with. Where there is no room for
+// smaller ones beside the whole ones the run goes on with these.
 void Trainer::settle_resolution(int iteration) {
     const int divisor = ramp_ ? ramp_divisor(options_, iteration, longest_side_) : 1;
     if (divisor == divisor_) return;
     drain();
-    divisor_ = divisor;
+    use_whole_photos();
+    if (divisor > 1) try {
+            use_smaller_photos(divisor);
+        } catch (const Error&) {
+            use_whole_photos();
+            ramp_.reset();
+        }
+}
+
+void Trainer::use_whole_photos() {
+    divisor_ = 1;
     small_data_.clear();
     small_photos_.clear();
     small_cameras_ = Buffer();
-    if (divisor == 1) return;
+}
+
+void Trainer::use_smaller_photos(int divisor) {
+    divisor_ = divisor;
     for (size_t v = 0; v < photo_cameras_.size(); ++v) {
         const Camera& camera = photo_cameras_[v];
         const Camera smaller = divided(camera, divisor);

@@ -242,7 +242,7 @@ TEST(BenchCommand, Tuning_hasARowForEveryWayOfThisDevice) {
         EXPECT_GT(passes[way]["median"].get<double>(), 0) << way;
 }
 
-TEST(BenchCommand, Growth_isATableFilesAndAPage_slow) {
+TEST(BenchCommand, Growth_isATableFilesAndAPage_long) {
     const fs::path json = scratch() / "growth.json", html = scratch() / "growth.html";
     const Outcome o = darb("bench --growth --most-splats 1000 --samples 1 --seconds 0 -q --json " +
                            json.string() + " --html " + html.string());

@@ -82,7 +82,7 @@ TEST(EffectCommand, without_the_lens_effect_a_wide_fisheye_is_straightened_as_by
     EXPECT_EQ(measured("--effects all,-lens"), measured("--effects all --lens undistort"));
 }
 
-TEST(EffectCommand, the_plan_prices_the_lens_where_photos_are_distorted_slow) {
+TEST(EffectCommand, the_plan_prices_the_lens_where_photos_are_distorted_long) {
     const auto lens_row = [](const fs::path& dataset) {
         const Outcome o = darb("plan " + dataset.string() + " -r 8 --json");
         EXPECT_EQ(o.code, 0) << o.err;

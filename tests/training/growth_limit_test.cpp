@@ -60,6 +60,27 @@ TEST(Limits, growth_stops_before_the_memory_budget) {
     EXPECT_LE(device.peak_bytes(), t.options.max_memory_bytes);
 }
 
+/// A budget that holds the ramp's smallest photos beside the whole ones, but not the next, from
+/// iteration 7 on.
+TEST(Limits, a_run_without_room_for_smaller_photos_trains_on_whole_ones) {
+    TinyTraining t = tiny_training({.width = 800, .height = 64, .splats = 8});
+    t.options.densify_until = 0;
+    t.options.average_from = 1;
+    Device roomy_device, narrow_device;
+    Trainer roomy(roomy_device, t.dataset, t.photos, t.start(), t.options);
+    run_to(roomy, 6);
+    t.options.max_memory_bytes = roomy_device.allocated_bytes() + 150'000;
+    Trainer narrow(narrow_device, t.dataset, t.photos, t.start(), t.options);
+    run_to(narrow, 6);
+    EXPECT_EQ(narrow.resolution_divisor(), 4);
+    run_to(roomy, 7);
+    run_to(narrow, 7);
+    EXPECT_EQ(roomy.resolution_divisor(), 2);
+    EXPECT_EQ(narrow.resolution_divisor(), 1);
+    run_to(narrow, 30);
+    EXPECT_EQ(narrow.counters().bad_gradients, 0U);
+}
+
 /// A budget that holds all but the mean: what is trained is not lost to it.
 TEST(Limits, a_run_without_room_for_its_mean_ends_without) {
     TinyTraining t = tiny_training();

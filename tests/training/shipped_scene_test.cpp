@@ -59,7 +59,7 @@ TEST(ShippedScene, a_short_run_of_mcmc_gains_3_db) {
 }
 
 // The measured runs of five seeds: {"iterations": N, "held_out_psnr_db": {"median": X}}.
-TEST(ShippedScene, a_full_run_is_as_good_as_the_published_one_slow) {
+TEST(ShippedScene, a_full_run_is_as_good_as_the_published_one_long) {
     const std::filesystem::path file = kSources / "assets/results/shipped_scene.json";
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "no published figures at " << file;
     const auto published = nlohmann::json::parse(read_text_file(file));

@@ -120,6 +120,20 @@ TEST(Strategy, a_run_resumes_with_the_photos_that_it_saw) {
     }
 }
 
+TEST(Strategy, a_run_does_not_resume_without_what_it_had) {
+    TinyTraining with = tiny_training(), without = tiny_training();
+    with.options.morton_order = true;  // settings name it only there
+    const Checkpoint checkpoint{{}, settings_text(with.options), "", 0};
+    try {
+        check_resumable(checkpoint, "file", without.options, without.dataset, "");
+        FAIL() << "no error";
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("morton_order: true then, not given now"),
+                  std::string::npos)
+            << e.what();
+    }
+}
+
 TEST(Strategy, adc_has_the_settings_that_it_always_had) {
     TrainOptions options;
     EXPECT_EQ(settings_text(options).find("strategy"), std::string::npos);

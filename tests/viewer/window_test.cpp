@@ -173,7 +173,7 @@ TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_slow) {
 }
 
 // Two scenes in turn on one running viewer.
-TEST_F(WindowTest, A_hundred_dropped_scenes_leave_no_memory_behind_slow) {
+TEST_F(WindowTest, A_hundred_dropped_scenes_leave_no_memory_behind_long) {
     write_ply(folder_ / "other.ply", model_);
     start();
     const auto loads = [&] {

@@ -55,7 +55,8 @@ void add_schedule_flag(CLI::App& command, TrainFlags& f) {
                 f.schedule_effects = "+sh,-exposure,-antialias";
             },
             "3dgs: its rates, limits, resets and background, no regularisers, harmonics by the "
-            "iteration, in runs of any length; options that are given beside it count")
+            "iteration, whole photos, in runs of any length; options that are given beside it "
+            "count")
         ->check(CLI::IsMember({"darb", "3dgs"}))
         ->default_str("darb");
 }

@@ -42,7 +42,8 @@ void add_strategy_flags(CLI::App& command, TrainFlags& f) {
     command
         .add_option("--resolution-ramp", f.resolution_ramp,
                     "on: the first tenth of the run sees photos of a quarter of their sides, the "
-                    "next fifth of half, never below 100 px (default: on)")
+                    "next fifth of half, their longest side never below 100 px (default: on; with "
+                    "--schedule 3dgs off)")
         ->check(CLI::IsMember({"on", "off"}));
     command
         .add_option("--sh-rest-every", f.sh_rest_every,

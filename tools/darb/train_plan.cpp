@@ -45,9 +45,15 @@ std::string time_text(const Forecast& f, const TrainOptions& options) {
         return fmt::format(
             "{} iterations{}, {} splats at the end", iterations,
             f.start_ms > 0 ? fmt::format(", {:.1f} ms each at first", f.start_ms) : "", end);
+    std::string text =
+        fmt::format("about {} for {} iterations, {:.1f} ms each at {} splats",
+                    format_duration(f.seconds), iterations, f.start_ms, f.start_splats);
+    for (std::size_t step = 0; step < f.ramp_ms.size(); ++step)
+        text += fmt::format("{}{:.1f}", step == 0 ? " (with smaller photos at first " : ", ",
+                            f.ramp_ms[step]);
+    if (!f.ramp_ms.empty()) text += ")";
     const std::string later = grows ? fmt::format(", {:.1f} ms at {}", f.end_ms, end) : "";
-    return fmt::format("about {} for {} iterations, {:.1f} ms each at {} splats{}",
-                       format_duration(f.seconds), iterations, f.start_ms, f.start_splats, later);
+    return text + later;
 }
 
 // Exact where the counts come true; the counts are a rule of thumb, so what a splat takes is said,
@@ -56,14 +62,14 @@ std::string memory_text(const Device& device, const Forecast& f, int most_degree
     const auto bytes = [&](const MemoryDemand& demand) {
         return static_cast<double>(plan_memory(device, demand).total());
     };
-    MemoryDemand empty = f.demand, colourful = f.demand;
+    MemoryDemand empty = f.peak, colourful = f.peak;
     empty.splats = empty.pairs = 0;
     colourful.sh_degree = most_degree;
-    const double all = bytes(f.demand), fixed = bytes(empty);
-    std::string text = fmt::format("{} of device memory ({} and {:.0f} bytes a splat",
-                                   format_bytes(static_cast<double>(f.bytes)), format_bytes(fixed),
-                                   (all - fixed) / std::max(1.0, double(f.demand.splats)));
-    if (most_degree > f.demand.sh_degree)
+    const double all = bytes(f.peak), fixed = bytes(empty);
+    std::string text =
+        fmt::format("{} of device memory ({} and {:.0f} bytes a splat", format_bytes(all),
+                    format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.peak.splats)));
+    if (most_degree > f.peak.sh_degree)
         text += fmt::format("; {} where the photos call for colour of degree {}",
                             format_bytes(bytes(colourful)), most_degree);
     return text + ")";
@@ -72,12 +78,14 @@ std::string memory_text(const Device& device, const Forecast& f, int most_degree
 void print_advice(const Device& device, const Dataset& dataset, const Forecast& f) {
     const auto budget =
         static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(device.info().heap_bytes));
-    const bool too_large = f.bytes > budget;
+    const bool too_large = plan_memory(device, f.peak).total() > budget;
     if (!too_large && f.seconds < kLongSeconds) return;
     std::string advice;
     if (const auto r = smaller_resolution(dataset.views))
         advice += fmt::format(" -r {} takes about a quarter.", *r);
-    if (const std::uint64_t most = splats_within(device, f.demand, budget); too_large && most > 0)
+    const std::uint64_t most =
+        std::min(splats_within(device, f.demand, budget), splats_within(device, f.peak, budget));
+    if (too_large && most > 0)
         advice += fmt::format(" --cap-max {} stays within the memory.", most);
     if (too_large)
         fmt::print(stderr, "warning: more than the {} of this device allow.{}\n",
