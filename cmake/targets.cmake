@@ -12,7 +12,7 @@ function(darb_library name)
   target_precompile_headers(darb_${name} REUSE_FROM darb_precompiled)
 endfunction()
 
-# What most files parse and is slow to parse, parsed once. The release build does without, so that a
+# What most files parse and is slow to parse, parsed once. The clang preset does without, so that a
 # forgotten include is an error there (CMAKE_DISABLE_PRECOMPILE_HEADERS in CMakePresets.json).
 set(darb_slow_headers <algorithm> <cmath> <filesystem> <functional> <optional> <string> <vector>
   <fmt/format.h> <glm/glm.hpp> <nlohmann/json.hpp>)

@@ -17,7 +17,8 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all 
   sanitize   unit tests and the quick tests of pipelines of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   sync       unit tests and the quick device tests under Vulkan synchronization validation
-  long       device tests that take longer than a commit may: minutes
+  long       what takes longer than a commit may: a clang build of all, without precompiled headers, and device tests
+             that take minutes
   quick      = setup style release unit
 TEXT
 }
@@ -75,7 +76,7 @@ do_release() { build release; }
 do_clang() { build asan; }
 do_unit() { run_ctest build -L '^unit$'; }
 do_gpu() { run_ctest build -LE '^unit$' -E "$long"; }
-do_long() { run_ctest build -R "$long"; }
+do_long() { build clang && run_ctest build -R "$long"; }
 do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
         run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone" --timeout 300
