@@ -306,7 +306,8 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
     Json both = before;
     both.update(now);
     std::string differences;
-    for (const auto& [name, value] : both.items()) {
+    for (const auto& setting : both.items()) {
+        const std::string& name = setting.key();
         const auto in = [&name](const Json& settings) {
             return settings.contains(name) ? settings[name].dump() : "not given";
         };
