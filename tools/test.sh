@@ -43,6 +43,7 @@ trap 'rm -rf "$logs"' EXIT
 # those in _long in the step of that name.
 long='_long(/|$)'
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
+numerics='^every_kernel/KernelGradient|^settings/EveryChoice' # of the device, no more host code than others
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
@@ -79,7 +80,7 @@ do_gpu() { run_ctest build -LE '^unit$' -E "$long"; }
 do_long() { build clang && run_ctest build -R "$long"; }
 do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
-        run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone" --timeout 300
+        run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$numerics" --timeout 300
 }
 do_fuzz() { tools/fuzz.sh 0.02; }
 do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E "$gpu_alone" --timeout 300; }
