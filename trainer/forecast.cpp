@@ -181,13 +181,14 @@ std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Fore
     return static_cast<std::uint64_t>(f.start_splats + share * (f.splats - f.start_splats));
 }
 
-void settle_peak(const Device& device, const TrainOptions& options, std::uint64_t small_pixels,
-                 std::uint32_t small_cameras, Forecast& f) {
+// photos: as add_photos counts them, the ramp's smaller ones among them.
+void settle_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
+                 Forecast& f) {
     f.peak = f.demand;
-    if (small_cameras == 0) return;
+    if (photos.small_cameras == 0) return;
     MemoryDemand early = f.demand;
-    early.small_pixels = small_pixels;
-    early.small_cameras = small_cameras;
+    early.small_pixels = photos.small_pixels;
+    early.small_cameras = photos.small_cameras;
     early.averages = false;
     early.splats = splats_with_smaller_photos(options, f);
     const double pairs_per_splat = double(f.demand.pairs) / std::max(1.0, double(f.splats));
@@ -270,8 +271,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     SplatModel start = initial_model(dataset, options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
-    const std::uint64_t small_pixels = f.demand.small_pixels;
-    const std::uint32_t small_cameras = f.demand.small_cameras;
+    const MemoryDemand photos = f.demand;
     f.demand.small_pixels = f.demand.small_cameras = 0;  // none at the end
     f.demand.sh_degree = predict_degree(options);
     start.sh_degree = f.demand.sh_degree;  // of the times
@@ -290,7 +290,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
             measure_both(scratch, dataset, start, options, f);
         } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
         }
-    settle_peak(scratch, options, small_pixels, small_cameras, f);
+    settle_peak(scratch, options, photos, f);
     return f;
 }
 
