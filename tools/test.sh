@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.." || exit 1
 all_steps="setup style release unit gpu clang sanitize fuzz sync"
 usage() {
     cat <<TEXT
-usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all but long)
+usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all but includes and long)
   setup      install missing packages (tools/setup.sh)
   style      include arrows, length caps, clang-format (tools/check_style.sh)
   release    build with gcc, warnings are errors
@@ -17,8 +17,8 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all 
   sanitize   unit tests and the quick tests of pipelines of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   sync       unit tests and the quick device tests under Vulkan synchronization validation
-  long       what takes longer than a commit may: a clang build of all, without precompiled headers, and device tests
-             that take minutes
+  includes   build all with clang without precompiled headers: a forgotten include is an error
+  long       device tests that take minutes
   quick      = setup style release unit
 TEXT
 }
@@ -30,7 +30,7 @@ case "${1:-full}" in
     *) steps=$* ;;
 esac
 for step in $steps; do
-    [[ " $all_steps long " == *" $step "* ]] || { usage >&2; exit 2; }
+    [[ " $all_steps includes long " == *" $step "* ]] || { usage >&2; exit 2; }
 done
 
 jobs=$(nproc)
@@ -77,7 +77,8 @@ do_release() { build release; }
 do_clang() { build asan; }
 do_unit() { run_ctest build -L '^unit$'; }
 do_gpu() { run_ctest build -LE '^unit$' -E "$long"; }
-do_long() { build clang && run_ctest build -R "$long"; }
+do_includes() { build clang; }
+do_long() { run_ctest build -R "$long"; }
 do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
         run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$numerics" --timeout 300
