@@ -24,8 +24,11 @@ class WindowTest : public DisplayTest {
     void SetUp() override {
         DisplayTest::SetUp();
         if (IsSkipped()) return;
+        write_scene(300);
+    }
+    void write_scene(std::uint32_t splats) {
         SceneOptions options;
-        options.count = 300;
+        options.count = splats;
         model_ = random_scene(options).model;
         write_ply(folder_ / "scene.ply", model_);
     }
@@ -174,6 +177,7 @@ TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_slow) {
 
 // Two scenes in turn on one running viewer.
 TEST_F(WindowTest, A_hundred_dropped_scenes_leave_no_memory_behind_long) {
+    write_scene(3'000);
     write_ply(folder_ / "other.ply", model_);
     start();
     const auto loads = [&] {
@@ -191,9 +195,9 @@ TEST_F(WindowTest, A_hundred_dropped_scenes_leave_no_memory_behind_long) {
         if (i == 20) after_some = program_->resident_bytes();
     }
     ASSERT_GT(after_some, 0u);
-    // One scene of 300 splats is 71 kB on the host and as much on the device: 80 would be 11 MB.
-    // The last ones may still be on their way out.
-    EXPECT_TRUE(eventually([&] { return program_->resident_bytes() < after_some + 6'000'000; }))
+    // One scene of 3,000 splats is 0.7 MB on the host and as much on the device: 80 on one of them
+    // would be 56 MB. The driver may first need a second worker's memory late, 9 MB once.
+    EXPECT_TRUE(eventually([&] { return program_->resident_bytes() < after_some + 30'000'000; }))
         << program_->resident_bytes() << " bytes for " << after_some;
     EXPECT_TRUE(program_->running()) << log("view.log");
 }
