@@ -219,6 +219,7 @@ void RunLog::evaluation(const Evaluation& evaluation) {
 }
 
 void add_events(const std::vector<Json>& events, ReportData& data) {
+    std::string sizes;  // of the photos, where they changed
     for (const Json& e : events) {
         const std::string kind = e.value("event", "");
         if (kind == "iteration") {
@@ -234,7 +235,16 @@ void add_events(const std::vector<Json>& events, ReportData& data) {
             data.evaluations.push_back({e.value("iteration", 0), number(e, "seconds"),
                                         number(e, "psnr_db"), number(e, "ssim"),
                                         e.value("splats", 0u)});
+        if (kind == "resolution") {
+            const int divisor = e.value("divisor", 1);
+            sizes += fmt::format("{}{} from iteration {}", sizes.empty() ? "" : ", ",
+                                 divisor == 1 ? "whole" : fmt::format("1/{} of the sides", divisor),
+                                 e.value("iteration", 0));
+        }
     }
+    if (!sizes.empty())
+        data.notes.push_back("Photos: " + sizes +
+                             "; loss and PSNR of the training photos jump where these change.");
 }
 
 ReportData RunLog::report_data(const RunSummary& summary) const {

@@ -18,8 +18,8 @@ namespace darb {
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
                      const std::filesystem::path& output);
 
-/// Samples and evaluations of a run's events into its report. A number that is null, as JSON has
-/// NaN and infinity, becomes NaN, which the report leaves out of its curves.
+/// Samples, evaluations and the photos' sizes of a run's events into its report. A number that is
+/// null, as JSON has NaN and infinity, becomes NaN, which the report leaves out of its curves.
 void add_events(const std::vector<nlohmann::json>& events, ReportData& data);
 
 class RunLog {

@@ -44,6 +44,22 @@ TEST(RunLog, names_that_are_no_utf_8_and_numbers_that_are_not_finite_are_written
     EXPECT_TRUE(std::isnan(data.samples.at(0).loss));
 }
 
+TEST(RunLog, a_report_says_where_the_photos_change) {
+    const auto step = [](int iteration, int divisor) {
+        return nlohmann::json{
+            {"event", "resolution"}, {"iteration", iteration}, {"divisor", divisor}};
+    };
+    ReportData data;
+    add_events({}, data);
+    EXPECT_TRUE(data.notes.empty());
+    add_events({step(1, 4), step(151, 2), step(451, 1)}, data);
+    ASSERT_EQ(data.notes.size(), 1u);
+    EXPECT_NE(data.notes[0].find("1/4 of the sides from iteration 1, 1/2 of the sides from "
+                                 "iteration 151, whole from iteration 451;"),
+              std::string::npos)
+        << data.notes[0];
+}
+
 // Probes after 3 and 6 iterations and growth that ends before the checkpoint, all found again by
 // the run that goes on behind them.
 TEST(RunLog, a_resumed_run_reports_what_it_found_before) {
