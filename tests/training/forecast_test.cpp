@@ -7,7 +7,9 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <nlohmann/json.hpp>
 
+#include "engine/core/files.h"
 #include "trainer/initial_model.h"
 #include "trainer/strategy.h"
 
@@ -51,6 +53,19 @@ TEST(PredictSplats, few_rounds_grow_less) {
     options.iterations = 1'500;
     EXPECT_GT(one_round, 4'000U);
     EXPECT_GT(predict_splats(4'000, kManyPixels, options, kNoLimit), one_round);
+}
+
+TEST(PredictSplats, is_within_half_and_twice_of_what_the_shipped_scene_has) {
+    const auto published = nlohmann::json::parse(read_text_file(
+        std::filesystem::path(DARB_SOURCE_DIR) / "assets" / "results" / "shipped_scene.json"));
+    const Dataset dataset = small_scene(1);
+    TrainOptions options;
+    options.iterations = published.at("iterations").get<int>();
+    const double predicted = default_budget(dataset, options);
+    for (const double splats : published.at("splats")) {
+        EXPECT_GT(predicted, 0.5 * splats);
+        EXPECT_LT(predicted, 2 * splats);
+    }
 }
 
 TEST(MeanSplats, lies_between_start_and_end) {
