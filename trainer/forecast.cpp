@@ -25,7 +25,7 @@ constexpr double kMaxGrowth = 60;
 constexpr double kGrowthPerRound = 1.4;
 
 // The stand-in for a trained scene: most trained splats are more opaque than those at the start.
-constexpr double kTrainedOpacity = 0.5;
+constexpr float kTrainedLogit = 0;  // of an opacity of a half
 // Trainer's buffers grow to 1.5 times the pairs that did not fit.
 constexpr double kPairRoom = 1.5;
 constexpr std::uint32_t kMinPairsPerSplat = 4;
@@ -46,6 +46,11 @@ struct Measurement {
     double ms = 0;            // an iteration
     std::uint64_t pairs = 0;  // the most of any frame
 };
+
+// The first round of density control, in which random splats go that no photo holds up.
+int first_round(const TrainOptions& options) {
+    return options.densify_begin() + options.round_interval();
+}
 
 // A few training views, evenly picked.
 Dataset some_views(const Dataset& dataset) {
@@ -132,15 +137,34 @@ void settle_size(const Device& device, const TrainOptions& options, std::uint32_
 }
 
 // The ramp's smaller photos, at the count at the start: the more it grows while they last, the more
-// they save beyond that.
+// they save beyond that. Where most of the start goes they save the same share of what is left.
 void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
+    int at_start = f.splats < f.start_splats ? first_round(options) : options.iterations;
     for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height))) {
         Dataset smaller = few;
         for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
         f.ramp_ms.push_back(measure_training(device, smaller, start, options).ms);
-        f.seconds -= step.iterations * (f.start_ms - f.ramp_ms.back()) / 1e3;
+        const int before = std::clamp(at_start, 0, step.iterations);
+        at_start -= before;
+        const double saved = 1 - f.ramp_ms.back() / f.start_ms;
+        f.seconds -= saved * (before * f.start_ms + (step.iterations - before) * f.end_ms) / 1e3;
     }
+}
+
+// What stands for the scene that a run makes of random splats: fewer of them, which cover about one
+// side of the region that they fill.
+SplatModel surface_model(const Dataset& dataset, TrainOptions options, const SplatModel& start,
+                         std::uint32_t count) {
+    options.random_points = count;
+    SplatModel model = initial_model(dataset, options);
+    model.sh_degree = start.sh_degree;
+    model.sh_rest.assign(model.size() * static_cast<size_t>(model.rest_count()), 0.0f);
+    // Their distances are the cube root of the volume for each.
+    const auto shrink = static_cast<float>(std::log(static_cast<double>(model.size())) / 6);
+    for (float& scale : model.log_scale) scale -= shrink;
+    std::fill(model.opacity.begin(), model.opacity.end(), kTrainedLogit);
+    return model;
 }
 
 // Times and pairs of the forecast, from the count at the start and one near that at the end.
@@ -155,16 +179,20 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
     const std::uint32_t wanted = f.splats;
     settle_size(device, options, wanted, pairs_per_splat(at_start, start.size()), f);
     const std::uint32_t most = device.info().type == "cpu" ? kMostMeasuredCpu : kMostMeasuredGpu;
-    const SplatModel grown = split_model(start, std::min(f.splats, most), options.seed);
-    if (grown.size() > start.size()) {
-        const Measurement at_end = measure_training(device, few, grown, options);
-        const double more = static_cast<double>(grown.size() - start.size());
+    const std::uint32_t count = std::min(f.splats, most);
+    const SplatModel later = f.splats < f.start_splats
+                                 ? surface_model(dataset, options, start, count)
+                                 : split_model(start, count, options.seed);
+    if (later.size() != start.size()) {
+        const Measurement at_end = measure_training(device, few, later, options);
+        const double more = double(later.size()) - double(start.size());
         const double per_splat = std::max(0.0, (at_end.ms - at_start.ms) / more);
-        settle_size(device, options, wanted, pairs_per_splat(at_end, grown.size()), f);
-        f.end_ms = at_start.ms + per_splat * (f.splats - f.start_splats);
+        settle_size(device, options, wanted, pairs_per_splat(at_end, later.size()), f);
+        f.end_ms = at_start.ms + per_splat * (double(f.splats) - f.start_splats);
     }
-    const double share = (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
-                         std::max(1.0, double(f.splats) - f.start_splats);
+    const double more = double(f.splats) - f.start_splats;
+    const double share =
+        more == 0 ? 0 : (mean_splats(f.start_splats, f.splats, options) - f.start_splats) / more;
     f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
     measure_ramp(device, few, start, options, f);
 }
@@ -173,6 +201,7 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
 // control runs.
 std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Forecast& f) {
     if (options.strategy != Strategy::adc) return f.splats;
+    if (f.splats < f.start_splats) return f.start_splats;
     double last = 0;
     for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height)))
         last += step.iterations;
@@ -185,11 +214,13 @@ std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Fore
 void settle_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
                  Forecast& f) {
     f.peak = f.demand;
-    if (photos.small_cameras == 0) return;
+    const bool falls = f.splats < f.start_splats;
+    if (photos.small_cameras == 0 && !falls) return;
     MemoryDemand early = f.demand;
     early.small_pixels = photos.small_pixels;
     early.small_cameras = photos.small_cameras;
     early.averages = false;
+    if (falls && options.probe_sh) early.sh_degree = 0;  // the first rounds come before the probes
     early.splats = splats_with_smaller_photos(options, f);
     const double pairs_per_splat = double(f.demand.pairs) / std::max(1.0, double(f.splats));
     early.pairs = static_cast<std::uint64_t>(pairs_per_splat * double(early.splats));
@@ -204,7 +235,7 @@ void settle_peak(const Device& device, const TrainOptions& options, const Memory
 }  // namespace
 
 std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
-                             const TrainOptions& options, std::uint32_t limit) {
+                             const TrainOptions& options, std::uint32_t limit, bool random_start) {
     if (options.strategy != Strategy::adc)
         return std::max(start, simulate_growth(options, start, limit).end);
     const int first = options.densify_begin() / options.round_interval();
@@ -213,7 +244,8 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
     const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
     const double most = std::min(growth * start, static_cast<double>(limit));
     const double wanted = kSplatsPerRootPixel * std::sqrt(static_cast<double>(photo_pixels));
-    return std::max(start, static_cast<std::uint32_t>(std::min(wanted, most)));
+    const auto end = static_cast<std::uint32_t>(std::min(wanted, most));
+    return random_start && rounds > 0 ? end : std::max(start, end);
 }
 
 int predict_degree(const TrainOptions& options) {
@@ -227,12 +259,17 @@ std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options
     std::uint64_t pixels = 0;
     for (const View& view : dataset.views)
         if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
-    return predict_splats(initial_count(dataset, adc), pixels, adc, options.max_splats);
+    return predict_splats(initial_count(dataset, adc), pixels, adc, options.max_splats,
+                          dataset.points.size() == 0);
 }
 
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
     if (options.strategy != Strategy::adc) return simulate_growth(options, start, end).mean;
     const double all = options.iterations;
+    if (end < start) {
+        const double until = std::clamp<double>(first_round(options), 0, all);
+        return (until * start + (all - until) * end) / all;
+    }
     const double to = std::clamp<double>(options.densify_end(), 0, all);
     const double from = std::clamp<double>(options.densify_begin(), 0, to);
     return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;
@@ -246,7 +283,6 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
     SplatModel model = start;
     model.resize(n * pieces);
     Pcg32 random(seed, 2);
-    const auto logit = static_cast<float>(std::log(kTrainedOpacity / (1 - kTrainedOpacity)));
     const size_t rest = static_cast<size_t>(start.rest_count());
     for (size_t i = 0; i < n * pieces; ++i) {
         const size_t from = i % n;
@@ -261,7 +297,7 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
         for (size_t a = 0; a < 4; ++a) model.rotation[4 * i + a] = start.rotation[4 * from + a];
         for (size_t a = 0; a < rest; ++a)
             model.sh_rest[rest * i + a] = start.sh_rest[rest * from + a];
-        model.opacity[i] = logit;
+        model.opacity[i] = kTrainedLogit;
     }
     return model;
 }
@@ -282,7 +318,8 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     f.start_splats = static_cast<std::uint32_t>(start.size());
     const std::uint32_t limit =
         std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
-    f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit);
+    f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit,
+                              dataset.points.size() == 0);
     f.demand.densifies = options.densify_end() > options.densify_begin();
     f.demand.averages = options.averages();
     settle_size(scratch, options, f.splats, 0, f);

@@ -23,14 +23,17 @@ struct Forecast {
     // At the end. Exact is what the plan makes of it; splats, pairs and degree are as uncertain as
     // the constants in the .cpp.
     MemoryDemand demand;
-    // Where the run needs most memory: at the end, or while the ramp's smaller photos are there.
+    // Where the run needs most memory: at the end, while the ramp's smaller photos are there, or at
+    // the start, where that has more splats.
     MemoryDemand peak;
 };
 
 /// Splats at the end, from those at the start and the pixels of all training photos: a rule of
 /// thumb, see the constants in the .cpp. limit: what the device and options.max_splats allow.
+/// random_start: without points; adc's first rounds take most of it, so fewer may be left.
 std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
-                             const TrainOptions& options, std::uint32_t limit);
+                             const TrainOptions& options, std::uint32_t limit,
+                             bool random_start = false);
 
 /// The degree of colour that a run ends with, where options.probe_sh does not refuse the first.
 int predict_degree(const TrainOptions& options);
@@ -39,7 +42,8 @@ int predict_degree(const TrainOptions& options);
 /// end with, from the same start.
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options);
 
-/// Mean count over the run; adc: where it grows evenly while density control runs.
+/// Mean count over the run; adc: where it grows evenly while density control runs, or falls in the
+/// first round.
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options);
 
 /// `start` split into pieces, at least as many as it has and at most `count`, which cover what it

@@ -68,12 +68,27 @@ TEST(PredictSplats, is_within_half_and_twice_of_what_the_shipped_scene_has) {
     }
 }
 
+TEST(PredictSplats, of_a_random_start_fewer_may_be_left) {
+    TrainOptions options;
+    const auto predicted = [&](bool random) {
+        return predict_splats(100'000, 1'000'000, options, kNoLimit, random);
+    };
+    EXPECT_EQ(predicted(false), 100'000U);
+    EXPECT_LT(predicted(true), 50'000U);
+    options.densify_until = 0;  // nothing goes without rounds
+    EXPECT_EQ(predicted(true), 100'000U);
+    use_strategy(Strategy::mcmc, options);
+    EXPECT_GE(predicted(true), 100'000U);
+}
+
 TEST(MeanSplats, lies_between_start_and_end) {
     TrainOptions options;
     EXPECT_DOUBLE_EQ(mean_splats(10, 10, options), 10);
     // 500 at 10, up to 15,000 on average at 20, then at 30.
     EXPECT_DOUBLE_EQ(mean_splats(10, 30, options),
                      (500 * 10 + 14'500 * 20 + 15'000 * 30) / 30'000.0);
+    // A random start until its first round.
+    EXPECT_DOUBLE_EQ(mean_splats(30, 10, options), (600 * 30 + 29'400 * 10) / 30'000.0);
 }
 
 TEST(SplitModel, keeps_place_and_area) {
@@ -104,6 +119,28 @@ TEST(Forecast, measures_on_the_scratch_device) {
     EXPECT_GE(f.seconds, options.iterations * f.start_ms * 0.999e-3);
     EXPECT_LE(f.seconds, options.iterations * f.end_ms * 1.001e-3);
     EXPECT_GE(f.demand.pairs, 4U * f.splats);
+}
+
+TEST(Forecast, a_random_start_goes_in_the_first_round) {
+    Dataset dataset = small_scene(1);
+    dataset.points = {};
+    TrainOptions options;
+    options.random_points = 60'000;
+    options.iterations = 1'000;
+    Device scratch;
+    const Forecast f = forecast_training(scratch, dataset, options);
+    EXPECT_EQ(f.start_splats, 60'000U);
+    EXPECT_EQ(f.splats, default_budget(dataset, options));
+    EXPECT_LT(f.splats, 30'000U);
+    EXPECT_EQ(f.demand.splats, f.splats);
+    EXPECT_EQ(f.peak.splats, 60'000U);
+    ASSERT_EQ(f.ramp_ms.size(), 1U);  // half the sides, for 300 of 1,000
+    const int first = options.densify_begin() + options.round_interval();
+    ASSERT_LT(first, 300);
+    const double half = f.ramp_ms[0] / f.start_ms;
+    EXPECT_NEAR(f.seconds * 1e3,
+                first * f.ramp_ms[0] + (300 - first) * half * f.end_ms + 700 * f.end_ms,
+                1e-6 * f.seconds * 1e3);
 }
 
 TEST(Forecast, stays_within_the_memory_budget) {

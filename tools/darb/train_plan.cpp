@@ -39,8 +39,8 @@ std::string about(std::uint32_t count) {
 
 std::string time_text(const Forecast& f, const TrainOptions& options) {
     const int iterations = options.iterations;
-    const bool grows = f.splats > f.start_splats;
-    const std::string end = grows ? about(f.splats) : std::to_string(f.splats);
+    const bool changes = f.splats != f.start_splats;
+    const std::string end = changes ? about(f.splats) : std::to_string(f.splats);
     if (f.seconds <= 0)
         return fmt::format(
             "{} iterations{}, {} splats at the end", iterations,
@@ -52,7 +52,7 @@ std::string time_text(const Forecast& f, const TrainOptions& options) {
         text += fmt::format("{}{:.1f}", step == 0 ? " (with smaller photos at first " : ", ",
                             f.ramp_ms[step]);
     if (!f.ramp_ms.empty()) text += ")";
-    const std::string later = grows ? fmt::format(", {:.1f} ms at {}", f.end_ms, end) : "";
+    const std::string later = changes ? fmt::format(", {:.1f} ms at {}", f.end_ms, end) : "";
     return text + later;
 }
 
