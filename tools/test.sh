@@ -43,7 +43,8 @@ trap 'rm -rf "$logs"' EXIT
 # those in _long in the step of that name.
 long='_long(/|$)'
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
-numerics='^every_kernel/KernelGradient|^settings/Every(Choice|Kernel.every_choice)' # of the device, no more host code than others
+# Of the device, with no more host code than others: not under sanitizers.
+numerics='^every_kernel/KernelGradient|^settings/Every(Choice|Kernel.every_choice)|for_every_kernel$'
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
