@@ -220,7 +220,8 @@ void settle_peak(const Device& device, const TrainOptions& options, const Memory
     early.small_pixels = photos.small_pixels;
     early.small_cameras = photos.small_cameras;
     early.averages = false;
-    if (falls && options.probe_sh) early.sh_degree = 0;  // the first rounds come before the probes
+    if (falls && options.probe_sh && first_round(options) < options.degree_interval())
+        early.sh_degree = 0;  // no probe has admitted a degree yet
     early.splats = splats_with_smaller_photos(options, f);
     const double pairs_per_splat = double(f.demand.pairs) / std::max(1.0, double(f.splats));
     early.pairs = static_cast<std::uint64_t>(pairs_per_splat * double(early.splats));

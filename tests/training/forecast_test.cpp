@@ -143,6 +143,22 @@ TEST(Forecast, a_random_start_goes_in_the_first_round) {
                 1e-6 * f.seconds * 1e3);
 }
 
+TEST(Forecast, a_random_start_has_no_degree_before_the_first_probe) {
+    Dataset dataset = small_scene(1);
+    dataset.points = {};
+    TrainOptions options;
+    options.random_points = 200'000;
+    options.iterations = 1'000;
+    options.probe_sh = true;
+    Device scratch;
+    const auto peak = [&] { return forecast_training(scratch, dataset, options, false).peak; };
+    EXPECT_EQ(peak().splats, 200'000U);
+    EXPECT_EQ(peak().sh_degree, 0);
+    options.densify_from = 300;  // behind the probe at 250
+    EXPECT_EQ(peak().splats, 200'000U);
+    EXPECT_GT(peak().sh_degree, 0);
+}
+
 TEST(Forecast, stays_within_the_memory_budget) {
     TrainOptions options;
     use_strategy(Strategy::mcmc, options);
