@@ -21,4 +21,8 @@ struct Error : std::runtime_error {
     std::string hint;
 };
 
+/// The hint of what finds bytes that no writer of a format can have meant.
+inline constexpr const char* kCopyAgain =
+    "The file is damaged or cut off: export or copy it again.";
+
 }  // namespace darb

@@ -16,35 +16,35 @@ using nlohmann::json;
 
 namespace {
 
-constexpr const char* kExport = "Correct the record, or export cameras.json again.";
+constexpr const char* kCorrectRecord = "Correct the record, or export cameras.json again.";
 
 double number(const json& record, const char* key, const std::string& where) {
     const auto at = record.find(key);
     if (at == record.end() || !at->is_number())
-        throw Error(where, fmt::format("{} is not a number", key), kExport);
+        throw Error(where, fmt::format("{} is not a number", key), kCorrectRecord);
     return at->get<double>();
 }
 
 int size_px(const json& record, const char* key, const std::string& where) {
     const double size = number(record, key, where);
     if (!(size >= 1 && size <= 1e6))
-        throw Error(where, fmt::format("{} {} is not valid", key, size), kExport);
+        throw Error(where, fmt::format("{} {} is not valid", key, size), kCorrectRecord);
     return static_cast<int>(size);
 }
 
 glm::dvec3 vector3(const json& list, const char* key, const std::string& where) {
     if (!list.is_array() || list.size() != 3 || !list[0].is_number() || !list[1].is_number() ||
         !list[2].is_number())
-        throw Error(where, fmt::format("{} does not hold 3 numbers", key), kExport);
+        throw Error(where, fmt::format("{} does not hold 3 numbers", key), kCorrectRecord);
     return {list[0].get<double>(), list[1].get<double>(), list[2].get<double>()};
 }
 
 View parse_view(const json& record, std::string where) {
     View view;
-    if (!record.is_object()) throw Error(where, "is not an object", kExport);
+    if (!record.is_object()) throw Error(where, "is not an object", kCorrectRecord);
     const auto name = record.find("img_name");
     if (name == record.end() || !name->is_string())
-        throw Error(where, "img_name is not a string", kExport);
+        throw Error(where, "img_name is not a string", kCorrectRecord);
     view.name = name->get<std::string>();
     where += fmt::format(" ({})", view.name);
     Camera& camera = view.camera;
@@ -62,7 +62,7 @@ View parse_view(const json& record, std::string where) {
 
     const json rotation = record.value("rotation", json());
     if (!rotation.is_array() || rotation.size() != 3)
-        throw Error(where, "rotation does not hold 3 rows", kExport);
+        throw Error(where, "rotation does not hold 3 rows", kCorrectRecord);
     glm::dmat3 world_to_camera;  // its columns are the rows of camera to world
     for (int r = 0; r < 3; ++r)
         world_to_camera[r] = vector3(rotation[static_cast<std::size_t>(r)], "rotation", where);

@@ -18,7 +18,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr const char* kExport = "Correct the entry, or export the file again.";
+constexpr const char* kCorrectEntry = "Correct the entry, or export the file again.";
 
 /// Some writers put numbers into strings.
 double to_number(const json& value, const char* key, const std::string& where) {
@@ -27,7 +27,7 @@ double to_number(const json& value, const char* key, const std::string& where) {
     double number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc{} || end != text.data() + text.size())
-        throw Error(where, fmt::format("{} is not a number", key), kExport);
+        throw Error(where, fmt::format("{} is not a number", key), kCorrectEntry);
     return number;
 }
 
@@ -40,7 +40,7 @@ void read_number(const json& object, const char* key, const std::string& where,
 std::string read_string(const json& object, const char* key, const std::string& where) {
     const auto at = object.find(key);
     if (at == object.end() || at->is_null()) return {};
-    if (!at->is_string()) throw Error(where, fmt::format("{} is not a string", key), kExport);
+    if (!at->is_string()) throw Error(where, fmt::format("{} is not a string", key), kCorrectEntry);
     return at->get<std::string>();
 }
 
@@ -50,7 +50,7 @@ bool read_bool(const json& object, const char* key, const std::string& where, bo
     if (at == object.end() || at->is_null()) return absent;
     if (at->is_boolean()) return at->get<bool>();
     if (at->is_number()) return at->get<double>() != 0;
-    throw Error(where, fmt::format("{} is neither true or false nor a number", key), kExport);
+    throw Error(where, fmt::format("{} is neither true or false nor a number", key), kCorrectEntry);
 }
 
 /// Keys that are absent leave what is there: the file's values are the frames' defaults.
@@ -94,13 +94,13 @@ void read_intrinsics(const json& object, const std::string& where, TransformsInt
 bool read_pose(const json& object, const std::string& where, TransformsFrame& frame) {
     const auto matrix = object.find("transform_matrix");
     if (matrix == object.end() || !matrix->is_array() || matrix->size() < 3)
-        throw Error(where, "has no transform_matrix of 4 x 4 or 3 x 4 numbers", kExport);
+        throw Error(where, "has no transform_matrix of 4 x 4 or 3 x 4 numbers", kCorrectEntry);
     glm::dmat3 camera_to_world;
     glm::dvec3 centre;
     for (int r = 0; r < 3; ++r) {
         const json& row = (*matrix)[static_cast<std::size_t>(r)];
         if (!row.is_array() || row.size() != 4)
-            throw Error(where, "a row of transform_matrix does not hold 4 numbers", kExport);
+            throw Error(where, "a row of transform_matrix does not hold 4 numbers", kCorrectEntry);
         for (int c = 0; c < 4; ++c) {
             // JSON has no NaN; writers put null or a string in its place.
             const json& value = row[static_cast<std::size_t>(c)];
@@ -177,9 +177,9 @@ TransformsFile parse_transforms(std::string_view text, const std::string& where)
     for (std::size_t i = 0; i < frames.size(); ++i) {
         TransformsFrame frame;
         std::string record = fmt::format("{}, frame {} of {}", where, i + 1, frames.size());
-        if (!frames[i].is_object()) throw Error(record, "is not an object", kExport);
+        if (!frames[i].is_object()) throw Error(record, "is not an object", kCorrectEntry);
         frame.file_path = read_string(frames[i], "file_path", record);
-        if (frame.file_path.empty()) throw Error(record, "has no file_path", kExport);
+        if (frame.file_path.empty()) throw Error(record, "has no file_path", kCorrectEntry);
         record += fmt::format(" ({})", frame.file_path);
         frame.mask_path = read_string(frames[i], "mask_path", record);
         frame.intrinsics = defaults;

@@ -2,13 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <numeric>
 #include <optional>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 #include "engine/gpu/device_state.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/gpu/spirv_reflect.h"
@@ -170,11 +170,6 @@ DeviceInfo describe(VkPhysicalDevice device) {
     if (const std::string few = buffers_trouble(info, kTraining); info.usable && !few.empty())
         info.reason += ", which cannot train: " + few;
     return info;
-}
-
-std::string lower(std::string text) {
-    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return text;
 }
 
 std::optional<std::size_t> parse_index(const std::string& text) {

@@ -14,7 +14,7 @@ struct CacheHead {
     std::uint64_t magic;
     std::uint64_t hash;
 };
-constexpr std::uint64_t kMagic = 0x3148434342524144;  // "DARBCCH1"
+constexpr std::uint64_t kCacheMagic = 0x3148434342524144;  // "DARBCCH1"
 
 // FNV-1a, 64 bits.
 std::uint64_t hash_bytes(std::span<const std::byte> data) {
@@ -34,14 +34,14 @@ std::vector<std::byte> load_pipeline_cache(const std::filesystem::path& file) tr
     if (bytes.size() < sizeof(head)) return {};
     std::memcpy(&head, bytes.data(), sizeof(head));
     bytes.erase(bytes.begin(), bytes.begin() + sizeof(head));
-    if (head.magic != kMagic || head.hash != hash_bytes(bytes)) return {};
+    if (head.magic != kCacheMagic || head.hash != hash_bytes(bytes)) return {};
     return bytes;
 } catch (const Error&) {
     return {};
 }
 
 void save_pipeline_cache(const std::filesystem::path& file, std::span<const std::byte> data) try {
-    const CacheHead head{kMagic, hash_bytes(data)};
+    const CacheHead head{kCacheMagic, hash_bytes(data)};
     std::vector<std::byte> bytes(sizeof(head) + data.size());
     std::memcpy(bytes.data(), &head, sizeof(head));
     if (!data.empty()) std::memcpy(bytes.data() + sizeof(head), data.data(), data.size());

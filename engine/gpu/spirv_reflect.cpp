@@ -48,7 +48,7 @@ enum Storage : std::uint32_t {
     kPushConstant = 9,
     kBuffer = 12
 };
-constexpr std::uint32_t kMagic = 0x07230203, kLocalSize = 17, kLocalSizeId = 38;
+constexpr std::uint32_t kSpirvMagic = 0x07230203, kLocalSize = 17, kLocalSizeId = 38;
 constexpr size_t kHeaderWords = 5;
 
 using Operands = std::span<const std::uint32_t>;
@@ -263,7 +263,7 @@ void resolve_local_size(const Module& module, ShaderInterface& out) {
 }  // namespace
 
 ShaderInterface reflect_spirv(std::span<const std::uint32_t> words, std::string_view shader) {
-    DARB_CHECK(words.size() > kHeaderWords && words[0] == kMagic, "{} is no SPIR-V", shader);
+    DARB_CHECK(words.size() > kHeaderWords && words[0] == kSpirvMagic, "{} is no SPIR-V", shader);
     Module module;
     ShaderInterface out;
     for (size_t at = kHeaderWords; at < words.size();) {

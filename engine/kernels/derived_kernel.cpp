@@ -14,10 +14,9 @@
 namespace darb {
 namespace {
 
-constexpr int kNodes = 64;          // enough for a pole at q = -1 with support 9
-constexpr double kNoise = 2e-15;    // of the samples: higher terms would spoil the derivative
-constexpr double kStep = 1e-200;    // of the complex-step derivative
-constexpr double kGaussRadius = 9;  // exp(-40) of the mass is beyond
+constexpr int kNodes = 64;        // enough for a pole at q = -1 with support 9
+constexpr double kNoise = 2e-15;  // of the samples: higher terms would spoil the derivative
+constexpr double kStep = 1e-200;  // of the complex-step derivative
 
 double profile_value(const KernelProfile& row, double q) {
     return row.profile({q, 0}).real();

@@ -14,6 +14,10 @@ struct QuadraturePoint {
 /// analytic near [-1, 1] it is exact to rounding, poles at +-i/3 included.
 std::span<const QuadraturePoint> even_quadrature();
 
+/// Where an integral over a Gaussian's distance may end, standard deviations: exp(-40) of the mass
+/// is beyond.
+constexpr double kGaussRadius = 9;
+
 /// Integral of f over [0, 1] by the same rule, all 64 points of it moved there; f analytic.
 template <class F>
 double integrate_unit(F f) {

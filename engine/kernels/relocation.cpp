@@ -6,11 +6,6 @@
 #include "engine/kernels/quadrature.h"
 
 namespace darb {
-namespace {
-
-constexpr double kGaussRadius = 9;  // exp(-40) of the mass is beyond
-
-}  // namespace
 
 double relocation_opacity(double opacity, int count) {
     DARB_CHECK(opacity >= 0 && opacity <= 1 && count >= 1, "opacity = {}, count = {}", opacity,

@@ -5,6 +5,7 @@
 
 #include "engine/core/check.h"
 #include "engine/reference/projection_terms.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb::reference {
 namespace {
@@ -16,10 +17,6 @@ double largest_scale(const float* log_scale) {
 
 double mean_gradient(double sum, std::uint32_t seen) {
     return seen > 0 ? sum / seen : 0.0;
-}
-
-double sigmoid(double logit) {
-    return 1 / (1 + std::exp(-logit));
 }
 
 /// Takes growth back, smallest gradients first and later splats before earlier, down to the cap.

@@ -7,6 +7,7 @@
 #include "engine/core/check.h"
 #include "engine/kernels/relocation.h"
 #include "engine/reference/projection_terms.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/strategy_args.h"
 
 namespace darb::reference {
@@ -14,10 +15,6 @@ namespace {
 
 constexpr double kGateSlope = 100;
 constexpr double kTurn = 6.283185307179586;
-
-double sigmoid(double logit) {
-    return 1 / (1 + std::exp(-logit));
-}
 
 }  // namespace
 

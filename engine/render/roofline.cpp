@@ -7,7 +7,9 @@
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
+#include "shaders/shared/limits.h"
 #include "shaders/shared/measure_args.h"
+#include "shaders/shared/render_args.h"
 
 namespace darb {
 
@@ -17,12 +19,12 @@ constexpr std::uint64_t kCopyBytes = 32u << 20;  // beyond the last-level cache 
 constexpr int kRuns = 4;                         // the first compiles
 
 // Of a splat and a pair, from the layouts in shaders/shared/render_args.h and Forward.
-constexpr double kProjectedBytes = 4 * 16;     // shape, light, bound, cover
-constexpr double kPairBytes = 2 * 4 + 3 * 16;  // order, splat, and the projected splat
-constexpr double kPartialBytes = 9 * 4;
+constexpr double kProjectedBytes = 4 * 16;               // shape, light, bound, cover
+constexpr double kPairBytes = 2 * 4 + 3 * 16;            // order, splat, and the projected splat
+constexpr double kSumsBytes = PARTIALS * sizeof(float);  // of the gradients of a pair
 constexpr double kSortBytes = 4 + 8 + 8;  // a digit: histogram, scatter's read and write
 constexpr double kTouchedShare = 0.6;     // of a tile's four blocks that a pair's ellipse touches
-constexpr double kTilePixels = 256;
+constexpr double kPixelsOfTile = TILE_SIZE * TILE_SIZE;
 // Multiply-adds, counted in the shaders.
 constexpr double kProjectFma = 250, kProjectBackwardFma = 600, kShFma = 3;
 constexpr double kBlendFma = 20, kBlendBackwardFma = 50;
@@ -64,7 +66,7 @@ DeviceRates measure_rates(Device& device) {
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     const double rest = c.rest_floats;
     const double floats = 14 + rest;  // parameters of a splat
-    const double samples = c.evaluated > 0 ? c.evaluated : c.pairs * kTilePixels * kTouchedShare;
+    const double samples = c.evaluated > 0 ? c.evaluated : c.pairs * kPixelsOfTile * kTouchedShare;
     if (pass == "project")
         return PassWork{c.splats * 8 + c.visible * (4 * floats + kProjectedBytes),
                         c.visible * (kProjectFma + kShFma * rest)};
@@ -79,13 +81,13 @@ std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     if (pass == "exposure")  // the map, and its gradient and that of the picture before it
         return PassWork{c.pixels * (24 + 36), c.pixels * kExposureFma};
     if (pass == "blend backward")
-        return PassWork{c.pairs * (kPairBytes + 2 * kPartialBytes) + c.pixels * 20,
+        return PassWork{c.pairs * (kPairBytes + 2 * kSumsBytes) + c.pixels * 20,
                         samples * kBlendBackwardFma};
     if (pass == "project backward") {  // parameters and two moments, read and written, or the sum
         const double steps = 1 / c.rest_every;
         const double sums =
             c.rest_every > 1 ? (c.visible * (1 - steps) + c.splats * steps) * 8 * rest : 0;
-        return PassWork{c.splats * (24 * (14 + rest * steps) + 16) + sums + c.pairs * kPartialBytes,
+        return PassWork{c.splats * (24 * (14 + rest * steps) + 16) + sums + c.pairs * kSumsBytes,
                         c.visible * (kProjectBackwardFma + 3 * kShFma * rest)};
     }
     return std::nullopt;

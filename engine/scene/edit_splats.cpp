@@ -176,9 +176,7 @@ std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatMode
 }
 
 std::size_t prune_opacity(double least, SplatModel& model) {
-    return keep_splats(
-        [&](std::size_t i) { return 1 / (1 + std::exp(-double{model.opacity[i]})) >= least; },
-        model);
+    return keep_splats([&](std::size_t i) { return sigmoid(model.opacity[i]) >= least; }, model);
 }
 
 void limit_sh_degree(int degree, SplatModel& model) {

@@ -17,7 +17,6 @@ namespace {
 constexpr std::size_t kStep = std::size_t{1} << 20;  // bytes of output at a time
 constexpr int kGzipWindow = 16 + MAX_WBITS;
 constexpr int kZstdLevel = 12;  // as the reference writer of SPZ
-constexpr const char* kCopyAgain = "The file is damaged or cut off: export or copy it again.";
 
 // deflate reaches 1,032 at most; scenes reach 20.
 constexpr std::uint64_t kLargestExpansion = 1024;

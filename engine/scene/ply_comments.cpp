@@ -3,21 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <optional>
 #include <string_view>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 
 namespace darb {
 
 namespace {
-
-std::string lower(std::string_view text) {
-    std::string lowered(text);
-    for (char& c : lowered) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return lowered;
-}
 
 /// Of "Key: value" or "Key value"; empty where the comment has another key.
 std::string_view value_of(std::string_view comment, std::string_view key) {

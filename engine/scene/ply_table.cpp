@@ -18,8 +18,6 @@ namespace {
 
 constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
 constexpr std::size_t kProgressRows = 1 << 16;  // between two reports
-constexpr const char* kCopyAgain = "Export or copy the file again.";
-
 std::size_t type_size(PlyType type) {
     switch (type) {
         case PlyType::int8:

@@ -20,7 +20,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kCopyAgain = "The file is damaged or cut off: export or copy it again.";
 constexpr std::size_t kPaletteRow = 64;         // entries a row of shN_centroids
 constexpr std::size_t kMostPalette = 65536;     // entries
 constexpr std::size_t kSparePixels = 1u << 20;  // of the pictures, beyond four times the splats

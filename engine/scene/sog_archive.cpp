@@ -14,8 +14,6 @@ namespace darb {
 
 namespace {
 
-constexpr const char* kCopyAgain = "The file is damaged or cut off: export or copy it again.";
-
 struct CloseArchive {
     void operator()(zip_t* archive) const { zip_discard(archive); }
 };

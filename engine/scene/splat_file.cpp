@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 #include "engine/scene/compressed_ply.h"
 #include "engine/scene/dot_splat.h"
 #include "engine/scene/edit_splats.h"
@@ -29,12 +29,6 @@ bool starts_with(Bytes bytes, std::string_view text) {
     return bytes.size() >= text.size() &&
            std::equal(text.begin(), text.end(), bytes.begin(),
                       [](char c, std::byte b) { return std::byte(c) == b; });
-}
-
-std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return text;
 }
 
 std::string encoding_of(const PlyHeader& header) {

@@ -2,6 +2,7 @@
 // C = (sh_degree + 1)^2 coefficients per colour; SH order and sign as in 3DGS.
 #pragma once
 
+#include <cmath>
 #include <glm/glm.hpp>
 #include <string>
 #include <vector>
@@ -35,5 +36,10 @@ struct SplatModel {
         sh_rest.resize(count * rest_count());
     }
 };
+
+/// The opacity that a logit stands for, 0 to 1.
+inline double sigmoid(double logit) {
+    return 1 / (1 + std::exp(-logit));
+}
 
 }  // namespace darb

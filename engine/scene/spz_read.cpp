@@ -17,7 +17,6 @@ namespace {
 
 using Bytes = std::span<const std::byte>;
 
-constexpr const char* kCopyAgain = "The file is damaged or cut off: export or copy it again.";
 constexpr int kMostFractionalBits = 24;
 constexpr std::size_t kMostExtensionBytes = std::size_t{1} << 20;
 

@@ -10,15 +10,15 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json spread_json(const Spread& s) {
-    return {{"median", s.median}, {"quartile_low", s.low}, {"quartile_high", s.high}};
-}
-
 Json error_json(const PictureError& e) {
     return {{"psnr_db", e.psnr_db}, {"max", e.largest}, {"percentile_99_9", e.percentile}};
 }
 
 }  // namespace
+
+Json spread_json(const Spread& s) {
+    return {{"median", s.median}, {"quartile_low", s.low}, {"quartile_high", s.high}};
+}
 
 std::string cost_table(const CostResult& result) {
     size_t width = 10;

@@ -8,6 +8,7 @@
 
 namespace darb {
 
+nlohmann::json spread_json(const Spread& spread);
 std::string cost_table(const CostResult& result);
 nlohmann::json cost_json(const CostResult& result);
 /// title: the scene. A whole page without outside resources.

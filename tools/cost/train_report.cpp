@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "tools/cost/report.h"
 #include "tools/cost/train_cost.h"
 #include "trainer/report/html.h"
 #include "trainer/report/page.h"
@@ -13,10 +14,6 @@ namespace darb {
 namespace {
 
 using Json = nlohmann::json;
-
-Json spread_json(const Spread& s) {
-    return {{"median", s.median}, {"quartile_low", s.low}, {"quartile_high", s.high}};
-}
 
 std::string error_text(const TrainCostRow& row) {
     return row.gradient_error ? fmt::format("{:.2e}", row.gradient_error->median) : "-";

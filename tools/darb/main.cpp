@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <exception>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 #include "tools/darb/commands.h"
 
 namespace {
@@ -44,9 +44,8 @@ void refuse_no_numbers(const std::vector<std::string>& arguments) {
         const bool option = argument.starts_with("--");
         const size_t equals = option ? argument.find('=') : std::string::npos;
         if (option && equals == std::string::npos) continue;
-        std::string value = equals == std::string::npos ? argument : argument.substr(equals + 1);
-        std::transform(value.begin(), value.end(), value.begin(),
-                       [](unsigned char c) { return std::tolower(c); });
+        std::string value =
+            darb::lower(equals == std::string::npos ? argument : argument.substr(equals + 1));
         if (value.starts_with('-') || value.starts_with('+')) value.erase(0, 1);
         if (value == "nan" || value == "inf" || value == "infinity" || beyond_float(value))
             throw darb::Error(argument, "is no number that anything here can take",

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 #include "engine/data/colmap.h"
 #include "engine/data/image_io.h"
 
@@ -48,10 +48,7 @@ Pictures pictures_below(const fs::path& folder) {
         } else if (is_photo_name(name)) {
             found.photos.push_back(*at);
         } else if (is_foreign_picture_name(name)) {
-            std::string extension = at->path().extension().string();
-            std::ranges::transform(extension, extension.begin(),
-                                   [](unsigned char c) { return std::tolower(c); });
-            ++found.foreign[extension];
+            ++found.foreign[lower(at->path().extension().string())];
         } else if (names_cameras(name)) {
             found.cameras = at->path();
         }

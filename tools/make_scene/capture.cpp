@@ -13,7 +13,6 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kTau = 6.283185307179586;
 constexpr double kFocal = 235;        // px
 constexpr double kPointNoise = 1e-3;  // world units, standard deviation
 constexpr double kPointReach = 6;     // world units from the origin; the floor fades out beyond

@@ -11,8 +11,6 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
-constexpr double kTau = 6.283185307179586;
-
 // A hash of one lattice point, in [0, 1).
 double lattice(int x, int y, int z) {
     auto h = static_cast<std::uint32_t>(x) * 0x8da6b343u ^

@@ -2,8 +2,11 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <numbers>
 
 namespace darb::make_scene {
+
+constexpr double kTau = 2 * std::numbers::pi;
 
 enum class Texture { plain, checker, wood, marble, stripes, beach_ball, dots, tiles };
 

@@ -10,7 +10,6 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kTau = 6.283185307179586;
 constexpr double kFar = 1e9;
 constexpr double kSkin = 1e-5;  // world units; keeps a ray off the surface it leaves
 const dvec3 kSun = glm::normalize(dvec3(0.55, -0.45, 0.9));

@@ -10,7 +10,7 @@ namespace darb {
 
 namespace {
 
-double median(std::vector<double> values) {
+double median_of(std::vector<double> values) {
     std::sort(values.begin(), values.end());
     return values[values.size() / 2];
 }
@@ -50,8 +50,8 @@ BlendStatistics measure_blending(Device& device, const SplatModel& model,
             blend.push_back(of_blend);
             frame.push_back(of_frame);
         }
-        sum.blend_ms += median(blend);
-        sum.frame_ms += median(frame);
+        sum.blend_ms += median_of(blend);
+        sum.frame_ms += median_of(frame);
     }
     const double count = static_cast<double>(cameras.size());
     sum.blended_per_pixel = splats / pixels;

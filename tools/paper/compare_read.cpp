@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr const char* kRemedy = "Name another folder with -o, or remove this one.";
+constexpr const char* kOtherFolder = "Name another folder with -o, or remove this one.";
 
 Json read_json(const fs::path& path) {
     Json json = Json::parse(read_text_file(path), nullptr, false);
@@ -99,13 +99,13 @@ RunState run_state(const fs::path& folder, const std::string& settings, const st
         const Json there = start.value("settings", Json::object());
         if (const std::string other = differences(there, Json::parse(settings)); !other.empty())
             throw Error(metrics_path.string(), "is of a run with other settings: " + other,
-                        kRemedy);
+                        kOtherFolder);
         const fs::path list = folder / "cameras.json";
         if (!fs::exists(list) || read_text_file(list) != cameras ||
             start.value("held_out_views", std::size_t{0}) != held_out)
             throw Error(list.string(),
                         "the run there had other photos, another size or other held-out views",
-                        kRemedy);
+                        kOtherFolder);
         if (!metrics.value("interrupted", true) && metrics.value("iteration", 0) == iterations)
             return RunState::finished;
     }

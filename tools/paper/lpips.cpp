@@ -42,7 +42,7 @@ constexpr Row kVgg16[] = {{1, 0, 0, 1, 1, false}, {1, 2, 0, 1, 1, true},   {2, 5
                           {4, 21, 0, 1, 1, true}, {5, 24, 2, 1, 1, false}, {5, 26, 0, 1, 1, false},
                           {5, 28, 0, 1, 1, true}};
 
-constexpr const char* kRemedy =
+constexpr const char* kSaveWeights =
     "Save the state_dict of lpips.LPIPS, or that of torchvision's net together with the package's "
     "lin layers, as safetensors, each tensor cloned (docs/paper.md has the lines).";
 
@@ -50,7 +50,7 @@ const Tensor& tensor_of(const Tensors& tensors, const std::vector<std::string>& 
                         const std::string& where) {
     for (const std::string& name : names)
         if (const auto found = tensors.find(name); found != tensors.end()) return found->second;
-    throw Error(where, "has no tensor " + names.front(), kRemedy);
+    throw Error(where, "has no tensor " + names.front(), kSaveWeights);
 }
 
 std::vector<std::string> trunk_names(const Row& row, const char* what) {
@@ -193,7 +193,7 @@ Lpips::Lpips(const Tensors& tensors, const std::string& where, const LpipsOption
             throw Error(where + ", tensor " + trunk_names(row, "weight").front(),
                         fmt::format("its shape is not [out][{}][{}][{}] of {}", channels, side,
                                     side, net_name()),
-                        kRemedy);
+                        kSaveWeights);
         layers_.push_back({row.pool, row.stride, row.padding, row.kept, weight, bias.data});
         channels = weight.shape[0];
         if (!row.kept) continue;
@@ -203,7 +203,7 @@ Lpips::Lpips(const Tensors& tensors, const std::string& where, const LpipsOption
         if (lin.data.size() != channels)
             throw Error(where + ", tensor " + head,
                         fmt::format("it has {} values for {} channels", lin.data.size(), channels),
-                        kRemedy);
+                        kSaveWeights);
         heads_.push_back(lin.data);
     }
 }

@@ -1,11 +1,10 @@
 // Copied from the supplement's tables as they are printed, suspect cells included (docs/paper.md).
 #include "tools/paper/paper_numbers.h"
 
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <string>
 
+#include "engine/core/text.h"
 #include "shaders/shared/kernel_list.h"
 
 namespace darb {
@@ -168,9 +167,7 @@ std::span<const PaperNumbers> paper_numbers() {
 }
 
 std::vector<PaperNumbers> paper_numbers_of(std::string_view dataset) {
-    std::string name(dataset);
-    std::transform(name.begin(), name.end(), name.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const std::string name = lower(dataset);
     std::vector<PaperNumbers> found;
     for (const PaperNumbers& row : kNumbers)
         if (row.scene == name) found.push_back(row);

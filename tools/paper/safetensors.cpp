@@ -17,7 +17,7 @@ namespace darb {
 namespace {
 
 constexpr std::size_t kLengthBytes = 8;
-constexpr const char* kRemedy =
+constexpr const char* kWriteAnew =
     "Write the file anew, for example with safetensors.torch.save_file in Python.";
 
 template <class T>
@@ -54,7 +54,7 @@ float value_at(const std::string& type, const std::byte* at) {
 
 Tensor read_tensor(const nlohmann::json& entry, std::span<const std::byte> bytes,
                    const std::string& where) {
-    const auto bad = [&](const std::string& what) { return Error(where, what, kRemedy); };
+    const auto bad = [&](const std::string& what) { return Error(where, what, kWriteAnew); };
     const std::string type = entry["dtype"];
     const auto offsets = entry["data_offsets"].get<std::vector<std::uint64_t>>();
     Tensor tensor{entry["shape"].get<std::vector<std::size_t>>(), {}};
@@ -78,15 +78,15 @@ Tensor read_tensor(const nlohmann::json& entry, std::span<const std::byte> bytes
 
 Tensors parse_safetensors(std::span<const std::byte> file, const std::string& where) {
     if (file.size() < kLengthBytes)
-        throw Error(where, "is too short for a safetensors file", kRemedy);
+        throw Error(where, "is too short for a safetensors file", kWriteAnew);
     const auto length = load<std::uint64_t>(file.data());
     if (length > file.size() - kLengthBytes)
         throw Error(where, "is no safetensors file, or is truncated: its header is longer than it",
-                    kRemedy);
+                    kWriteAnew);
     const char* text = reinterpret_cast<const char*>(file.data()) + kLengthBytes;
     const auto header = nlohmann::json::parse(text, text + length, nullptr, false);
     if (!header.is_object())
-        throw Error(where, "is no safetensors file: its header is no JSON object", kRemedy);
+        throw Error(where, "is no safetensors file: its header is no JSON object", kWriteAnew);
     Tensors tensors;
     for (const auto& [name, entry] : header.items()) {
         if (name == "__metadata__") continue;
@@ -95,7 +95,7 @@ Tensors parse_safetensors(std::span<const std::byte> file, const std::string& wh
             if (size_of(entry.at("dtype").get<std::string>()) == 0) continue;
             tensors[name] = read_tensor(entry, file.subspan(kLengthBytes + length), place);
         } catch (const nlohmann::json::exception&) {
-            throw Error(place, "lacks dtype, shape or data_offsets", kRemedy);
+            throw Error(place, "lacks dtype, shape or data_offsets", kWriteAnew);
         }
     }
     return tensors;
