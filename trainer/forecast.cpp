@@ -52,6 +52,10 @@ int first_round(const TrainOptions& options) {
     return options.densify_begin() + options.round_interval();
 }
 
+bool has_rounds(const TrainOptions& options) {
+    return options.densify_end() > options.densify_begin();
+}
+
 // A few training views, evenly picked.
 Dataset some_views(const Dataset& dataset) {
     Dataset few;
@@ -116,11 +120,20 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     return result;
 }
 
+double pairs_per_splat(const Measurement& m, const SplatModel& model) {
+    return static_cast<double>(m.pairs) / std::max(static_cast<double>(model.size()), 1.0);
+}
+
+// Room that the buffers will have for the pairs of a splat.
+double pair_room(double pairs) {
+    return std::max(double{kMinPairsPerSplat}, kPairRoom * pairs);
+}
+
 // Splats and pairs at the end: of the splats that are wanted no more than a budget of memory leaves
 // room for, where Trainer's growth stops.
 void settle_size(const Device& device, const TrainOptions& options, std::uint32_t wanted,
-                 double pairs_per_splat, Forecast& f) {
-    const double room = std::max(double{kMinPairsPerSplat}, kPairRoom * pairs_per_splat);
+                 double pairs, Forecast& f) {
+    const double room = pair_room(pairs);
     const auto demand_for = [&](std::uint64_t splats) {
         f.demand.splats = splats;
         f.demand.pairs = static_cast<std::uint64_t>(room * static_cast<double>(splats));
@@ -140,11 +153,13 @@ void settle_size(const Device& device, const TrainOptions& options, std::uint32_
 // they save beyond that. Where most of the start goes they save the same share of what is left.
 void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
-    int at_start = f.splats < f.start_splats ? first_round(options) : options.iterations;
+    int at_start = f.falls ? first_round(options) : options.iterations;
     for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height))) {
         Dataset smaller = few;
         for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
-        f.ramp_ms.push_back(measure_training(device, smaller, start, options).ms);
+        const Measurement measured = measure_training(device, smaller, start, options);
+        f.ramp_ms.push_back(measured.ms);
+        if (at_start > 0) f.start_pairs = pairs_per_splat(measured, start);
         const int before = std::clamp(at_start, 0, step.iterations);
         at_start -= before;
         const double saved = 1 - f.ramp_ms.back() / f.start_ms;
@@ -167,70 +182,91 @@ SplatModel surface_model(const Dataset& dataset, TrainOptions options, const Spl
     return model;
 }
 
+// How much of the run is as slow as its end, the rest as its start; in the mean.
+double share_of_the_end(const TrainOptions& options, const Forecast& f) {
+    if (f.falls) return 1 - std::clamp(double(first_round(options)) / options.iterations, 0.0, 1.0);
+    if (f.splats == f.start_splats) return 0;
+    return (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
+           (double(f.splats) - f.start_splats);
+}
+
 // Times and pairs of the forecast, from the count at the start and one near that at the end.
 void measure_both(Device& device, const Dataset& dataset, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
     const Dataset few = some_views(dataset);
     const Measurement at_start = measure_training(device, few, start, options);
     f.start_ms = f.end_ms = at_start.ms;
-    const auto pairs_per_splat = [](const Measurement& m, std::size_t splats) {
-        return static_cast<double>(m.pairs) / std::max(static_cast<double>(splats), 1.0);
-    };
+    f.start_pairs = pairs_per_splat(at_start, start);
     const std::uint32_t wanted = f.splats;
-    settle_size(device, options, wanted, pairs_per_splat(at_start, start.size()), f);
+    settle_size(device, options, wanted, f.start_pairs, f);
     const std::uint32_t most = device.info().type == "cpu" ? kMostMeasuredCpu : kMostMeasuredGpu;
     const std::uint32_t count = std::min(f.splats, most);
-    const SplatModel later = f.splats < f.start_splats
-                                 ? surface_model(dataset, options, start, count)
-                                 : split_model(start, count, options.seed);
-    if (later.size() != start.size()) {
+    const SplatModel later = f.falls ? surface_model(dataset, options, start, count)
+                                     : split_model(start, count, options.seed);
+    if (f.falls || later.size() != start.size()) {
         const Measurement at_end = measure_training(device, few, later, options);
-        const double more = double(later.size()) - double(start.size());
-        const double per_splat = std::max(0.0, (at_end.ms - at_start.ms) / more);
-        settle_size(device, options, wanted, pairs_per_splat(at_end, later.size()), f);
-        f.end_ms = at_start.ms + per_splat * (double(f.splats) - f.start_splats);
+        settle_size(device, options, wanted, pairs_per_splat(at_end, later), f);
+        const auto measured = static_cast<double>(later.size());
+        const double ms = f.falls ? at_end.ms : std::max(at_end.ms, at_start.ms);
+        const double per_splat = f.falls ? ms / std::max(1.0, measured)
+                                         : (ms - at_start.ms) / (measured - f.start_splats);
+        f.end_ms = ms + per_splat * (f.splats - measured);
     }
-    const double more = double(f.splats) - f.start_splats;
-    const double share =
-        more == 0 ? 0 : (mean_splats(f.start_splats, f.splats, options) - f.start_splats) / more;
+    const double share = share_of_the_end(options, f);
     f.seconds = options.iterations * (f.start_ms + share * (f.end_ms - f.start_ms)) / 1e3;
     measure_ramp(device, few, start, options, f);
+}
+
+// The iterations with smaller photos.
+int ramp_end(const TrainOptions& options, const Forecast& f) {
+    int last = 0;
+    for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height)))
+        last += step.iterations;
+    return last;
 }
 
 // Splats in the last iteration with smaller photos, at most: adc's grow evenly while density
 // control runs.
 std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Forecast& f) {
     if (options.strategy != Strategy::adc) return f.splats;
-    if (f.splats < f.start_splats) return f.start_splats;
-    double last = 0;
-    for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height)))
-        last += step.iterations;
+    if (f.falls) return f.start_splats;
     const double rounds = std::max(1, options.densify_end() - options.densify_begin());
-    const double share = std::clamp((last - options.densify_begin()) / rounds, 0.0, 1.0);
+    const double grown = ramp_end(options, f) - options.densify_begin();
+    const double share = std::clamp(grown / rounds, 0.0, 1.0);
     return static_cast<std::uint64_t>(f.start_splats + share * (f.splats - f.start_splats));
 }
 
-// photos: as add_photos counts them, the ramp's smaller ones among them.
+// The most of what the end takes; of the last rounds of density control, with the colour that there
+// is by then; and of the first iterations, with smaller photos or before most of a random start
+// goes. photos: as add_photos counts them, the ramp's smaller ones among them.
 void settle_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
                  Forecast& f) {
     f.peak = f.demand;
-    const bool falls = f.splats < f.start_splats;
-    if (photos.small_cameras == 0 && !falls) return;
-    MemoryDemand early = f.demand;
+    f.peak.densifies = false;
+    const auto take_larger = [&](const MemoryDemand& demand) {
+        if (plan_memory(device, demand).total() > plan_memory(device, f.peak).total())
+            f.peak = demand;
+    };
+    MemoryDemand rounds = f.demand;
+    rounds.averages = false;
+    rounds.sh_degree = predict_degree(options, options.densify_end());
+    if (rounds.densifies) take_larger(rounds);
+    if (photos.small_cameras == 0 && !f.falls) return;
+    MemoryDemand early = rounds;
     early.small_pixels = photos.small_pixels;
     early.small_cameras = photos.small_cameras;
-    early.averages = false;
-    if (falls && options.probe_sh && first_round(options) < options.degree_interval())
-        early.sh_degree = 0;  // no probe has admitted a degree yet
+    early.sh_degree =
+        predict_degree(options, f.falls ? first_round(options) + 1 : ramp_end(options, f));
     early.splats = splats_with_smaller_photos(options, f);
-    const double pairs_per_splat = double(f.demand.pairs) / std::max(1.0, double(f.splats));
-    early.pairs = static_cast<std::uint64_t>(pairs_per_splat * double(early.splats));
+    const double room = f.falls ? pair_room(f.start_pairs)
+                                : double(f.demand.pairs) / std::max(1.0, double(f.demand.splats));
+    early.pairs = static_cast<std::uint64_t>(room * double(early.splats));
     if (options.max_memory_bytes > 0)  // growth stops before it
         early.splats =
             std::min(early.splats,
                      std::max<std::uint64_t>(splats_within(device, early, options.max_memory_bytes),
                                              f.start_splats));
-    if (plan_memory(device, early).total() > plan_memory(device, f.demand).total()) f.peak = early;
+    take_larger(early);
 }
 
 }  // namespace
@@ -249,9 +285,9 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
     return random_start && rounds > 0 ? end : std::max(start, end);
 }
 
-int predict_degree(const TrainOptions& options) {
+int predict_degree(const TrainOptions& options, int iterations) {
     if (!options.probe_sh) return options.sh_degree;
-    return std::min(options.sh_degree, (options.iterations - 1) / options.degree_interval());
+    return std::min(options.sh_degree, std::max(iterations - 1, 0) / options.degree_interval());
 }
 
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
@@ -267,10 +303,6 @@ std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
     if (options.strategy != Strategy::adc) return simulate_growth(options, start, end).mean;
     const double all = options.iterations;
-    if (end < start) {
-        const double until = std::clamp<double>(first_round(options), 0, all);
-        return (until * start + (all - until) * end) / all;
-    }
     const double to = std::clamp<double>(options.densify_end(), 0, all);
     const double from = std::clamp<double>(options.densify_begin(), 0, to);
     return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;
@@ -310,7 +342,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     add_photos(dataset.views, options, f.demand);
     const MemoryDemand photos = f.demand;
     f.demand.small_pixels = f.demand.small_cameras = 0;  // none at the end
-    f.demand.sh_degree = predict_degree(options);
+    f.demand.sh_degree = predict_degree(options, options.iterations);
     start.sh_degree = f.demand.sh_degree;  // of the times
     if (options.probe_sh)
         start.sh_degree =
@@ -321,7 +353,9 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
         std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit,
                               dataset.points.size() == 0);
-    f.demand.densifies = options.densify_end() > options.densify_begin();
+    f.demand.densifies = has_rounds(options);
+    f.falls =
+        dataset.points.size() == 0 && has_rounds(options) && options.strategy != Strategy::mcmc;
     f.demand.averages = options.averages();
     settle_size(scratch, options, f.splats, 0, f);
     if (measure && f.demand.photo_pixels > 0) try {

@@ -16,15 +16,17 @@ namespace darb {
 struct Forecast {
     std::uint32_t start_splats = 0;
     std::uint32_t splats = 0;         // at the end, within options.max_memory_bytes
+    bool falls = false;               // the first round takes most of the start, which is random
     double start_ms = 0, end_ms = 0;  // an iteration at these counts; 0: not measured
     std::vector<double> ramp_ms;      // of each of ramp_steps(), at the count at the start, as far
                                       // as they were measured
     double seconds = 0;               // of the whole run; 0: not measured
+    double start_pairs = 0;           // a splat, of the photos that the start sees; 0: as seconds
     // At the end. Exact is what the plan makes of it; splats, pairs and degree are as uncertain as
     // the constants in the .cpp.
     MemoryDemand demand;
-    // Where the run needs most memory: at the end, while the ramp's smaller photos are there, or at
-    // the start, where that has more splats.
+    // Where the run needs most memory: at the end, in the last rounds of density control, while the
+    // ramp's smaller photos are there, or at the start, where that has more splats.
     MemoryDemand peak;
 };
 
@@ -35,15 +37,15 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit,
                              bool random_start = false);
 
-/// The degree of colour that a run ends with, where options.probe_sh does not refuse the first.
-int predict_degree(const TrainOptions& options);
+/// The degree of colour that a run has after so many iterations, where options.probe_sh does not
+/// refuse the first.
+int predict_degree(const TrainOptions& options, int iterations);
 
 /// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
 /// end with, from the same start.
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options);
 
-/// Mean count over the run; adc: where it grows evenly while density control runs, or falls in the
-/// first round.
+/// Mean count over the run; adc: where it grows evenly while density control runs.
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options);
 
 /// `start` split into pieces, at least as many as it has and at most `count`, which cover what it

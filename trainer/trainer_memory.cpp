@@ -60,8 +60,8 @@ MemoryDemand Trainer::growth_demand() const {
         most *= static_cast<std::uint64_t>(divisor_);
     }
     if (options_.probe_sh)  // what is on trial is to have room, and what follows it
-        demand.sh_degree =
-            demand.sh_degree == 0 ? std::min(1, options_.sh_degree) : predict_degree(options_);
+        demand.sh_degree = demand.sh_degree == 0 ? std::min(1, options_.sh_degree)
+                                                 : predict_degree(options_, options_.iterations);
     demand.room_splats = 0;
     demand.pairs = std::max(4 * demand.splats, most + most / 2);
     demand.pairs += demand.pairs / 2;

@@ -62,14 +62,14 @@ std::string memory_text(const Device& device, const Forecast& f, int most_degree
     const auto bytes = [&](const MemoryDemand& demand) {
         return static_cast<double>(plan_memory(device, demand).total());
     };
-    MemoryDemand empty = f.peak, colourful = f.peak;
+    MemoryDemand empty = f.peak, colourful = f.demand;
     empty.splats = empty.pairs = 0;
     colourful.sh_degree = most_degree;
     const double all = bytes(f.peak), fixed = bytes(empty);
     std::string text =
         fmt::format("{} of device memory ({} and {:.0f} bytes a splat", format_bytes(all),
                     format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.peak.splats)));
-    if (most_degree > f.peak.sh_degree)
+    if (most_degree > f.demand.sh_degree)
         text += fmt::format("; {} where the photos call for colour of degree {}",
                             format_bytes(bytes(colourful)), most_degree);
     return text + ")";
