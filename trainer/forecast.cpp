@@ -229,11 +229,11 @@ int ramp_end(const TrainOptions& options, const Forecast& f) {
 // control runs.
 std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Forecast& f) {
     if (options.strategy != Strategy::adc) return f.splats;
-    if (f.falls) return f.start_splats;
     const double rounds = std::max(1, options.densify_end() - options.densify_begin());
-    const double grown = ramp_end(options, f) - options.densify_begin();
-    const double share = std::clamp(grown / rounds, 0.0, 1.0);
-    return static_cast<std::uint64_t>(f.start_splats + share * (f.splats - f.start_splats));
+    const double until = ramp_end(options, f) - options.densify_begin();
+    const double share = std::clamp(until / rounds, 0.0, 1.0), from = f.falls ? 0 : f.start_splats;
+    const auto grown = static_cast<std::uint64_t>(from + share * (f.splats - from));
+    return std::max<std::uint64_t>(f.start_splats, grown);
 }
 
 // The most of what the end takes; of the last rounds of density control, with the colour that there

@@ -58,21 +58,15 @@ std::string time_text(const Forecast& f, const TrainOptions& options) {
 
 // Exact where the counts come true; the counts are a rule of thumb, so what a splat takes is said,
 // too.
-std::string memory_text(const Device& device, const Forecast& f, int most_degree) {
+std::string memory_text(const Device& device, const Forecast& f) {
     const auto bytes = [&](const MemoryDemand& demand) {
         return static_cast<double>(plan_memory(device, demand).total());
     };
-    MemoryDemand empty = f.peak, colourful = f.demand;
+    MemoryDemand empty = f.peak;
     empty.splats = empty.pairs = 0;
-    colourful.sh_degree = most_degree;
     const double all = bytes(f.peak), fixed = bytes(empty);
-    std::string text =
-        fmt::format("{} of device memory ({} and {:.0f} bytes a splat", format_bytes(all),
-                    format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.peak.splats)));
-    if (most_degree > f.demand.sh_degree)
-        text += fmt::format("; {} where the photos call for colour of degree {}",
-                            format_bytes(bytes(colourful)), most_degree);
-    return text + ")";
+    return fmt::format("{} of device memory ({} and {:.0f} bytes a splat)", format_bytes(all),
+                       format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.peak.splats)));
 }
 
 void print_advice(const Device& device, const Dataset& dataset, const Forecast& f) {
@@ -101,8 +95,7 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     scratch.set_variants(device.variants());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
-    fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train),
-               memory_text(device, f, flags.train.sh_degree));
+    fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train), memory_text(device, f));
     print_advice(device, dataset, f);
 }
 
