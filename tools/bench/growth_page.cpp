@@ -65,7 +65,7 @@ Plot log_plot(const std::string& title, const std::string& x_label) {
 
 // The passes of one curve against what varies.
 Plot pass_plot(const GrowthCurve& curve) {
-    Plot plot = log_plot(fmt::format("Passes of a {} by {}", curve.name, curve.by), curve.by);
+    Plot plot = log_plot(fmt::format("Passes, {} by {}", curve.name, curve.by), curve.by);
     if (curve.points.empty()) return plot;
     for (const PassFigure& pass : curve.points.back().passes) {
         PlotSeries s;
