@@ -145,7 +145,9 @@ TEST(Forecast, a_random_start_goes_in_the_first_round) {
                     first * f.ramp_ms[0] + (300 - first) * half * f.end_ms + 700 * f.end_ms,
                     1e-6 * f.seconds * 1e3)
             << strategy_name(strategy);
+        options.resolution_ramp = false;
         EXPECT_GT(f.start_pairs, 0);
+        EXPECT_LT(f.start_pairs, forecast_training(scratch, dataset, options).start_pairs);
     }
 }
 
@@ -251,6 +253,20 @@ TEST(Forecast, counts_the_splats_that_stand_beside_smaller_photos) {
     options.max_memory_bytes = all - 500'000;
     EXPECT_LE(plan_memory(scratch, peak_of()).total(), options.max_memory_bytes);
     scratch.set_memory_budget(0);
+}
+
+TEST(Forecast, few_random_splats_grow_beside_smaller_photos) {
+    Device scratch;
+    Dataset dataset = small_scene(1);
+    dataset.points = {};
+    TrainOptions options;
+    options.random_points = 1'000;
+    options.average_from = 1;
+    options.densify_until = options.iterations / 5;  // before the smaller photos go
+    const Forecast f = forecast_training(scratch, dataset, options, false);
+    EXPECT_GT(f.splats, 1'000U);
+    EXPECT_GT(f.peak.small_pixels, 0U);
+    EXPECT_EQ(f.peak.splats, f.splats);
 }
 
 TEST(Forecast, counts_the_time_that_smaller_photos_save) {
