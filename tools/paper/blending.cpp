@@ -1,19 +1,13 @@
 #include "tools/paper/blending.h"
 
-#include <algorithm>
-
 #include "engine/core/check.h"
 #include "engine/reference/render.h"
 #include "engine/render/renderer.h"
+#include "tools/paper/quantile.h"
 
 namespace darb {
 
 namespace {
-
-double median_of(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    return values[values.size() / 2];
-}
 
 double blended_splats(const SplatModel& model, const Camera& camera) {
     const reference::RenderResult result =
@@ -50,8 +44,8 @@ BlendStatistics measure_blending(Device& device, const SplatModel& model,
             blend.push_back(of_blend);
             frame.push_back(of_frame);
         }
-        sum.blend_ms += median_of(blend);
-        sum.frame_ms += median_of(frame);
+        sum.blend_ms += median(blend);
+        sum.frame_ms += median(frame);
     }
     const double count = static_cast<double>(cameras.size());
     sum.blended_per_pixel = splats / pixels;

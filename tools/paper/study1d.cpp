@@ -8,6 +8,7 @@
 
 #include "engine/core/check.h"
 #include "engine/reference/parallel.h"
+#include "tools/paper/quantile.h"
 
 namespace darb {
 
@@ -15,21 +16,6 @@ namespace {
 
 constexpr double kFailedShare = 0.5;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-/// Between neighbours, of sorted values; NaN of none.
-double quantile(const std::vector<double>& sorted, double share) {
-    if (sorted.empty()) return kNaN;
-    const double place = share * static_cast<double>(sorted.size() - 1);
-    const auto below = static_cast<std::size_t>(place);
-    const std::size_t above = std::min(below + 1, sorted.size() - 1);
-    const double rest = place - static_cast<double>(below);
-    return (1 - rest) * sorted[below] + rest * sorted[above];
-}
-
-double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    return quantile(values, 0.5);
-}
 
 bool has_failed(const Fit1d& fit, double mean_square) {
     return !std::isfinite(fit.loss) || fit.loss >= kFailedShare * mean_square;
