@@ -46,6 +46,7 @@ tests    xvfb                 a display for the tests of the window
 tests    xdotool              mouse and keys in them
 tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effects that are off cost nothing
 tests    python3              style script (standard library only)
+tests    universal-ctags      sizes of functions and classes, tools/structure.py
 tests    ffmpeg               the video of a camera path
 pages    chromium             opens the reports; Debian alone: that of Ubuntu is no package
 pages    fonts-dejavu-core    their letters

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""Measures how easy the tree is to change: sizes, signatures, members, and the files that a change of each kind touches.
+
+    structure.py [--json] [ROOT]
+
+Sizes are read with Universal Ctags (Debian: universal-ctags). The files of a change are those that name the last thing
+of its kind that was added, tests and documents left out: whoever adds the next one has to look at them.
+A number with a target is marked where it misses it.
+"""
+
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+import sys
+
+FOLDERS = ("engine", "trainer", "viewer", "tools", "shaders")
+LONGEST_FUNCTION, MOST_PARAMETERS, MOST_MEMBERS = 60, 7, 25  # lines, of a signature, of a class
+
+# kind of change: (example, pattern of what names it, most files that it should take)
+CHANGES = {
+    "kernel": ("half-cosine squared", r"half_cosine_squared|HALF_COSINE_SQUARED", 2),
+    "effect": ("exposure", r"\bexposure|\bExposure|EFFECT_EXPOSURE", 6),
+    "format": ("SPZ", r"\bspz|Spz|SPZ", 2),
+    "strategy": ("mcmc", r"\bmcmc|\bMcmc", 2),
+    "command": ("psi", r"\bpsi_command|add_psi|run_psi", 2),
+    "sort": ("ballot", r"ballot", 3),
+    "attribute": ("colour", r"\bsh_dc\b|kShDc|SH_DC", 8),
+    "option": ("clearance", r"\bclearance", 2),
+    "second process": ("gradients before the step", r"GradientBuffers|gradient_buffers", 4),
+}
+
+
+def source_files(root):
+    listed = subprocess.run(["git", "-C", root, "ls-files", *FOLDERS], capture_output=True, text=True, check=True)
+    return [name for name in listed.stdout.splitlines()
+            if name.endswith((".cpp", ".h", ".comp", ".glsl", ".txt")) and not name.startswith("tools/make_scene")]
+
+
+def tags(root, files):
+    """Every function and member of the C++ files."""
+    command = ["ctags", "--sort=no", "--languages=C++", "--langmap=C++:.cpp.h", "--c++-kinds=fpmcs",
+               "--fields=+neSKs", "--output-format=json", "-f", "-", "-L", "-"]
+    cpp = [name for name in files if name.endswith((".cpp", ".h"))]
+    done = subprocess.run(command, cwd=root, input="\n".join(cpp), capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(f"structure.py: ctags: {done.stderr.strip() or 'failed'}; install universal-ctags")
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def parameters(signature):
+    """Of a signature, commas within brackets left out."""
+    inner = re.sub(r"\([^()]*\)|<[^<>]*>|\{[^{}]*\}", "", re.sub(r"<[^<>]*>", "", signature.strip()[1:-1]))
+    return 0 if inner.strip() in ("", "void") else inner.count(",") + 1
+
+
+def sizes(root, files):
+    functions, signatures, members, methods = {}, {}, {}, {}
+    for tag in tags(root, files):
+        place = f"{tag['path']}: {tag.get('scope', '').removeprefix('darb::')}::{tag['name']}".replace(" ::", " ")
+        if tag["kind"] == "function" and "end" in tag:
+            functions[place] = tag["end"] - tag["line"] + 1
+        if tag["kind"] in ("function", "prototype"):
+            signatures[place] = max(signatures.get(place, 0), parameters(tag.get("signature", "()")))
+        if tag.get("scopeKind") == "class":
+            of_class = members if tag["kind"] == "member" else methods
+            of_class[tag["scope"].removeprefix("darb::")] = of_class.get(tag["scope"].removeprefix("darb::"), 0) + 1
+    return functions, signatures, members, methods
+
+
+def over(values, limit):
+    return sorted(((value, name) for name, value in values.items() if value > limit), reverse=True)
+
+
+def changes(root, files):
+    texts = {name: (pathlib.Path(root) / name).read_text(errors="replace") for name in files}
+    return {kind: sorted(name for name, text in texts.items() if re.search(pattern, text))
+            for kind, (_, pattern, _) in CHANGES.items()}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="the same, with every place, as JSON")
+    parser.add_argument("root", nargs="?", default=".")
+    options = parser.parse_args()
+    files = source_files(options.root)
+    functions, signatures, members, methods = sizes(options.root, files)
+    touched = changes(options.root, files)
+    lists = {"functions over 60 lines": over(functions, LONGEST_FUNCTION),
+             "signatures over 7 parameters": over(signatures, MOST_PARAMETERS),
+             "classes over 25 members": over(members, MOST_MEMBERS)}
+    if options.json:
+        print(json.dumps({**lists, "files of a change": touched}, indent=1))
+        return
+    for title, rows in lists.items():
+        print(f"{title}: {len(rows)}")
+        for value, name in rows[:12]:
+            print(f"  {value:4}  {name}")
+    for name in ("Trainer", "Forward", "Viewer"):
+        print(f"class {name}: {members.get(name, 0)} members, {methods.get(name, 0)} methods declared and defined")
+    print("files that name the last thing of a kind:")
+    for kind, (example, _, most) in CHANGES.items():
+        count = len(touched[kind])
+        print(f"  {kind:15} {count:3}  (target {most}; {example}){'' if count <= most else '  over'}")
+
+
+if __name__ == "__main__":
+    main()
