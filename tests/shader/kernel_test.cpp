@@ -256,7 +256,7 @@ TEST_F(KernelShader, ReferenceVectors_agreeWithinTheBoundOfQ) {
             EXPECT_NEAR(v.slope, answers[i].slope, 4 * curvature * bound + 1e-6)
                 << kernel_name(kernel) << " case " << v.index << " (" << v.tag << ")";
         }
-        EXPECT_LE(at_the_edge, 20) << kernel_name(kernel);
+        EXPECT_LT(2 * at_the_edge, static_cast<int>(cases.size())) << kernel_name(kernel);
     }
 }
 

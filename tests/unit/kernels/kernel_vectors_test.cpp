@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 
 namespace darb {
 namespace {
@@ -21,20 +23,31 @@ class KernelVectors : public testing::Test {
         vectors_ = std::move(*loaded);
     }
 
-    void expect_close(const KernelVector& v, const char* what, double expected, double got,
-                      double relative) const {
-        const double tolerance = 1e-15 + relative * std::abs(expected);
-        EXPECT_NEAR(expected, got, tolerance) << what << " of " << kernel_name(v.kernel) << " case "
-                                              << v.index << " (" << v.tag << "), q = " << v.q;
+    /// `of` is a function of q, which the file rounds to double: a last bit more or less of q is
+    /// what limits it where it is steep or near a zero at the edge.
+    template <typename OfQ>
+    static void expect_close(const KernelVector& v, const char* what, double expected,
+                             const OfQ& of, double relative) {
+        const double below = of(std::nextafter(v.q, 0)), above = of(std::nextafter(v.q, 1e300));
+        // Where q lies on the edge itself, the other side of it is zero: no more than a jump of the
+        // steepness inside counts, and a kernel's own jump is not taken for rounding.
+        const bool beside_edge = below == 0 || above == 0;
+        const double rounding_of_q = beside_edge ? 0 : std::abs(above - below);
+        const double tolerance = 1e-15 + relative * std::abs(expected) + rounding_of_q;
+        EXPECT_NEAR(expected, of(v.q), tolerance)
+            << what << " of " << kernel_name(v.kernel) << " case " << v.index << " (" << v.tag
+            << "), q = " << v.q;
     }
 
     std::vector<KernelVector> vectors_;
 };
 
-TEST_F(KernelVectors, EveryKernel_hasAllKindsOfCases) {
-    std::vector<int> count(KERNEL_COUNT);
-    for (const KernelVector& v : vectors_) ++count[static_cast<std::size_t>(v.kernel)];
-    for (const int n : count) EXPECT_EQ(n, 92);
+TEST_F(KernelVectors, EveryKernel_hasTheSameKindsOfCases) {
+    std::vector<std::set<std::string>> kinds(KERNEL_COUNT);
+    for (const KernelVector& v : vectors_) kinds[static_cast<std::size_t>(v.kernel)].insert(v.tag);
+    EXPECT_GE(kinds[KERNEL_GAUSSIAN].size(), 5u);
+    for (std::size_t kernel = 0; kernel < kinds.size(); ++kernel)
+        EXPECT_EQ(kinds[kernel], kinds[KERNEL_GAUSSIAN]) << kernel_name(static_cast<int>(kernel));
 }
 
 TEST_F(KernelVectors, Value_agreesTo1e13) {
@@ -48,13 +61,22 @@ TEST_F(KernelVectors, Value_agreesTo1e13) {
 }
 
 TEST_F(KernelVectors, Slope_agreesTo1e12) {
-    for (const KernelVector& v : vectors_)
-        expect_close(v, "slope", v.slope, kernel_slope(v.kernel, Footprint::psi, v.q), 1e-12);
+    for (const KernelVector& v : vectors_) {
+        const auto slope = [&](double q) { return kernel_slope(v.kernel, Footprint::psi, q); };
+        expect_close(v, "slope", v.slope, slope, 1e-12);
+    }
 }
 
 TEST_F(KernelVectors, Slope_givesTheGradientsOfTheConic) {
     for (const KernelVector& v : vectors_) {
-        const double g = v.opacity * kernel_slope(v.kernel, Footprint::psi, v.q);
+        const auto by_q = [&](double q) {
+            return v.opacity * kernel_slope(v.kernel, Footprint::psi, q);
+        };
+        const auto times = [&](double factor) {
+            return [by_q, factor](double q) { return by_q(q) * factor; };
+        };
+        const auto value = [&](double q) { return kernel_value(v.kernel, Footprint::psi, q); };
+        const double g = by_q(v.q);
         const double to_dx = 2 * (v.a * v.dx + v.b * v.dy), to_dy = 2 * (v.b * v.dx + v.c * v.dy);
         // a dx and b dy cancel in needles; their rounding is relative to the larger of the two.
         const double slack = 4e-16 * std::abs(g);
@@ -62,11 +84,10 @@ TEST_F(KernelVectors, Slope_givesTheGradientsOfTheConic) {
                     1e-11 * std::abs(v.d_dx) + slack * std::abs(2 * v.a * v.dx) + 1e-16);
         EXPECT_NEAR(v.d_dy, g * to_dy,
                     1e-11 * std::abs(v.d_dy) + slack * std::abs(2 * v.c * v.dy) + 1e-16);
-        expect_close(v, "d_a", v.d_a, g * v.dx * v.dx, 1e-11);
-        expect_close(v, "d_b", v.d_b, g * 2 * v.dx * v.dy, 1e-11);
-        expect_close(v, "d_c", v.d_c, g * v.dy * v.dy, 1e-11);
-        expect_close(v, "d_opacity", v.d_opacity, kernel_value(v.kernel, Footprint::psi, v.q),
-                     2e-9);  // w near a zero at the edge, from a rounded q
+        expect_close(v, "d_a", v.d_a, times(v.dx * v.dx), 1e-11);
+        expect_close(v, "d_b", v.d_b, times(2 * v.dx * v.dy), 1e-11);
+        expect_close(v, "d_c", v.d_c, times(v.dy * v.dy), 1e-11);
+        expect_close(v, "d_opacity", v.d_opacity, value, 1e-13);
     }
 }
 
