@@ -1,6 +1,6 @@
 // Gradients of blend.comp: from dL/dimage to sums over pixels from which dL/d(mean, l11, l21, l22, opacity, colour)
 // follow, PARTIALS floats for each splat-tile pair in the pair's own slot, so that sums per splat need no
-// atomics and repeat bit by bit. Place: after the loss. Source: KERNELS section 4 in moments form.
+// atomics and repeat bit by bit. Place: after the loss. Source: docs/math.md, Gradients.
 // One of two ways to the same sums; the other is blend_backward_buckets.comp.
 // Work: one subgroup a tile, its areas one after another, pixels dealt as in blend.comp; the lanes' sums are
 // reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.

@@ -1,7 +1,7 @@
 // Sums a splat's partials over its tiles, takes them back through the projection to its parameters and does
 // the Adam step there (UPDATE = 1), or stores the gradients in the moments' place (UPDATE = 0).
 // With REST_GATHER the harmonics above the first band of a splat in view add to rest_sum instead.
-// Place: last pass of an iteration. Source: KERNELS section 4; Adam as in TRAINING section 1.
+// Place: last pass of an iteration. Source: docs/math.md, Gradients and Optimizer.
 // Work: one thread a splat, all N of them: Adam is dense, an unseen splat's moments decay and move it.
 // Shared memory: none. Does nothing when the frame overflowed its pair buffers: the host repeats it.
 // A splat whose gradient is not finite, or whose square is not, is counted and left as it is for this step.

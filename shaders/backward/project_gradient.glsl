@@ -1,5 +1,5 @@
 // From the summed partials of one splat to the gradients of its parameters: the exact derivative of project.comp.
-// Source: KERNELS section 4. Needs camera data, covariance.glsl, sh.glsl and the parameter buffers.
+// Source: docs/math.md, Gradients. Needs camera data, covariance.glsl, sh.glsl and the parameter buffers.
 
 struct SplatGradient {
     vec3 position, log_scale;

@@ -1,5 +1,5 @@
 // Decides for every splat whether density control keeps, clones, splits or prunes it.
-// Source: 3DGS section 5, graphdeco's thresholds (TRAINING section 1). Place: between iterations.
+// Source: docs/math.md, Density control; 3DGS section 5, graphdeco's thresholds. Place: between iterations.
 // Work: one thread a splat. Shared memory: none. Writes keep (0, 1) and grow (0, 1) for their scans.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,5 +1,5 @@
 // Projects every splat: camera space, Cholesky factor of the projected covariance, colour from SH, reach and
-// the tiles that it touches. Place: first pass of a frame. Source: KERNELS sections 4 to 6; EWA splatting.
+// the tiles that it touches. Place: first pass of a frame. Source: docs/math.md, Projection.
 // Work: one thread a splat. Shared memory: none. Reads parameters; writes the projected splat and its cover.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,5 +1,5 @@
 // From a splat's parameters and a camera to the projected Cholesky factor, with its derivatives' ingredients.
-// KERNELS: M = sqrt(scale) J W R diag(s), S' = M M^T + low_pass I, q = (l11 dx + l21 dy)^2 + (l22 dy)^2.
+// M = sqrt(scale) J W R diag(s), S' = M M^T + low_pass I, q = (l11 dx + l21 dy)^2 + (l22 dy)^2 (docs/math.md).
 #include "lib/finite.glsl"
 
 // Rotation matrix of a unit quaternion (w, x, y, z); column k is the splat's axis k in the world.
