@@ -14,6 +14,8 @@ namespace darb {
 
 namespace {
 
+constexpr double kLongest_s = 24 * 60 * 60;  // a clock's time of day or since 1970 is longer
+
 // Position, field of view and quaternion as one vector of eight numbers. The field of view is
 // ln tan(fov / 2): whatever a curve does between two keys, it stays between 0 and 180 degrees.
 using Row = std::array<double, 8>;
@@ -92,6 +94,7 @@ void write_camera_path(const std::filesystem::path& file, const CameraPath& path
 
 CameraPath read_camera_path(const std::filesystem::path& file) {
     CameraPath path;
+    path.file = file;
     const std::string hint = "A path is written by the viewer's panel \"Camera path\".";
     try {
         const auto json = nlohmann::json::parse(read_text_file(file));
@@ -104,6 +107,10 @@ CameraPath read_camera_path(const std::filesystem::path& file) {
             key.orientation = glm::dquat(q[0], q[1], q[2], q[3]);
             key.fov_y = glm::radians(k.at("fov_y_degrees").get<double>());
             const std::string where = fmt::format("{}, key {}", file.string(), path.keys.size());
+            if (!(key.seconds >= 0 && key.seconds <= kLongest_s))
+                throw Error(
+                    where, fmt::format("its time is {} s; 0 to {} can be", key.seconds, kLongest_s),
+                    "Count the seconds from the start of the path.");
             if (!path.keys.empty() && key.seconds <= path.keys.back().seconds)
                 throw Error(where, "its time is not after that of the key before", hint);
             if (!(glm::length(key.orientation) > 1e-6))

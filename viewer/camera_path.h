@@ -21,6 +21,7 @@ struct KeyFrame {
 
 struct CameraPath {
     std::vector<KeyFrame> keys;
+    std::filesystem::path file;  // that it was read from, for messages; may be empty
 
     double duration() const { return keys.empty() ? 0 : keys.back().seconds; }
     /// The current view, `seconds` after the last key (the first is at 0).
@@ -33,7 +34,7 @@ struct CameraPath {
 void apply(const KeyFrame& key, Navigation& view);
 
 /// JSON: {"key_frames": [{"seconds", "eye": [3], "orientation": [w, x, y, z], "fov_y_degrees"}]}.
-/// read throws Error naming file and key.
+/// read throws Error naming file and key; a path lasts at most a day.
 void write_camera_path(const std::filesystem::path& file, const CameraPath& path);
 CameraPath read_camera_path(const std::filesystem::path& file);
 

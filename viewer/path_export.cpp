@@ -20,44 +20,51 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// frame_00012.png is 12; -1 for other names.
-int frame_number(const std::string& name) {
-    int number = -1, end = 0;
-    if (std::sscanf(name.c_str(), "frame_%9d.png%n", &number, &end) != 1) return -1;
-    const bool ours = name == fmt::format("frame_{:05d}.png", number);
-    return ours && number >= 0 ? number : -1;
+// Over nine hours at 30 frames a second; more is a mistake in the times.
+constexpr double kMostFrames = 1'000'000;
+
+std::int64_t count_frames(const CameraPath& path, int fps) {
+    const std::string where = path.file.empty() ? "camera path" : path.file.string();
+    if (path.keys.empty()) throw Error(where, "has no key frames", "Add some with the key K.");
+    if (fps < 1)
+        throw Error(where, fmt::format("{} frames a second", fps),
+                    "Export at least one frame a second.");
+    const double frames = std::floor(path.duration() * fps + 1e-9) + 1;
+    if (!(frames >= 1 && frames <= kMostFrames))
+        throw Error(fmt::format("{}, key {}", where, path.keys.size() - 1),
+                    fmt::format("{} s at {} frames a second are {:.0f} frames; an export writes 1 "
+                                "to {:.0f}",
+                                path.duration(), fps, frames, kMostFrames),
+                    "Set the keys' seconds, which count from the start, or lower the frames a "
+                    "second.");
+    return static_cast<std::int64_t>(frames);
 }
 
-// ffmpeg reads %05d in the name of its input: a percent sign of the folder is written twice.
+// ffmpeg reads %05d in the name of its input: a percent sign of the folder is written twice. From
+// the root, so that no name reads as an option or a protocol.
 std::string as_pattern(const fs::path& folder) {
     std::string pattern;
-    for (const char c : folder.string()) pattern += c == '%' ? "%%" : std::string(1, c);
+    for (const char c : fs::absolute(folder).string())
+        pattern += c == '%' ? "%%" : std::string(1, c);
     return pattern;
 }
 
 }  // namespace
 
 PathExport::PathExport(CameraPath path, const ExportOptions& options)
-    : path_(std::move(path)), options_(options), frames_(0) {
-    if (path_.keys.empty())
-        throw Error("camera path", "has no key frames", "Add some with the key K.");
-    if (options_.fps < 1)
-        throw Error("camera path", fmt::format("{} frames a second", options_.fps),
-                    "Export at least one frame a second.");
+    : path_(std::move(path)),
+      options_(options),
+      frames_(count_frames(path_, options.fps)),
+      folder_(options.folder, frames_) {
     if (options_.display.mode == VIEW_ERROR) options_.display.mode = VIEW_COLOUR;
-    frames_ = static_cast<int>(std::floor(path_.duration() * options_.fps + 1e-9)) + 1;
 }
 
 PathExport::~PathExport() {
     if (ffmpeg_ <= 0) return;
     ::kill(ffmpeg_, SIGTERM);
-    watch_video(true);
-    std::error_code none;
-    fs::remove(video_file(), none);
-}
-
-fs::path PathExport::frame_file(int n) const {
-    return options_.folder / fmt::format("frame_{:05d}.png", n);
+    int status = 0;
+    wait_for_ffmpeg(status, true);
+    folder_.drop_unfinished_video();
 }
 
 void PathExport::step(const Render& render, bool wait) {
@@ -65,27 +72,20 @@ void PathExport::step(const Render& render, bool wait) {
     if (!has_frames()) {
         Navigation view;
         apply(path_.sample(double(next_) / options_.fps), view);
-        write_png(frame_file(next_),
+        write_png(folder_.claim(frame_name(next_)),
                   render(view.camera(options_.width, options_.height), options_.display));
         ++next_;
     } else if (ffmpeg_ < 0) {
-        delete_later_frames();
+        folder_.finish(frames_);
         start_video();
     } else {
         watch_video(wait);
     }
 }
 
-void PathExport::delete_later_frames() const {
-    std::error_code none;
-    std::vector<fs::path> later;
-    for (const fs::directory_entry& entry : fs::directory_iterator(options_.folder, none))
-        if (frame_number(entry.path().filename().string()) >= frames_) later.push_back(entry);
-    for (const fs::path& file : later) fs::remove(file, none);
-}
-
 void PathExport::start_video() {
-    summary_ = fmt::format("{} frames in {}", frames_, options_.folder.string());
+    summary_ = fmt::format("{} frames in {}", frames_, folder_.path().string());
+    const fs::path unfinished = folder_.claim(ExportFolder::kUnfinishedVideo);
     // yuv420p, which every player shows, needs even sizes.
     std::vector<std::string> words{"ffmpeg",
                                    "-nostdin",
@@ -97,7 +97,7 @@ void PathExport::start_video() {
                                    "-start_number",
                                    "0",
                                    "-i",
-                                   as_pattern(options_.folder) + "/frame_%05d.png",
+                                   as_pattern(folder_.path()) + "/frame_%05d.png",
                                    "-frames:v",
                                    std::to_string(frames_),
                                    "-vf",
@@ -108,28 +108,42 @@ void PathExport::start_video() {
                                    "yuv420p",
                                    "-crf",
                                    "18",
-                                   video_file().string()};
+                                   "-f",
+                                   "mp4",
+                                   fs::absolute(unfinished).string()};
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
     if (posix_spawnp(&ffmpeg_, "ffmpeg", nullptr, nullptr, argv.data(), environ) != 0) {
         ffmpeg_ = -1;
         done_ = true;
+        folder_.finish(frames_);
         summary_ += "; no video, ffmpeg is not installed";
     }
 }
 
-void PathExport::watch_video(bool wait) {
-    int status = 0;
+// Whether it has ended.
+bool PathExport::wait_for_ffmpeg(int& status, bool wait) const {
     pid_t ended = -1;
     do ended = waitpid(ffmpeg_, &status, wait ? 0 : WNOHANG);
     while (ended < 0 && errno == EINTR);
-    if (ended == 0) return;
-    const bool made = ended == ffmpeg_ && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    if (ended < 0) status = -1;
+    return ended != 0;
+}
+
+void PathExport::watch_video(bool wait) {
+    int status = 0;
+    if (!wait_for_ffmpeg(status, wait)) return;
     ffmpeg_ = -1;
     done_ = true;
-    summary_ += made ? "; video " + video_file().string()
-                     : std::string("; no video: ffmpeg failed, its message is on the terminal");
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+        folder_.keep_video();
+        summary_ += "; video " + (folder_.path() / ExportFolder::kVideo).string();
+    } else {
+        folder_.drop_unfinished_video();
+        summary_ += "; no video: ffmpeg failed, its message is on the terminal";
+    }
+    folder_.finish(frames_);
 }
 
 }  // namespace darb

@@ -100,11 +100,13 @@ TEST_F(ViewerWork, The_folder_holds_the_frames_of_the_last_export_alone) {
     viewer_->export_path_now();
     ASSERT_TRUE(is_frame(2));
     std::ofstream(session().path.folder / "frame_00002_mine.png") << "another's";
+    std::ofstream(session().path.folder / "frame_00003.png") << "another's";
     make_path(2);
     viewer_->export_path_now();
     EXPECT_TRUE(is_frame(1));
     EXPECT_FALSE(is_frame(2));
     EXPECT_TRUE(fs::exists(session().path.folder / "frame_00002_mine.png"));
+    EXPECT_TRUE(is_frame(3)) << "not this program's";
     session().path.fps = 0;
     EXPECT_THROW(viewer_->export_path_now(), Error);
 }

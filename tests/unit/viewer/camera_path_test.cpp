@@ -121,6 +121,10 @@ TEST_F(CameraPathFile, Broken_files_are_errors_that_name_the_file) {
     for (const std::string& text :
          {std::string("{"), std::string("[]"), std::string(R"({"key_frames":[]})"),
           R"({"key_frames":[)" + key + "," + key + "]}",  // no time passes
+          std::string(R"({"key_frames":[{"seconds":1700000000,"eye":[0,0,0],)"
+                      R"("orientation":[1,0,0,0],"fov_y_degrees":50}]})"),
+          std::string(R"({"key_frames":[{"seconds":-1,"eye":[0,0,0],)"
+                      R"("orientation":[1,0,0,0],"fov_y_degrees":50}]})"),
           std::string(R"({"key_frames":[{"seconds":0,"eye":[0,0],"orientation":[1,0,0,0],)"
                       R"("fov_y_degrees":50}]})"),
           std::string(R"({"key_frames":[{"seconds":0,"eye":[0,0,0],"orientation":[0,0,0,0],)"
