@@ -30,9 +30,9 @@ CHANGES = [
     ("shaders/backward/blend_backward.comp", "slot = pair_order[number - 1u];", "slot = splat;"),
     ("shaders/backward/project_backward.comp",
      "const uint begin = pair_begin[i], end = begin + pair_count[i];", "const uint begin = i, end = i + 1u;"),
-    ("engine/render/backward.cpp", "if (pairs > pair_capacity_ || pair_capacity_ == 0) {",
+    ("engine/raster/backward.cpp", "if (pairs > pair_capacity_ || pair_capacity_ == 0) {",
      "if (splats > pair_capacity_ || (pair_capacity_ == 0 && pairs + 1 > 0)) {"),
-    ("engine/render/backward.cpp", "pair_capacity_ = std::max(pairs, 1024u);",
+    ("engine/raster/backward.cpp", "pair_capacity_ = std::max(pairs, 1024u);",
      "pair_capacity_ = std::max(splats, 1024u);"),
 ]
 

@@ -6,8 +6,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
-#include "engine/render/gpu_splats.h"
-#include "engine/render/tuning.h"
+#include "engine/primitives/tuning.h"
+#include "engine/raster/gpu_splats.h"
 #include "trainer/initial_model.h"
 #include "trainer/resolution_ramp.h"
 #include "trainer/strategy.h"

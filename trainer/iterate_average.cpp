@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
 #include "shaders/shared/optim_args.h"
 
 namespace darb {

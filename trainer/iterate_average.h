@@ -7,7 +7,7 @@
 
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
-#include "engine/render/gpu_splats.h"
+#include "engine/raster/gpu_splats.h"
 
 namespace darb {
 

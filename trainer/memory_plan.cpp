@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "engine/render/backward.h"
-#include "engine/render/loss.h"
+#include "engine/raster/backward.h"
+#include "engine/raster/loss.h"
 #include "trainer/densify/density_control.h"
 #include "trainer/densify/error_score.h"
 #include "trainer/densify/mcmc.h"

@@ -9,7 +9,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "engine/render/forward.h"
+#include "engine/raster/forward.h"
 #include "trainer/options.h"
 
 namespace darb {

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "engine/kernels/kernel_family.h"
-#include "engine/render/accuracy.h"
-#include "engine/render/effects.h"
+#include "engine/plan/accuracy.h"
+#include "engine/raster/effects.h"
 
 namespace darb {
 

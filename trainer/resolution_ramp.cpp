@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
 #include "shaders/shared/strategy_args.h"
 
 namespace darb {

@@ -12,10 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "engine/data/compare_view.h"
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "trainer/options.h"
-#include "trainer/report/report.h"
+#include "trainer/run_report.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -45,11 +46,6 @@ struct RunOptions {
     std::string effects;          // the plan in a line, for the log
     std::string effects_json;     // the same as JSON, for metrics.json; may be empty
     std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
-};
-
-struct ViewMetrics {
-    std::string name;
-    double psnr_db = 0, ssim = 0;
 };
 
 struct Evaluation {

@@ -10,7 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/render/tuning.h"
+#include "engine/primitives/tuning.h"
 #include "trainer/checkpoint.h"
 #include "trainer/strategy.h"
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/render/roofline.h"
-#include "trainer/report/report.h"
+#include "engine/plan/roofline.h"
 #include "trainer/run.h"
+#include "trainer/run_report.h"
 
 namespace darb {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/core/check.h"
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
 #include "shaders/shared/effect_args.h"
 
 namespace darb {

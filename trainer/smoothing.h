@@ -3,7 +3,7 @@
 #pragma once
 
 #include "engine/gpu/commands.h"
-#include "engine/render/forward.h"
+#include "engine/raster/forward.h"
 
 namespace darb {
 

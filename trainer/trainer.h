@@ -14,9 +14,9 @@
 
 #include "engine/core/image.h"
 #include "engine/data/dataset.h"
-#include "engine/render/backward.h"
-#include "engine/render/forward.h"
-#include "engine/render/loss.h"
+#include "engine/raster/backward.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/loss.h"
 #include "trainer/densify/density_control.h"
 #include "trainer/densify/error_score.h"
 #include "trainer/densify/mcmc.h"

@@ -4,7 +4,7 @@
 #include <glm/glm.hpp>
 
 #include "engine/kernels/kernel_family.h"
-#include "engine/render/accuracy.h"
+#include "engine/plan/accuracy.h"
 #include "shaders/shared/limits.h"
 #include "shaders/shared/view_args.h"
 

@@ -11,7 +11,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
-#include "engine/render/effect_plan.h"
+#include "engine/plan/effect_plan.h"
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
 #include "viewer/edit.h"

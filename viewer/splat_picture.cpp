@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "engine/core/error.h"
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
 #include "engine/scene/edit_splats.h"
 
 namespace darb {

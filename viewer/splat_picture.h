@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/core/image.h"
-#include "engine/render/forward.h"
+#include "engine/raster/forward.h"
 #include "engine/render/frame_exchange.h"
 #include "engine/render/upsample.h"
 #include "viewer/bounds.h"

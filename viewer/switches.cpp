@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "engine/core/check.h"
-#include "engine/render/effect_plan.h"
+#include "engine/plan/effect_plan.h"
 
 namespace darb {
 

@@ -7,11 +7,11 @@
 #include "engine/core/rng.h"
 #include "engine/gpu/commands.h"
 #include "engine/kernels/kernel_coefficients.h"
+#include "engine/primitives/radix_sort.h"
+#include "engine/primitives/scan.h"
+#include "engine/raster/kernel_constants.h"
+#include "engine/raster/loss.h"
 #include "engine/reference/loss.h"
-#include "engine/render/kernel_constants.h"
-#include "engine/render/loss.h"
-#include "engine/render/radix_sort.h"
-#include "engine/render/scan.h"
 #include "shaders/shared/kernel_probe_args.h"
 
 namespace darb::check {

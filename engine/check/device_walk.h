@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "engine/core/image.h"
-#include "engine/render/backward.h"
-#include "engine/render/gpu_splats.h"
+#include "engine/raster/backward.h"
+#include "engine/raster/gpu_splats.h"
 
 namespace darb::check {
 

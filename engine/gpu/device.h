@@ -41,7 +41,7 @@ struct DeviceInfo {
 };
 
 /// Which of several equal ways a pass takes: name of the choice -> name of the way. What they mean,
-/// and what a missing one means, is known to engine/render/tuning.h.
+/// and what a missing one means, is known to engine/primitives/tuning.h.
 using Variants = std::map<std::string, std::string, std::less<>>;
 
 /// Why the blend passes cannot run in the subgroups of a device, or "". They want 4 to 64 lanes,

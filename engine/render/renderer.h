@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "engine/core/image.h"
-#include "engine/render/accuracy.h"
-#include "engine/render/forward.h"
+#include "engine/plan/accuracy.h"
+#include "engine/raster/forward.h"
 #include "engine/render/frame_exchange.h"
 #include "engine/render/upsample.h"
 

@@ -1,7 +1,7 @@
 #include "engine/render/upsample.h"
 
-#include "engine/render/frame_limit.h"
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
+#include "engine/raster/frame_limit.h"
 #include "shaders/shared/render_args.h"
 
 namespace darb {

@@ -1,5 +1,5 @@
 // The kernel contract of all shaders: w and dw/dq as functions of q = d^2, and how far they reach. Which
-// kernel runs is a set of specialization constants (engine/render/kernel_constants.h sets them), so that after
+// kernel runs is a set of specialization constants (engine/raster/kernel_constants.h sets them), so that after
 // constant folding one kernel's arithmetic is left. The constants alone, unset, are the Gaussian by exp().
 // Accuracy: multiplications and additions only where Vulkan promises correct rounding; see KernelCoefficients.
 // The including shader enables GL_GOOGLE_include_directive.

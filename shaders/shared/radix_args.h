@@ -1,4 +1,4 @@
-// Arguments of the radix sort (shaders/sort/radix_*.comp, engine/render/radix_sort.h).
+// Arguments of the radix sort (shaders/sort/radix_*.comp, engine/primitives/radix_sort.h).
 #ifndef DARB_SHARED_RADIX_ARGS_H
 #define DARB_SHARED_RADIX_ARGS_H
 

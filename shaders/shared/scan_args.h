@@ -1,4 +1,4 @@
-// Arguments of the exclusive prefix sum (shaders/sort/scan_*.comp, engine/render/scan.h).
+// Arguments of the exclusive prefix sum (shaders/sort/scan_*.comp, engine/primitives/scan.h).
 #ifndef DARB_SHARED_SCAN_ARGS_H
 #define DARB_SHARED_SCAN_ARGS_H
 

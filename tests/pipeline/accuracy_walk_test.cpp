@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "engine/core/rng.h"
+#include "engine/plan/accuracy.h"
 #include "engine/reference/render.h"
-#include "engine/render/accuracy.h"
 #include "tests/support/device_walk.h"
 
 namespace darb::test {

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "engine/render/effect_plan.h"
+#include "engine/plan/effect_plan.h"
 #include "engine/render/renderer.h"
 #include "tests/support/compare.h"
 #include "tests/support/random_scene.h"

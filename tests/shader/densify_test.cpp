@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "engine/core/rng.h"
+#include "engine/raster/backward.h"
 #include "engine/reference/density_control.h"
-#include "engine/render/backward.h"
 #include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
 #include "trainer/densify/density_control.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/gpu/commands.h"
-#include "engine/render/kernel_constants.h"
+#include "engine/raster/kernel_constants.h"
 #include "shaders/shared/kernel_probe_args.h"
 #include "tests/support/kernel_vectors.h"
 

@@ -1,5 +1,5 @@
 // shaders/loss against a brute force in double: values, gradient, sizes, mask, guards, repeats.
-#include "engine/render/loss.h"
+#include "engine/raster/loss.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // RadixSort against std::stable_sort: adversarial sizes, keys and key bits, both scatter
 // strategies, guard words behind all results.
-#include "engine/render/radix_sort.h"
+#include "engine/primitives/radix_sort.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Scan against std::exclusive_scan: adversarial sizes and values, both team forms, guard words.
-#include "engine/render/scan.h"
+#include "engine/primitives/scan.h"
 
 #include <gtest/gtest.h>
 

@@ -6,10 +6,10 @@
 
 #include "engine/core/rng.h"
 #include "engine/gpu/commands.h"
+#include "engine/primitives/groups.h"
+#include "engine/raster/backward.h"
+#include "engine/raster/kernel_constants.h"
 #include "engine/reference/render.h"
-#include "engine/render/backward.h"
-#include "engine/render/groups.h"
-#include "engine/render/kernel_constants.h"
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 

@@ -8,10 +8,10 @@
 
 #include "engine/core/rng.h"
 #include "engine/gpu/commands.h"
+#include "engine/primitives/tuning.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/kernel_constants.h"
 #include "engine/reference/blend.h"
-#include "engine/render/forward.h"
-#include "engine/render/kernel_constants.h"
-#include "engine/render/tuning.h"
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "engine/gpu/commands.h"
-#include "engine/render/forward.h"
-#include "engine/render/groups.h"
-#include "engine/render/kernel_constants.h"
+#include "engine/primitives/groups.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/kernel_constants.h"
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 

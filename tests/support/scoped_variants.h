@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/render/tuning.h"
+#include "engine/primitives/tuning.h"
 
 namespace darb::test {
 

@@ -1,6 +1,6 @@
 // Effects in training: probes for view-dependent colour, exposure, anti-aliasing, and runs that go
 // on bit by bit with all of them.
-#include "engine/render/effect_plan.h"
+#include "engine/plan/effect_plan.h"
 #include "tests/support/compare.h"
 #include "tests/support/tiny_training.h"
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/report/html.h"
+#include "engine/report/page.h"
+#include "engine/report/svg_plot.h"
 #include "tools/bench/growth.h"
-#include "trainer/report/html.h"
-#include "trainer/report/page.h"
-#include "trainer/report/svg_plot.h"
 
 namespace darb {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/gpu/commands.h"
-#include "engine/render/roofline.h"
+#include "engine/plan/roofline.h"
 #include "tools/cost/cost.h"
 
 namespace darb {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/render/forward.h"
+#include "engine/raster/forward.h"
 
 namespace darb {
 

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
-#include "engine/render/effect_plan.h"
-#include "engine/render/gpu_splats.h"
+#include "engine/plan/effect_plan.h"
+#include "engine/raster/gpu_splats.h"
 #include "engine/scene/splat_file.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "engine/render/tuning.h"
+#include "engine/primitives/tuning.h"
 #include "tools/bench/native_blend.h"
 
 namespace darb {

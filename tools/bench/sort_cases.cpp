@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "engine/core/rng.h"
-#include "engine/render/radix_sort.h"
-#include "engine/render/scan.h"
+#include "engine/primitives/radix_sort.h"
+#include "engine/primitives/scan.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/native_sort.h"
 

@@ -11,7 +11,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
-#include "engine/render/tuning.h"
+#include "engine/primitives/tuning.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/render/tuner.h"
+#include "engine/plan/tuner.h"
 #include "tools/bench/cases.h"
 
 namespace darb {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "engine/core/rng.h"
-#include "engine/render/accuracy.h"
-#include "engine/render/blend_backward.h"
+#include "engine/plan/accuracy.h"
+#include "engine/raster/blend_backward.h"
 #include "tools/bench/native_blend.h"
 
 namespace darb {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/gpu/device.h"
-#include "engine/render/accuracy.h"
+#include "engine/plan/accuracy.h"
 #include "tools/cost/picture_error.h"
 #include "tools/cost/views.h"
 

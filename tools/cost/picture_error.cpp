@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "engine/core/check.h"
+#include "engine/plan/accuracy.h"
 #include "engine/reference/render.h"
-#include "engine/render/accuracy.h"
 
 namespace darb {
 

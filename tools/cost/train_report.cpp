@@ -3,11 +3,11 @@
 
 #include <algorithm>
 
+#include "engine/report/html.h"
+#include "engine/report/page.h"
+#include "engine/report/svg_plot.h"
 #include "tools/cost/report.h"
 #include "tools/cost/train_cost.h"
-#include "trainer/report/html.h"
-#include "trainer/report/page.h"
-#include "trainer/report/svg_plot.h"
 
 namespace darb {
 

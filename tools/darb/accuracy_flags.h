@@ -1,11 +1,11 @@
-// --accuracy and one flag for each accuracy setting, as the table of engine/render names them.
+// --accuracy and one flag for each accuracy setting, as the table of engine/plan names them.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <array>
 #include <string>
 
-#include "engine/render/accuracy.h"
+#include "engine/plan/accuracy.h"
 
 namespace darb {
 

@@ -5,8 +5,8 @@
 
 #include "engine/core/image.h"
 #include "engine/data/depth_io.h"
-#include "engine/render/accuracy.h"
-#include "engine/render/effect_plan.h"
+#include "engine/plan/accuracy.h"
+#include "engine/plan/effect_plan.h"
 
 namespace darb {
 

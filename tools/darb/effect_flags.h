@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/render/effect_plan.h"
+#include "engine/plan/effect_plan.h"
 #include "trainer/options.h"
 
 namespace darb {

@@ -9,7 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/dataset.h"
-#include "engine/render/frame_limit.h"
+#include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/gpu/device.h"
-#include "engine/render/effect_plan.h"
+#include "engine/plan/effect_plan.h"
 #include "trainer/options.h"
 
 namespace darb {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
-#include "engine/render/effect_plan.h"
+#include "engine/plan/effect_plan.h"
 #include "engine/scene/splat_model.h"
 #include "tools/darb/plan_price.h"
 

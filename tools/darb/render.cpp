@@ -10,7 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
-#include "engine/render/frame_limit.h"
+#include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/render/tuner.h"
+#include "engine/plan/tuner.h"
 
 namespace darb {
 

@@ -15,7 +15,7 @@ struct TuneFlags {
 
 void add_tune_flags(CLI::App& command, TuneFlags& flags);
 
-/// engine/render/tuner.h, with its lines on stderr. Before anything is made for the device. Throws
+/// engine/plan/tuner.h, with its lines on stderr. Before anything is made for the device. Throws
 /// Error for names that are not known.
 void settle_tuning(Device& device, const TuneFlags& flags = {});
 

@@ -6,6 +6,9 @@
 #include <cmath>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/report/html.h"
+#include "engine/report/page.h"
+#include "engine/report/svg_plot.h"
 #include "tools/paper/compare.h"
 #include "tools/paper/compare_crops.h"
 #include "tools/paper/compare_means.h"
@@ -13,9 +16,6 @@
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 #include "tools/paper/pictures.h"
-#include "trainer/report/html.h"
-#include "trainer/report/page.h"
-#include "trainer/report/svg_plot.h"
 
 namespace darb {
 

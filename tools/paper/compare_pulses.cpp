@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/report/html.h"
 #include "tools/paper/compare_stats.h"
-#include "trainer/report/html.h"
 
 namespace darb {
 

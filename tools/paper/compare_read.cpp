@@ -9,8 +9,8 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "engine/report/html.h"
 #include "tools/paper/compare.h"
-#include "trainer/report/html.h"
 
 namespace darb {
 

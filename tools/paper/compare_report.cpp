@@ -1,12 +1,12 @@
 // A comparison as text and as JSON.
 #include <fmt/format.h>
 
+#include "engine/report/html.h"
 #include "tools/paper/compare.h"
 #include "tools/paper/compare_means.h"
 #include "tools/paper/compare_pulses.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
-#include "trainer/report/html.h"
 
 namespace darb {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "trainer/report/html.h"
+#include "engine/report/html.h"
 
 namespace darb {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "engine/data/image_io.h"
-#include "trainer/report/html.h"
+#include "engine/report/html.h"
 
 namespace darb {
 

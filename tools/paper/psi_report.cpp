@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/report/html.h"
+#include "engine/report/page.h"
+#include "engine/report/svg_plot.h"
 #include "tools/paper/pictures.h"
 #include "tools/paper/rings.h"
-#include "trainer/report/html.h"
-#include "trainer/report/page.h"
-#include "trainer/report/svg_plot.h"
 
 namespace darb {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
 #include "shaders/shared/strategy_args.h"
 #include "trainer/densify/round_buffers.h"
 

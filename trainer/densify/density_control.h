@@ -6,8 +6,8 @@
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
-#include "engine/render/gpu_splats.h"
-#include "engine/render/scan.h"
+#include "engine/primitives/scan.h"
+#include "engine/raster/gpu_splats.h"
 #include "shaders/shared/optim_args.h"
 
 namespace darb {

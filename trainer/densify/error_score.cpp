@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
 
 namespace darb {
 

@@ -7,9 +7,9 @@
 
 #include <vector>
 
-#include "engine/render/backward.h"
-#include "engine/render/forward.h"
-#include "engine/render/loss.h"
+#include "engine/raster/backward.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/loss.h"
 #include "shaders/shared/strategy_args.h"
 
 namespace darb {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "engine/kernels/relocation.h"
-#include "engine/render/groups.h"
+#include "engine/primitives/groups.h"
 #include "shaders/shared/strategy_args.h"
 
 namespace darb {

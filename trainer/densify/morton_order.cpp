@@ -1,7 +1,7 @@
 #include "trainer/densify/morton_order.h"
 
-#include "engine/render/groups.h"
-#include "engine/render/radix_sort.h"
+#include "engine/primitives/groups.h"
+#include "engine/primitives/radix_sort.h"
 #include "shaders/shared/order_args.h"
 
 namespace darb {

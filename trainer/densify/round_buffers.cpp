@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "engine/render/gpu_splats.h"
-#include "engine/render/scan.h"
+#include "engine/primitives/scan.h"
+#include "engine/raster/gpu_splats.h"
 
 namespace darb {
 

@@ -1,0 +1,93 @@
+// EffectPlan: which effects of shaders/shared/effect_list.h a scene or a data set calls for, each
+// with the number that was measured on it. What is off is not compiled, not stored, not computed.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/data/dataset.h"
+#include "engine/raster/effects.h"
+#include "engine/scene/splat_model.h"
+#include "shaders/shared/effect_list.h"
+#include "shaders/shared/limits.h"
+
+namespace darb {
+
+/// The name of an effect on the command line and in files.
+std::string_view effect_name(int effect);
+std::optional<int> effect_from_name(std::string_view name);
+
+struct EffectRow {
+    bool on = false;
+    bool overridden = false;  // the command line said so
+    int degree = 0;           // of EFFECT_VIEW_COLOUR
+    double measured = 0;      // what the rule looked at; its unit stands in the reason
+    std::string reason;       // a clause
+};
+
+struct EffectPlan {
+    std::array<EffectRow, EFFECT_COUNT> rows;
+
+    bool on(int effect) const { return rows[static_cast<std::size_t>(effect)].on; }
+    EffectRow& row(int effect) { return rows[static_cast<std::size_t>(effect)]; }
+    const EffectRow& row(int effect) const { return rows[static_cast<std::size_t>(effect)]; }
+    ProjectionEffects projection() const {
+        return {on(EFFECT_OFF_CENTRE) || on(EFFECT_LENS), on(EFFECT_ANTIALIAS), false,
+                on(EFFECT_LENS), on(EFFECT_NEAR)};
+    }
+    /// Counters decide, frame by frame, where the command line does not.
+    Crowds crowds() const {
+        if (!row(EFFECT_HUGE).overridden) return Crowds::by_counters;
+        return on(EFFECT_HUGE) ? Crowds::always : Crowds::never;
+    }
+    /// EFFECT_HUGE as the counters of a frame say; the most of several frames counts.
+    void note_frame(std::uint32_t huge_splats, std::uint32_t longest_list);
+
+  private:
+    std::uint32_t most_huge_ = 0, longest_list_ = 0;  // of the frames that were noted
+};
+
+/// "auto", "all", "none", or changes to one of them, auto where none is named: "+exposure,-sh",
+/// "all,-lens".
+struct EffectChoice {
+    enum class Base { automatic, all, none } base = Base::automatic;
+    std::array<std::optional<bool>, EFFECT_COUNT> changed{};
+};
+/// Throws Error naming the word that is no effect.
+EffectChoice parse_effects(std::string_view text);
+
+/// What a rendering asks for beside the pictures themselves.
+struct RenderOutputs {
+    bool depth = false;
+    float near_plane = static_cast<float>(NEAR_DEFAULT);
+    bool free_camera = false;  // a viewer's, beside the views: near-plane care is called for
+};
+
+/// For pictures of a scene through these cameras (none: only what the file decides, and care for
+/// the near plane). An effect that is an identity where the rule says off may be forced on;
+/// anti-aliasing is as the file says, as another choice would show another scene: `all` leaves it
+/// alone, `none` and -antialias drop it.
+EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& views,
+                          const RenderOutputs& outputs, const EffectChoice& choice = {});
+
+/// For training. photos: as load_photos gives them, for the exposure's rule; empty: that effect is
+/// off. The degree of view-dependent colour is found while training: see TrainOptions::probe_sh.
+/// kernel: a row of engine/kernels; all but the Gaussian call for anti-aliasing where the data set
+/// has points.
+EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& photos, int sh_degree,
+                         const EffectChoice& choice = {}, int kernel = KERNEL_GAUSSIAN);
+
+/// The model as the plan wants it: higher bands dropped, the render mode as planned.
+void apply_plan(const EffectPlan& plan, SplatModel& model);
+/// The cameras as the plan wants them: pinholes where lenses are off.
+void apply_plan(const EffectPlan& plan, std::vector<View>& views);
+
+/// One line: the effects that are on, with their reasons.
+std::string plan_line(const EffectPlan& plan);
+
+}  // namespace darb

@@ -1,0 +1,339 @@
+// The rules of the effect plan: when a scene or a data set calls for an effect, by numbers measured
+// on it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/data/lens.h"
+#include "engine/kernels/kernel_family.h"
+#include "engine/plan/effect_rules.h"
+
+namespace darb {
+
+namespace {
+
+constexpr double kColourStep = 1.0 / 512;  // half of an 8-bit step
+// A shift by it moves a value of a step from 0 to 1, the steepest there is, by 1/40 of an 8-bit
+// step.
+constexpr double kCentreStep_px = 1e-4;
+// Largest pixel footprint of a point over its smallest. Captures at one distance and size stay
+// below it and lose by anti-aliasing, those that vary both lie above and gain: docs/effects.md.
+constexpr double kFootprintRatio = 2.5;
+constexpr double kFootprintShare = 0.05;  // of the points
+// Exposures are off in evaluation, and those of neighbouring photos drift together: on a plush toy
+// whose gains spread by 2 % they cost 2.8 dB on held-out views.
+constexpr double kGainSpread = 0.05;
+constexpr std::size_t kGainViews = 3;              // that see a point, at least
+constexpr std::size_t kGainPoints = 20;            // of a photo, at least
+constexpr double kDarkest = 10, kBrightest = 245;  // of 255: sensors are linear in between
+
+/// The largest change of a colour that band l of a splat can make over all directions:
+/// |sum c_m Y_m| <= |c| sqrt(sum Y_m^2), and sum Y_m^2 = (2 l + 1) / 4 pi.
+double band_bound(const SplatModel& model, std::size_t splat, int band) {
+    const auto stored = static_cast<std::size_t>(model.rest_count());
+    const std::size_t first = static_cast<std::size_t>(band * band - 1);
+    const std::size_t last = static_cast<std::size_t>((band + 1) * (band + 1) - 1);
+    double most = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        double sum = 0;
+        for (std::size_t k = first; k < last; ++k) {
+            const double value = model.sh_rest[splat * stored + k * 3 + c];
+            sum += value * value;
+        }
+        most = std::max(most, sum);
+    }
+    return std::sqrt(most * (2 * band + 1) / (4 * 3.14159265358979));
+}
+
+EffectRow colour_rule(const SplatModel& model) {
+    EffectRow row;
+    double dropped = 0;  // the largest change by the bands above row.degree
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        double above = 0;
+        for (int band = model.sh_degree; band > 0; --band) {
+            above += band_bound(model, i, band);
+            if (above < kColourStep) continue;
+            row.degree = std::max(row.degree, band);
+            row.measured = std::max(row.measured, above);
+            break;
+        }
+        dropped = std::max(dropped, above < kColourStep ? above : 0.0);
+    }
+    row.on = row.degree > 0;
+    row.reason = row.on ? fmt::format("degree {}: a colour changes by up to {:.3f} with the view",
+                                      row.degree, row.measured)
+                        : fmt::format(
+                              "no colour changes by more than {:.4f} with the view, "
+                              "limit 1/512",
+                              dropped);
+    if (!row.on) row.measured = dropped;
+    return row;
+}
+
+EffectRow centre_rule(const std::vector<View>& views) {
+    EffectRow row;
+    for (const View& view : views) {
+        const Camera& c = view.camera;
+        row.measured = std::max(
+            {row.measured, std::abs(c.cx - 0.5 * c.width), std::abs(c.cy - 0.5 * c.height)});
+    }
+    row.on = row.measured > kCentreStep_px;
+    row.reason = views.empty()
+                     ? "no cameras are named"
+                     : fmt::format("the principal point is off by {:.4f} px at most", row.measured);
+    return row;
+}
+
+EffectRow lens_rule(const std::vector<View>& views) {
+    EffectRow row;
+    std::size_t lenses = 0, distorted = 0, wide = 0;
+    for (const View& view : views) {
+        lenses += view.camera.lens.active ? 1 : 0;
+        distorted += view.lens.distorted() ? 1 : 0;
+        wide += too_wide_to_undistort(view.lens) ? 1 : 0;
+    }
+    const std::string too_wide =
+        wide > 0 ? fmt::format("; {} see more than 60 degrees to a side", wide) : "";
+    row.on = lenses > 0;
+    row.measured = static_cast<double>(lenses);
+    row.reason = "no cameras are named";
+    if (views.empty()) return row;
+    row.reason =
+        views.empty() ? "no cameras are named"
+        : row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),
+                               too_wide)
+                 : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
+                               distorted, views.size(), too_wide);
+    return row;
+}
+
+/// Depth of a point over the focal length, where the view sees it: the world's size of a pixel.
+std::optional<double> footprint(const Camera& camera, const double* point) {
+    const glm::dvec3 p =
+        camera.rotation * glm::dvec3(point[0], point[1], point[2]) + camera.translation;
+    if (!(p.z > 0)) return std::nullopt;
+    const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+    if (!(x >= 0 && y >= 0 && x <= camera.width && y <= camera.height)) return std::nullopt;
+    return p.z / std::max(camera.fx, camera.fy);
+}
+
+// Raised cosine and half-cosine squared gained in training where the footprints did not call for
+// it, the Gaussian did not; without points they lost (docs/effects.md). The other kernels follow
+// those two.
+EffectRow antialias_rule(const Dataset& dataset, int kernel) {
+    EffectRow row;
+    std::size_t wide = 0;
+    const PointCloud& points = dataset.points;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+        double least = 1e300, most = 0;
+        const auto see = [&](const View& view) {
+            if (view.is_test) return;
+            const auto size = footprint(view.camera, &points.position[3 * p]);
+            if (!size) return;
+            least = std::min(least, *size);
+            most = std::max(most, *size);
+        };
+        if (points.seen_begin.empty()) {
+            for (const View& view : dataset.views) see(view);
+        } else {
+            for (std::size_t k = points.seen_begin[p]; k < points.seen_begin[p + 1]; ++k)
+                see(dataset.views[points.seen_by[k]]);
+        }
+        wide += most > kFootprintRatio * least ? 1 : 0;
+    }
+    row.measured = static_cast<double>(wide) / std::max<double>(1.0, double(points.size()));
+    row.on = row.measured >= kFootprintShare;
+    row.reason = points.size() == 0
+                     ? "there are no points to measure footprints on"
+                     : fmt::format(
+                           "{:.1f} % of the points are seen at pixel footprints that "
+                           "differ by more than {}x, limit {:.0f} %",
+                           100 * row.measured, kFootprintRatio, 100 * kFootprintShare);
+    if (!row.on && kernel != KERNEL_GAUSSIAN && points.size() > 0) {
+        row.on = true;
+        row.reason = fmt::format("{}: kernels but the Gaussian train with it", kernel_name(kernel));
+    }
+    return row;
+}
+
+/// Mean of the colours around a point in a photo; nothing near the limits of the sensor.
+std::optional<double> brightness(const View& view, const ImageU8& photo, const double* point) {
+    constexpr int kReach = 2;  // px: 5 x 5
+    if (!footprint(view.camera, point)) return std::nullopt;
+    const Camera& c = view.camera;
+    const glm::dvec3 p = c.rotation * glm::dvec3(point[0], point[1], point[2]) + c.translation;
+    const int x0 = static_cast<int>(c.fx * p.x / p.z + c.cx);
+    const int y0 = static_cast<int>(c.fy * p.y / p.z + c.cy);
+    if (x0 < kReach || y0 < kReach || x0 + kReach >= photo.width || y0 + kReach >= photo.height)
+        return std::nullopt;
+    double sum = 0;
+    for (int y = y0 - kReach; y <= y0 + kReach; ++y)
+        for (int x = x0 - kReach; x <= x0 + kReach; ++x)
+            for (int channel = 0; channel < 3; ++channel) sum += photo.at(x, y, channel);
+    sum /= 75;
+    if (!(sum > kDarkest && sum < kBrightest)) return std::nullopt;
+    return sum;
+}
+
+double median_of(std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/// Per photo, the median over its points of brightness here over the median brightness of the
+/// point; empty where too few points say so.
+std::vector<double> photo_gains(const Dataset& dataset, const std::vector<ImageU8>& photos) {
+    const PointCloud& points = dataset.points;
+    std::vector<std::vector<double>> ratios(dataset.views.size());
+    std::vector<double> seen;
+    std::vector<std::uint32_t> by;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+        seen.clear();
+        by.clear();
+        for (std::size_t k = points.seen_begin[p]; k < points.seen_begin[p + 1]; ++k) {
+            const std::uint32_t v = points.seen_by[k];
+            const View& view = dataset.views[v];
+            if (view.is_test || view.camera.lens.active) continue;
+            if (const auto b = brightness(view, photos[v], &points.position[3 * p])) {
+                seen.push_back(*b);
+                by.push_back(v);
+            }
+        }
+        if (seen.size() < kGainViews) continue;
+        std::vector<double> sorted = seen;
+        const double middle = median_of(sorted);
+        for (std::size_t k = 0; k < seen.size(); ++k) ratios[by[k]].push_back(seen[k] / middle);
+    }
+    std::vector<double> gains;
+    for (std::vector<double>& own : ratios)
+        if (own.size() >= kGainPoints) gains.push_back(median_of(own));
+    return gains;
+}
+
+EffectRow exposure_rule(const Dataset& dataset, const std::vector<ImageU8>& photos) {
+    EffectRow row;
+    if (dataset.points.seen_begin.empty() || photos.size() != dataset.views.size()) {
+        row.reason = "the source does not say which photos see a point";
+        return row;
+    }
+    std::vector<double> gains = photo_gains(dataset, photos);
+    if (gains.size() < 2) {
+        row.reason = "too few photos share points";
+        return row;
+    }
+    // Robust: the middle half of the photos, scaled to the whole of a normal distribution's sigma.
+    std::sort(gains.begin(), gains.end());
+    const std::size_t quarter = gains.size() / 4;
+    const double spread = gains[gains.size() - 1 - quarter] - gains[quarter];
+    row.measured = spread / gains[gains.size() / 2] / 1.349;
+    row.on = row.measured > kGainSpread;
+    row.reason = fmt::format("gains of {} photos over shared points spread by {:.1f} %, limit 5 %",
+                             gains.size(), 100 * row.measured);
+    return row;
+}
+
+/// An alpha channel that is opaque everywhere is none. Without the pixels every one counts.
+EffectRow alpha_rule(const Dataset& dataset, const std::vector<ImageU8>& photos) {
+    EffectRow row;
+    if (!dataset.has_alpha) {
+        row.reason = "no photo has an alpha channel or a mask";
+        return row;
+    }
+    if (photos.size() != dataset.views.size()) {
+        row.on = true;
+        row.reason = dataset.alpha_is_mask ? "there are masks, or gaps in straightened photos"
+                                           : "photos have an alpha channel";
+        return row;
+    }
+    std::size_t count = 0, training = 0;
+    for (std::size_t v = 0; v < photos.size(); ++v) {
+        if (dataset.views[v].is_test) continue;
+        ++training;
+        const std::vector<std::uint8_t>& data = photos[v].data;
+        bool opaque = true;
+        for (std::size_t i = 3; i < data.size() && opaque; i += 4) opaque = data[i] == 255;
+        count += opaque ? 0 : 1;
+    }
+    row.on = count > 0;
+    row.measured = static_cast<double>(count);
+    row.reason = fmt::format("{} of {} photos have pixels that are not opaque{}", count, training,
+                             count > 0 && dataset.alpha_is_mask ? ", which are left out" : "");
+    return row;
+}
+
+/// Frames tell, see EffectPlan::note_frame.
+EffectRow huge_rule() {
+    EffectRow row;
+    row.reason = "the counters of each frame decide on the next; none was drawn yet";
+    return row;
+}
+
+/// What the command line says, on top of the rules. fixed: rows that `all` leaves alone.
+void override_rows(const EffectChoice& choice, EffectPlan& plan, int most_degree,
+                   std::initializer_list<int> fixed) {
+    for (int e = 0; e < EFFECT_COUNT; ++e) {
+        EffectRow& row = plan.row(e);
+        std::optional<bool> wanted = choice.changed[static_cast<std::size_t>(e)];
+        const bool is_fixed = std::find(fixed.begin(), fixed.end(), e) != fixed.end();
+        if (!wanted && choice.base == EffectChoice::Base::none) wanted = false;
+        if (!wanted && choice.base == EffectChoice::Base::all && !is_fixed) wanted = true;
+        if (!wanted) continue;
+        if (e == EFFECT_VIEW_COLOUR) {
+            if (*wanted && most_degree == 0) continue;
+            row.degree = *wanted ? most_degree : 0;
+        }
+        if (*wanted == row.on && e != EFFECT_VIEW_COLOUR && e != EFFECT_HUGE) continue;
+        row.on = *wanted;
+        row.overridden = true;
+        row.reason = fmt::format("--effects; the rule: {}", row.reason);
+    }
+}
+
+}  // namespace
+
+EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& views,
+                          const RenderOutputs& outputs, const EffectChoice& choice) {
+    EffectPlan plan;
+    plan.row(EFFECT_VIEW_COLOUR) = colour_rule(model);
+    plan.row(EFFECT_ANTIALIAS) = {
+        model.antialias, false, 0, model.antialias ? 1.0 : 0.0,
+        fmt::format("the file says SplatRenderMode {}", model.antialias ? "mip" : "default")};
+    plan.row(EFFECT_EXPOSURE).reason = "of photos in training alone";
+    plan.row(EFFECT_OFF_CENTRE) = centre_rule(views);
+    plan.row(EFFECT_LENS) = lens_rule(views);
+    plan.row(EFFECT_ALPHA).reason = "of photos alone; pictures are over the background";
+    plan.row(EFFECT_DEPTH) = {outputs.depth, false, 0, outputs.depth ? 1.0 : 0.0,
+                              outputs.depth ? "depth was asked for" : "no output asks for it"};
+    plan.row(EFFECT_HUGE) = huge_rule();
+    if (outputs.free_camera)
+        plan.row(EFFECT_NEAR) = {true, false, 0, 0, "the camera moves, a splat may lie beside it"};
+    else
+        plan.row(EFFECT_NEAR) = near_rule(model, views, outputs.near_plane);
+    override_rows(choice, plan, model.sh_degree,
+                  {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH});
+    return plan;
+}
+
+EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& photos, int sh_degree,
+                         const EffectChoice& choice, int kernel) {
+    EffectPlan plan;
+    plan.row(EFFECT_VIEW_COLOUR) = {
+        sh_degree > 0, false, sh_degree, 0,
+        fmt::format("up to degree {}, once a probe on photos set aside gains by the first",
+                    sh_degree)};
+    plan.row(EFFECT_ANTIALIAS) = antialias_rule(dataset, kernel);
+    plan.row(EFFECT_EXPOSURE) = exposure_rule(dataset, photos);
+    plan.row(EFFECT_OFF_CENTRE) = centre_rule(dataset.views);
+    plan.row(EFFECT_LENS) = lens_rule(dataset.views);
+    plan.row(EFFECT_ALPHA) = alpha_rule(dataset, photos);
+    plan.row(EFFECT_DEPTH).reason = "no regulariser asks for it";
+    plan.row(EFFECT_HUGE) = huge_rule();
+    plan.row(EFFECT_NEAR) = {true, false, 0, 0,
+                             "splats move while they train, beside the cameras too"};
+    override_rows(choice, plan, sh_degree, {EFFECT_DEPTH});
+    return plan;
+}
+
+}  // namespace darb

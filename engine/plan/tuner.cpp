@@ -1,0 +1,268 @@
+#include "engine/plan/tuner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/core/rng.h"
+#include "engine/gpu/shader_table.h"
+
+namespace darb {
+
+namespace {
+
+constexpr double kGain = 0.97;  // less is not worth another way
+constexpr int kFormat = 2;
+
+// A frame of a CPU must not take long, one of a GPU must not be too short to tell ways apart.
+struct Size {
+    std::uint32_t splats;
+    int width, height;
+    double scale;  // standard deviation of a splat, of a sphere of radius 1 that fills the picture
+    int warm_up, samples;
+};
+
+Size size_for(const DeviceInfo& info) {
+    if (info.type == "cpu") return {3'000, 240, 176, 0.03, 1, 3};
+    return {200'000, 1280, 720, 0.01, 3, 7};
+}
+
+SplatModel tuning_scene(const Size& size) {
+    SplatModel model;
+    model.resize(size.splats);
+    Pcg32 random(7, 7);
+    for (std::size_t i = 0; i < size.splats; ++i) {
+        glm::dvec3 p;
+        do
+            for (int a = 0; a < 3; ++a) p[a] = random.uniform(-1, 1);
+        while (glm::dot(p, p) > 1);
+        for (std::size_t a = 0; a < 3; ++a) {
+            model.position[3 * i + a] = static_cast<float>(p[static_cast<int>(a)]);
+            model.log_scale[3 * i + a] =
+                static_cast<float>(std::log(size.scale) + 0.4 * random.normal());
+            model.sh_dc[3 * i + a] = static_cast<float>(random.uniform(-1, 1));
+        }
+        for (std::size_t a = 0; a < 4; ++a)
+            model.rotation[4 * i + a] = static_cast<float>(random.normal());
+        model.opacity[i] = static_cast<float>(1.5 * random.normal());
+    }
+    return model;
+}
+
+Camera tuning_camera(const Size& size) {
+    Camera camera;
+    camera.width = size.width;
+    camera.height = size.height;
+    camera.fx = camera.fy = 2.0 * size.height;
+    camera.cx = 0.5 * size.width;
+    camera.cy = 0.5 * size.height;
+    camera.translation = {0, 0, 4};
+    return camera;
+}
+
+ForwardOptions tuning_options() {
+    ForwardOptions options;
+    options.store_for_backward = true;
+    return options;
+}
+
+template <class Word>
+std::uint64_t fnv1a(std::uint64_t hash, std::span<const Word> words) {
+    for (const Word word : words) hash = (hash ^ static_cast<std::uint64_t>(word)) * 0x100000001b3;
+    return hash;
+}
+
+constexpr std::uint64_t kHashStart = 0xcbf29ce484222325;
+
+std::string shader_hash() {
+    std::uint64_t hash = kHashStart;
+    for (const ShaderBinary& shader : shader_table()) hash = fnv1a(hash, shader.words);
+    return fmt::format("{:016x}", hash);
+}
+
+// What a record must agree with, but for the shaders.
+nlohmann::json key_of(const DeviceInfo& info) {
+    return {{"format", kFormat},
+            {"device", info.name},
+            {"driver", info.driver},
+            {"driver_version", info.driver_version},
+            {"pipeline_cache", info.cache_uuid},
+            {"subgroup_size", info.subgroup_size}};
+}
+
+std::string dumped(const nlohmann::json& json, int indent = -1) {
+    return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::filesystem::path file_of(const DeviceInfo& info, const std::filesystem::path& folder) {
+    const std::string key = dumped(key_of(info));
+    return folder /
+           fmt::format("tuning-{:016x}.json", fnv1a(kHashStart, std::span<const char>(key)));
+}
+
+// The least of the frames' times for each of several sets of passes.
+std::vector<double> measure(Device& device, const Variants& variants,
+                            const std::vector<TuningGroup>& groups) {
+    device.set_variants(variants);
+    TuningFrame frame(device);
+    const Size size = size_for(device.info());
+    for (int i = 0; i < size.warm_up; ++i) frame.run({});
+    std::vector<double> least(groups.size(), std::numeric_limits<double>::infinity());
+    for (int i = 0; i < size.samples; ++i) {
+        const std::vector<double> ms = frame.run(groups);
+        for (std::size_t g = 0; g < groups.size(); ++g) least[g] = std::min(least[g], ms[g]);
+    }
+    return least;
+}
+
+}  // namespace
+
+std::string fastest_way(const TuningGroup& group, const std::vector<TuningTime>& times) {
+    std::string best = group.ways.front();
+    double least = 0;
+    for (const TuningTime& time : times) {
+        if (time.group != group.name || time.way == "buckets") continue;
+        const bool usual = time.way == group.ways.front();  // the first that is measured
+        if (usual || time.ms < least) {
+            least = usual ? kGain * time.ms : time.ms;
+            best = time.way;
+        }
+    }
+    return best;
+}
+
+TuningFrame::TuningFrame(Device& device)
+    : splats_(device, tuning_scene(size_for(device.info())), false),
+      forward_(device, tuning_options()),
+      backward_(device, tuning_options()),
+      data_(camera_data(tuning_camera(size_for(device.info())), splats_.origin())),
+      cameras_(upload_cameras(device, {data_})),
+      d_image_(device, "d_image", std::uint64_t{data_.width} * data_.height * 12),
+      commands_(device),
+      has_timestamps_(device.info().timestamp_period_ns > 0) {
+    d_image_.upload(std::vector<float>(std::size_t{data_.width} * data_.height * 3, 0.5f));
+    forward_.reserve(splats_.count(), splats_.count() * 8, static_cast<int>(data_.width),
+                     static_cast<int>(data_.height));
+}
+
+std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point start;
+    do {
+        backward_.reserve(forward_.pair_capacity());
+        commands_.begin();
+        forward_.record(commands_, splats_, cameras_, 0, data_, 0, glm::vec3(0.0f));
+        commands_.pass("blend backward");
+        backward_.record(commands_, forward_, d_image_, data_, glm::vec3(0.0f));
+        start = Clock::now();
+        commands_.submit_and_wait();
+    } while (forward_.make_room(forward_.read_status()));
+    const std::chrono::duration<double, std::milli> whole = Clock::now() - start;
+    std::vector<double> ms(groups.size(), has_timestamps_ ? 0 : whole.count());
+    for (const PassTime& pass : commands_.pass_times())
+        for (std::size_t g = 0; g < groups.size(); ++g)
+            if (const auto& passes = groups[g].passes;
+                std::find(passes.begin(), passes.end(), pass.name) != passes.end())
+                ms[g] += pass.ms;
+    return ms;
+}
+
+TuningRecord measure_tuning(Device& device) {
+    const Variants before = device.variants();
+    const std::vector<TuningGroup> groups = tuning_groups(device.info());
+    const Variants defaults = default_variants(device.info());
+    TuningRecord record;
+    const std::vector<double> usual = measure(device, defaults, groups);
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+        record.times.push_back({groups[g].name, groups[g].ways.front(), usual[g]});
+        for (std::size_t w = 1; w < groups[g].ways.size(); ++w) {
+            Variants variants = defaults;
+            variants[groups[g].name] = groups[g].ways[w];
+            try {
+                const double ms = measure(device, variants, {groups[g]})[0];
+                record.times.push_back({groups[g].name, groups[g].ways[w], ms});
+            } catch (const Error&) {
+            }
+        }
+        record.choice[groups[g].name] = fastest_way(groups[g], record.times);
+    }
+    device.set_variants(before);
+    device.forget_peak();
+    return record;
+}
+
+std::optional<TuningRecord> read_tuning(const DeviceInfo& info,
+                                        const std::filesystem::path& folder) try {
+    std::error_code error;
+    if (folder.empty() || !std::filesystem::is_regular_file(file_of(info, folder), error))
+        return std::nullopt;
+    const nlohmann::json json =
+        nlohmann::json::parse(read_text_file(file_of(info, folder)), nullptr, false);
+    if (!json.is_object() || json.value("shaders", "") != shader_hash()) return std::nullopt;
+    const nlohmann::json key = key_of(info);
+    for (const auto& [name, value] : key.items())
+        if (!json.contains(name) || dumped(json[name]) != dumped(value)) return std::nullopt;
+    TuningRecord record;
+    record.choice = parse_variants(info, json.at("choice").get<std::string>(), "tuning");
+    for (const nlohmann::json& time : json.at("times"))
+        record.times.push_back({time.at("group").get<std::string>(),
+                                time.at("way").get<std::string>(), time.at("ms").get<double>()});
+    return record;
+} catch (const std::exception&) {  // of a file that another hand changed
+    return std::nullopt;
+}
+
+void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
+                  const TuningRecord& record) try {
+    if (folder.empty()) return;
+    nlohmann::json json = key_of(info);
+    json["shaders"] = shader_hash();
+    json["choice"] = variants_text(record.choice);
+    json["times"] = nlohmann::json::array();
+    for (const TuningTime& time : record.times)
+        json["times"].push_back({{"group", time.group}, {"way", time.way}, {"ms", time.ms}});
+    write_file_atomic(file_of(info, folder), dumped(json, 2) + "\n");
+} catch (const Error&) {
+}
+
+std::string tuning_text(const TuningRecord& record) {
+    std::string text = variants_text(record.choice), group;
+    for (const TuningTime& time : record.times) {
+        text += fmt::format("{}{} {:.3f}", time.group == group ? ", " : "; " + time.group + ": ",
+                            time.way, time.ms);
+        group = time.group;
+    }
+    return record.times.empty() ? text : text + " ms";
+}
+
+void tune(Device& device, const TuneRequest& request) {
+    const DeviceInfo& info = device.info();
+    const auto note = [&](const std::string& line) {
+        if (request.note) request.note(line);
+    };
+    Variants variants = parse_variants(info, request.forced, "--tune " + request.forced);
+    if (const char* text = std::getenv("DARB_TUNE"); text != nullptr)
+        variants.merge(parse_variants(info, text, "DARB_TUNE"));
+    const bool open = variants.size() < tuning_groups(info).size();
+    std::optional<TuningRecord> record;
+    if (!request.retune) record = read_tuning(info, device.cache_folder());
+    if (request.retune || (open && !record && !is_known_device(info))) {
+        note(fmt::format("{}: measuring which passes are the fastest, kept for later runs",
+                         info.name));
+        record = measure_tuning(device);
+        write_tuning(info, device.cache_folder(), *record);
+        note("tuned: " + tuning_text(*record));
+    }
+    if (record) variants.merge(Variants(record->choice));
+    device.set_variants(std::move(variants));
+}
+
+}  // namespace darb

@@ -1,0 +1,78 @@
+// The tuner: measures the ways of a device's passes (engine/primitives/tuning.h) on a small made-up
+// scene, and keeps what it found in a file beside the pipeline cache, once for each device, driver,
+// subgroup size and set of shaders.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/gpu/commands.h"
+#include "engine/primitives/tuning.h"
+#include "engine/raster/blend_backward.h"
+
+namespace darb {
+
+struct TuningTime {
+    std::string group, way;
+    double ms = 0;  // of the group's passes, the least of a few frames
+};
+
+struct TuningRecord {
+    Variants choice;                // of every group
+    std::vector<TuningTime> times;  // of every way
+};
+
+/// One frame of the tuner's scene, forward and backward blend, in the ways of the device at
+/// construction. The same splats at every call; more of them where the device is no CPU.
+class TuningFrame {
+  public:
+    explicit TuningFrame(Device& device);
+
+    /// Of each group the milliseconds of its passes together; of the whole frame where the device
+    /// has no timestamps. The first call compiles.
+    std::vector<double> run(const std::vector<TuningGroup>& groups);
+
+  private:
+    GpuSplats splats_;
+    Forward forward_;
+    BlendBackward backward_;
+    gpu::CameraData data_;
+    Buffer cameras_, d_image_;
+    Commands commands_;
+    bool has_timestamps_;
+};
+
+/// The default unless another way takes 3 % less. Never buckets, which hold 17 to 34 million pairs
+/// a frame in the 4 GiB that Vulkan binds at most, the other way 134 million: how many a run will
+/// need is not known here, so they are for who asks for them.
+std::string fastest_way(const TuningGroup& group, const std::vector<TuningTime>& times);
+
+/// Each group with all others at their defaults, and the fastest way of each. A way that a driver
+/// refuses is left out. The device's variants and its peak of memory are afterwards as before.
+TuningRecord measure_tuning(Device& device);
+
+/// The record of this device in the folder of the pipeline cache; nothing where there is none, or
+/// it cannot be read, or it is of another device, driver, subgroup size or set of shaders.
+std::optional<TuningRecord> read_tuning(const DeviceInfo& info,
+                                        const std::filesystem::path& folder);
+/// Atomically. A folder that cannot be written is no error: the next process measures again.
+void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
+                  const TuningRecord& record);
+
+struct TuneRequest {
+    std::string forced;                            // as parse_variants; of --tune
+    bool retune = false;                           // measure anew, known devices too
+    std::function<void(const std::string&)> note;  // may be empty
+};
+
+/// Settles the ways of a device: what is forced, then DARB_TUNE, then the record, then the default.
+/// Without a record a device that is not known is measured. Throws Error for unknown names.
+void tune(Device& device, const TuneRequest& request);
+
+/// The choice in a line, with the milliseconds of every way.
+std::string tuning_text(const TuningRecord& record);
+
+}  // namespace darb

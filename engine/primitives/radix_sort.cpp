@@ -1,0 +1,152 @@
+#include "engine/primitives/radix_sort.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/primitives/tuning.h"
+#include "shaders/shared/radix_args.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kDigitBits = 8;
+constexpr std::uint32_t kRowBytes = RADIX_MAX_DIGITS * 4;  // counters of a subgroup
+// 1024 keys a thread make the 256 counters of its column cheap; 8 lanes are then 8192 keys a block.
+constexpr std::uint32_t kColumnItems = 1024;
+constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
+
+RadixSort::Strategy resolve(const Device& device, RadixSort::Strategy strategy) {
+    if (strategy != RadixSort::Strategy::automatic) return strategy;
+    return tuning_of(device).scatter;
+}
+
+SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,
+                        bool iota) {
+    return {{"THREADS", static_cast<std::int32_t>(threads)},
+            {"ITEMS", static_cast<std::int32_t>(items)},
+            {"SUBGROUPS", static_cast<std::int32_t>(subgroups)},
+            {"IOTA", iota ? 1 : 0}};
+}
+
+const char* histogram_name(RadixSort::Strategy strategy) {
+    return strategy == RadixSort::Strategy::columns ? "radix_histogram_columns" : "radix_histogram";
+}
+
+const char* scatter_name(RadixSort::Strategy strategy) {
+    return strategy == RadixSort::Strategy::columns ? "radix_scatter_columns"
+                                                    : "radix_scatter_ballot";
+}
+
+}  // namespace
+
+RadixSort::Shape RadixSort::choose_shape(const Device& device, Strategy strategy,
+                                         std::uint32_t subgroup_size) {
+    const std::uint32_t lanes = subgroup_size != 0 ? subgroup_size : device.info().subgroup_size;
+    if (strategy == Strategy::columns) return {lanes, kColumnItems, 1};
+    const std::uint32_t rows = std::bit_floor(device.info().shared_memory_bytes / kRowBytes);
+    const std::uint32_t threads = std::max(std::min(kBallotThreads, rows * lanes), lanes);
+    return {threads, kBallotItems, threads / lanes};
+}
+
+RadixSort::RadixSort(Device& device, std::uint32_t capacity, Strategy strategy,
+                     std::uint32_t subgroup_size)
+    : capacity_(capacity),
+      strategy_(resolve(device, strategy)),
+      shape_(choose_shape(device, strategy_, subgroup_size)) {
+    DARB_CHECK(capacity > 0);
+    const std::uint64_t blocks = (std::uint64_t{capacity} + block() - 1) / block();
+    if (blocks > device.info().max_groups_x)
+        throw Error("sort",
+                    fmt::format("{} pairs are more than {} allows", capacity, device.info().name),
+                    "Use smaller images or fewer splats, or choose another device (darb devices).");
+    const auto [threads, items, subgroups] = shape_;
+    const SpecConstants plain = constants(threads, items, subgroups, false);
+    const SpecConstants iota = constants(threads, items, subgroups, true);
+    prepare_ = Pipeline(device, "radix_prepare");
+    histogram_ = Pipeline(device, histogram_name(strategy_), plain, true, subgroup_size);
+    scatter_ = Pipeline(device, scatter_name(strategy_), plain, true, subgroup_size);
+    scatter_iota_ = Pipeline(device, scatter_name(strategy_), iota, true, subgroup_size);
+
+    make_buffers(device, *this, buffers(capacity, shape_), "sort");
+    scan_.emplace(device, static_cast<std::uint32_t>(counters(capacity, shape_)));
+}
+
+// One workgroup a block, and a scan over the counters of all blocks.
+std::uint64_t RadixSort::max_capacity(const Device& device) {
+    const std::uint64_t counters = Scan::max_capacity(device, Scan::best_strategy(device));
+    const std::uint64_t blocks =
+        std::min<std::uint64_t>(device.info().max_groups_x, counters / RADIX_MAX_DIGITS);
+    return blocks * choose_shape(device, resolve(device, Strategy::automatic), 0).block();
+}
+
+std::uint64_t RadixSort::counters(std::uint32_t capacity, const Shape& shape) {
+    return (std::uint64_t{capacity} + shape.block() - 1) / shape.block() * RADIX_MAX_DIGITS;
+}
+
+BufferList<RadixSort> RadixSort::buffers(std::uint32_t capacity, const Shape& shape) {
+    const std::uint64_t pair_bytes = std::uint64_t{capacity} * 4;
+    return {{&RadixSort::plan_, "sort plan", sizeof(gpu::RadixPlan)},
+            {&RadixSort::histograms_, "sort histograms", counters(capacity, shape) * 4},
+            {&RadixSort::total_, "sort total", 4},
+            {&RadixSort::keys_temp_, "sort keys", pair_bytes},
+            {&RadixSort::values_temp_, "sort values", pair_bytes}};
+}
+
+std::uint64_t RadixSort::device_bytes(const Device& device, std::uint32_t capacity) {
+    const Shape shape = choose_shape(device, resolve(device, Strategy::automatic), 0);
+    return charged_bytes(buffers(capacity, shape)) +
+           Scan::device_bytes(static_cast<std::uint32_t>(counters(capacity, shape)));
+}
+
+void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& values,
+                       const Buffer& count_buffer, std::uint64_t count_offset, int key_bits,
+                       bool iota_values) {
+    const std::uint64_t bytes = std::uint64_t{capacity_} * 4;
+    DARB_CHECK(key_bits >= 1 && key_bits <= 32, "{} bits", key_bits);
+    DARB_CHECK(keys.bytes() >= bytes && values.bytes() >= bytes, "{} and {} bytes, capacity {}",
+               keys.bytes(), values.bytes(), capacity_);
+    const gpu::RadixPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4),
+                                     block()};
+    commands.dispatch(prepare_, args, {count_buffer, plan_}, 1);
+    scan_->prepare(commands, plan_, offsetof(gpu::RadixPlan, counters));
+
+    const int passes = (key_bits + kDigitBits - 1) / kDigitBits;
+    const Buffer* from_keys = &keys;
+    const Buffer* from_values = &values;
+    const Buffer* to_keys = &keys_temp_;
+    const Buffer* to_values = &values_temp_;
+    if (passes % 2 == 1) {  // start in the scratch buffers, so that the last pass ends in keys
+        commands.copy(keys, keys_temp_, bytes);
+        if (!iota_values) commands.copy(values, values_temp_, bytes);
+        std::swap(from_keys, to_keys);
+        std::swap(from_values, to_values);
+    }
+    int done_bits = 0;
+    for (int pass = 0; pass < passes; ++pass) {
+        // Equal digits: 12 bits as 6 + 6 have fewer counters than 8 + 4.
+        const int bits = (key_bits - done_bits + passes - pass - 1) / (passes - pass);
+        record_pass(commands, static_cast<std::uint32_t>(done_bits), 1U << bits,
+                    iota_values && pass == 0, *from_keys, *from_values, *to_keys, *to_values);
+        done_bits += bits;
+        std::swap(from_keys, to_keys);
+        std::swap(from_values, to_values);
+    }
+}
+
+void RadixSort::record_pass(Commands& commands, std::uint32_t shift, std::uint32_t digits,
+                            bool iota, const Buffer& keys_in, const Buffer& values_in,
+                            const Buffer& keys_out, const Buffer& values_out) {
+    const gpu::RadixPassArgs args{shift, digits};
+    commands.dispatch_indirect(histogram_, args, {plan_, keys_in, histograms_}, plan_, 0);
+    scan_->run(commands, histograms_, histograms_, total_);
+    commands.dispatch_indirect(iota ? scatter_iota_ : scatter_, args,
+                               {plan_, histograms_, keys_in, values_in, keys_out, values_out},
+                               plan_, 0);
+}
+
+}  // namespace darb

@@ -1,0 +1,58 @@
+// BlendBackward: from dL/dimage to sums over pixels for each splat-tile pair, in the way that the
+// device's tuning says; recorded after Forward::record of the same frame.
+#pragma once
+
+#include "engine/primitives/tuning.h"
+#include "engine/raster/forward.h"
+
+namespace darb {
+
+class BlendBackward {
+  public:
+    /// options: those of the forward pass, with store_for_backward. The device's tuning must be the
+    /// one that the forward pass was made with.
+    BlendBackward(Device& device, const ForwardOptions& options);
+
+    /// Makes the outputs fit; never shrinks. The queue must be idle. records: those of the forward
+    /// pass's checkpoints, for which record() makes room where nobody did.
+    void reserve(std::uint32_t pairs, std::uint32_t records = 0);
+    /// Device memory beside a Forward of this size, once a frame was recorded.
+    static FrameBytes device_bytes(const FrameSize& size);
+
+    /// d_image: float [3][H][W]. Belongs to the current pass() of commands.
+    void record(Commands& commands, const Forward& forward, const Buffer& d_image,
+                const gpu::CameraData& data, const glm::vec3& background);
+
+    /// Pairs that the buffers below can have, by the device's bindings and its largest buffer.
+    static std::uint64_t max_pairs(const Device& device);
+
+    /// What shaders/backward/blend_backward.comp says, in the order of the pairs' slots: float
+    /// [K][8]. Shaders bind PARTIAL_WINDOWS windows of it, as lib/partials.glsl says.
+    const Buffer& partials() const { return partials_; }
+    BufferRange partials(std::uint32_t window) const;
+    std::uint32_t window_pairs() const { return window_pairs_; }
+    const Buffer& rest() const { return rest_; }  // float [K]
+
+  private:
+    static BufferList<BlendBackward> pair_buffers(std::uint64_t pairs);
+    static BufferList<BlendBackward> segment_buffers(const FrameSize& size);
+    static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
+    void make_pipelines(bool segmented);
+    void record_subgroup(Commands& commands, const Forward& forward, const Buffer& d_image,
+                         gpu::BlendArgs args);
+    void record_buckets(Commands& commands, const Forward& forward, const Buffer& d_image,
+                        gpu::BlendArgs args);
+
+    Device* device_;
+    ForwardOptions options_;
+    BackwardBlend way_;
+    Pipeline blend_;                         // of either way
+    Pipeline bucket_tiles_, bucket_behind_;  // of buckets
+    bool segmented_ = false;                 // whether the pipelines take segments
+    Buffer behind_;                          // pixels' state between their dispatches
+    Buffer bucket_tile_, bucket_rest_;       // of buckets
+    std::uint32_t pair_capacity_ = 0, window_pairs_ = 0;
+    Buffer partials_, rest_;
+};
+
+}  // namespace darb

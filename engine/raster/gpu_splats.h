@@ -1,0 +1,86 @@
+// GpuSplats: the parameters of N splats in device memory, one buffer an attribute, in SplatModel's
+// layout; with the optimiser's moments beside them where they are trained.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "engine/gpu/buffer.h"
+#include "engine/primitives/groups.h"
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+enum Attribute { kPosition, kLogScale, kRotation, kOpacity, kShDc, kShRest, kAttributeCount };
+
+class GpuSplats {
+  public:
+    GpuSplats() = default;
+    /// Uploads the model. with_moments adds two floats for each parameter, set to zero,
+    /// with_rest_sum one for each of the harmonics above the first band.
+    GpuSplats(Device& device, const SplatModel& model, bool with_moments,
+              bool with_rest_sum = false);
+
+    /// Everything back to the host; kernel, footprint, origin and degree as given at the start.
+    SplatModel download() const;
+
+    std::uint32_t count() const { return count_; }
+    int sh_degree() const { return header_.sh_degree; }
+    int kernel() const { return header_.kernel; }
+    Footprint footprint() const { return header_.footprint; }
+    bool antialias() const { return header_.antialias; }
+    const glm::dvec3& origin() const { return header_.origin; }
+    bool has_moments() const { return static_cast<bool>(moments_[0]); }
+
+    /// Floats per splat of an attribute (0 for kShRest at degree 0).
+    std::uint32_t stride(int attribute) const { return strides_[attribute]; }
+    Buffer& parameters(int attribute) { return parameters_[attribute]; }
+    const Buffer& parameters(int attribute) const { return parameters_[attribute]; }
+    Buffer& moments(int attribute) { return moments_[attribute]; }
+    const Buffer& moments(int attribute) const { return moments_[attribute]; }
+
+    /// [N][stride of kShRest], where has_rest_sum(): gradients since their last step.
+    Buffer& rest_sum() { return rest_sum_; }
+    bool has_rest_sum() const { return has_rest_sum_; }
+
+    /// [N] deviation of the 3D smoothing filter, world units; one unused word where no effect needs
+    /// it.
+    Buffer& smoothing() { return smoothing_; }
+    const Buffer& smoothing() const { return smoothing_; }
+
+    /// After an attribute's buffers were replaced by ones of another count (density control).
+    void set_count(std::uint32_t count) { count_ = count; }
+
+    /// What passes over splats work off one dispatch at a time, as the harmonics and their moments
+    /// are bound by range where one binding of the device does not hold them all.
+    std::vector<SplatRange> ranges() const;
+    /// The rows of a range in one of the buffers of the harmonics.
+    BufferRange rows(const Buffer& of_rest, const SplatRange& range) const;
+
+    /// Device memory of the parameters of so many splats; their moments take twice as much.
+    static std::uint64_t parameter_bytes(std::uint64_t count, int sh_degree);
+    /// Floats per splat of the attributes.
+    static std::array<std::uint32_t, kAttributeCount> strides(int sh_degree);
+
+    /// The most splats that this device's bindings and its largest buffer allow.
+    static std::uint32_t max_count(const Device& device, int sh_degree, bool with_moments);
+
+  private:
+    SplatModel header_;  // no splats, only what is not per splat
+    std::uint32_t count_ = 0;
+    std::uint64_t binding_bytes_ = 0;  // the most that one binding holds
+    std::array<std::uint32_t, kAttributeCount> strides_{};
+    std::array<Buffer, kAttributeCount> parameters_;
+    std::array<Buffer, kAttributeCount> moments_;  // [N][stride][2]: first, second
+    bool has_rest_sum_ = false;
+    Buffer rest_sum_;
+    Buffer smoothing_;
+};
+
+/// The host array of an attribute.
+std::vector<float>& attribute_values(SplatModel& model, int attribute);
+const std::vector<float>& attribute_values(const SplatModel& model, int attribute);
+const char* attribute_name(int attribute);
+
+}  // namespace darb

@@ -1,0 +1,53 @@
+#include "engine/raster/kernel_constants.h"
+
+#include <cmath>
+#include <string>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+
+namespace darb {
+namespace {
+
+constexpr float kUnbounded = 3e38f;  // R^2 of the Gaussian
+// How much the computed w may stray, relative to w, from the one that bounded the splat: rounding
+// that differs between passes; the built-in functions; and the error of the Gaussian's polynomial,
+// whose reach is the closed form's.
+constexpr double kRoundingMargin = 1e-6, kBuiltinMargin = 1e-4;
+
+}  // namespace
+
+SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, int degree,
+                               float alpha_cutoff) {
+    DARB_CHECK(evaluation == EVALUATION_POLYNOMIAL || evaluation == EVALUATION_BUILTIN,
+               "evaluation = {}", evaluation);
+    DARB_CHECK(alpha_cutoff > 0 && alpha_cutoff < 1, "alpha_cutoff = {}", alpha_cutoff);
+    if (footprint == Footprint::exact && !has_exact_footprint(kernel))
+        throw Error(std::string(kernel_name(kernel)), "has no exact footprint",
+                    "Use the footprint psi, or one pulse.");
+    const KernelCoefficients& k = kernel_coefficients(kernel, footprint, degree);
+    if (k.form == KERNEL_FORM_RINGS) evaluation = EVALUATION_BUILTIN;
+    double margin = evaluation == EVALUATION_BUILTIN ? kBuiltinMargin : kRoundingMargin;
+    if (k.form == KERNEL_FORM_GAUSSIAN) margin += 1.5 * k.value_error;
+    DARB_CHECK(k.half_power <= 9, "half_power = {}", k.half_power);  // shaders/kernels/compact.glsl
+    SpecConstants constants{
+        {"KERNEL", *kernel_with_pulses(kernel, 1)},
+        {"KERNEL_PULSES", kernel_pulses(kernel)},
+        {"FOOTPRINT", static_cast<int>(footprint)},
+        {"EVALUATION", evaluation},
+        {"KERNEL_FORM", k.form},
+        {"KERNEL_DEGREE", k.degree},
+        {"KERNEL_HALF_POWER", k.half_power},
+        {"KERNEL_SQUARED_VARIABLE", k.squared ? 1 : 0},
+        {"KERNEL_SUPPORT", std::isfinite(k.support) ? static_cast<float>(k.support) : kUnbounded},
+        {"KERNEL_INVERSE_SUPPORT", static_cast<float>(k.inverse_support)},
+        {"COVARIANCE_SCALE", static_cast<float>(covariance_scale(kernel, footprint))},
+        {"ALPHA_CUTOFF", alpha_cutoff},
+        {"KERNEL_REACH_MARGIN", static_cast<float>(margin)},
+    };
+    for (std::size_t i = 0; i < k.c.size(); ++i)
+        constants.emplace("KERNEL_C" + std::to_string(i), static_cast<float>(k.c[i]));
+    return constants;
+}
+
+}  // namespace darb

@@ -1,0 +1,132 @@
+#include "engine/raster/loss.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <thread>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kMinRows = 16;  // px; a strip reads 20 rows more than it owns
+// On GPUs a strip reads 64 columns: with 32 lanes 2 a thread, whose state of about 110 floats fits
+// the registers. lavapipe keeps it on the stack, where wider strips pay until the cache is full.
+constexpr int kGpuStripWidth = 64;
+constexpr int kMinCpuColumns = 8, kMaxCpuColumns = 14;
+
+int ceil_divide(int a, int b) {
+    return (a + b - 1) / b;
+}
+
+int cluster_lanes(const Device& device) {
+    const std::uint32_t smallest = device.info().min_subgroup_size;
+    if (smallest < 4) {
+        throw Error(device.info().name, "its subgroups have fewer than 4 lanes",
+                    "training needs subgroup shuffles; choose another device with --device");
+    }
+    return static_cast<int>(std::min(32u, std::bit_floor(smallest)));
+}
+
+// Columns a thread on a CPU: the fewest columns computed in all for this width of image.
+int cpu_columns(int lanes, int width) {
+    int best = kMaxCpuColumns, best_cost = std::numeric_limits<int>::max();
+    for (int columns = kMaxCpuColumns; columns >= kMinCpuColumns; --columns) {
+        const int cost = columns * ceil_divide(width, lanes * columns - 2 * LOSS_HALO);
+        if (cost < best_cost) {
+            best = columns;
+            best_cost = cost;
+        }
+    }
+    return best;
+}
+
+int columns_of(const Device& device, int lanes, int max_width, const LossOptions& options) {
+    if (options.columns > 0) return options.columns;
+    return device.is_lavapipe() ? cpu_columns(lanes, max_width) : kGpuStripWidth / lanes;
+}
+
+}  // namespace
+
+Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& options)
+    : max_width_(max_width),
+      max_height_(max_height),
+      lanes_(cluster_lanes(device)),
+      columns_(columns_of(device, lanes_, max_width, options)),
+      rows_(options.rows) {
+    DARB_CHECK(max_width > 0 && max_height > 0, "{} x {}", max_width, max_height);
+    const DeviceInfo& info = device.info();
+    if (device.is_lavapipe()) {
+        threads_ = static_cast<int>(info.subgroup_size);
+        wanted_works_ = 4 * static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    } else {
+        threads_ = static_cast<int>(std::max(64u, info.max_subgroup_size));
+        wanted_works_ = 4096;
+    }
+    DARB_CHECK(lanes_ * columns_ > 2 * LOSS_HALO, "{} lanes, {} columns", lanes_, columns_);
+    const SpecConstants constants = {{"THREADS", threads_},
+                                     {"LANES", lanes_},
+                                     {"COLUMNS", columns_},
+                                     {"USE_MASK", options.use_mask ? 1 : 0},
+                                     {"USE_ALPHA", options.use_alpha ? 1 : 0}};
+    loss_ = Pipeline(device, "loss", constants);
+    sum_ = Pipeline(device, "loss_sum", {}, false);
+    make_buffers(device, *this, buffers(device, max_width, max_height, options), "loss");
+}
+
+// The most strips that any size up to the largest can be cut into.
+BufferList<Loss> Loss::buffers(const Device& device, int max_width, int max_height,
+                               const LossOptions& options) {
+    const int lanes = cluster_lanes(device);
+    const int columns = columns_of(device, lanes, max_width, options);
+    const int strips = ceil_divide(max_width, lanes * columns - 2 * LOSS_HALO);
+    const int rows = options.rows > 0 ? options.rows : kMinRows;
+    const std::uint64_t works = std::uint64_t{3} * strips * ceil_divide(max_height, rows);
+    return {{&Loss::partial_, "loss.partial", works * sizeof(glm::vec4)}};
+}
+
+std::uint64_t Loss::device_bytes(const Device& device, int max_width, int max_height,
+                                 const LossOptions& options) {
+    return charged_bytes(buffers(device, max_width, max_height, options));
+}
+
+gpu::LossArgs Loss::arguments(int width, int height) const {
+    gpu::LossArgs args{};
+    args.width = width;
+    args.height = height;
+    const int strips = ceil_divide(width, lanes_ * columns_ - 2 * LOSS_HALO);
+    int rows = rows_ > 0 ? rows_ : height;
+    while (rows_ == 0 && rows > kMinRows &&
+           3 * strips * ceil_divide(height, rows) < wanted_works_) {
+        rows = std::max(kMinRows, ceil_divide(rows, 2));
+    }
+    args.rows = rows;
+    args.strips = strips;
+    args.works = 3 * strips * ceil_divide(height, rows);
+    return args;
+}
+
+void Loss::record(Commands& commands, const BufferRange& image, const BufferRange& ground_truth,
+                  const BufferRange& d_image, const BufferRange& results,
+                  std::uint32_t result_index, int width, int height, glm::vec3 background,
+                  float lambda) {
+    DARB_CHECK(width > 0 && width <= max_width_ && height > 0 && height <= max_height_,
+               "{} x {}, made for {} x {}", width, height, max_width_, max_height_);
+    const float scale = 1.0f / (3.0f * static_cast<float>(width) * static_cast<float>(height));
+    gpu::LossArgs args = arguments(width, height);
+    args.l1_scale = (1.0f - lambda) * scale;
+    args.ssim_scale = -lambda * scale;
+    args.background_r = background.r;
+    args.background_g = background.g;
+    args.background_b = background.b;
+    commands.pass("loss");
+    commands.dispatch(loss_, args, {image, ground_truth, d_image, partial_},
+                      ceil_divide(static_cast<int>(args.works), threads_ / lanes_));
+    const gpu::LossSumArgs sum_args{args.works, result_index, scale};
+    commands.dispatch(sum_, sum_args, {partial_, results}, 1);
+}
+
+}  // namespace darb

@@ -1,0 +1,259 @@
+// engine/primitives/tuning, engine/plan/tuner: names, what a device allows, the record on disk,
+// what wins.
+#include "engine/primitives/tuning.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/plan/tuner.h"
+#include "tests/support/scoped_variants.h"
+#include "tests/support/shared_device.h"
+
+namespace darb::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+DeviceInfo some_gpu() {
+    DeviceInfo info;
+    info.name = "Some GPU";
+    info.driver = "some driver 1.2";
+    info.driver_version = 12;
+    info.cache_uuid = "00ff";
+    info.type = "discrete";
+    info.max_storage_buffer_bytes = 0xFFFFFFFF;
+    info.max_workgroup_threads = 1024;
+    info.shared_memory_bytes = 48 * 1024;
+    info.subgroup_size = info.min_subgroup_size = info.max_subgroup_size = 32;
+    return info;
+}
+
+std::vector<std::string> ways(const DeviceInfo& info, const std::string& group) {
+    for (const TuningGroup& g : tuning_groups(info))
+        if (g.name == group) return g.ways;
+    return {};
+}
+
+std::string refusal(const std::string& text) {
+    try {
+        parse_variants(some_gpu(), text, "--tune");
+    } catch (const Error& e) {
+        return e.what();
+    }
+    return "";
+}
+
+/// A cache folder of its own, gone afterwards.
+class Tuner : public testing::Test {
+  protected:
+    void SetUp() override { fs::create_directories(folder_); }
+    void TearDown() override { fs::remove_all(folder_); }
+    static TuningRecord record() {
+        return {parse_variants(some_gpu(), "backward=buckets,blend=256x1,scan=thread", "test"),
+                {{"blend", "128x2", 1.5}, {"blend", "256x1", 1.25}}};
+    }
+    fs::path only_file() const {
+        fs::path file;
+        for (const auto& entry : fs::directory_iterator(folder_)) {
+            EXPECT_TRUE(file.empty()) << "two files";
+            file = entry.path();
+        }
+        return file;
+    }
+    const fs::path folder_ =
+        fs::path(testing::TempDir()) / fmt::format("darb_tuning_{}", ::getpid());
+};
+
+TEST(Tuning, names_come_back_in_one_order) {
+    const Variants variants =
+        parse_variants(some_gpu(), "backward=buckets,scatter=columns", "--tune");
+    EXPECT_EQ(variants_text(variants), "scatter=columns,backward=buckets");
+    EXPECT_EQ(parse_variants(some_gpu(), "", "--tune"), Variants{});
+}
+
+TEST(Tuning, unknown_names_are_errors_that_list_the_known_ones) {
+    for (const char* text :
+         {"no_such=1", "blend=1x256", "backward", "backward=", "=", "backward=buckets,,"}) {
+        SCOPED_TRACE(text);
+        EXPECT_NE(refusal(text).find("backward=subgroup|buckets"), std::string::npos)
+            << refusal(text);
+    }
+    EXPECT_NE(refusal("no_such=1").find("'no_such'"), std::string::npos);
+    EXPECT_NE(refusal("blend=1x256").find("'1x256'"), std::string::npos);
+}
+
+TEST(Tuning, shapes_are_those_that_fit_the_device) {
+    using Names = std::vector<std::string>;
+    DeviceInfo info = some_gpu();
+    EXPECT_EQ(ways(info, "blend"), (Names{"128x2", "256x1", "64x4", "32x8"}));
+    info.subgroup_size = 64;
+    EXPECT_EQ(ways(info, "blend"), (Names{"256x1", "128x2", "64x4"}));
+    info.subgroup_size = 4;  // a subgroup's list takes a kilobyte
+    info.shared_memory_bytes = 32 * 1024;
+    EXPECT_EQ(ways(info, "blend"), (Names{"16x16", "128x2", "64x4", "32x8"}));
+    EXPECT_EQ(ways(info, "scatter").front(), "ballot");
+    info.driver = "llvmpipe Mesa 25";
+    EXPECT_EQ(ways(info, "scatter").front(), "columns");
+    EXPECT_TRUE(is_known_device(info));
+}
+
+TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
+    Device& device = shared_device();
+    EXPECT_EQ(all_variants(device), default_variants(device.info()));
+    const ScopedVariants some(device, "scatter=ballot,backward=buckets");
+    EXPECT_EQ(tuning_of(device).scatter, RadixSort::Strategy::ballot);
+    EXPECT_EQ(tuning_of(device).backward, BackwardBlend::buckets);
+    EXPECT_EQ(result_variants(device), "backward=buckets");
+    EXPECT_EQ(RadixSort(device, 100).strategy(), RadixSort::Strategy::ballot);
+}
+
+TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_pairs) {
+    const auto taken = [](const char* group, const std::vector<TuningTime>& times) {
+        for (const TuningGroup& g : tuning_groups(some_gpu()))
+            if (g.name == group) return fastest_way(g, times);
+        return std::string();
+    };
+    EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.98}}), "subgroup");
+    EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.9}}), "thread");
+    EXPECT_EQ(taken("backward", {{"backward", "subgroup", 1}, {"backward", "buckets", 0.1}}),
+              "subgroup");
+}
+
+TEST_F(Tuner, a_record_is_read_back) {
+    write_tuning(some_gpu(), folder_, record());
+    const auto read = read_tuning(some_gpu(), folder_);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->choice, record().choice);
+    ASSERT_EQ(read->times.size(), 2U);
+    EXPECT_EQ(read->times[1].way, "256x1");
+    EXPECT_EQ(read->times[1].ms, 1.25);
+}
+
+TEST_F(Tuner, a_record_of_another_device_is_none) {
+    write_tuning(some_gpu(), folder_, record());
+    const std::string text = read_text_file(only_file());
+    const auto refused = [&](auto change) {
+        DeviceInfo info = some_gpu();
+        change(info);
+        if (read_tuning(info, folder_)) return false;
+        // Nor where the file has the name that this device's would have.
+        const fs::path file = only_file();
+        write_tuning(info, folder_, record());
+        for (const auto& entry : fs::directory_iterator(folder_))
+            write_file_atomic(entry.path(), text);
+        const bool none = !read_tuning(info, folder_);
+        for (const auto& entry : fs::directory_iterator(folder_))
+            if (entry.path() != file) fs::remove(entry.path());
+        return none;
+    };
+    EXPECT_TRUE(refused([](DeviceInfo& info) { info.name = "Another"; }));
+    EXPECT_TRUE(refused([](DeviceInfo& info) { info.driver = "another"; }));
+    EXPECT_TRUE(refused([](DeviceInfo& info) { info.driver_version += 1; }));
+    EXPECT_TRUE(refused([](DeviceInfo& info) { info.cache_uuid = "00fe"; }));
+    EXPECT_TRUE(refused([](DeviceInfo& info) { info.subgroup_size = 64; }));
+    EXPECT_TRUE(read_tuning(some_gpu(), folder_));
+}
+
+TEST_F(Tuner, a_record_that_was_cut_or_changed_is_none) {
+    write_tuning(some_gpu(), folder_, record());
+    const fs::path file = only_file();
+    const std::string text = read_text_file(file);
+    for (std::size_t size = 0; size + 2 < text.size(); size += 7) {
+        write_file_atomic(file, std::string_view(text).substr(0, size));
+        EXPECT_FALSE(read_tuning(some_gpu(), folder_)) << size << " bytes";
+    }
+    const auto changed = [&](const std::string& from, const std::string& to) {
+        std::string other = text;
+        const std::size_t at = other.find(from);
+        EXPECT_NE(at, std::string::npos) << from;
+        write_file_atomic(file, other.replace(at, from.size(), to));
+        return !read_tuning(some_gpu(), folder_);
+    };
+    EXPECT_TRUE(changed("blend=256x1", "blend=255x1"));
+    EXPECT_TRUE(changed("\"shaders\": \"", "\"shaders\": \"0"));
+    EXPECT_TRUE(changed("\"times\": [", "\"times\": [7,"));
+    EXPECT_TRUE(changed("1.25", "null"));
+}
+
+TEST_F(Tuner, a_folder_that_cannot_be_written_is_no_error) {
+    write_file_atomic(folder_ / "file", std::string_view("x"));
+    write_tuning(some_gpu(), folder_ / "file", record());  // below a file: not even for root
+    EXPECT_FALSE(read_tuning(some_gpu(), folder_ / "file"));
+    write_tuning(some_gpu(), {}, record());
+    EXPECT_FALSE(read_tuning(some_gpu(), {}));
+}
+
+TEST_F(Tuner, a_known_device_is_not_measured_unless_asked) {
+    DeviceOptions options;
+    options.cache_folder = folder_;
+    Device device(options);
+    if (!is_known_device(device.info())) GTEST_SKIP() << "a device that is always measured";
+    std::string said;
+    tune(device, {"", false, [&](const std::string& line) { said += line; }});
+    EXPECT_EQ(said, "");
+    EXPECT_EQ(all_variants(device), default_variants(device.info()));
+    EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+// What is forced wins over DARB_TUNE, that over the record, that over the default.
+TEST_F(Tuner, the_nearest_word_wins) {
+    DeviceOptions options;
+    options.cache_folder = folder_;
+    Device device(options);
+    TuningRecord record{default_variants(device.info()), {}};
+    record.choice["scan"] = ways(device.info(), "scan")[1];
+    record.choice["scatter"] = "ballot";
+    record.choice["backward"] = "buckets";
+    write_tuning(device.info(), folder_, record);
+    const char* before = std::getenv("DARB_TUNE");
+    const std::string kept = before != nullptr ? before : "";
+    ::setenv("DARB_TUNE", "scatter=columns,backward=buckets", 1);
+    tune(device, {"backward=subgroup", false, {}});
+    EXPECT_EQ(device.variants().at("scan"), record.choice["scan"]);
+    EXPECT_EQ(device.variants().at("scatter"), "columns");
+    EXPECT_EQ(device.variants().at("backward"), "subgroup");
+    ::setenv("DARB_TUNE", "no_such=1", 1);
+    EXPECT_THROW(tune(device, {}), Error);
+    if (before != nullptr)
+        ::setenv("DARB_TUNE", kept.c_str(), 1);
+    else
+        ::unsetenv("DARB_TUNE");
+}
+
+// Which way is the fastest is no matter here, only that all were measured and one of each is kept.
+TEST_F(Tuner, retuning_measures_every_way_and_keeps_the_choice_slow) {
+    DeviceOptions options;
+    options.cache_folder = folder_;
+    Device device(options);
+    std::string said;
+    tune(device, {"", true, [&](const std::string& line) { said += line + "\n"; }});
+    EXPECT_NE(said.find("measuring"), std::string::npos);
+    const auto record = read_tuning(device.info(), folder_);
+    ASSERT_TRUE(record);
+    EXPECT_EQ(record->choice, device.variants());
+    std::size_t all = 0;
+    for (const TuningGroup& group : tuning_groups(device.info())) {
+        all += group.ways.size();
+        for (const std::string& way : group.ways) {
+            const auto time =
+                std::find_if(record->times.begin(), record->times.end(),
+                             [&](const auto& t) { return t.group == group.name && t.way == way; });
+            ASSERT_NE(time, record->times.end()) << group.name << "=" << way;
+            EXPECT_GT(time->ms, 0) << group.name << "=" << way;
+        }
+    }
+    EXPECT_EQ(record->times.size(), all);
+    Device next(options);
+    tune(next, {});
+    EXPECT_EQ(next.variants(), record->choice);
+}
+
+}  // namespace
+}  // namespace darb::test
