@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Fuzzes every reader of files with libFuzzer (clang): splat scenes, COLMAP, transforms.json, checkpoints; and, where
+# Fuzzes every reader of files with libFuzzer (clang): splat scenes, photos, COLMAP, transforms.json, checkpoints; and, where
 # the tests are built, the pipeline with random scenes that hold poison (tests/pipeline/scene_fuzz_test.cpp).
 #   tools/fuzz.sh [MINUTES]      of each (default 10; fractions are legal); 0.02 is what the test gate does
 # Seeds: small whole files of every format and version (tests/fuzz/make_seeds.cpp). What is learned stays in
@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-readers="ply compressed_ply dot_splat spz sog splat_file colmap transforms checkpoint"
+readers="ply compressed_ply dot_splat spz sog splat_file photo colmap transforms checkpoint"
 minutes=${1:-10}
 seconds=$(awk -v m="$minutes" 'BEGIN { s = m * 60; print (s < 1 ? 1 : int(s)) }')
 build=build-asan

@@ -28,7 +28,9 @@ build    libnanoflann-dev     nearest neighbours
 build    libfmt-dev           text
 build    libcli11-dev         command line
 build    nlohmann-json3-dev   JSON
-build    libstb-dev           PNG and JPEG
+build    libjpeg-dev          JPEG photos
+build    libpng-dev           PNG photos
+build    libstb-dev           writing PNG and JPEG
 build    zlib1g-dev           checksums and compression
 build    libzstd-dev          SPZ files
 build    libzip-dev           SOG files

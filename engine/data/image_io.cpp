@@ -1,20 +1,17 @@
 #include "engine/data/image_io.h"
 
 #include <fmt/format.h>
-#include <stb/stb_image.h>
 #include <stb/stb_image_write.h>
 
 #include <algorithm>
-#include <cstring>
 #include <fstream>
-#include <limits>
-#include <memory>
 #include <vector>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/exif.h"
+#include "engine/data/photo_decoder.h"
 
 namespace darb {
 
@@ -22,7 +19,6 @@ namespace {
 
 constexpr std::size_t kHeadBytes = std::size_t{1}
                                    << 18;  // EXIF and ICC come before the frame header
-constexpr const char* kReplace = "Replace the file by a PNG or JPEG that an image viewer opens.";
 
 constexpr std::string_view kPhotoExtensions[] = {".png", ".jpg", ".jpeg"};
 constexpr std::string_view kForeignExtensions[] = {".webp", ".tif",  ".tiff",
@@ -33,41 +29,16 @@ bool has_one_of(const std::filesystem::path& path, std::span<const std::string_v
                                [&](std::string_view e) { return has_extension(path, e); });
 }
 
-const stbi_uc* raw(std::span<const std::byte> bytes) {
-    return reinterpret_cast<const stbi_uc*>(bytes.data());
+[[noreturn]] void refuse_picture(std::span<const std::byte> head, const std::string& where) {
+    throw Error(where, head.empty() ? "is empty" : "is no PNG or JPEG", kReplacePhoto);
 }
 
-int length_of(std::span<const std::byte> bytes, const std::string& where) {
-    if (bytes.size() > std::numeric_limits<int>::max())
-        throw Error(where, "is larger than 2 GiB", kReplace);
-    return static_cast<int>(bytes.size());
-}
-
-/// Whether a PNG has a chunk tRNS, which makes one colour transparent; before the first IDAT.
-bool has_transparent_colour(std::span<const std::byte> file) {
-    constexpr std::size_t kSignature = 8, kChunk = 12;  // length, type, checksum
-    constexpr unsigned char kBegin[kSignature] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-    if (file.size() < kSignature || std::memcmp(file.data(), kBegin, kSignature) != 0) return false;
-    for (std::size_t at = kSignature; at + kChunk <= file.size();) {
-        std::size_t length = 0;
-        for (std::size_t i = 0; i < 4; ++i)
-            length = length << 8 | static_cast<std::size_t>(file[at + i]);
-        const std::string_view type(reinterpret_cast<const char*>(&file[at + 4]), 4);
-        if (type == "tRNS") return true;
-        if (type == "IDAT" || length > file.size()) return false;
-        at += kChunk + length;
-    }
-    return false;
-}
-
-bool parse_info(std::span<const std::byte> head, const std::string& where, ImageInfo& info) {
-    info.orientation = exif_orientation(head);
-    if (!stbi_info_from_memory(raw(head), length_of(head, where), &info.width, &info.height,
-                               &info.channels))
-        return false;
-    // stb counts the alpha of a palette alone.
-    if (info.channels % 2 == 1 && has_transparent_colour(head)) ++info.channels;
-    return true;
+/// head: the first part of a file of `bytes` bytes, or all of it.
+PhotoHead photo_head(std::span<const std::byte> head, std::uint64_t bytes,
+                     const std::string& where) {
+    if (is_jpeg(head)) return jpeg_head(head, bytes, where);
+    if (is_png(head)) return png_head(head, bytes, where);
+    refuse_picture(head, where);
 }
 
 void check_picture(const ImageU8& image) {
@@ -83,6 +54,18 @@ void append_bytes(void* context, void* data, int size) {
 }
 
 }  // namespace
+
+void check_photo_claim(std::int64_t width, std::int64_t height, std::uint64_t least,
+                       std::uint64_t bytes, const std::string& where) {
+    const auto refuse = [&](const std::string& why) {
+        throw Error(where, fmt::format("claims {} x {} px, {}", width, height, why), kReplacePhoto);
+    };
+    if (width < 1 || height < 1) refuse("which is no picture");
+    if (std::max(width, height) > kMostPhotoSide || width * height > kMostPhotoPixels)
+        refuse(fmt::format("beyond the limit of {} million", kMostPhotoPixels / 1'000'000));
+    if (least > bytes)
+        refuse(fmt::format("which takes {} bytes at least, but the file has {}", least, bytes));
+}
 
 bool is_photo_name(const std::filesystem::path& path) {
     return has_one_of(path, kPhotoExtensions);
@@ -104,26 +87,24 @@ ImageInfo read_image_info(const std::filesystem::path& path) {
         throw Error(path.string(), "cannot be opened", "Check the path and its permissions.");
     file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
     head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-    ImageInfo info;
-    if (parse_info(head, path.string(), info)) return info;
-    if (head.size() == kHeadBytes && parse_info(read_file(path), path.string(), info)) return info;
-    throw Error(path.string(), "is no PNG or JPEG, or is damaged", kReplace);
+    const std::uint64_t bytes =
+        head.size() < kHeadBytes ? head.size() : std::filesystem::file_size(path);
+    PhotoHead found = photo_head(head, bytes, path.string());
+    if (found.cut) {
+        head = read_file(path);
+        found = photo_head(head, head.size(), path.string());
+    }
+    return {found.width, found.height, found.channels, exif_orientation(head)};
+}
+
+ImageInfo parse_image_info(std::span<const std::byte> file, const std::string& where) {
+    const PhotoHead found = photo_head(file, file.size(), where);
+    return {found.width, found.height, found.channels, exif_orientation(file)};
 }
 
 ImageU8 decode_image(std::span<const std::byte> file, const std::string& where, int orientation) {
-    int width = 0, height = 0, stored = 0;
-    const int length = length_of(file, where);
-    if (!stbi_info_from_memory(raw(file), length, &width, &height, &stored))
-        throw Error(where, "is no PNG or JPEG, or is damaged", kReplace);
-    if (stored % 2 == 1 && has_transparent_colour(file)) ++stored;
-    const int wanted = stored == 2 ? 4 : stored;
-    const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
-        stbi_load_from_memory(raw(file), length, &width, &height, &stored, wanted),
-        stbi_image_free);
-    if (!pixels)
-        throw Error(where, fmt::format("cannot be decoded: {}", stbi_failure_reason()), kReplace);
-    ImageU8 image(width, height, wanted);
-    std::copy_n(pixels.get(), image.data.size(), image.data.begin());
+    if (!is_jpeg(file) && !is_png(file)) refuse_picture(file, where);
+    const ImageU8 image = is_jpeg(file) ? decode_jpeg(file, where) : decode_png(file, where);
     return orient_image(image,
                         orientation == kExifOrientation ? exif_orientation(file) : orientation);
 }

@@ -30,6 +30,7 @@ constexpr int kExifOrientation = 0;  // turn as the file's EXIF says
 
 /// Reads the head of the file only. Throws Error naming the file where it is no PNG or JPEG.
 ImageInfo read_image_info(const std::filesystem::path& path);
+ImageInfo parse_image_info(std::span<const std::byte> file, const std::string& where);
 
 /// 1, 3 or 4 channels, 8 bits (16-bit PNGs lose their low byte; grey with alpha becomes RGBA),
 /// turned by `orientation`, 1 to 8. Throws Error naming the file. Thread-safe.

@@ -14,10 +14,12 @@
 #include "engine/data/camera_list.h"
 #include "engine/data/colmap.h"
 #include "engine/data/colmap_write.h"
+#include "engine/data/image_io.h"
 #include "engine/data/transforms.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/spz_layout.h"
+#include "tests/support/photo_files.h"
 #include "tests/support/random_scene.h"
 #include "trainer/checkpoint.h"
 
@@ -215,6 +217,13 @@ void make_transforms(const fs::path& corpus) {
     write_file_atomic(corpus / "transforms/cameras", list);
 }
 
+void make_photos(const fs::path& corpus) {
+    for (const auto& [name, file] : sample_photos()) {
+        DARB_CHECK(decode_image(file, name).width > 0, "{}", name);
+        write_file_atomic(corpus / "photo" / name, file);
+    }
+}
+
 void make_checkpoints(const fs::path& corpus) {
     for (const int degree : {0, 2}) {
         Checkpoint c;
@@ -244,6 +253,7 @@ int main(int argc, char** argv) {
         darb::test::make_scenes(corpus);
         darb::test::make_colmap(corpus);
         darb::test::make_transforms(corpus);
+        darb::test::make_photos(corpus);
         darb::test::make_checkpoints(corpus);
     } catch (const std::exception& e) {
         fmt::print(stderr, "make_seeds: {}\n", e.what());
