@@ -1,6 +1,6 @@
 // The family of reconstruction kernels in double: the one place where a kernel's maths stands.
 // q = d^2, the squared Mahalanobis distance of a pixel centre under the projected covariance.
-// Source: DARB-Splatting, arXiv 2501.12369, corrected (errata in ARCHITECTURE.md).
+// Source: DARB-Splatting, arXiv 2501.12369, corrected (errata in docs/paper.md).
 #pragma once
 
 #include <optional>

@@ -17,16 +17,16 @@ constexpr double kFocal = 235;        // px
 constexpr double kPointNoise = 1e-3;  // world units, standard deviation
 constexpr double kPointReach = 6;     // world units from the origin; the floor fades out beyond
 
-Camera look_at(const dvec3& eye, const dvec3& target) {
+Camera look_at(const dvec3& eye, const dvec3& target, int scale) {
     const dvec3 forward = glm::normalize(target - eye);
     const dvec3 right = glm::normalize(glm::cross(forward, dvec3(0, 0, 1)));
     const dvec3 down = glm::cross(forward, right);
     Camera camera;
-    camera.width = kWidth;
-    camera.height = kHeight;
-    camera.fx = camera.fy = kFocal;
-    camera.cx = kWidth / 2.0;
-    camera.cy = kHeight / 2.0;
+    camera.width = kWidth * scale;
+    camera.height = kHeight * scale;
+    camera.fx = camera.fy = kFocal * scale;
+    camera.cx = camera.width / 2.0;
+    camera.cy = camera.height / 2.0;
     camera.rotation = glm::transpose(glm::dmat3(right, down, forward));
     camera.translation = -(camera.rotation * eye);
     return camera;
@@ -44,13 +44,14 @@ std::uint8_t to_byte(double linear) {
 }
 
 dvec3 pixel_colour(const World& world, const Camera& camera, int x, int y, Pcg32& rng) {
+    const int samples = std::max(kSamples * kWidth / camera.width, 16);
     dvec3 sum(0.0);
-    for (int i = 0; i < kSamples; ++i) {  // R2 sequence over the pixel
+    for (int i = 0; i < samples; ++i) {  // R2 sequence over the pixel
         const double u = 0.7548776662466927 * (i + 1), v = 0.5698402909980532 * (i + 1);
         const Ray ray = ray_through(camera, x + u - std::floor(u), y + v - std::floor(v));
         sum += glm::min(radiance(world, ray, rng), dvec3(4.0));
     }
-    return sum / static_cast<double>(kSamples);
+    return sum / static_cast<double>(samples);
 }
 
 ImageU8 take_photo(const World& world, const Camera& camera, std::uint64_t seed) {
@@ -71,7 +72,8 @@ PointCloud sample_points(const World& world, const std::vector<View>& views,
     Pcg32 rng(7);
     while (points.size() < kPoints) {
         const std::size_t v = rng.below(static_cast<std::uint32_t>(views.size()));
-        const double x = rng.uniform(0, kWidth), y = rng.uniform(0, kHeight);
+        const double x = rng.uniform(0, views[v].camera.width);
+        const double y = rng.uniform(0, views[v].camera.height);
         const Ray ray = ray_through(views[v].camera, x, y);
         const double t = depth_along(world, ray);
         if (views[v].is_test || t < 0 || glm::length(ray.at(t)) > kPointReach) continue;
@@ -85,7 +87,7 @@ PointCloud sample_points(const World& world, const std::vector<View>& views,
 
 }  // namespace
 
-std::vector<View> camera_path() {
+std::vector<View> camera_path(int scale) {
     std::vector<View> views;
     for (int i = 0; i < kViews; ++i) {
         const double share = static_cast<double>(i) / kViews;
@@ -97,7 +99,7 @@ std::vector<View> camera_path() {
                         0.2 + radius * std::sin(height));
         View view;
         view.name = fmt::format("view_{:02d}.png", i);
-        view.camera = look_at(eye, {0, 0, 0.24});
+        view.camera = look_at(eye, {0, 0, 0.24}, scale);
         view.is_test = i % kTestEvery == kTestOffset;
         views.push_back(view);
     }

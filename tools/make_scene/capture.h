@@ -11,8 +11,8 @@ namespace darb::make_scene {
 constexpr int kViews = 48;
 constexpr int kTestEvery = 6;  // of 6 views one is held out: 8 of 48
 constexpr int kTestOffset = 3;
-constexpr int kWidth = 200, kHeight = 150;  // px
-constexpr int kSamples = 64;                // per pixel
+constexpr int kWidth = 200, kHeight = 150;  // px, of the shipped photos
+constexpr int kSamples = 64;                // per pixel of these; larger photos share them out
 constexpr int kPoints = 4000;
 
 struct Capture {
@@ -20,8 +20,9 @@ struct Capture {
     PointCloud points;
 };
 
-/// One turn and a half around the scene at changing heights; View::is_test marks the held-out ones.
-std::vector<View> camera_path();
+/// Three turns around the scene at changing heights; View::is_test marks the held-out ones. scale
+/// >= 1 multiplies the sides of the photos.
+std::vector<View> camera_path(int scale = 1);
 
 /// Photos (gamma 2.2, 8 bits) and kPoints surface points, evenly spread over the pixels of the
 /// training views, with 1 mm of noise. Uses all cores; the result does not depend on their number.
