@@ -6,7 +6,8 @@
         check=FILE    what `darb check --every-kernel --json FILE` wrote
         quick=FILE    the same of `darb check --json FILE`
         price=FILE    what tools/price_of_determinism.py wrote
-        guards=FILE, kills=FILE, soak=FILE    output of tools/guards.py run, tools/kill_runs.sh, tools/soak.sh
+        guards=FILE, soak=FILE    output of tools/guards.py run, tools/soak.sh
+        hostile=FILE  the hostile.json of tools/hostile.sh
         fuzz=FILE     output of tools/fuzz.sh, of one run or of several behind each other
 """
 
@@ -73,10 +74,10 @@ def guards(text):
     return {"disabled": int(disabled), "unwatched": int(unwatched)}
 
 
-def kills(text):
-    found = re.search(r"^(\d+) of (\d+) kills survived, (\d+) of them with a checkpoint to resume; the scene is the same",
-                      text, re.M)
-    return {"kills": int(found[2]), "survived": int(found[1]), "with_a_checkpoint": int(found[3])}
+def hostile(text):
+    day = json.loads(text)
+    return {"hours": rounded(day["hours"]), "findings": len(day["findings"]), "counts": day["counts"],
+            "of": {name: part["executions"] for name, part in day["parts"].items()}}
 
 
 def soak(text):
@@ -85,7 +86,7 @@ def soak(text):
             "mib_in_the_last_fifth": float(found[4]), "mib_most": float(found[5])}
 
 
-COLLECT = {"check": check, "quick": quick, "price": json.loads, "fuzz": fuzz, "guards": guards, "kills": kills,
+COLLECT = {"check": check, "quick": quick, "price": json.loads, "fuzz": fuzz, "guards": guards, "hostile": hostile,
            "soak": soak}
 
 
@@ -141,9 +142,9 @@ def run_table(figures):
     line("`tools/fuzz.sh`", "fuzz",
          lambda f: f"{f['executions']:,} executions in {f['hours']} h, {f['findings']} findings left: " +
          ", ".join(f"{n} {r['executions']:,}" for n, r in f["of"].items()))
-    line("`tools/kill_runs.sh`", "kills",
-         lambda f: f"{f['survived']} of {f['kills']} kills resumed to the same bytes, {f['with_a_checkpoint']} of them "
-         "from a checkpoint")
+    line("`tools/hostile.sh`", "hostile",
+         lambda f: f"{sum(f['of'].values()):,} executions in {f['hours']} h, {f['findings']} findings left: " +
+         ", ".join(f"{n} {count:,}" for n, count in f["of"].items()))
     line("`tools/soak.sh`", "soak",
          lambda f: f"{f['iterations']:,} iterations: {f['mib_in_the_fourth_fifth']} MiB, "
          f"then {f['mib_in_the_last_fifth']} MiB")
