@@ -145,7 +145,7 @@ GUARDS = [
         const float transmittance""",
      "blend_test", "BlendCases.image_sizes_that_are_no_multiple_of_a_tile_match_double"),
     ("odd image sizes, more than 65,536 tiles", "wide_tile_keys", "engine/raster/forward.cpp",
-     "bits_for(tile_count),", "16,",
+     "bits_for(args.tile_count),", "16,",
      "frame_test", "Frame.more_than_65536_tiles_are_told_apart"),
     ("NaN or infinity in a PLY, points or pose", "finite_splats", "engine/scene/ply.cpp",
      "if (!all_finite(values, columns)) return;", "",

@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "engine/raster/backward.h"
+#include "engine/raster/frame_buffers.h"
+#include "engine/raster/frame_view.h"
 #include "engine/raster/loss.h"
 #include "trainer/densify/density_control.h"
 #include "trainer/densify/error_score.h"
@@ -16,7 +18,8 @@ namespace darb {
 
 namespace {
 
-constexpr std::uint64_t kFewest = 1024;  // splats and pairs that Forward and Backward make room for
+constexpr std::uint64_t kFewest =
+    1024;  // splats and pairs that FrameBuffers and Backward make room for
 
 FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     const auto room = [](std::uint64_t wanted, std::uint64_t most) {
@@ -24,12 +27,12 @@ FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     };
     FrameSize size;
     size.splats = room(std::max(demand.splats, demand.room_splats), 0xFFFFFFFFu);
-    size.pairs = room(demand.pairs, Forward::max_pairs(device));
+    size.intersections = room(demand.pairs, FrameBuffers::max_intersections(device));
     size.pixels = std::uint64_t(demand.width) * demand.height;
     size.tiles = image_tiles(demand.width, demand.height);
     size.list_segments = demand.list_segments;
     size.cooperates = demand.cooperates;
-    size.bucket = Forward::bucket(device, demand.frame);
+    size.bucket = FrameBuffers::bucket(device, demand.frame);
     return size;
 }
 
@@ -77,14 +80,14 @@ std::uint64_t strategy_bytes(const MemoryDemand& demand) {
 
 MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     const FrameSize size = frame_size(device, demand);
-    FrameBytes bytes = Forward::device_bytes(device, demand.frame, size);
+    FrameBytes bytes = FrameBuffers::device_bytes(device, demand.frame, size);
     bytes += Backward::device_bytes(size);
     MemoryPlan plan;
     plan.parameters = GpuSplats::parameter_bytes(demand.splats, demand.sh_degree);
     plan.moments = moment_bytes(demand.splats, demand.sh_degree, false) +
                    rest_sum_bytes(demand.splats, demand.sh_degree, demand.rest_sum);
     plan.frame = bytes.splats;
-    plan.pairs = bytes.pairs;
+    plan.pairs = bytes.intersections;
     plan.photos = demand.photo_pixels * 4;
     plan.images = bytes.images + image_bytes(device, demand);
     plan.effects = effect_bytes(demand) + strategy_bytes(demand);

@@ -9,7 +9,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "engine/raster/forward.h"
+#include "engine/raster/forward_options.h"
 #include "trainer/options.h"
 
 namespace darb {

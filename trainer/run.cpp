@@ -294,7 +294,7 @@ std::string Run::other_way() const {
     return fmt::format(
         ", and so does --tune backward=subgroup, which holds {}, in a run that "
         "starts again",
-        Forward::max_pairs(device_, BackwardBlend::subgroup));
+        FrameBuffers::max_intersections(device_, BackwardBlend::subgroup));
 }
 
 void Run::train(const std::atomic<bool>* stop) {
@@ -356,7 +356,7 @@ void Run::report_memory() {
          fmt::format(
              "frames come near the {} pairs of splats and tiles that this device can hold; a "
              "smaller -r leaves room{}",
-             Forward::max_pairs(device_), other_way()));
+             FrameBuffers::max_intersections(device_), other_way()));
 }
 
 void Run::report_probes() {

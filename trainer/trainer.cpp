@@ -47,7 +47,6 @@ ForwardOptions forward_options(const TrainOptions& options) {
     f.kernel = options.kernel;
     f.footprint = options.footprint;
     set_options(options.accuracy, f);
-    f.sh_stored = options.probe_sh ? 0 : options.sh_degree;
     f.effects = {options.off_centre || options.lens, options.antialias, options.antialias,
                  options.lens, options.near_care};
     f.crowds = options.crowds;
@@ -70,6 +69,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       nearest_(nearest_points(dataset)),
       next_probe_(options.degree_interval()),
       splats_(device, start_model(start, options), true, options.sh_rest_every > 1),
+      buffers_(device, forward_options(options)),
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options), BackwardResult::update),
       loss_(device, largest(dataset, &Camera::width), largest(dataset, &Camera::height),
@@ -112,7 +112,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
         exposure_.emplace(device, static_cast<std::uint32_t>(train_views_.size()), pixels);
     make_strategy(dataset);
     settle_effects(0);
-    forward_.reserve(splats_.count(), splats_.count() * 4, largest(dataset, &Camera::width),
+    buffers_.reserve(splats_.count(), splats_.count() * 4, largest(dataset, &Camera::width),
                      largest(dataset, &Camera::height));
 }
 
@@ -221,7 +221,8 @@ void Trainer::drain() {
 }
 
 void Trainer::reserve_backward() {
-    backward_.reserve(splats_.count(), forward_.pair_capacity(), forward_.checkpoint_records());
+    backward_.reserve(splats_.count(), buffers_.size().intersections,
+                      buffers_.frame().checkpoint_records());
 }
 
 void Trainer::launch(int iteration) {
@@ -230,8 +231,8 @@ void Trainer::launch(int iteration) {
     const int view = view_for(iteration);
     const gpu::CameraData& data = camera_data_of(view);
     const int width = static_cast<int>(data.width), height = static_cast<int>(data.height);
-    const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
-    forward_.reserve(splats_.count(), pairs, width, height);
+    const std::uint32_t pairs = std::max(buffers_.size().intersections, splats_.count() * 4);
+    buffers_.reserve(splats_.count(), pairs, width, height);
     reserve_backward();
     note_memory();
 
@@ -242,36 +243,41 @@ void Trainer::launch(int iteration) {
     AdamStep step = rates(iteration);
     step.clearance = static_cast<float>(options_.clearance * nearest_[view]);
     record(commands, view, iteration, degree_at(iteration), step, flight.loss);
-    commands.copy(forward_.status(), flight.status, sizeof(gpu::FrameStatus));
+    commands.copy(buffers_.frame().counters.status, flight.status, sizeof(gpu::FrameStatus));
     commands.submit();
+}
+
+FrameView Trainer::frame_view(int view, int degree, const glm::vec3& background) const {
+    return {camera_data_of(view), &cameras_now(), static_cast<std::uint32_t>(view), degree,
+            background};
 }
 
 void Trainer::record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
                      const Buffer& loss) {
-    const gpu::CameraData& data = camera_data_of(view);
-    const Buffer &cameras = cameras_now(), &photo_pixels = pixels_of_photo(view);
-    const auto index = static_cast<std::uint32_t>(view);
+    const FrameView seen = frame_view(view, degree, background_for(iteration));
+    const gpu::CameraData& data = seen.camera;
+    const Buffer& photo_pixels = pixels_of_photo(view);
     const std::uint32_t pixels = data.width * data.height;
     const std::uint32_t photo = photo_of(view);
-    const glm::vec3 behind = background_for(iteration);
-    forward_.record(commands, splats_, cameras, index, data, degree, behind);
-    if (exposure_) exposure_->record(commands, forward_.image(), photo, pixels);
-    const Buffer& compared = exposure_ ? exposure_->mapped() : forward_.image();
+    Frame& frame = buffers_.frame();
+    const Buffer& image = frame.images.image;
+    forward_.record(commands, splats_, seen, frame);
+    if (exposure_) exposure_->record(commands, image, photo, pixels);
+    const Buffer& compared = exposure_ ? exposure_->mapped() : image;
     if (scores(iteration))
-        score_->record(commands, forward_, backward_, compared, photo_pixels, d_image_,
-                       splats_.count(), data, behind);
-    loss_.record(commands, compared, photo_pixels, d_image_, loss, 0, static_cast<int>(data.width),
-                 static_cast<int>(data.height), behind, options_.lambda_dssim);
+        score_->record(commands, seen, frame, backward_, {compared, photo_pixels, d_image_},
+                       splats_.count());
+    loss_.record(commands, {compared, photo_pixels, d_image_, loss}, static_cast<int>(data.width),
+                 static_cast<int>(data.height), seen.background, options_.lambda_dssim);
     if (exposure_) {
         const double t = std::clamp(double(iteration) / options_.iterations, 0.0, 1.0);
         const double rate = options_.exposure_lr_init *
                             std::pow(options_.exposure_lr_final / options_.exposure_lr_init, t);
         const int visits = (iteration - 1) / static_cast<int>(train_views_.size()) + 1;
-        exposure_->record_backward(commands, forward_.image(), d_image_, forward_.status(), photo,
-                                   pixels, static_cast<float>(rate), visits);
+        exposure_->record_backward(commands, image, d_image_, frame.counters.status, photo, pixels,
+                                   static_cast<float>(rate), visits);
     }
-    backward_.record(commands, forward_, splats_, d_image_, cameras, index, data, degree, behind,
-                     step);
+    backward_.record(commands, seen, frame, splats_, d_image_, step);
     if (mcmc_) record_noise(commands, iteration);
 }
 
@@ -289,7 +295,7 @@ gpu::FrameStatus Trainer::finish(Flight& flight) {
     counters_.longest_list = std::max(counters_.longest_list, status.longest_list);
     counters_.huge_splats = std::max(counters_.huge_splats, status.huge_splats);
     counters_.most_pairs = std::max(counters_.most_pairs, status.pairs);
-    forward_.note_crowds(status);
+    buffers_.note_status(status);
     check_gradients(iteration, status);
     for (const PassTime& pass : flight.commands.pass_times()) {
         const auto known = std::find_if(pass_totals_.begin(), pass_totals_.end(),
@@ -322,7 +328,7 @@ void Trainer::settle(Flight& flight) {
         do {
             counters_.overflows += status.overflow != 0 ? 1 : 0;
             ++counters_.redone_iterations;
-            forward_.make_room(status, [this] { reserve_backward(); });
+            buffers_.make_room(status, [this] { reserve_backward(); });
             launch(i);
             status = finish(flights_[i & 1]);
         } while (status.overflow != 0);
@@ -349,7 +355,7 @@ void Trainer::density_control(int iteration) {
         gpu::DensifyArgs args{};
         const std::uint32_t within_memory = splats_within_memory();
         const bool pairs_are_near =
-            counters_.most_pairs > kMostPairs * Forward::max_pairs(*device_);
+            counters_.most_pairs > kMostPairs * FrameBuffers::max_intersections(*device_);
         if (pairs_are_near && stopped_by_pairs_ == 0) stopped_by_pairs_ = splats_.count();
         const std::uint32_t limit =
             std::min({options_.max_splats, within_memory,
@@ -400,20 +406,22 @@ std::map<std::string, ColourMap> Trainer::exposures() {
 
 ImageF Trainer::render(const Camera& camera) {
     drain();
-    const gpu::CameraData data = camera_data(camera, splats_.origin());
-    const Buffer cameras = upload_cameras(*device_, {data});
+    FrameView view{camera_data(camera, splats_.origin()), nullptr, 0, sh_degree(), background_};
+    const Buffer cameras = upload_cameras(*device_, {view.camera});
+    view.cameras = &cameras;
+    Frame& frame = buffers_.frame();
     Commands& commands = flights_[0].commands;
-    const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
-    forward_.reserve(splats_.count(), pairs, camera.width, camera.height);
+    const std::uint32_t pairs = std::max(buffers_.size().intersections, splats_.count() * 4);
+    buffers_.reserve(splats_.count(), pairs, camera.width, camera.height);
     average_.swap(splats_);
     do {
         commands.begin();
-        forward_.record(commands, splats_, cameras, 0, data, sh_degree(), background_);
+        forward_.record(commands, splats_, view, frame);
         commands.submit_and_wait();
-    } while (forward_.make_room(forward_.read_status(), [this] { reserve_backward(); }));
+    } while (buffers_.make_room(frame.read_status(), [this] { reserve_backward(); }));
     average_.swap(splats_);
     return planes_to_image(
-        forward_.image().download<float>(size_t(camera.width) * camera.height * 3), camera.width,
+        frame.images.image.download<float>(size_t(camera.width) * camera.height * 3), camera.width,
         camera.height);
 }
 
@@ -446,8 +454,6 @@ void Trainer::restore(const State& s) {
     drain();
     splats_ = GpuSplats();  // first, so that there are never two
     splats_ = GpuSplats(*device_, s.model, true, options_.sh_rest_every > 1);
-    forward_.set_sh_stored(s.model.sh_degree);
-    backward_.set_sh_stored(s.model.sh_degree);
     if (s.next_probe > 0) next_probe_ = s.next_probe;
     if (smoothing_) {
         update_smoothing();

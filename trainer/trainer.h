@@ -16,6 +16,7 @@
 #include "engine/data/dataset.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
 #include "engine/raster/loss.h"
 #include "trainer/densify/density_control.h"
 #include "trainer/densify/error_score.h"
@@ -149,10 +150,11 @@ class Trainer {
     };
     int view_for(int iteration);
     int degree_at(int iteration) const;
-    void reserve_backward();  // beside forward_
+    void reserve_backward();  // as buffers_
     void launch(int iteration);
     void record(Commands& commands, int view, int iteration, int degree, const AdamStep& step,
                 const Buffer& loss);
+    FrameView frame_view(int view, int degree, const glm::vec3& background) const;
     std::uint32_t photo_of(int view) const;  // its index among the training photos
     void settle_effects(int iteration);
     void update_smoothing();
@@ -203,6 +205,7 @@ class Trainer {
     float probe_rate_ = 1;          // share of all rates while a probe runs
 
     GpuSplats splats_;
+    FrameBuffers buffers_;
     Forward forward_;
     Backward backward_;
     Loss loss_;

@@ -86,20 +86,22 @@ double Trainer::photo_psnr(int view) {
     Flight& flight = flights_[0];
     const gpu::CameraData& data = camera_data_of(view);
     const int width = static_cast<int>(data.width), height = static_cast<int>(data.height);
-    forward_.reserve(splats_.count(), std::max(forward_.pair_capacity(), splats_.count() * 4),
+    Frame& frame = buffers_.frame();
+    buffers_.reserve(splats_.count(), std::max(frame.size.intersections, splats_.count() * 4),
                      width, height);
     do {
         flight.commands.begin();
-        forward_.record(flight.commands, splats_, cameras_now(), static_cast<std::uint32_t>(view),
-                        data, sh_degree(), background_);
+        forward_.record(flight.commands, splats_, frame_view(view, sh_degree(), background_),
+                        frame);
         if (exposure_)
-            exposure_->record(flight.commands, forward_.image(), photo_of(view),
+            exposure_->record(flight.commands, frame.images.image, photo_of(view),
                               data.width * data.height);
-        loss_.record(flight.commands, exposure_ ? exposure_->mapped() : forward_.image(),
-                     pixels_of_photo(view), d_image_, flight.loss, 0, width, height, background_,
-                     options_.lambda_dssim);
+        loss_.record(flight.commands,
+                     {exposure_ ? exposure_->mapped() : frame.images.image, pixels_of_photo(view),
+                      d_image_, flight.loss},
+                     width, height, background_, options_.lambda_dssim);
         flight.commands.submit_and_wait();
-    } while (forward_.make_room(forward_.read_status(), [this] { reserve_backward(); }));
+    } while (buffers_.make_room(frame.read_status(), [this] { reserve_backward(); }));
     gpu::LossResult loss;
     std::memcpy(&loss, flight.loss.mapped(), sizeof loss);
     const double mse = double(loss.mse) / std::max(double(loss.weight), 1e-12);

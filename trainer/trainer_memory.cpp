@@ -9,10 +9,10 @@ namespace darb {
 
 MemoryDemand Trainer::memory_demand() const {
     MemoryDemand demand = demand_;
-    const FrameSize& size = forward_.size();
+    const FrameSize& size = buffers_.size();
     demand.splats = splats_.count();
     demand.room_splats = size.splats;
-    demand.pairs = size.pairs;
+    demand.pairs = size.intersections;
     demand.list_segments = size.list_segments;
     demand.cooperates = size.cooperates;
     demand.sh_degree = splats_.sh_degree();
@@ -26,10 +26,10 @@ MemoryDemand Trainer::memory_demand() const {
 
 // Looked at before each iteration, planned where something has changed.
 void Trainer::note_memory() {
-    const FrameSize& size = forward_.size();
+    const FrameSize& size = buffers_.size();
     const std::array<std::uint64_t, 6> now{
-        splats_.count(),    size.pairs,      std::uint64_t(splats_.sh_degree()),
-        size.list_segments, size.cooperates, std::uint64_t(divisor_)};
+        splats_.count(),    size.intersections, std::uint64_t(splats_.sh_degree()),
+        size.list_segments, size.cooperates,    std::uint64_t(divisor_)};
     if (now == noted_) return;
     noted_ = now;
     planned_bytes_ = std::max(planned_bytes_, plan_memory(*device_, memory_demand()).total());

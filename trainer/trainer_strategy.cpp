@@ -63,8 +63,8 @@ void Trainer::record_noise(Commands& commands, int iteration) {
     const double rate =
         options_.noise_lr * position_rate(iteration) * kNoiseExtent * kNoiseExtent / extent_;
     Pcg32 random(options_.seed, 0x6E6F697Eull << 32 | static_cast<std::uint32_t>(iteration));
-    mcmc_->record_noise(commands, splats_, forward_.status(), static_cast<float>(rate),
-                        options_.prune_opacity, random.next());
+    mcmc_->record_noise(commands, splats_, buffers_.frame().counters.status,
+                        static_cast<float>(rate), options_.prune_opacity, random.next());
 }
 
 const gpu::CameraData& Trainer::camera_data_of(int view) const {

@@ -133,7 +133,6 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
     set_options(key.accuracy, options);
     options.kernel = key.kernel;
     options.footprint = key.footprint;
-    options.sh_stored = key.sh_stored;
     options.effects = key.effects;
     options.crowds = key.crowds;
     options.store_for_backward = key.store;
@@ -167,19 +166,21 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
     return key;
 }
 
-Forward& SplatPicture::forward_for(const GpuSplats& splats, const DisplaySettings& display,
-                                   bool moving) {
+SplatPicture::Slot& SplatPicture::slot_for(const GpuSplats& splats, const DisplaySettings& display,
+                                           bool moving) {
     const Key key = key_for(display, moving);
     const int degree = std::min(display.sh_degree, splats.sh_degree());
     Slot& slot = slots_[moving ? 1 : 0];
     const bool same = slot.forward && key == slot.key;
     compiled_ |= !same || slot.degree != degree;
     slot.degree = degree;
-    if (same) return *slot.forward;
+    if (same) return slot;
+    slot.buffers.reset();
     slot.forward.reset();
+    slot.buffers.emplace(*device_, options_for(key));
     slot.forward.emplace(*device_, options_for(key));
     slot.key = key;
-    return *slot.forward;
+    return slot;
 }
 
 bool SplatPicture::ready_to_move(const DisplaySettings& display) const {
@@ -211,7 +212,10 @@ void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
                           const PhotoOverlay& photo, std::optional<double> moving) {
     compiled_ = false;
     const GpuSplats& shown = moving ? some_styled(display.style, *moving) : styled(display.style);
-    Forward& forward = forward_for(shown, display, moving.has_value());
+    Slot& slot = slot_for(shown, display, moving.has_value());
+    Forward& forward = *slot.forward;
+    FrameBuffers& buffers = *slot.buffers;
+    Frame& frame = buffers.frame();
     Camera camera = seen;
     if (!display.effects.lens) camera.lens = {};
     const bool is_halved =
@@ -219,54 +223,49 @@ void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
     const Camera rendered = is_halved ? halved(camera) : camera;
     compiled_ |= is_halved && !upsample_;
     if (is_halved && !upsample_) upsample_.emplace(*device_);
-    const gpu::CameraData data = camera_data(rendered, shown.origin(), display.near_plane);
-    const int degree = std::min(display.sh_degree, shown.sh_degree());
-    forward.before_blend = nullptr;
-    glm::vec3 background = display.background;
-    if (display.mode == VIEW_DEPTH) {
-        background = glm::vec3(0.0f);
-        forward.before_blend = depth_colours(forward, camera, shown.count());
-    }
+    const bool depth = display.mode == VIEW_DEPTH;
+    const FrameView view{camera_data(rendered, shown.origin(), display.near_plane),
+                         &exchange_.cameras(), 0, std::min(display.sh_degree, shown.sh_degree()),
+                         depth ? glm::vec3(0.0f) : display.background};
     const std::uint64_t bytes = std::uint64_t(camera.width) * camera.height * 4;
     if (pixels_.bytes() < bytes) pixels_ = Buffer(*device_, "pixels", bytes);
-    const std::uint32_t pairs = std::max(forward.pair_capacity(),
-                                         std::min(shown.count() * 2, Forward::max_pairs(*device_)));
-    forward.reserve(shown.count(), pairs, rendered.width, rendered.height);
+    const std::uint32_t pairs =
+        std::max(frame.size.intersections,
+                 std::min(shown.count() * 2, FrameBuffers::max_intersections(*device_)));
+    buffers.reserve(shown.count(), pairs, rendered.width, rendered.height);
     do {
         commands_.begin();
-        exchange_.send(commands_, data);
-        forward.record(commands_, shown, exchange_.cameras(), 0, data, degree, background);
-        const Buffer& image = is_halved
-                                  ? upsample_->record(commands_, forward.image(), rendered, camera)
-                                  : forward.image();
-        record_display(forward, image, camera, display, photo);
-        exchange_.fetch(commands_, forward.status());
+        exchange_.send(commands_, view.camera);
+        forward.record_intersections(commands_, shown, view, frame);
+        if (depth) record_depth_colours(frame.splats, camera, shown.count());
+        forward.record_blend(commands_, view, frame);
+        const Buffer& image =
+            is_halved ? upsample_->record(commands_, frame.images.image, rendered, camera)
+                      : frame.images.image;
+        record_display(frame, image, camera, display, photo);
+        exchange_.fetch(commands_, frame.counters.status);
         commands_.submit_and_wait();
         status_ = exchange_.status();
-    } while (forward.make_room(status_));
+    } while (buffers.make_room(status_));
     pass_times_ = commands_.pass_times();
     width_ = camera.width;
     height_ = camera.height;
 }
 
-std::function<void(Commands&)> SplatPicture::depth_colours(const Forward& forward,
-                                                           const Camera& camera,
-                                                           std::uint32_t splats) {
+void SplatPicture::record_depth_colours(const ProjectedSplats& projected, const Camera& camera,
+                                        std::uint32_t splats) {
+    if (splats == 0) return;
     const double depth =
         glm::dot(glm::transpose(camera.rotation)[2], bounds_.centre - camera.centre());
     const gpu::DepthLightArgs args{splats,
                                    static_cast<float>(std::max(0.0, depth - 1.5 * bounds_.radius)),
                                    static_cast<float>(std::max(depth, 0.0) + 1.5 * bounds_.radius)};
-    return [this, args, &forward](Commands& commands) {
-        if (args.splat_count == 0) return;
-        commands.pass("depth colours");
-        const Groups g = groups_for(args.splat_count);
-        commands.dispatch(depth_light_, args, {forward.splat_bound(), forward.splat_light()}, g.x,
-                          g.y);
-    };
+    commands_.pass("depth colours");
+    const Groups g = groups_for(splats);
+    commands_.dispatch(depth_light_, args, {projected.bound, projected.light}, g.x, g.y);
 }
 
-void SplatPicture::record_display(const Forward& forward, const Buffer& image, const Camera& camera,
+void SplatPicture::record_display(const Frame& frame, const Buffer& image, const Camera& camera,
                                   const DisplaySettings& display, const PhotoOverlay& photo) {
     gpu::DisplayArgs args{};
     args.width = static_cast<std::uint32_t>(camera.width);
@@ -294,8 +293,8 @@ void SplatPicture::record_display(const Forward& forward, const Buffer& image, c
     commands_.pass("display");
     const Groups g = groups_for(std::uint64_t(args.width) * args.height, VIEW_GROUP);
     commands_.dispatch(pipeline, args,
-                       {image, has_photo ? *photo.photo : no_photo_, forward.tile_range(),
-                        forward.last_pair(), pixels_},
+                       {image, has_photo ? *photo.photo : no_photo_, frame.intersections.tile_range,
+                        frame.images.last_pair, pixels_},
                        g.x, g.y);
 }
 

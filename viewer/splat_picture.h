@@ -9,6 +9,7 @@
 
 #include "engine/core/image.h"
 #include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
 #include "engine/render/frame_exchange.h"
 #include "engine/render/upsample.h"
 #include "viewer/bounds.h"
@@ -71,10 +72,10 @@ class SplatPicture {
     const GpuSplats* splats() const { return live_ ? live_ : own_ ? &*own_ : nullptr; }
     const GpuSplats& styled(SplatStyle style);
     const GpuSplats& some_styled(SplatStyle style, double share);
-    Forward& forward_for(const GpuSplats& splats, const DisplaySettings& display, bool moving);
-    std::function<void(Commands&)> depth_colours(const Forward& forward, const Camera& camera,
-                                                 std::uint32_t splats);
-    void record_display(const Forward& forward, const Buffer& image, const Camera& camera,
+    // The splats' colours become their depths, between the two steps of a frame.
+    void record_depth_colours(const ProjectedSplats& projected, const Camera& camera,
+                              std::uint32_t splats);
+    void record_display(const Frame& frame, const Buffer& image, const Camera& camera,
                         const DisplaySettings& display, const PhotoOverlay& photo);
 
     struct Key {  // what a Forward is built for
@@ -86,6 +87,13 @@ class SplatPicture {
         bool ellipsoids = false, store = false, depth = false;
         bool operator==(const Key&) const = default;
     };
+    struct Slot {
+        std::optional<FrameBuffers> buffers;
+        std::optional<Forward> forward;
+        Key key;
+        int degree = -1;  // of the last picture: it has a pipeline of its own
+    };
+    Slot& slot_for(const GpuSplats& splats, const DisplaySettings& display, bool moving);
     Key key_for(const DisplaySettings& display, bool moving) const;
     static ForwardOptions options_for(const Key& key);
 
@@ -102,11 +110,6 @@ class SplatPicture {
     std::vector<std::uint32_t> important_;
     std::vector<std::uint8_t> removed_;
     Bounds bounds_;
-    struct Slot {
-        std::optional<Forward> forward;
-        Key key;
-        int degree = -1;  // of the last picture: it has a pipeline of its own
-    };
     std::array<Slot, 2> slots_;  // at rest, moving
     Buffer pixels_, no_photo_;
     int width_ = 0, height_ = 0;

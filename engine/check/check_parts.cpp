@@ -180,7 +180,7 @@ std::vector<Row> check_loss(Device& device) {
     Loss loss(device, kWidth, kHeight);
     Commands commands(device);
     commands.begin();
-    loss.record(commands, rendered, ground, d_image, result, 0, kWidth, kHeight, glm::vec3(0));
+    loss.record(commands, {rendered, ground, d_image, result}, kWidth, kHeight, glm::vec3(0));
     commands.submit_and_wait();
     const auto got = result.download<gpu::LossResult>(1)[0];
     const auto d = d_image.download<float>(kPixels * 3);

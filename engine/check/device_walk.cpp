@@ -14,7 +14,6 @@ ForwardOptions forward_options(const SplatModel& model, const WalkSettings& sett
     options.depth_order = settings.depth_order;
     options.alpha_cutoff = settings.alpha_cutoff;
     options.transmittance_stop = settings.transmittance_stop;
-    options.sh_stored = model.sh_degree;
     options.store_for_backward = settings.depth_order != DEPTH_ORDER_PIXEL;
     options.effects.antialias = model.antialias;
     return options;
@@ -35,32 +34,34 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
     options.effects.lens = camera.lens.active;
     const int degree = std::min(settings.sh_degree, model.sh_degree);
     GpuSplats splats(device, model, true);
+    FrameBuffers buffers(device, options);
     Forward forward(device, options);
     Backward backward(device, options, BackwardResult::store_gradient);
-    const gpu::CameraData data = camera_data(camera, model.origin);
-    const Buffer cameras = upload_cameras(device, {data});
+    FrameView view{camera_data(camera, model.origin), nullptr, 0, degree, settings.background};
+    const Buffer cameras = upload_cameras(device, {view.camera});
+    view.cameras = &cameras;
+    Frame& frame = buffers.frame();
     const size_t floats = size_t(camera.width) * camera.height * 3;
     Buffer d_planes(device, "d_image", floats * sizeof(float));
     if (!d_image.data.empty()) d_planes.upload(to_planes(d_image));
-    forward.reserve(splats.count(), settings.pairs, camera.width, camera.height);
+    buffers.reserve(splats.count(), settings.pairs, camera.width, camera.height);
 
     Commands commands(device);
     DeviceWalk walk;
     for (;;) {
-        if (!d_image.data.empty()) backward.reserve(splats.count(), forward.pair_capacity());
+        if (!d_image.data.empty()) backward.reserve(splats.count(), frame.size.intersections);
         commands.begin();
-        forward.record(commands, splats, cameras, 0, data, degree, settings.background);
+        forward.record(commands, splats, view, frame);
         if (!d_image.data.empty())
-            backward.record(commands, forward, splats, d_planes, cameras, 0, data, degree,
-                            settings.background, AdamStep{});
+            backward.record(commands, view, frame, splats, d_planes, AdamStep{});
         commands.submit_and_wait();
-        walk.status = forward.read_status();
-        if (!forward.make_room(walk.status)) break;
+        walk.status = frame.read_status();
+        if (!buffers.make_room(walk.status)) break;
     }
     walk.image =
-        planes_to_image(forward.image().download<float>(floats), camera.width, camera.height);
+        planes_to_image(frame.images.image.download<float>(floats), camera.width, camera.height);
     if (splats.count() > 0)
-        walk.pair_count = forward.pair_count().download<std::uint32_t>(splats.count());
+        walk.pair_count = frame.splats.intersection_count.download<std::uint32_t>(splats.count());
     if (d_image.data.empty()) return walk;
     for (int a = 0; a < kAttributeCount; ++a) {
         const size_t n = size_t{splats.count()} * splats.stride(a);

@@ -159,7 +159,6 @@ FrameAccuracy frame_accuracy(const Accuracy& accuracy, const SplatModel& model) 
     frame.halved = accuracy.value(kRenderScale) < 1;
     frame.options.kernel = model.kernel;
     frame.options.footprint = frame.footprint;
-    frame.options.sh_stored = model.sh_degree;
     frame.options.effects.antialias = model.antialias;
     return frame;
 }

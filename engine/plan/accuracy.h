@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "engine/raster/forward.h"
+#include "engine/raster/forward_options.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -70,7 +70,7 @@ struct FrameAccuracy {
     Footprint footprint = Footprint::psi;
     int sh_degree = 0;       // in use, at most the model's
     bool halved = false;     // rendered at half the size and upsampled
-    ForwardOptions options;  // kernel and sh_stored are the model's
+    ForwardOptions options;  // the kernel is the model's
 };
 FrameAccuracy frame_accuracy(const Accuracy& accuracy, const SplatModel& model);
 

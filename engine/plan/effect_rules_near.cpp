@@ -11,7 +11,7 @@
 
 #include "engine/plan/effect_plan.h"
 #include "engine/plan/effect_rules.h"
-#include "engine/raster/forward.h"
+#include "engine/raster/frame_view.h"
 
 namespace darb {
 

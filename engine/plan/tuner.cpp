@@ -141,30 +141,33 @@ std::string fastest_way(const TuningGroup& group, const std::vector<TuningTime>&
 
 TuningFrame::TuningFrame(Device& device)
     : splats_(device, tuning_scene(size_for(device.info())), false),
+      buffers_(device, tuning_options()),
       forward_(device, tuning_options()),
       backward_(device, tuning_options()),
-      data_(camera_data(tuning_camera(size_for(device.info())), splats_.origin())),
-      cameras_(upload_cameras(device, {data_})),
-      d_image_(device, "d_image", std::uint64_t{data_.width} * data_.height * 12),
+      view_{camera_data(tuning_camera(size_for(device.info())), splats_.origin())},
+      cameras_(upload_cameras(device, {view_.camera})),
+      d_image_(device, "d_image", std::uint64_t{view_.camera.width} * view_.camera.height * 12),
       commands_(device),
       has_timestamps_(device.info().timestamp_period_ns > 0) {
-    d_image_.upload(std::vector<float>(std::size_t{data_.width} * data_.height * 3, 0.5f));
-    forward_.reserve(splats_.count(), splats_.count() * 8, static_cast<int>(data_.width),
-                     static_cast<int>(data_.height));
+    const std::uint32_t width = view_.camera.width, height = view_.camera.height;
+    view_.cameras = &cameras_;
+    d_image_.upload(std::vector<float>(std::size_t{width} * height * 3, 0.5f));
+    buffers_.reserve(splats_.count(), splats_.count() * 8, static_cast<int>(width),
+                     static_cast<int>(height));
 }
 
 std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
     using Clock = std::chrono::steady_clock;
     Clock::time_point start;
     do {
-        backward_.reserve(forward_.pair_capacity());
+        backward_.reserve(buffers_.size().intersections);
         commands_.begin();
-        forward_.record(commands_, splats_, cameras_, 0, data_, 0, glm::vec3(0.0f));
+        forward_.record(commands_, splats_, view_, buffers_.frame());
         commands_.pass("blend backward");
-        backward_.record(commands_, forward_, d_image_, data_, glm::vec3(0.0f));
+        backward_.record(commands_, view_, buffers_.frame(), d_image_);
         start = Clock::now();
         commands_.submit_and_wait();
-    } while (forward_.make_room(forward_.read_status()));
+    } while (buffers_.make_room(buffers_.frame().read_status()));
     const std::chrono::duration<double, std::milli> whole = Clock::now() - start;
     std::vector<double> ms(groups.size(), has_timestamps_ ? 0 : whole.count());
     for (const PassTime& pass : commands_.pass_times())

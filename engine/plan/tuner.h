@@ -12,6 +12,8 @@
 #include "engine/gpu/commands.h"
 #include "engine/primitives/tuning.h"
 #include "engine/raster/blend_backward.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
 
 namespace darb {
 
@@ -37,9 +39,10 @@ class TuningFrame {
 
   private:
     GpuSplats splats_;
+    FrameBuffers buffers_;
     Forward forward_;
     BlendBackward backward_;
-    gpu::CameraData data_;
+    FrameView view_;
     Buffer cameras_, d_image_;
     Commands commands_;
     bool has_timestamps_;

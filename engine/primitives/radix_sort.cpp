@@ -116,36 +116,30 @@ void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& val
     scan_->prepare(commands, plan_, offsetof(gpu::RadixPlan, counters));
 
     const int passes = (key_bits + kDigitBits - 1) / kDigitBits;
-    const Buffer* from_keys = &keys;
-    const Buffer* from_values = &values;
-    const Buffer* to_keys = &keys_temp_;
-    const Buffer* to_values = &values_temp_;
+    KeyValues from{&keys, &values}, to{&keys_temp_, &values_temp_};
     if (passes % 2 == 1) {  // start in the scratch buffers, so that the last pass ends in keys
         commands.copy(keys, keys_temp_, bytes);
         if (!iota_values) commands.copy(values, values_temp_, bytes);
-        std::swap(from_keys, to_keys);
-        std::swap(from_values, to_values);
+        std::swap(from, to);
     }
     int done_bits = 0;
     for (int pass = 0; pass < passes; ++pass) {
         // Equal digits: 12 bits as 6 + 6 have fewer counters than 8 + 4.
         const int bits = (key_bits - done_bits + passes - pass - 1) / (passes - pass);
         record_pass(commands, static_cast<std::uint32_t>(done_bits), 1U << bits,
-                    iota_values && pass == 0, *from_keys, *from_values, *to_keys, *to_values);
+                    iota_values && pass == 0, from, to);
         done_bits += bits;
-        std::swap(from_keys, to_keys);
-        std::swap(from_values, to_values);
+        std::swap(from, to);
     }
 }
 
 void RadixSort::record_pass(Commands& commands, std::uint32_t shift, std::uint32_t digits,
-                            bool iota, const Buffer& keys_in, const Buffer& values_in,
-                            const Buffer& keys_out, const Buffer& values_out) {
+                            bool iota, const KeyValues& from, const KeyValues& to) {
     const gpu::RadixPassArgs args{shift, digits};
-    commands.dispatch_indirect(histogram_, args, {plan_, keys_in, histograms_}, plan_, 0);
+    commands.dispatch_indirect(histogram_, args, {plan_, *from.keys, histograms_}, plan_, 0);
     scan_->run(commands, histograms_, histograms_, total_);
     commands.dispatch_indirect(iota ? scatter_iota_ : scatter_, args,
-                               {plan_, histograms_, keys_in, values_in, keys_out, values_out},
+                               {plan_, histograms_, *from.keys, *from.values, *to.keys, *to.values},
                                plan_, 0);
 }
 

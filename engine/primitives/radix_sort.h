@@ -56,9 +56,11 @@ class RadixSort {
     static BufferList<RadixSort> buffers(std::uint32_t capacity, const Shape& shape);
     static std::uint64_t counters(std::uint32_t capacity, const Shape& shape);
     static Shape choose_shape(const Device& device, Strategy strategy, std::uint32_t subgroup_size);
+    struct KeyValues {
+        const Buffer *keys, *values;
+    };
     void record_pass(Commands& commands, std::uint32_t shift, std::uint32_t digits, bool iota,
-                     const Buffer& keys_in, const Buffer& values_in, const Buffer& keys_out,
-                     const Buffer& values_out);
+                     const KeyValues& from, const KeyValues& to);
 
     std::uint32_t capacity_;
     Strategy strategy_;

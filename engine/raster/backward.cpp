@@ -42,28 +42,22 @@ FrameBytes Backward::device_bytes(const FrameSize& size) {
     return bytes;
 }
 
-void Backward::set_sh_stored(int degree) {
-    if (degree != options_.sh_stored) project_.clear();
-    options_.sh_stored = degree;
-}
-
-Pipeline& Backward::project_pipeline(int sh_degree, int rest) {
-    const auto found = project_.find({sh_degree, rest});
+Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int rest) {
+    const std::array<int, 3> key{sh_degree, sh_stored, rest};
+    const auto found = project_.find(key);
     if (found != project_.end()) return found->second;
     SpecConstants constants = kernel_constants(options_);
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
-    constants["SH_STORED"] = options_.sh_stored;
+    constants["SH_STORED"] = sh_stored;
     add_constants(options_.effects, constants);
     constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(blend_.window_pairs());
     constants["UPDATE"] = result_ == BackwardResult::update ? 1 : 0;
     constants["REST"] = rest;
-    return project_
-        .emplace(std::pair(sh_degree, rest), Pipeline(*device_, "project_backward", constants))
-        .first->second;
+    return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;
 }
 
-void Backward::reserve(std::uint32_t splats, std::uint32_t pairs, std::uint32_t records) {
+void Backward::reserve(std::uint32_t splats, std::uint32_t intersections, std::uint32_t records) {
     if (splats > splat_capacity_ || splat_capacity_ == 0) {
         splat_capacity_ = 0;
         splats = std::max(splats, 1024u);
@@ -72,23 +66,23 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t pairs, std::uint32_t 
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
     const std::uint32_t window_pairs = blend_.window_pairs();
-    blend_.reserve(pairs, records);
+    blend_.reserve(intersections, records);
     if (blend_.window_pairs() != window_pairs) project_.clear();
 }
 
-void Backward::record_shares(Commands& commands, const Forward& forward, const Buffer& image,
-                             const gpu::CameraData& data) {
-    blend_.record(commands, forward, image, data, glm::vec3(0));
+void Backward::record_shares(Commands& commands, const FrameView& view, const Frame& frame,
+                             const Buffer& image) {
+    FrameView black = view;
+    black.background = glm::vec3(0);
+    blend_.record(commands, black, frame, image);
 }
 
-void Backward::record(Commands& commands, const Forward& forward, GpuSplats& splats,
-                      const Buffer& d_image, const Buffer& cameras, std::uint32_t camera_index,
-                      const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
-                      const AdamStep& step) {
-    DARB_CHECK(splats.has_moments() && forward.options().store_for_backward, "set up for training");
+void Backward::record(Commands& commands, const FrameView& view, const Frame& frame,
+                      GpuSplats& splats, const Buffer& d_image, const AdamStep& step) {
+    DARB_CHECK(splats.has_moments() && options_.store_for_backward, "set up for training");
     DARB_CHECK(step.rest == REST_EACH || splats.has_rest_sum(), "nothing to gather in");
     commands.pass("blend backward");
-    blend_.record(commands, forward, d_image, data, background);
+    blend_.record(commands, view, frame, d_image);
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
@@ -96,7 +90,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
     for (const SplatRange& range : splats.ranges()) {
         const gpu::ProjectBackwardArgs args{range.first,
                                             range.first + range.count,
-                                            camera_index,
+                                            view.index,
                                             static_cast<float>(LOW_PASS_DEFAULT),
                                             step.position,
                                             step.scale,
@@ -112,9 +106,9 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                                             step.clearance,
                                             1.0f / static_cast<float>(step.rest_every)};
         const Groups g = groups_for(range.count);
-        const int rest = sh_degree > 0 ? step.rest : REST_EACH;  // nothing to step at degree 0
-        commands.dispatch(project_pipeline(sh_degree, rest), args,
-                          {cameras,
+        const int rest = view.sh_degree > 0 ? step.rest : REST_EACH;  // nothing to step at degree 0
+        commands.dispatch(project_pipeline(view.sh_degree, splats.sh_degree(), rest), args,
+                          {*view.cameras,
                            splats.parameters(kPosition),
                            splats.parameters(kLogScale),
                            splats.parameters(kRotation),
@@ -127,8 +121,8 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                            splats.moments(kOpacity),
                            splats.moments(kShDc),
                            splats.rows(splats.moments(kShRest), range),
-                           forward.pair_count(),
-                           forward.pair_begin(),
+                           frame.splats.intersection_count,
+                           frame.splats.first_intersection,
                            blend_.partials(0),
                            blend_.partials(1),
                            blend_.partials(2),
@@ -136,7 +130,7 @@ void Backward::record(Commands& commands, const Forward& forward, GpuSplats& spl
                            blend_.partials(4),
                            blend_.rest(),
                            gradient_sum_,
-                           forward.status(),
+                           frame.counters.status,
                            splats.smoothing(),
                            splats.rows(splats.rest_sum(), range)},
                           g.x, g.y);

@@ -2,12 +2,12 @@
 // frame. blend_backward -> project_backward, which ends in the Adam step or in stored gradients.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <map>
-#include <utility>
 
 #include "engine/raster/blend_backward.h"
-#include "engine/raster/forward.h"
+#include "engine/raster/gpu_splats.h"
 #include "shaders/shared/optim_args.h"
 
 namespace darb {
@@ -39,28 +39,23 @@ class Backward {
   public:
     Backward(Device& device, const ForwardOptions& options, BackwardResult result);
 
-    /// Buffers for so many splats and pairs, and records as BlendBackward::reserve says: never
+    /// Buffers for so many splats and intersections, records as BlendBackward::reserve says: never
     /// shrinks, 0 of any asks for no more. Where there are more splats, gradient_sum() starts at 0.
-    void reserve(std::uint32_t splats, std::uint32_t pairs, std::uint32_t records = 0);
-    /// Device memory beside a Forward of this size.
+    void reserve(std::uint32_t splats, std::uint32_t intersections, std::uint32_t records = 0);
+    /// Device memory beside a frame of this size.
     static FrameBytes device_bytes(const FrameSize& size);
 
     /// d_image: float [3][H][W]. splats must have moments.
-    void record(Commands& commands, const Forward& forward, GpuSplats& splats,
-                const Buffer& d_image, const Buffer& cameras, std::uint32_t camera_index,
-                const gpu::CameraData& data, int sh_degree, const glm::vec3& background,
-                const AdamStep& step);
+    void record(Commands& commands, const FrameView& view, const Frame& frame, GpuSplats& splats,
+                const Buffer& d_image, const AdamStep& step);
 
-    /// The backward blend alone: the pairs' sums of alpha T times the planes of `image`, float
-    /// [3][H][W], where record() leaves those of dL/dcolour. Recorded between Forward::record and
-    /// record(); where lists take several dispatches it leaves another final transmittance.
-    void record_shares(Commands& commands, const Forward& forward, const Buffer& image,
-                       const gpu::CameraData& data);
-    /// Its partials, [K][8] of each pair; the last three are those of the colour.
+    /// The backward blend alone: the intersections' sums of alpha T times the planes of `image`,
+    /// float [3][H][W], where record() leaves those of dL/dcolour. Recorded between Forward::record
+    /// and record(); where lists take several dispatches it leaves another final transmittance.
+    void record_shares(Commands& commands, const FrameView& view, const Frame& frame,
+                       const Buffer& image);
+    /// Its partials, [K][8] of each intersection; the last three are those of the colour.
     const BlendBackward& blend() const { return blend_; }
-
-    /// After the splats' colour buffers changed their degree.
-    void set_sh_stored(int degree);
 
     /// [N][2]: sum of |dL/dmean| in NDC units and the number of frames that saw the splat.
     Buffer& gradient_sum() { return gradient_sum_; }
@@ -68,13 +63,13 @@ class Backward {
 
   private:
     static BufferList<Backward> splat_buffers(std::uint64_t splats);
-    Pipeline& project_pipeline(int sh_degree, int rest);
+    Pipeline& project_pipeline(int sh_degree, int sh_stored, int rest);
 
     Device* device_;
     ForwardOptions options_;
     BackwardResult result_;
     BlendBackward blend_;
-    std::map<std::pair<int, int>, Pipeline> project_;  // by degree and REST_*
+    std::map<std::array<int, 3>, Pipeline> project_;  // by degree, that of the buffers, REST_*
     std::uint32_t splat_capacity_ = 0;
     Buffer gradient_sum_;
 };

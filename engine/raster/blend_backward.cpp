@@ -4,6 +4,7 @@
 
 #include "engine/core/check.h"
 #include "engine/primitives/groups.h"
+#include "engine/raster/forward.h"
 
 namespace darb {
 
@@ -11,27 +12,27 @@ namespace {
 
 constexpr std::uint64_t kPartialBytes = PARTIALS * sizeof(float);
 
-std::uint64_t pairs_of_a_binding(const Device& device) {
+std::uint64_t of_a_binding(const Device& device) {
     return device.info().max_storage_buffer_bytes / kPartialBytes / 8 * 8;  // windows: 256 bytes
 }
 
 }  // namespace
 
 // Several bindings, but one buffer.
-std::uint64_t BlendBackward::max_pairs(const Device& device) {
-    return std::min(pairs_of_a_binding(device) * PARTIAL_WINDOWS,
+std::uint64_t BlendBackward::max_intersections(const Device& device) {
+    return std::min(of_a_binding(device) * PARTIAL_WINDOWS,
                     device.info().max_allocation_bytes / kPartialBytes);
 }
 
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
-    : device_(&device), options_(options), way_(tuning_of(device).backward) {
+    : device_(&device), options_(options), method_(tuning_of(device).backward) {
     make_pipelines(false);
     make_buffers(device, *this, segment_buffers({}), "blend backward");
 }
 
-BufferList<BlendBackward> BlendBackward::pair_buffers(std::uint64_t pairs) {
-    return {{&BlendBackward::partials_, "pair partials", pairs * kPartialBytes},
-            {&BlendBackward::rest_, "pair partials, rest", pairs * 4}};
+BufferList<BlendBackward> BlendBackward::intersection_buffers(std::uint64_t k) {
+    return {{&BlendBackward::partials_, "pair partials", k * kPartialBytes},
+            {&BlendBackward::rest_, "pair partials, rest", k * 4}};
 }
 
 BufferList<BlendBackward> BlendBackward::segment_buffers(const FrameSize& size) {
@@ -45,10 +46,10 @@ BufferList<BlendBackward> BlendBackward::bucket_buffers(std::uint64_t records) {
 
 FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
     FrameBytes bytes;
-    bytes.pairs = charged_bytes(pair_buffers(size.pairs));
+    bytes.intersections = charged_bytes(intersection_buffers(size.intersections));
     bytes.images = charged_bytes(segment_buffers(size));
     if (const std::uint64_t records = size.checkpoint_records(); records > 0)
-        bytes.pairs += charged_bytes(bucket_buffers(records));
+        bytes.intersections += charged_bytes(bucket_buffers(records));
     return bytes;
 }
 
@@ -57,10 +58,10 @@ void BlendBackward::make_pipelines(bool segmented) {
     const std::uint32_t subgroup = add_block_constants(*device_, constants);
     constants["THREADS"] = static_cast<std::int32_t>(subgroup);
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
-    constants["BUCKET"] = static_cast<std::int32_t>(bucket_pairs(*device_));
+    constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
     constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(window_pairs_);
     segmented_ = segmented;
-    if (way_ == BackwardBlend::subgroup) {
+    if (method_ == BackwardBlend::subgroup) {
         blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
         return;
     }
@@ -70,17 +71,17 @@ void BlendBackward::make_pipelines(bool segmented) {
     bucket_behind_ = Pipeline(*device_, "bucket_behind", constants);
 }
 
-// A size is taken note of once its buffers are there, as in Forward.
-void BlendBackward::reserve(std::uint32_t pairs, std::uint32_t records) {
+// A size is taken note of once its buffers are there, as in FrameBuffers.
+void BlendBackward::reserve(std::uint32_t intersections, std::uint32_t records) {
     if (records > 0 && bucket_tile_.bytes() < std::uint64_t{records} * 4)
         make_buffers(*device_, *this, bucket_buffers(records), "blend backward");
-    if (pairs <= pair_capacity_ && pair_capacity_ > 0) return;
-    pair_capacity_ = 0;
-    pairs = std::max(pairs, 1024u);
-    make_buffers(*device_, *this, pair_buffers(pairs), "blend backward");
-    pair_capacity_ = pairs;
-    const std::uint64_t most = pairs_of_a_binding(*device_);
-    if (window_pairs_ > 0 || pair_capacity_ <= most) return;
+    if (intersections <= capacity_ && capacity_ > 0) return;
+    capacity_ = 0;
+    intersections = std::max(intersections, 1024u);
+    make_buffers(*device_, *this, intersection_buffers(intersections), "blend backward");
+    capacity_ = intersections;
+    const std::uint64_t most = of_a_binding(*device_);
+    if (window_pairs_ > 0 || capacity_ <= most) return;
     window_pairs_ = static_cast<std::uint32_t>(most);
     make_pipelines(segmented_);
 }
@@ -92,59 +93,70 @@ BufferRange BlendBackward::partials(std::uint32_t window) const {
     return {partials_, first, std::min(bytes, partials_.bytes() - first)};
 }
 
-void BlendBackward::record(Commands& commands, const Forward& forward, const Buffer& d_image,
-                           const gpu::CameraData& data, const glm::vec3& background) {
-    const std::uint32_t segments = forward.list_segments();
-    DARB_CHECK(forward.pair_capacity() <= pair_capacity_, "{} pairs of {}", forward.pair_capacity(),
-               pair_capacity_);
-    if (segments > 1 && !segmented_) make_pipelines(true);
-    if (segments > 1 && behind_.bytes() < forward.size().pixels * 4)
-        make_buffers(*device_, *this, segment_buffers(forward.size()), "blend backward");
+void BlendBackward::record(Commands& commands, const FrameView& view, const Frame& frame,
+                           const Buffer& d_image) {
+    const FrameSize& size = frame.size;
+    DARB_CHECK(size.intersections <= capacity_, "{} intersections of {}", size.intersections,
+               capacity_);
+    if (size.list_segments > 1 && !segmented_) make_pipelines(true);
+    if (size.list_segments > 1 && behind_.bytes() < size.pixels * 4)
+        make_buffers(*device_, *this, segment_buffers(size), "blend backward");
     commands.fill(partials_, 0);
     commands.fill(rest_, 0);
-    const gpu::BlendArgs args{data.width,   data.height, data.tiles_x, background.r, background.g,
-                              background.b, 0,           segments};
-    if (way_ == BackwardBlend::subgroup)
-        record_subgroup(commands, forward, d_image, args);
+    const gpu::CameraData& camera = view.camera;
+    const gpu::BlendArgs args{camera.width,
+                              camera.height,
+                              camera.tiles_x,
+                              view.background.r,
+                              view.background.g,
+                              view.background.b,
+                              0,
+                              size.list_segments};
+    if (method_ == BackwardBlend::subgroup)
+        record_subgroup(commands, frame, d_image, args);
     else
-        record_buckets(commands, forward, d_image, args);
+        record_buckets(commands, frame, d_image, args);
 }
 
 // Long lists take several dispatches, the last part of every list first.
-void BlendBackward::record_subgroup(Commands& commands, const Forward& forward,
-                                    const Buffer& d_image, gpu::BlendArgs args) {
+void BlendBackward::record_subgroup(Commands& commands, const Frame& frame, const Buffer& d_image,
+                                    gpu::BlendArgs args) {
+    const ProjectedSplats& s = frame.splats;
+    const TileIntersections& t = frame.intersections;
+    const FrameImages& images = frame.images;
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     for (args.segment = args.segments; args.segment-- > 0;)
-        commands.dispatch(blend_, args,
-                          {forward.tile_range(), forward.pair_order(), forward.pair_splat(),
-                           forward.splat_shape(), forward.splat_light(), forward.splat_bound(),
-                           d_image, forward.final_transmittance(), forward.last_pair(), partials(0),
-                           partials(1), partials(2), partials(3), partials(4), rest_, behind_},
-                          args.tiles_x, tiles_y);
+        commands.dispatch(
+            blend_, args,
+            {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape, s.light,
+             s.bound, d_image, images.final_transmittance, images.last_pair, partials(0),
+             partials(1), partials(2), partials(3), partials(4), rest_, behind_},
+            args.tiles_x, tiles_y);
 }
 
-void BlendBackward::record_buckets(Commands& commands, const Forward& forward,
-                                   const Buffer& d_image, gpu::BlendArgs args) {
-    const std::uint32_t records = forward.checkpoint_records();
+void BlendBackward::record_buckets(Commands& commands, const Frame& frame, const Buffer& d_image,
+                                   gpu::BlendArgs args) {
+    const ProjectedSplats& s = frame.splats;
+    const TileIntersections& t = frame.intersections;
+    const FrameImages& images = frame.images;
+    const std::uint32_t records = frame.checkpoint_records();
     DARB_CHECK(records > 0, "the forward pass stores no checkpoints");
-    reserve(pair_capacity_, records);
+    reserve(capacity_, records);
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     const gpu::BucketArgs buckets{args.width, args.height, args.tiles_x, records};
     commands.fill(bucket_tile_, 0);
-    commands.dispatch(bucket_tiles_, buckets, {forward.tile_range(), bucket_tile_}, args.tiles_x,
-                      tiles_y);
+    commands.dispatch(bucket_tiles_, buckets, {t.tile_range, bucket_tile_}, args.tiles_x, tiles_y);
     for (args.segment = args.segments; args.segment-- > 0;)
-        commands.dispatch(bucket_behind_, args,
-                          {forward.tile_range(), d_image, forward.last_pair(),
-                           forward.checkpoints(), behind_, bucket_rest_},
-                          args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
+        commands.dispatch(
+            bucket_behind_, args,
+            {t.tile_range, d_image, images.last_pair, images.checkpoints, behind_, bucket_rest_},
+            args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
     const Groups g = groups_for(records, 1);
-    commands.dispatch(
-        blend_, buckets,
-        {forward.tile_range(), forward.pair_order(), forward.pair_splat(), forward.splat_shape(),
-         forward.splat_light(), forward.splat_bound(), d_image, forward.last_pair(), bucket_tile_,
-         forward.checkpoints(), bucket_rest_, partials_, rest_},
-        g.x, g.y);
+    commands.dispatch(blend_, buckets,
+                      {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape,
+                       s.light, s.bound, d_image, images.last_pair, bucket_tile_,
+                       images.checkpoints, bucket_rest_, partials_, rest_},
+                      g.x, g.y);
 }
 
 }  // namespace darb

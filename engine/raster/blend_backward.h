@@ -1,9 +1,13 @@
-// BlendBackward: from dL/dimage to sums over pixels for each splat-tile pair, in the way that the
-// device's tuning says; recorded after Forward::record of the same frame.
+// BlendBackward: from dL/dimage to sums over pixels for each intersection, by the method that
+// the device's tuning says; recorded after Forward::record of the same frame.
 #pragma once
 
+#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/commands.h"
 #include "engine/primitives/tuning.h"
-#include "engine/raster/forward.h"
+#include "engine/raster/forward_options.h"
+#include "engine/raster/frame.h"
+#include "engine/raster/frame_view.h"
 
 namespace darb {
 
@@ -13,20 +17,20 @@ class BlendBackward {
     /// one that the forward pass was made with.
     BlendBackward(Device& device, const ForwardOptions& options);
 
-    /// Makes the outputs fit; never shrinks. The queue must be idle. records: those of the forward
-    /// pass's checkpoints, for which record() makes room where nobody did.
-    void reserve(std::uint32_t pairs, std::uint32_t records = 0);
-    /// Device memory beside a Forward of this size, once a frame was recorded.
+    /// Makes the outputs fit; never shrinks. The queue must be idle. records: those of the frame's
+    /// checkpoints, for which record() makes room where nobody did.
+    void reserve(std::uint32_t intersections, std::uint32_t records = 0);
+    /// Device memory beside a frame of this size, once one was recorded.
     static FrameBytes device_bytes(const FrameSize& size);
 
     /// d_image: float [3][H][W]. Belongs to the current pass() of commands.
-    void record(Commands& commands, const Forward& forward, const Buffer& d_image,
-                const gpu::CameraData& data, const glm::vec3& background);
+    void record(Commands& commands, const FrameView& view, const Frame& frame,
+                const Buffer& d_image);
 
-    /// Pairs that the buffers below can have, by the device's bindings and its largest buffer.
-    static std::uint64_t max_pairs(const Device& device);
+    /// What the buffers below can hold, by the device's bindings and its largest buffer.
+    static std::uint64_t max_intersections(const Device& device);
 
-    /// What shaders/backward/blend_backward.comp says, in the order of the pairs' slots: float
+    /// What shaders/backward/blend_backward.comp says, in the order of emission: float
     /// [K][8]. Shaders bind PARTIAL_WINDOWS windows of it, as lib/partials.glsl says.
     const Buffer& partials() const { return partials_; }
     BufferRange partials(std::uint32_t window) const;
@@ -34,24 +38,24 @@ class BlendBackward {
     const Buffer& rest() const { return rest_; }  // float [K]
 
   private:
-    static BufferList<BlendBackward> pair_buffers(std::uint64_t pairs);
+    static BufferList<BlendBackward> intersection_buffers(std::uint64_t intersections);
     static BufferList<BlendBackward> segment_buffers(const FrameSize& size);
     static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
     void make_pipelines(bool segmented);
-    void record_subgroup(Commands& commands, const Forward& forward, const Buffer& d_image,
+    void record_subgroup(Commands& commands, const Frame& frame, const Buffer& d_image,
                          gpu::BlendArgs args);
-    void record_buckets(Commands& commands, const Forward& forward, const Buffer& d_image,
+    void record_buckets(Commands& commands, const Frame& frame, const Buffer& d_image,
                         gpu::BlendArgs args);
 
     Device* device_;
     ForwardOptions options_;
-    BackwardBlend way_;
-    Pipeline blend_;                         // of either way
+    BackwardBlend method_;
+    Pipeline blend_;                         // of either method
     Pipeline bucket_tiles_, bucket_behind_;  // of buckets
     bool segmented_ = false;                 // whether the pipelines take segments
     Buffer behind_;                          // pixels' state between their dispatches
     Buffer bucket_tile_, bucket_rest_;       // of buckets
-    std::uint32_t pair_capacity_ = 0, window_pairs_ = 0;
+    std::uint32_t capacity_ = 0, window_pairs_ = 0;
     Buffer partials_, rest_;
 };
 

@@ -109,10 +109,8 @@ gpu::LossArgs Loss::arguments(int width, int height) const {
     return args;
 }
 
-void Loss::record(Commands& commands, const BufferRange& image, const BufferRange& ground_truth,
-                  const BufferRange& d_image, const BufferRange& results,
-                  std::uint32_t result_index, int width, int height, glm::vec3 background,
-                  float lambda) {
+void Loss::record(Commands& commands, const LossBuffers& buffers, int width, int height,
+                  const glm::vec3& background, float lambda) {
     DARB_CHECK(width > 0 && width <= max_width_ && height > 0 && height <= max_height_,
                "{} x {}, made for {} x {}", width, height, max_width_, max_height_);
     const float scale = 1.0f / (3.0f * static_cast<float>(width) * static_cast<float>(height));
@@ -123,10 +121,10 @@ void Loss::record(Commands& commands, const BufferRange& image, const BufferRang
     args.background_g = background.g;
     args.background_b = background.b;
     commands.pass("loss");
-    commands.dispatch(loss_, args, {image, ground_truth, d_image, partial_},
+    commands.dispatch(loss_, args, {buffers.image, buffers.ground_truth, buffers.d_image, partial_},
                       ceil_divide(static_cast<int>(args.works), threads_ / lanes_));
-    const gpu::LossSumArgs sum_args{args.works, result_index, scale};
-    commands.dispatch(sum_, sum_args, {partial_, results}, 1);
+    const gpu::LossSumArgs sum_args{args.works, buffers.result_index, scale};
+    commands.dispatch(sum_, sum_args, {partial_, buffers.results}, 1);
 }
 
 }  // namespace darb

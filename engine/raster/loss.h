@@ -27,6 +27,15 @@ struct LossOptions {
     int columns = 0, rows = 0;
 };
 
+/// What a Loss reads and writes.
+struct LossBuffers {
+    BufferRange image;         // float [3][H][W]
+    BufferRange ground_truth;  // [H][W] R | G << 8 | B << 16 | A << 24, straight alpha
+    BufferRange d_image;       // float [3][H][W]: dL/dimage, every pixel is written
+    BufferRange results;       // gpu::LossResult[], of which result_index is written
+    std::uint32_t result_index = 0;
+};
+
 class Loss {
   public:
     /// For images up to max_width x max_height px. Throws Error where the device's subgroups have
@@ -37,13 +46,10 @@ class Loss {
     static std::uint64_t device_bytes(const Device& device, int max_width, int max_height,
                                       const LossOptions& options = {});
 
-    /// image [3][H][W] float, ground_truth [H][W] R | G << 8 | B << 16 | A << 24 with straight
-    /// alpha, d_image [3][H][W] float: dL/dimage, every pixel is written. results: LossResult[], of
-    /// which result_index is written. Two dispatches under the pass "loss". Where x = y the
-    /// gradient of L1 is 0. Bit-equal from run to run on one device.
-    void record(Commands& commands, const BufferRange& image, const BufferRange& ground_truth,
-                const BufferRange& d_image, const BufferRange& results, std::uint32_t result_index,
-                int width, int height, glm::vec3 background, float lambda = 0.2f);
+    /// Two dispatches under the pass "loss". Where x = y the gradient of L1 is 0. Bit-equal from
+    /// run to run on one device.
+    void record(Commands& commands, const LossBuffers& buffers, int width, int height,
+                const glm::vec3& background, float lambda = 0.2f);
 
     /// The loss itself, from the result of record().
     static double value(const gpu::LossResult& result, double lambda = 0.2) {

@@ -21,7 +21,6 @@ FrameAccuracy frame_of(const SplatModel& model, ForwardOptions options) {
     FrameAccuracy frame = frame_accuracy({}, model);
     options.kernel = frame.options.kernel;
     options.footprint = frame.options.footprint;
-    options.sh_stored = frame.options.sh_stored;
     options.effects.antialias = model.antialias;
     frame.options = options;
     return frame;
@@ -47,6 +46,7 @@ Renderer::Renderer(Device& device, const SplatModel& model, const ForwardOptions
 Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy& accuracy)
     : accuracy_(accuracy),
       splats_(device, model, false),
+      buffers_(device, accuracy_.options),
       forward_(device, accuracy_.options),
       exchange_(device),
       commands_(device) {
@@ -56,24 +56,25 @@ Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy&
 ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int sh_degree,
                         float near_plane) {
     const Camera rendered = accuracy_.halved ? halved(camera) : camera;
-    const gpu::CameraData data = camera_data(rendered, splats_.origin(), near_plane);
     DARB_CHECK(!camera.lens.active || forward_.options().effects.lens, "a lens, not compiled in");
-    camera_ = data;
     const int degree =
         sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
-    const std::uint32_t pairs = std::max(forward_.pair_capacity(), splats_.count() * 4);
-    forward_.reserve(splats_.count(), pairs, rendered.width, rendered.height);
+    view_ = {camera_data(rendered, splats_.origin(), near_plane), &exchange_.cameras(), 0, degree,
+             background};
+    Frame& frame = buffers_.frame();
+    buffers_.reserve(splats_.count(), std::max(frame.size.intersections, splats_.count() * 4),
+                     rendered.width, rendered.height);
     const Buffer* image = nullptr;
     for (;;) {
         commands_.begin();
-        exchange_.send(commands_, data);
-        forward_.record(commands_, splats_, exchange_.cameras(), 0, data, degree, background);
-        image = upsample_ ? &upsample_->record(commands_, forward_.image(), rendered, camera)
-                          : &forward_.image();
-        exchange_.fetch(commands_, forward_.status());
+        exchange_.send(commands_, view_.camera);
+        forward_.record(commands_, splats_, view_, frame);
+        image = upsample_ ? &upsample_->record(commands_, frame.images.image, rendered, camera)
+                          : &frame.images.image;
+        exchange_.fetch(commands_, frame.counters.status);
         commands_.submit_and_wait();
         status_ = exchange_.status();
-        if (!forward_.make_room(status_)) break;
+        if (!buffers_.make_room(status_)) break;
     }
     pass_times_ = commands_.pass_times();
     const size_t floats = size_t(camera.width) * camera.height * 3;
@@ -81,14 +82,15 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
 }
 
 ImageF Renderer::render_depth() {
-    DARB_CHECK(camera_.width > 0, "no picture was rendered before");
-    const int width = static_cast<int>(camera_.width), height = static_cast<int>(camera_.height);
+    DARB_CHECK(view_.camera.width > 0, "no picture was rendered before");
+    const int width = static_cast<int>(view_.camera.width);
+    const int height = static_cast<int>(view_.camera.height);
     commands_.begin();
-    forward_.record_depth(commands_, splats_.count(), camera_);
+    forward_.record_depth(commands_, splats_.count(), view_, buffers_.frame());
     commands_.submit_and_wait();
     pass_times_ = commands_.pass_times();
     const size_t pixels = size_t(width) * height;
-    const auto planes = forward_.image().download<float>(2 * pixels);
+    const auto planes = buffers_.frame().images.image.download<float>(2 * pixels);
     ImageF result(width, height, 2);
     for (size_t p = 0; p < pixels; ++p) {
         const float weight = planes[pixels + p];

@@ -6,6 +6,7 @@
 #include "engine/core/image.h"
 #include "engine/plan/accuracy.h"
 #include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
 #include "engine/render/frame_exchange.h"
 #include "engine/render/upsample.h"
 
@@ -17,8 +18,8 @@ class Renderer {
     /// effects.lens.
     Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {},
              const ProjectionEffects& effects = {}, Crowds crowds = Crowds::by_counters);
-    /// options as they are, but for kernel, footprint, sh_stored and effects.antialias, which are
-    /// the model's.
+    /// options as they are, but for kernel, footprint and effects.antialias, which are the
+    /// model's.
     Renderer(Device& device, const SplatModel& model, const ForwardOptions& options);
 
     /// RGB, not clamped. sh_degree -1: all that the accuracy allows. Grows its buffers and repeats
@@ -40,12 +41,13 @@ class Renderer {
 
     FrameAccuracy accuracy_;
     GpuSplats splats_;
+    FrameBuffers buffers_;
     Forward forward_;
     std::optional<Upsample> upsample_;  // where the resolution is halved
     FrameExchange exchange_;
     Commands commands_;
     gpu::FrameStatus status_{};
-    gpu::CameraData camera_{};  // of the last render
+    FrameView view_;  // of the last render
     std::vector<PassTime> pass_times_;
 };
 

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/raster/blend_backward.h"
+#include "engine/raster/frame_buffers.h"
 #include "engine/raster/frame_limit.h"
 #include "tests/support/device_walk.h"
 #include "tests/support/projected_frame.h"
@@ -18,7 +19,7 @@ namespace {
 
 using Words = std::vector<std::uint32_t>;
 
-struct Frame {
+struct ShownFrame {
     Camera camera;
     gpu::FrameStatus status;
     std::vector<float> image;
@@ -30,24 +31,30 @@ struct Frame {
     }
 };
 
-Frame render_frame(const SplatModel& model, const Camera& camera, std::uint32_t pairs = 200'000) {
+ShownFrame render_frame(const SplatModel& model, const Camera& camera,
+                        std::uint32_t pairs = 200'000) {
     Device& device = shared_device();
     GpuSplats splats(device, model, false);
+    FrameBuffers buffers(device, forward_options(model, {}));
     Forward forward(device, forward_options(model, {}));
-    const gpu::CameraData data = camera_data(camera, model.origin);
-    const Buffer cameras = upload_cameras(device, {data});
-    forward.reserve(splats.count(), pairs, camera.width, camera.height);
+    FrameView view{camera_data(camera, model.origin), nullptr, 0, model.sh_degree,
+                   glm::vec3(0.25f)};
+    const Buffer cameras = upload_cameras(device, {view.camera});
+    view.cameras = &cameras;
+    buffers.reserve(splats.count(), pairs, camera.width, camera.height);
+    Frame& frame = buffers.frame();
     Commands commands(device);
     commands.begin();
-    forward.record(commands, splats, cameras, 0, data, model.sh_degree, glm::vec3(0.25f));
+    forward.record(commands, splats, view, frame);
     commands.submit_and_wait();
-    Frame f{camera, forward.read_status(), {}, {}, {}};
-    f.image = forward.image().download<float>(size_t(camera.width) * camera.height * 3);
-    const size_t tile_count = size_t{data.tiles_x} * data.tiles_y;
-    f.ranges = forward.tile_range().download<glm::uvec2>(tile_count);
-    const std::uint32_t stored = std::min(f.status.pairs, forward.pair_capacity());
-    const Words order = forward.pair_order().download<std::uint32_t>(stored);
-    const Words splat = forward.pair_splat().download<std::uint32_t>(stored);
+    ShownFrame f{camera, frame.read_status(), {}, {}, {}};
+    f.image = frame.images.image.download<float>(size_t(camera.width) * camera.height * 3);
+    const size_t tile_count = size_t{view.camera.tiles_x} * view.camera.tiles_y;
+    const TileIntersections& t = frame.intersections;
+    f.ranges = t.tile_range.download<glm::uvec2>(tile_count);
+    const std::uint32_t stored = std::min(f.status.pairs, frame.size.intersections);
+    const Words order = t.intersection_from_sorted.download<std::uint32_t>(stored);
+    const Words splat = t.splat_from_intersection.download<std::uint32_t>(stored);
     for (const glm::uvec2& range : f.ranges) {
         f.tiles.emplace_back();
         for (std::uint32_t j = range.x; j < range.y; ++j)
@@ -66,7 +73,7 @@ const SceneOptions kScene{.count = 400,
 
 TEST(Frame, lists_match_the_covers_sorted_by_depth_on_the_host) {
     const TestScene s = random_scene(kScene);
-    const Frame f = render_frame(s.model, s.camera);
+    const ShownFrame f = render_frame(s.model, s.camera);
     const ProjectedFrame p = project_on_device(s.model, s.camera);
     Words order;
     for (std::uint32_t i = 0; i < s.model.size(); ++i)
@@ -89,7 +96,7 @@ TEST(Frame, equal_depths_keep_file_order) {
     s.camera.translation = {0, 0, 3};
     for (size_t i = 0; i < s.model.size(); ++i)
         s.model.position[i * 3 + 2] = static_cast<float>(i % 3) * 0.25f;
-    const Frame f = render_frame(s.model, s.camera);
+    const ShownFrame f = render_frame(s.model, s.camera);
     ASSERT_GT(f.status.visible, 200U);
     for (const Words& tile : f.tiles)
         for (size_t j = 1; j < tile.size(); ++j) {
@@ -149,12 +156,12 @@ TEST(Frame, tiles_rendered_apart_equal_the_whole) {
     options.min_log_scale = -5;
     options.max_log_scale = -3.8;
     const TestScene s = random_scene(options);
-    const Frame whole = render_frame(s.model, s.camera);
+    const ShownFrame whole = render_frame(s.model, s.camera);
     Camera part = s.camera;
     part.width = part.height = 32;
     part.cx -= 48;
     part.cy -= 32;
-    const Frame window = render_frame(s.model, part);
+    const ShownFrame window = render_frame(s.model, part);
     std::vector<float> expected;
     for (size_t c = 0; c < 3; ++c)
         for (size_t y = 0; y < 32; ++y)
@@ -164,7 +171,7 @@ TEST(Frame, tiles_rendered_apart_equal_the_whole) {
     EXPECT_TRUE(compare("window", expected, window.image, tolerance("image_float32")));
 }
 
-void expect_background(const Frame& f) {
+void expect_background(const ShownFrame& f) {
     for (const float value : f.image) ASSERT_EQ(value, 0.25f);
     EXPECT_EQ(f.status.visible, 0U);
     EXPECT_EQ(f.status.pairs, 0U);
@@ -189,20 +196,23 @@ TEST(Frame, an_empty_frame_after_a_full_one_is_empty) {
     Device& device = shared_device();
     const TestScene s = random_scene(kScene);
     GpuSplats splats(device, s.model, false);
+    FrameBuffers buffers(device, forward_options(s.model, {}));
     Forward forward(device, forward_options(s.model, {}));
     Camera away = s.camera;
     away.translation.z = -30;
     const std::vector<gpu::CameraData> data = {camera_data(s.camera, {}), camera_data(away, {})};
     const Buffer cameras = upload_cameras(device, data);
-    forward.reserve(splats.count(), 100'000, s.camera.width, s.camera.height);
+    buffers.reserve(splats.count(), 100'000, s.camera.width, s.camera.height);
     Commands commands(device);
     commands.begin();
+    Frame& frame = buffers.frame();
     for (std::uint32_t i = 0; i < 2; ++i)
-        forward.record(commands, splats, cameras, i, data[i], 1, glm::vec3(0.25f));
+        forward.record(commands, splats, {data[i], &cameras, i, 1, glm::vec3(0.25f)}, frame);
     commands.submit_and_wait();
-    EXPECT_EQ(forward.read_status().visible, 0U);
-    EXPECT_EQ(forward.read_status().culled[CULL_NEAR], splats.count());
-    for (const float value : forward.image().download<float>(140 * 90 * 3)) ASSERT_EQ(value, 0.25f);
+    EXPECT_EQ(frame.read_status().visible, 0U);
+    EXPECT_EQ(frame.read_status().culled[CULL_NEAR], splats.count());
+    for (const float value : frame.images.image.download<float>(140 * 90 * 3))
+        ASSERT_EQ(value, 0.25f);
 }
 
 TEST(Frame, one_splat_over_the_whole_image_is_in_every_tile) {
@@ -212,7 +222,7 @@ TEST(Frame, one_splat_over_the_whole_image_is_in_every_tile) {
         s.model.log_scale[c] = 3;
     }
     s.model.opacity[0] = 4;
-    const Frame f = render_frame(s.model, s.camera);
+    const ShownFrame f = render_frame(s.model, s.camera);
     EXPECT_EQ(f.status.pairs, 44U * 32U);
     for (const Words& tile : f.tiles) EXPECT_EQ(tile, Words{0});
     for (size_t i = 0; i < size_t{700} * 500; ++i) ASSERT_NE(f.image[i], 0.25f);
@@ -220,8 +230,9 @@ TEST(Frame, one_splat_over_the_whole_image_is_in_every_tile) {
 
 TEST(Frame, pairs_beyond_the_capacity_raise_the_flag_and_keep_the_rest_in_bounds) {
     TestScene s = random_scene({.count = 500, .width = 300, .height = 200, .sh_degree = 0});
-    const Frame full = render_frame(s.model, s.camera);
-    const Frame cut = render_frame(s.model, s.camera, 1);  // raised to the least capacity, 1,024
+    const ShownFrame full = render_frame(s.model, s.camera);
+    const ShownFrame cut =
+        render_frame(s.model, s.camera, 1);  // raised to the least capacity, 1,024
     ASSERT_GT(full.status.pairs, 2000U);
     EXPECT_EQ(full.status.overflow, 0U);
     EXPECT_EQ(cut.status.overflow, 1U);
@@ -232,7 +243,7 @@ TEST(Frame, pairs_beyond_the_capacity_raise_the_flag_and_keep_the_rest_in_bounds
 
 TEST(Frame, renderer_grows_and_repeats_until_everything_fits) {
     TestScene s = random_scene({.count = 500, .width = 300, .height = 200, .sh_degree = 0});
-    const Frame full = render_frame(s.model, s.camera);
+    const ShownFrame full = render_frame(s.model, s.camera);
     Renderer renderer(shared_device(), s.model);
     const ImageF image = renderer.render(s.camera, glm::vec3(0.25f));
     EXPECT_EQ(renderer.status().overflow, 0U);
@@ -251,22 +262,23 @@ TEST(Frame, a_budget_without_ample_room_gets_the_room_it_needs) {
         status.overflow = OVERFLOW_PAIRS;
         status.pairs = 300'000;
         const auto grown = [&](std::uint32_t budget_pairs) {
-            Forward forward(device, options);
-            forward.reserve(500, 1024, 300, 200);
+            FrameBuffers buffers(device, options);
+            buffers.reserve(500, 1024, 300, 200);
             BlendBackward backward(device, options);
-            if (store) backward.reserve(forward.pair_capacity());
-            const auto bytes = [&](std::uint32_t pairs) {
-                FrameSize size = forward.size();
-                size.pairs = pairs;
-                const std::uint64_t own = Forward::device_bytes(device, options, size).pairs;
-                return store ? own + BlendBackward::device_bytes(size).pairs : own;
+            if (store) backward.reserve(buffers.size().intersections);
+            const auto bytes = [&](std::uint32_t intersections) {
+                FrameSize size = buffers.size();
+                size.intersections = intersections;
+                const std::uint64_t own =
+                    FrameBuffers::device_bytes(device, options, size).intersections;
+                return store ? own + BlendBackward::device_bytes(size).intersections : own;
             };
             device.set_memory_budget(budget_pairs == 0 ? 0
                                                        : device.allocated_bytes() +
                                                              bytes(budget_pairs) - bytes(1024));
-            forward.make_room(status);
-            if (store) backward.reserve(forward.pair_capacity());
-            return forward.pair_capacity();
+            buffers.make_room(status);
+            if (store) backward.reserve(buffers.size().intersections);
+            return buffers.size().intersections;
         };
         EXPECT_EQ(grown(0), 450'000U);
         EXPECT_EQ(grown(460'000), 450'000U);
@@ -296,8 +308,8 @@ TEST(Frame, a_picture_beyond_a_binding_names_its_camera_and_a_resolution) {
     const int width = std::stoi(text.substr(at + 3));
     EXPECT_GT(width, 0.8 * side);
     EXPECT_EQ(refusal(width, static_cast<int>(std::lround(1.5 * width))), "");
-    Forward forward(shared_device(), {});
-    EXPECT_THROW(forward.reserve(1, 1, 2 * side, side), Error);
+    FrameBuffers buffers(shared_device(), {});
+    EXPECT_THROW(buffers.reserve(1, 1, 2 * side, side), Error);
 }
 
 TEST(Frame, pairs_beyond_the_buckets_name_the_way_that_holds_them) {
@@ -308,18 +320,18 @@ TEST(Frame, pairs_beyond_the_buckets_name_the_way_that_holds_them) {
     std::uint32_t most = 0;
     {
         const ScopedVariants variants(device, "backward=subgroup");
-        most = Forward::max_pairs(device);
+        most = FrameBuffers::max_intersections(device);
     }
     const ScopedVariants variants(device, "backward=buckets");
-    ASSERT_LT(Forward::max_pairs(device), most);
-    Forward forward(device, options);
-    forward.reserve(5, 1024, 30, 20);
+    ASSERT_LT(FrameBuffers::max_intersections(device), most);
+    FrameBuffers buffers(device, options);
+    buffers.reserve(5, 1024, 30, 20);
     const auto hint = [&](std::uint32_t pairs) -> std::string {
         gpu::FrameStatus status{};
         status.overflow = OVERFLOW_PAIRS;
         status.pairs = pairs;
         try {
-            forward.make_room(status);
+            buffers.make_room(status);
         } catch (const Error& error) {
             return error.what();
         }
@@ -407,7 +419,7 @@ TEST(Frame, more_than_65536_tiles_are_told_apart) {
         for (size_t c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = -8;
         s.model.opacity[i] = 4;
     }
-    const Frame f = render_frame(s.model, s.camera);
+    const ShownFrame f = render_frame(s.model, s.camera);
     ASSERT_EQ(f.tiles.size(), 65'538U);
     EXPECT_EQ(f.status.visible, 4U);
     EXPECT_EQ(f.tiles.front().size(), 2U);

@@ -65,17 +65,21 @@ TEST_P(KernelGradient, matches_differences_of_the_devices_own_images) {
 
     Device& device = shared_device();
     GpuSplats splats(device, s.model, false);
+    FrameBuffers buffers(device, forward_options(s.model, settings));
     Forward forward(device, forward_options(s.model, settings));
-    const gpu::CameraData data = camera_data(s.camera, s.model.origin);
-    const Buffer cameras = upload_cameras(device, {data});
-    forward.reserve(splats.count(), 1024, o.width, o.height);
+    FrameView view{camera_data(s.camera, s.model.origin), nullptr, 0, 1, settings.background};
+    const Buffer cameras = upload_cameras(device, {view.camera});
+    view.cameras = &cameras;
+    Frame& frame = buffers.frame();
+    buffers.reserve(splats.count(), 1024, o.width, o.height);
     Commands commands(device);
     const auto loss = [&] {
         commands.begin();
-        forward.record(commands, splats, cameras, 0, data, 1, settings.background);
+        forward.record(commands, splats, view, frame);
         commands.submit_and_wait();
-        return weighted_sum(weights, planes_to_image(forward.image().download<float>(16 * 12 * 3),
-                                                     o.width, o.height));
+        return weighted_sum(
+            weights,
+            planes_to_image(frame.images.image.download<float>(16 * 12 * 3), o.width, o.height));
     };
     constexpr float kStep = 0x1p-6f;
     for (int a = 0; a < kAttributeCount; ++a) {

@@ -41,14 +41,18 @@ Shares shares_on_device(const TestScene& scene, const std::vector<std::uint32_t>
         o.store_for_backward = true;
         return o;
     }();
+    FrameBuffers buffers(d, options);
+    Frame& frame = buffers.frame();
     Forward forward(d, options);
     Backward backward(d, options, BackwardResult::update);
     GpuSplats splats(d, scene.model, true);
     const auto n = splats.count();
-    const gpu::CameraData data = camera_data(scene.camera, scene.model.origin);
-    const Buffer cameras = upload_cameras(d, {data});
-    forward.reserve(n, 200'000, scene.camera.width, scene.camera.height);
-    backward.reserve(n, forward.pair_capacity());
+    FrameView view{camera_data(scene.camera, scene.model.origin), nullptr, 0, scene.model.sh_degree,
+                   background};
+    const Buffer cameras = upload_cameras(d, {view.camera});
+    view.cameras = &cameras;
+    buffers.reserve(n, 200'000, scene.camera.width, scene.camera.height);
+    backward.reserve(n, frame.size.intersections);
     Buffer ground(d, "photo", photo.size() * 4), scratch(d, "d_image", photo.size() * 12);
     ground.upload(photo);
     ErrorScore score(d, photos);
@@ -56,16 +60,15 @@ Shares shares_on_device(const TestScene& scene, const std::vector<std::uint32_t>
     Commands commands(d);
     for (int i = 0; i < times; ++i) {
         commands.begin();
-        forward.record(commands, splats, cameras, 0, data, scene.model.sh_degree, background);
-        score.record(commands, forward, backward, forward.image(), ground, scratch, n, data,
-                     background);
+        forward.record(commands, splats, view, frame);
+        score.record(commands, view, frame, backward, {frame.images.image, ground, scratch}, n);
         commands.submit_and_wait();
     }
-    EXPECT_EQ(forward.read_status().overflow, 0U);
+    EXPECT_EQ(frame.read_status().overflow, 0U);
     const std::vector<float> flat = score.state(n);
     Shares result;
     for (size_t i = 0; i < n; ++i) result.got.emplace_back(flat[2 * i], flat[2 * i + 1]);
-    const std::vector<float> planes = forward.image().download<float>(photo.size() * 3);
+    const std::vector<float> planes = frame.images.image.download<float>(photo.size() * 3);
     result.image = ImageF(scene.camera.width, scene.camera.height, 3);
     for (size_t p = 0; p < photo.size(); ++p)
         for (size_t c = 0; c < 3; ++c) result.image.data[3 * p + c] = planes[c * photo.size() + p];
@@ -133,15 +136,19 @@ std::array<std::vector<float>, kAttributeCount> gradients(const TestScene& scene
     Device& d = shared_device();
     ForwardOptions options = forward_options(scene.model, {});
     options.store_for_backward = true;
+    FrameBuffers buffers(d, options);
+    Frame& frame = buffers.frame();
     Forward forward(d, options);
     Backward backward(d, options, BackwardResult::store_gradient);
     GpuSplats splats(d, scene.model, true);
     const auto n = splats.count();
     const int width = scene.camera.width, height = scene.camera.height;
-    const gpu::CameraData data = camera_data(scene.camera, scene.model.origin);
-    const Buffer cameras = upload_cameras(d, {data});
-    forward.reserve(n, 200'000, width, height);
-    backward.reserve(n, forward.pair_capacity());
+    FrameView view{camera_data(scene.camera, scene.model.origin), nullptr, 0, scene.model.sh_degree,
+                   glm::vec3(0.3f)};
+    const Buffer cameras = upload_cameras(d, {view.camera});
+    view.cameras = &cameras;
+    buffers.reserve(n, 200'000, width, height);
+    backward.reserve(n, frame.size.intersections);
     const auto photo = random_photo(width, height, 4);
     Buffer ground(d, "photo", photo.size() * 4), scratch(d, "scratch", photo.size() * 12),
         d_image(d, "d_image", photo.size() * 12);
@@ -155,14 +162,12 @@ std::array<std::vector<float>, kAttributeCount> gradients(const TestScene& scene
     score.reset(n);
     Commands commands(d);
     commands.begin();
-    forward.record(commands, splats, cameras, 0, data, scene.model.sh_degree, glm::vec3(0.3f));
+    forward.record(commands, splats, view, frame);
     if (scored)
-        score.record(commands, forward, backward, forward.image(), ground, scratch, n, data,
-                     glm::vec3(0.3f));
-    backward.record(commands, forward, splats, d_image, cameras, 0, data, scene.model.sh_degree,
-                    glm::vec3(0.3f), {});
+        score.record(commands, view, frame, backward, {frame.images.image, ground, scratch}, n);
+    backward.record(commands, view, frame, splats, d_image, {});
     commands.submit_and_wait();
-    EXPECT_EQ(forward.read_status().overflow, 0U);
+    EXPECT_EQ(frame.read_status().overflow, 0U);
     std::array<std::vector<float>, kAttributeCount> result;
     for (int a = 0; a < kAttributeCount; ++a)
         result[static_cast<size_t>(a)] =

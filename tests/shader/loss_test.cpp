@@ -192,7 +192,7 @@ Output run(Loss& loss, const Case& c, const Data& data, int repeats = 1) {
     for (int i = 0; i < repeats; ++i) {
         Commands commands(device());
         commands.begin();
-        loss.record(commands, image, photo, d_image, results, kResultIndex, c.width, c.height,
+        loss.record(commands, {image, photo, d_image, results, kResultIndex}, c.width, c.height,
                     c.background, c.lambda);
         commands.submit_and_wait();
         for (const PassTime& time : commands.pass_times()) out.ms = std::min(out.ms, time.ms);

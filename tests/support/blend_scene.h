@@ -177,7 +177,7 @@ struct BlendPipelines {
         SpecConstants constants =
             kernel_constants(scene.kernel, scene.footprint, scene.evaluation, 5, scene.cutoff);
         const std::uint32_t subgroup = add_block_constants(device, constants);
-        bucket = bucket_pairs(device);
+        bucket = bucket_length(device);
         constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
         constants["BUCKET"] = static_cast<std::int32_t>(bucket);
         constants["THREADS"] = static_cast<std::int32_t>(subgroup);

@@ -127,7 +127,7 @@ TEST(Limits, growth_stops_before_the_pairs_that_the_bindings_hold) {
         SCOPED_TRACE(fault);
         t.options.initial_scale = scale;
         const std::unique_ptr<Device> narrow = faulty_device(fault);
-        EXPECT_EQ(Forward::max_pairs(*narrow), most);
+        EXPECT_EQ(FrameBuffers::max_intersections(*narrow), most);
         Trainer trainer(*narrow, t.dataset, t.photos, t.start(), t.options);
         run_to(trainer, 60);
         EXPECT_GT(trainer.counters().most_pairs, most * 7 / 10);

@@ -111,9 +111,8 @@ void run_tiles(const Work& work, TileFunction function, int threads) {
 
 }  // namespace
 
-BlendFrame download_frame(const Forward& forward, const gpu::CameraData& data, std::uint32_t splats,
-                          std::uint32_t pairs, const glm::vec3& background) {
-    const ForwardOptions& options = forward.options();
+BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, const FrameView& view,
+                          std::uint32_t splats, std::uint32_t intersections) {
     const KernelCoefficients& k =
         kernel_coefficients(options.kernel, options.footprint, options.polynomial_degree);
     BlendFrame f;
@@ -124,17 +123,20 @@ BlendFrame download_frame(const Forward& forward, const gpu::CameraData& data, s
                     "Measure a scene of the Gaussian kernel at the default accuracy.");
     for (std::size_t i = 0; i < f.polynomial.size(); ++i)
         f.polynomial[i] = static_cast<float>(k.c[i]);
-    f.width = data.width;
-    f.height = data.height;
-    f.tiles_x = data.tiles_x;
-    f.tiles_y = data.tiles_y;
-    f.tile_range = forward.tile_range().download<glm::uvec2>(std::size_t{f.tiles_x} * f.tiles_y);
-    f.pair_order = forward.pair_order().download<std::uint32_t>(pairs);
-    f.pair_splat = forward.pair_splat().download<std::uint32_t>(pairs);
-    f.shape = forward.splat_shape().download<glm::vec4>(splats);
-    f.light = forward.splat_light().download<glm::vec4>(splats);
-    f.bound = forward.splat_bound().download<glm::vec4>(splats);
-    f.background = background;
+    f.width = view.camera.width;
+    f.height = view.camera.height;
+    f.tiles_x = view.camera.tiles_x;
+    f.tiles_y = view.camera.tiles_y;
+    f.tile_range =
+        frame.intersections.tile_range.download<glm::uvec2>(std::size_t{f.tiles_x} * f.tiles_y);
+    f.pair_order =
+        frame.intersections.intersection_from_sorted.download<std::uint32_t>(intersections);
+    f.pair_splat =
+        frame.intersections.splat_from_intersection.download<std::uint32_t>(intersections);
+    f.shape = frame.splats.shape.download<glm::vec4>(splats);
+    f.light = frame.splats.light.download<glm::vec4>(splats);
+    f.bound = frame.splats.bound.download<glm::vec4>(splats);
+    f.background = view.background;
     f.alpha_cutoff = options.alpha_cutoff;
     f.least_transmittance = least_transmittance(options.transmittance_stop);
     return f;

@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/raster/forward.h"
+#include "engine/raster/forward_options.h"
+#include "engine/raster/frame.h"
+#include "engine/raster/frame_view.h"
 
 namespace darb {
 
@@ -27,10 +29,10 @@ struct BlendFrame {
     float least_transmittance = 0;  // the stop less its slack
 };
 
-/// Of the last frame that forward recorded; the queue must be idle. Throws Error where the frame
-/// is of another kernel, evaluation or storage than the loops know.
-BlendFrame download_frame(const Forward& forward, const gpu::CameraData& data, std::uint32_t splats,
-                          std::uint32_t pairs, const glm::vec3& background);
+/// Of the frame that was recorded last; the queue must be idle. Throws Error where it is of another
+/// kernel, evaluation or storage than the loops know.
+BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, const FrameView& view,
+                          std::uint32_t splats, std::uint32_t intersections);
 
 /// What the forward loop writes and the backward loop reads.
 struct BlendedImage {

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include "engine/plan/effect_plan.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/scene/splat_file.h"
 #include "tools/bench/cases.h"
@@ -51,11 +53,13 @@ BenchResult measure_frames(Device& device, const SplatModel& model, const Camera
     options.effects.antialias = p.model.antialias;
     options.crowds = p.plan.crowds();
     const GpuSplats splats(device, p.model, false);
+    FrameBuffers buffers(device, options);
     Forward forward(device, options);
     Commands commands(device);
-    const gpu::CameraData data = camera_data(camera, splats.origin());
-    const Buffer cameras = upload_cameras(device, {data});
-    forward.reserve(splats.count(), splats.count() * 4, camera.width, camera.height);
+    FrameView view{camera_data(camera, splats.origin()), nullptr, 0, p.model.sh_degree};
+    const Buffer cameras = upload_cameras(device, {view.camera});
+    view.cameras = &cameras;
+    buffers.reserve(splats.count(), splats.count() * 4, camera.width, camera.height);
     gpu::FrameStatus status{};
     BenchResult result;
     take_samples(
@@ -63,11 +67,10 @@ BenchResult measure_frames(Device& device, const SplatModel& model, const Camera
         [&] {
             do {
                 commands.begin();
-                forward.record(commands, splats, cameras, 0, data, p.model.sh_degree,
-                               glm::vec3(0.0f));
+                forward.record(commands, splats, view, buffers.frame());
                 commands.submit_and_wait();
-                status = forward.read_status();
-            } while (forward.make_room(status));
+                status = buffers.frame().read_status();
+            } while (buffers.make_room(status));
             return commands.pass_times();
         },
         result);

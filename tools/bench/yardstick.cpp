@@ -6,6 +6,9 @@
 #include "engine/core/rng.h"
 #include "engine/plan/accuracy.h"
 #include "engine/raster/blend_backward.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
+#include "engine/raster/gpu_splats.h"
 #include "tools/bench/native_blend.h"
 
 namespace darb {
@@ -43,29 +46,31 @@ class Side {
     Side(Device& device, const SplatModel& model, const Camera& camera,
          const ProjectionEffects& effects)
         : splats_(device, model, false),
+          buffers_(device, options_of(model, effects)),
           forward_(device, options_of(model, effects)),
           backward_(device, forward_.options()),
           commands_(device),
-          data_(camera_data(camera, splats_.origin())),
-          cameras_(upload_cameras(device, {data_})),
-          degree_(model.sh_degree) {
-        const std::size_t floats = std::size_t{data_.width} * data_.height * 3;
+          view_{camera_data(camera, splats_.origin()), nullptr, 0, model.sh_degree},
+          cameras_(upload_cameras(device, {view_.camera})) {
+        view_.cameras = &cameras_;
+        const std::size_t floats = std::size_t{view_.camera.width} * view_.camera.height * 3;
         Pcg32 random(7, 1);
         for (std::size_t i = 0; i < floats; ++i)
             d_image_.push_back(static_cast<float>(random.uniform(-1, 1)));
         d_image_on_device_ = Buffer(device, "d_image", floats * 4);
         d_image_on_device_.upload(d_image_);
-        forward_.reserve(splats_.count(), splats_.count() * 4, camera.width, camera.height);
+        buffers_.reserve(splats_.count(), splats_.count() * 4, camera.width, camera.height);
         do {
             commands_.begin();
             record_forward();
             commands_.submit_and_wait();
-            status_ = forward_.read_status();
-        } while (forward_.make_room(status_));
-        backward_.reserve(forward_.pair_capacity());
+            status_ = buffers_.frame().read_status();
+        } while (buffers_.make_room(status_));
+        backward_.reserve(buffers_.size().intersections);
         draw();
         if (forward_.options().kernel == KERNEL_GAUSSIAN)
-            frame_ = download_frame(forward_, data_, splats_.count(), status_.pairs, background_);
+            frame_ = download_frame(forward_.options(), buffers_.frame(), view_, splats_.count(),
+                                    status_.pairs);
     }
 
     /// Milliseconds of the passes "blend" and "blend backward".
@@ -73,7 +78,7 @@ class Side {
         commands_.begin();
         record_forward();
         commands_.pass("blend backward");
-        backward_.record(commands_, forward_, d_image_on_device_, data_, background_);
+        backward_.record(commands_, view_, buffers_.frame(), d_image_on_device_);
         commands_.submit_and_wait();
         std::pair<double, double> ms;
         for (const PassTime& pass : commands_.pass_times()) {
@@ -91,7 +96,8 @@ class Side {
     }
 
     double picture_psnr() const {
-        return psnr(image_.image, forward_.image().download<float>(image_.image.size()));
+        return psnr(image_.image,
+                    buffers_.frame().images.image.download<float>(image_.image.size()));
     }
     double sums_error() const {
         double error = 0, norm = 0;
@@ -106,18 +112,15 @@ class Side {
     const gpu::FrameStatus& status() const { return status_; }
 
   private:
-    void record_forward() {
-        forward_.record(commands_, splats_, cameras_, 0, data_, degree_, background_);
-    }
+    void record_forward() { forward_.record(commands_, splats_, view_, buffers_.frame()); }
 
     GpuSplats splats_;
+    FrameBuffers buffers_;
     Forward forward_;
     BlendBackward backward_;
     Commands commands_;
-    gpu::CameraData data_;
+    FrameView view_;
     Buffer cameras_, d_image_on_device_;
-    int degree_;
-    glm::vec3 background_{0.0f};
     gpu::FrameStatus status_{};
     std::vector<float> d_image_;
     BlendFrame frame_;

@@ -58,35 +58,34 @@ void ErrorScore::restore(const std::vector<float>& state) {
 
 // Long lists: blend_backward keeps the pixels' state in the final transmittance, which the backward
 // pass of the loss wants as it was.
-void ErrorScore::record(Commands& commands, const Forward& forward, Backward& backward,
-                        const Buffer& image, const Buffer& photo, const Buffer& d_image,
-                        std::uint32_t splats, const gpu::CameraData& data,
-                        const glm::vec3& background) {
+void ErrorScore::record(Commands& commands, const FrameView& view, const Frame& frame,
+                        Backward& backward, const Images& images, std::uint32_t splats) {
     if (splats == 0) return;
-    const std::uint32_t pixels = data.width * data.height;
+    const gpu::CameraData& camera = view.camera;
+    const std::uint32_t pixels = camera.width * camera.height;
     const Groups each_pixel = groups_for(pixels), each_splat = groups_for(splats);
-    const Buffer& transmittance = forward.final_transmittance();
-    const bool several = forward.list_segments() > 1;
+    const Buffer& transmittance = frame.images.final_transmittance;
+    const bool several = frame.size.list_segments > 1;
     if (several && transmittance_.bytes() < transmittance.bytes())
-        make_buffers(*device_, *this, segment_buffers(forward.size().pixels), "error share");
+        make_buffers(*device_, *this, segment_buffers(frame.size.pixels), "error share");
     commands.pass("error share");
-    commands.dispatch(
-        image_,
-        gpu::ErrorImageArgs{data.width, data.height, background.r, background.g, background.b},
-        {image, photo, d_image}, each_pixel.x, each_pixel.y);
+    commands.dispatch(image_,
+                      gpu::ErrorImageArgs{camera.width, camera.height, view.background.r,
+                                          view.background.g, view.background.b},
+                      {images.image, images.photo, images.d_image}, each_pixel.x, each_pixel.y);
     if (several) commands.copy(transmittance, transmittance_, std::uint64_t{pixels} * 4);
-    backward.record_shares(commands, forward, d_image, data);
+    backward.record_shares(commands, view, frame, images.d_image);
     if (several) commands.copy(transmittance_, transmittance, std::uint64_t{pixels} * 4);
     const BlendBackward& sums = backward.blend();
     if (sums.window_pairs() != window_pairs_) {
         window_pairs_ = sums.window_pairs();
         share_ = share_pipeline(*device_, window_pairs_);
     }
-    commands.dispatch(
-        share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
-        {forward.pair_count(), forward.pair_begin(), sums.partials(0), sums.partials(1),
-         sums.partials(2), sums.partials(3), sums.partials(4), forward.status(), shares_},
-        each_splat.x, each_splat.y);
+    commands.dispatch(share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
+                      {frame.splats.intersection_count, frame.splats.first_intersection,
+                       sums.partials(0), sums.partials(1), sums.partials(2), sums.partials(3),
+                       sums.partials(4), frame.counters.status, shares_},
+                      each_splat.x, each_splat.y);
 }
 
 }  // namespace darb

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "engine/raster/backward.h"
-#include "engine/raster/forward.h"
+#include "engine/raster/frame.h"
+#include "engine/raster/frame_view.h"
 #include "engine/raster/loss.h"
 #include "shaders/shared/strategy_args.h"
 
@@ -26,11 +27,14 @@ class ErrorScore {
     static std::uint64_t device_bytes(std::uint64_t splats, std::uint64_t pixels,
                                       std::uint32_t list_segments);
 
-    /// Recorded between Forward::record of a frame and its loss; image: the picture that is
-    /// compared. d_image [3][H][W] is scratch here.
-    void record(Commands& commands, const Forward& forward, Backward& backward, const Buffer& image,
-                const Buffer& photo, const Buffer& d_image, std::uint32_t splats,
-                const gpu::CameraData& data, const glm::vec3& background);
+    struct Images {
+        const Buffer& image;    // the picture that is compared
+        const Buffer& photo;    // with this
+        const Buffer& d_image;  // [3][H][W], scratch here
+    };
+    /// Recorded between Forward::record of a frame and its loss.
+    void record(Commands& commands, const FrameView& view, const Frame& frame, Backward& backward,
+                const Images& images, std::uint32_t splats);
 
     /// [N][2]: sum over the photos of the splat's share of their mean error; 1 where one saw it.
     const Buffer& shares() const { return shares_; }

@@ -1,0 +1,36 @@
+// ForwardOptions: what is fixed when the passes of a frame are compiled, each a specialization
+// constant.
+#pragma once
+
+#include "engine/gpu/pipeline.h"
+#include "engine/raster/effects.h"
+#include "engine/scene/splat_model.h"
+#include "shaders/shared/accuracy_list.h"
+#include "shaders/shared/limits.h"
+
+namespace darb {
+
+struct ForwardOptions {
+    int kernel = KERNEL_GAUSSIAN;
+    Footprint footprint = Footprint::psi;
+    int evaluation = EVALUATION_POLYNOMIAL;
+    int polynomial_degree = 5;
+    float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
+    float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
+    int storage = STORAGE_FLOAT32;         // of projected splats
+    int depth_order = DEPTH_ORDER_CENTRE;  // DEPTH_ORDER_PIXEL: forward only
+    ProjectionEffects effects;
+    bool store_for_backward = false;
+    bool backward_follows = true;  // false: what is stored is looked at, without a backward pass
+    Crowds crowds = Crowds::by_counters;
+};
+
+/// The constants of these options that several passes share: kernel, storage and depth order.
+SpecConstants kernel_constants(const ForwardOptions& options);
+
+/// What the transmittance of a pixel stays at or above: the stop less its slack for rounding.
+constexpr float least_transmittance(float stop) {
+    return static_cast<float>(stop * (1 - TRANSMITTANCE_SLACK));
+}
+
+}  // namespace darb

@@ -1,0 +1,100 @@
+// Frame: the device memory of one frame, plain structs of buffers. Forward writes them, Backward
+// and whoever shows a frame read them, FrameBuffers makes them and lets them grow. An intersection
+// is a splat in a tile; N splats, K intersections, T tiles, H x W pixels.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "engine/gpu/buffer.h"
+#include "engine/primitives/radix_sort.h"
+#include "engine/primitives/scan.h"
+#include "shaders/shared/render_args.h"
+
+namespace darb {
+
+/// What the buffers of a frame are made for.
+struct FrameSize {
+    std::uint32_t splats = 0, intersections = 0;
+    std::uint64_t pixels = 0;         // of the largest image
+    std::uint32_t tiles = 0;          // of the image with the most
+    std::uint32_t list_segments = 1;  // dispatches of the blend passes, LIST_SEGMENT of a list each
+    bool cooperates = false;          // some frame had huge splats
+    std::uint32_t bucket = 0;         // intersections of a checkpoint; 0: there are none
+    /// Of every tile one more than its full buckets.
+    std::uint64_t checkpoint_records() const {
+        return bucket > 0 ? intersections / bucket + std::uint64_t{tiles} : 0;
+    }
+};
+
+/// Device memory, by what it grows with.
+struct FrameBytes {
+    std::uint64_t splats = 0, intersections = 0,
+                  images = 0;  // images: pixels, tiles, what is fixed
+    FrameBytes& operator+=(const FrameBytes& other) {
+        splats += other.splats;
+        intersections += other.intersections;
+        images += other.images;
+        return *this;
+    }
+};
+
+/// What the host does not know of a frame while it records it.
+struct FrameCounters {
+    Buffer status;  // gpu::FrameStatus
+    Buffer groups;  // gpu::FrameGroups
+    // A word each; in_use: at most what the buffers hold.
+    Buffer splats, visible, visible_in_use, intersections, intersections_in_use;
+};
+
+/// What the projection leaves of each splat, [N] each, and the order of depth.
+struct ProjectedSplats {
+    Buffer shape, light, bound;              // as shaders/lib/projected.glsl reads them
+    Buffer cover, intersection_count;        // the tiles that a splat meets
+    Buffer visible, visible_offset;          // 0 or 1, and its sum over the splats before
+    Buffer depth_key, splat_from_depth;      // of the visible ones, nearest first
+    Buffer count_by_depth, offset_by_depth;  // of intersections, in that order
+    Buffer first_intersection;               // by splat: where its intersections begin
+};
+
+/// Which splats a tile has, nearest first.
+struct TileIntersections {
+    Buffer tile;                      // [K] sorted
+    Buffer splat_from_intersection;   // [K] in the order of emission: splat and blocks of the tile
+    Buffer intersection_from_sorted;  // [K] by tile, then by depth
+    Buffer tile_range;                // [T][2] of that
+    Buffer huge_rank;                 // [K / HUGE_PAIRS + 1], once a frame had huge splats
+    Buffer no_huge_rank;              // a word, in its place until then
+};
+
+/// float [3][H][W] not clamped; what the backward pass walks back from.
+struct FrameImages {
+    Buffer image;
+    Buffer final_transmittance, last_pair;  // [H][W], where they are stored
+    Buffer checkpoints;                     // shaders/lib/bucket.glsl; where there are buckets
+};
+
+/// Scratch memory of the sorts, each for a capacity.
+struct FrameSorts {
+    std::optional<Scan> scan;
+    std::optional<RadixSort> by_depth, by_tile;
+};
+
+struct Frame {
+    FrameSize size;
+    bool cooperates = false;  // the next frame is emitted with a workgroup for each huge splat
+    FrameCounters counters;
+    ProjectedSplats splats;
+    TileIntersections intersections;
+    FrameImages images;
+    FrameSorts sorts;
+
+    std::uint32_t checkpoint_records() const {
+        return static_cast<std::uint32_t>(images.checkpoints.bytes() / CHECKPOINT_BYTES);
+    }
+    gpu::FrameStatus read_status() const {
+        return counters.status.download<gpu::FrameStatus>(1)[0];
+    }
+};
+
+}  // namespace darb

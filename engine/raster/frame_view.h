@@ -1,0 +1,33 @@
+// FrameView: what a frame is drawn of, as the passes read it.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "engine/gpu/buffer.h"
+#include "engine/scene/camera.h"
+#include "shaders/shared/limits.h"
+#include "shaders/shared/render_args.h"
+
+namespace darb {
+
+/// A camera, on the host and on the device, and what is drawn through it.
+struct FrameView {
+    gpu::CameraData camera{};
+    const Buffer* cameras = nullptr;  // gpu::CameraData[]: `camera` is the one at `index`
+    std::uint32_t index = 0;
+    int sh_degree = 0;  // of the colours, at most the splats'
+    glm::vec3 background{0.0f};
+};
+
+/// A camera as the shaders read it. origin: SplatModel::origin, taken out of the pose in double.
+gpu::CameraData camera_data(const Camera& camera, const glm::dvec3& origin,
+                            float near_plane = static_cast<float>(NEAR_DEFAULT));
+
+/// Cameras in a device buffer, in the order given.
+Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& cameras);
+
+/// Tiles of an image.
+std::uint32_t image_tiles(int width, int height);
+
+}  // namespace darb
