@@ -17,7 +17,7 @@ struct Checkpoint {
     std::string settings;                      // settings_text() of the run that wrote it
     std::string dataset;                       // dataset_fingerprint() of it
     double seconds = 0;                        // of training until then
-    std::string tuning = "backward=subgroup";  // result_variants(): the only ones of older files
+    std::string tuning = "backward=subgroup";  // result_tuning(): the only ones of older files
 };
 
 /// Throws Error naming the file where it cannot be written; an older file is then intact.

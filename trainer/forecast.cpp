@@ -6,7 +6,6 @@
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
-#include "engine/primitives/tuning.h"
 #include "engine/raster/gpu_splats.h"
 #include "trainer/initial_model.h"
 #include "trainer/resolution_ramp.h"

@@ -10,7 +10,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 #include "engine/raster/frame_limit.h"
 #include "engine/scene/ply.h"
 #include "trainer/checkpoint.h"
@@ -36,14 +36,13 @@ DeviceRates rates_of(Device& device) {
     return rates;
 }
 
-// Read before the trainer is made: the ways of the device that change bits are those that the run
+// Read before the trainer is made: what of the device's tuning changes bits is as the run
 // began with.
 std::optional<Checkpoint> checkpoint_of(Device& device, const std::filesystem::path& path) {
     if (path.empty()) return std::nullopt;
     Checkpoint checkpoint = read_checkpoint(path);
-    Variants variants = parse_variants(device.info(), checkpoint.tuning, path.string());
-    variants.merge(Variants(device.variants()));
-    device.set_variants(std::move(variants));
+    const TuningNames names = parse_tuning(device.info(), checkpoint.tuning, path.string());
+    device.set_tuning(with_names(device.tuning(), names));
     return checkpoint;
 }
 
@@ -72,7 +71,7 @@ class Run {
           photos_(loaded_.empty() ? run.photos : loaded_),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
           rates_(rates_of(device)),
-          tuning_(result_variants(device)),
+          tuning_(result_tuning(device)),
           checkpoint_(checkpoint_of(device, run.resume_from)),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
           log_(run.output, !run.resume_from.empty()),
@@ -225,7 +224,7 @@ void Run::save_model(int iteration) {
 void Run::save_checkpoint(const std::filesystem::path& path) {
     stopwatch(false);
     write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_,
-                            result_variants(device_)});
+                            result_tuning(device_)});
     stopwatch(true);
 }
 
@@ -290,7 +289,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
 
 // Of the backward blend, where that holds more pairs.
 std::string Run::other_way() const {
-    if (result_variants(device_) == "backward=subgroup") return "";
+    if (result_tuning(device_) == "backward=subgroup") return "";
     return fmt::format(
         ", and so does --tune backward=subgroup, which holds {}, in a run that "
         "starts again",

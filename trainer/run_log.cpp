@@ -10,7 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 #include "trainer/checkpoint.h"
 #include "trainer/strategy.h"
 
@@ -122,7 +122,7 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
               {"version", DARB_VERSION},
               {"device", device.info().name},
               {"driver", device.info().driver},
-              {"tuning", variants_text(all_variants(device))},
+              {"tuning", names_text(tuning_names(device.tuning()))},
               {"dataset", dataset.root.string()},
               {"source", dataset.source},
               {"notes", dataset.notes},

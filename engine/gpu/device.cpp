@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdlib>
-#include <cstring>
 #include <string_view>
 #include <utility>
 
@@ -18,11 +16,6 @@ namespace {
 
 // Vulkan's header names it only with VK_ENABLE_BETA_EXTENSIONS.
 constexpr const char* kPortabilitySubset = "VK_KHR_portability_subset";
-
-bool validation_from_environment() {
-    const char* value = std::getenv("DARB_VALIDATION");
-    return value != nullptr && *value != '\0' && std::strcmp(value, "0") != 0;
-}
 
 // Features in the chain that vkCreateDevice and the query share.
 struct Features {
@@ -91,7 +84,7 @@ bool offers_extension(VkPhysicalDevice physical, const std::string& name) {
 
 Device::State::State(const DeviceOptions& options, bool validation)
     : instance(validation, options.instance_extensions) {
-    if (const char* text = std::getenv("DARB_FAULT")) faults = parse_faults(text);
+    faults = options.faults;
     const ListedDevice chosen = choose(instance, options.select);
     physical = chosen.handle;
     info = chosen.info;
@@ -99,6 +92,7 @@ Device::State::State(const DeviceOptions& options, bool validation)
     if (faults.allocation_bytes != 0) info.max_allocation_bytes = faults.allocation_bytes;
     info.max_storage_buffer_bytes =
         std::min(info.max_storage_buffer_bytes, info.max_allocation_bytes);
+    tuning = usual_tuning(info);
     lavapipe = info.driver.starts_with("llvmpipe");
     vkGetPhysicalDeviceMemoryProperties(physical, &memory);
     try {
@@ -229,8 +223,7 @@ VkResult Device::State::wait_idle() {
 }
 
 Device::Device(const DeviceOptions& options)
-    : state_(
-          std::make_unique<State>(options, options.validation || validation_from_environment())) {}
+    : state_(std::make_unique<State>(options, options.validation)) {}
 
 Device::~Device() {
     if (state_ && state_->allocated != 0)
@@ -268,11 +261,11 @@ VkPipelineCache Device::pipeline_cache() const {
 const std::filesystem::path& Device::cache_folder() const {
     return state_->cache_folder;
 }
-void Device::set_variants(Variants variants) {
-    state_->variants = std::move(variants);
+void Device::set_tuning(const Tuning& tuning) {
+    state_->tuning = tuning;
 }
-const Variants& Device::variants() const {
-    return state_->variants;
+const Tuning& Device::tuning() const {
+    return state_->tuning;
 }
 std::uint64_t Device::allocated_bytes() const {
     return state_->allocated;

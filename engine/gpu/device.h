@@ -1,17 +1,18 @@
-// Device: one Vulkan 1.3 device with one compute queue, no window system needed.
-// Environment: DARB_VALIDATION=1 turns the validation layers on; DARB_FAULT injects faults for
-// tests (engine/gpu/faults.h). Everything below engine/gpu knows buffers, pipelines and commands;
-// nothing of splats.
+// Device: one Vulkan 1.3 device with one compute queue, no window system needed. engine/gpu knows
+// buffers, pipelines and commands; nothing of splats. What the environment asks for (validation,
+// faults, tuning) is read by commands and tests and handed down in options.
 #pragma once
 
 #include <vulkan/vulkan.h>
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
+
+#include "engine/gpu/faults.h"
+#include "engine/gpu/tuning.h"
 
 namespace darb {
 
@@ -40,10 +41,6 @@ struct DeviceInfo {
     std::string reason;  // why it was rejected, or why it ranks where it does
 };
 
-/// Which of several equal ways a pass takes: name of the choice -> name of the way. What they mean,
-/// and what a missing one means, is known to engine/primitives/tuning.h.
-using Variants = std::map<std::string, std::string, std::less<>>;
-
 /// Why the blend passes cannot run in the subgroups of a device, or "". They want 4 to 64 lanes,
 /// and to name their number where there are several.
 std::string subgroup_trouble(const DeviceInfo& info);
@@ -56,8 +53,9 @@ std::vector<DeviceInfo> list_devices();
 std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::string& select);
 
 struct DeviceOptions {
-    std::string select;       // "" = best usable; a number = index; else part of a name
-    bool validation = false;  // core + synchronization validation; also DARB_VALIDATION=1
+    std::string select;                  // "" = best usable; a number = index; else part of a name
+    bool validation = false;             // core + synchronization validation
+    Faults faults;                       // injected for tests
     std::filesystem::path cache_folder;  // pipeline cache; "" = default_cache_folder()
     /// For a window: surface extensions of the instance, VK_KHR_swapchain of the device. A name
     /// that is not offered is an Error. The queue does graphics too wherever the device has such a
@@ -90,9 +88,9 @@ class Device {
     /// Where the pipeline cache lies and whatever else was measured of this device; "" = nowhere.
     const std::filesystem::path& cache_folder() const;
 
-    /// For all objects that are made for this device from now on.
-    void set_variants(Variants variants);
-    const Variants& variants() const;
+    /// For all objects that are made for this device from now on; usual_tuning() at first.
+    void set_tuning(const Tuning& tuning);
+    const Tuning& tuning() const;
 
     /// Bytes of live Buffers, and the most there ever were.
     std::uint64_t allocated_bytes() const;

@@ -51,7 +51,7 @@ struct Device::State {
     Instance instance;
     Faults faults;
     DeviceInfo info;
-    Variants variants;
+    Tuning tuning;
     bool lavapipe = false;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkPhysicalDeviceMemoryProperties memory{};

@@ -1,10 +1,10 @@
-// Faults injected for tests through the environment variable DARB_FAULT, a comma-separated list:
+// Faults injected for tests, as text a comma-separated list (the command reads it from DARB_FAULT):
 //   oom:NAME   creating the buffer NAME fails as if the device were out of memory
 //   lost:N     the N-th submit of the device (from 1) and all later ones report a lost device
 //   binding:N  the device says that a storage buffer binding holds at most N bytes
 //   allocation:N  the device says that a buffer has at most N bytes
 //   memory:N   buffers beyond N bytes in all fail as if the device were out of memory
-// Unset in normal use. Read once per Device; a text that is neither is an Error.
+// None in normal use. A text that is none of these is an Error.
 #pragma once
 
 #include <cstdint>

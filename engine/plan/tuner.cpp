@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -109,9 +108,9 @@ std::filesystem::path file_of(const DeviceInfo& info, const std::filesystem::pat
 }
 
 // The least of the frames' times for each of several sets of passes.
-std::vector<double> measure(Device& device, const Variants& variants,
+std::vector<double> measure(Device& device, const TuningNames& names,
                             const std::vector<TuningGroup>& groups) {
-    device.set_variants(variants);
+    device.set_tuning(with_names(usual_tuning(device.info()), names));
     TuningFrame frame(device);
     const Size size = size_for(device.info());
     for (int i = 0; i < size.warm_up; ++i) frame.run({});
@@ -125,15 +124,15 @@ std::vector<double> measure(Device& device, const Variants& variants,
 
 }  // namespace
 
-std::string fastest_way(const TuningGroup& group, const std::vector<TuningTime>& times) {
-    std::string best = group.ways.front();
+std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTime>& times) {
+    std::string best = group.choices.front();
     double least = 0;
     for (const TuningTime& time : times) {
-        if (time.group != group.name || time.way == "buckets") continue;
-        const bool usual = time.way == group.ways.front();  // the first that is measured
+        if (time.group != group.name || time.choice == "buckets") continue;
+        const bool usual = time.choice == group.choices.front();  // the first that is measured
         if (usual || time.ms < least) {
             least = usual ? kGain * time.ms : time.ms;
-            best = time.way;
+            best = time.choice;
         }
     }
     return best;
@@ -179,25 +178,25 @@ std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
 }
 
 TuningRecord measure_tuning(Device& device) {
-    const Variants before = device.variants();
+    const Tuning before = device.tuning();
     const std::vector<TuningGroup> groups = tuning_groups(device.info());
-    const Variants defaults = default_variants(device.info());
+    const TuningNames usual_names = tuning_names(usual_tuning(device.info()));
     TuningRecord record;
-    const std::vector<double> usual = measure(device, defaults, groups);
+    const std::vector<double> usual = measure(device, usual_names, groups);
     for (std::size_t g = 0; g < groups.size(); ++g) {
-        record.times.push_back({groups[g].name, groups[g].ways.front(), usual[g]});
-        for (std::size_t w = 1; w < groups[g].ways.size(); ++w) {
-            Variants variants = defaults;
-            variants[groups[g].name] = groups[g].ways[w];
+        record.times.push_back({groups[g].name, groups[g].choices.front(), usual[g]});
+        for (std::size_t w = 1; w < groups[g].choices.size(); ++w) {
+            TuningNames names = usual_names;
+            names[groups[g].name] = groups[g].choices[w];
             try {
-                const double ms = measure(device, variants, {groups[g]})[0];
-                record.times.push_back({groups[g].name, groups[g].ways[w], ms});
+                const double ms = measure(device, names, {groups[g]})[0];
+                record.times.push_back({groups[g].name, groups[g].choices[w], ms});
             } catch (const Error&) {
             }
         }
-        record.choice[groups[g].name] = fastest_way(groups[g], record.times);
+        record.choice[groups[g].name] = fastest_choice(groups[g], record.times);
     }
-    device.set_variants(before);
+    device.set_tuning(before);
     device.forget_peak();
     return record;
 }
@@ -214,7 +213,7 @@ std::optional<TuningRecord> read_tuning(const DeviceInfo& info,
     for (const auto& [name, value] : key.items())
         if (!json.contains(name) || dumped(json[name]) != dumped(value)) return std::nullopt;
     TuningRecord record;
-    record.choice = parse_variants(info, json.at("choice").get<std::string>(), "tuning");
+    record.choice = parse_tuning(info, json.at("choice").get<std::string>(), "tuning");
     for (const nlohmann::json& time : json.at("times"))
         record.times.push_back({time.at("group").get<std::string>(),
                                 time.at("way").get<std::string>(), time.at("ms").get<double>()});
@@ -228,19 +227,19 @@ void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
     if (folder.empty()) return;
     nlohmann::json json = key_of(info);
     json["shaders"] = shader_hash();
-    json["choice"] = variants_text(record.choice);
+    json["choice"] = names_text(record.choice);
     json["times"] = nlohmann::json::array();
     for (const TuningTime& time : record.times)
-        json["times"].push_back({{"group", time.group}, {"way", time.way}, {"ms", time.ms}});
+        json["times"].push_back({{"group", time.group}, {"way", time.choice}, {"ms", time.ms}});
     write_file_atomic(file_of(info, folder), dumped(json, 2) + "\n");
 } catch (const Error&) {
 }
 
 std::string tuning_text(const TuningRecord& record) {
-    std::string text = variants_text(record.choice), group;
+    std::string text = names_text(record.choice), group;
     for (const TuningTime& time : record.times) {
         text += fmt::format("{}{} {:.3f}", time.group == group ? ", " : "; " + time.group + ": ",
-                            time.way, time.ms);
+                            time.choice, time.ms);
         group = time.group;
     }
     return record.times.empty() ? text : text + " ms";
@@ -251,10 +250,9 @@ void tune(Device& device, const TuneRequest& request) {
     const auto note = [&](const std::string& line) {
         if (request.note) request.note(line);
     };
-    Variants variants = parse_variants(info, request.forced, "--tune " + request.forced);
-    if (const char* text = std::getenv("DARB_TUNE"); text != nullptr)
-        variants.merge(parse_variants(info, text, "DARB_TUNE"));
-    const bool open = variants.size() < tuning_groups(info).size();
+    TuningNames names = parse_tuning(info, request.forced, "--tune " + request.forced);
+    names.merge(parse_tuning(info, request.environment, "DARB_TUNE"));
+    const bool open = names.size() < tuning_groups(info).size();
     std::optional<TuningRecord> record;
     if (!request.retune) record = read_tuning(info, device.cache_folder());
     if (request.retune || (open && !record && !is_known_device(info))) {
@@ -264,8 +262,8 @@ void tune(Device& device, const TuneRequest& request) {
         write_tuning(info, device.cache_folder(), *record);
         note("tuned: " + tuning_text(*record));
     }
-    if (record) variants.merge(Variants(record->choice));
-    device.set_variants(std::move(variants));
+    if (record) names.merge(TuningNames(record->choice));
+    device.set_tuning(with_names(usual_tuning(info), names));
 }
 
 }  // namespace darb

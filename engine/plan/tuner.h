@@ -1,4 +1,4 @@
-// The tuner: measures the ways of a device's passes (engine/primitives/tuning.h) on a small made-up
+// The tuner: measures the choices of a device's tuning (tuning_names.h) on a small made-up
 // scene, and keeps what it found in a file beside the pipeline cache, once for each device, driver,
 // subgroup size and set of shaders.
 #pragma once
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/gpu/commands.h"
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
@@ -18,16 +18,16 @@
 namespace darb {
 
 struct TuningTime {
-    std::string group, way;
+    std::string group, choice;
     double ms = 0;  // of the group's passes, the least of a few frames
 };
 
 struct TuningRecord {
-    Variants choice;                // of every group
-    std::vector<TuningTime> times;  // of every way
+    TuningNames choice;             // of every group
+    std::vector<TuningTime> times;  // of all
 };
 
-/// One frame of the tuner's scene, forward and backward blend, in the ways of the device at
+/// One frame of the tuner's scene, forward and backward blend, with the device's tuning at
 /// construction. The same splats at every call; more of them where the device is no CPU.
 class TuningFrame {
   public:
@@ -48,13 +48,13 @@ class TuningFrame {
     bool has_timestamps_;
 };
 
-/// The default unless another way takes 3 % less. Never buckets, which hold 17 to 34 million pairs
+/// The usual choice unless another takes 3 % less. Never buckets, which hold 17 to 34 million pairs
 /// a frame in the 4 GiB that Vulkan binds at most, the other way 134 million: how many a run will
 /// need is not known here, so they are for who asks for them.
-std::string fastest_way(const TuningGroup& group, const std::vector<TuningTime>& times);
+std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTime>& times);
 
-/// Each group with all others at their defaults, and the fastest way of each. A way that a driver
-/// refuses is left out. The device's variants and its peak of memory are afterwards as before.
+/// Each group with all others at their usual choice, and the fastest of each. One that a driver
+/// refuses is left out. The device's tuning and its peak of memory are afterwards as before.
 TuningRecord measure_tuning(Device& device);
 
 /// The record of this device in the folder of the pipeline cache; nothing where there is none, or
@@ -66,16 +66,18 @@ void write_tuning(const DeviceInfo& info, const std::filesystem::path& folder,
                   const TuningRecord& record);
 
 struct TuneRequest {
-    std::string forced;                            // as parse_variants; of --tune
+    std::string forced;                            // as parse_tuning; of --tune
+    std::string environment;                       // the same, of DARB_TUNE
     bool retune = false;                           // measure anew, known devices too
     std::function<void(const std::string&)> note;  // may be empty
 };
 
-/// Settles the ways of a device: what is forced, then DARB_TUNE, then the record, then the default.
+/// Sets the tuning of a device: what is forced, then the environment's, then the record, then the
+/// usual.
 /// Without a record a device that is not known is measured. Throws Error for unknown names.
 void tune(Device& device, const TuneRequest& request);
 
-/// The choice in a line, with the milliseconds of every way.
+/// The choice in a line, with the milliseconds of all.
 std::string tuning_text(const TuningRecord& record);
 
 }  // namespace darb

@@ -7,7 +7,6 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
-#include "engine/primitives/tuning.h"
 #include "shaders/shared/radix_args.h"
 
 namespace darb {
@@ -22,7 +21,8 @@ constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
 
 RadixSort::Strategy resolve(const Device& device, RadixSort::Strategy strategy) {
     if (strategy != RadixSort::Strategy::automatic) return strategy;
-    return tuning_of(device).scatter;
+    return device.tuning().scatter_by_columns ? RadixSort::Strategy::columns
+                                              : RadixSort::Strategy::ballot;
 }
 
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,

@@ -17,7 +17,7 @@ class RadixSort {
   public:
     /// How the scatter pass ranks keys. Same result, other cost: see shaders/sort/radix_scatter_*.
     enum class Strategy {
-        automatic,  // as the device is tuned: engine/primitives/tuning.h
+        automatic,  // as the device is tuned: engine/gpu/tuning.h
         ballot,
         columns,
     };

@@ -4,7 +4,6 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
-#include "engine/primitives/tuning.h"
 #include "shaders/shared/scan_args.h"
 
 namespace darb {
@@ -50,7 +49,7 @@ SpecConstants top_constants(const Device& device) {
 }  // namespace
 
 Scan::Strategy Scan::best_strategy(const Device& device) {
-    return {tuning_of(device).scan_by_thread, 0};
+    return {device.tuning().scan_by_thread, 0};
 }
 
 Scan::Scan(Device& device, std::uint32_t capacity)

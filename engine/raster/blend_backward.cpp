@@ -25,7 +25,7 @@ std::uint64_t BlendBackward::max_intersections(const Device& device) {
 }
 
 BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
-    : device_(&device), options_(options), method_(tuning_of(device).backward) {
+    : device_(&device), options_(options), method_(device.tuning().backward) {
     make_pipelines(false);
     make_buffers(device, *this, segment_buffers({}), "blend backward");
 }

@@ -4,7 +4,6 @@
 
 #include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
-#include "engine/primitives/tuning.h"
 #include "engine/raster/forward_options.h"
 #include "engine/raster/frame.h"
 #include "engine/raster/frame_view.h"

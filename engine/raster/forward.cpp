@@ -6,7 +6,6 @@
 
 #include "engine/core/check.h"
 #include "engine/primitives/groups.h"
-#include "engine/primitives/tuning.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/kernel_constants.h"
 
@@ -79,7 +78,7 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
     const bool parts = frame.size.list_segments > 1;
     Pipeline& pipeline = blend_[parts ? 1 : 0];
     if (pipeline) return pipeline;
-    const std::uint32_t threads = tuning_of(*device_).blend_threads;
+    const std::uint32_t threads = device_->tuning().blend_threads;
     SpecConstants blend = kernel_constants(options_);
     blend["MIN_TRANSMITTANCE"] = least_transmittance(options_.transmittance_stop);
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;

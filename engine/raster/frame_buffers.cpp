@@ -138,7 +138,7 @@ FrameBytes FrameBuffers::device_bytes(const Device& device, const ForwardOptions
 }
 
 std::uint32_t FrameBuffers::max_intersections(const Device& device) {
-    return max_intersections(device, tuning_of(device).backward);
+    return max_intersections(device, device.tuning().backward);
 }
 
 std::uint32_t FrameBuffers::max_intersections(const Device& device, BackwardBlend backward) {
@@ -152,7 +152,7 @@ std::uint32_t FrameBuffers::max_intersections(const Device& device, BackwardBlen
 }
 
 std::uint32_t FrameBuffers::bucket(const Device& device, const ForwardOptions& options) {
-    const bool buckets = tuning_of(device).backward == BackwardBlend::buckets;
+    const bool buckets = device.tuning().backward == BackwardBlend::buckets;
     return walks_back(options) && buckets ? bucket_length(device) : 0;
 }
 

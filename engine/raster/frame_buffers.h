@@ -5,7 +5,6 @@
 #include <functional>
 
 #include "engine/gpu/buffer_list.h"
-#include "engine/primitives/tuning.h"
 #include "engine/raster/forward_options.h"
 #include "engine/raster/frame.h"
 

@@ -8,6 +8,7 @@
 #include "engine/plan/effect_plan.h"
 #include "engine/render/renderer.h"
 #include "tests/support/compare.h"
+#include "tests/support/device_options.h"
 #include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_lenses.h"
@@ -162,7 +163,7 @@ TEST(EffectPicture, a_depth_image_leaves_the_picture_alone) {
 TEST(EffectMemory, frames_hold_no_buffer_of_an_effect_that_is_off) {
     const Scene scene;
     const auto bytes = [&](const char* effects) {
-        Device device;
+        Device device{test::device_options()};
         const EffectPlan plan =
             plan_rendering(scene.model, scene.views, {}, parse_effects(effects));
         SplatModel model = scene.model;
@@ -192,7 +193,7 @@ TrainOptions plain_options() {
 std::vector<float> trained(const TinyTraining& t, const TrainOptions& options, int steps,
                            std::uint64_t* bytes = nullptr,
                            std::set<std::string>* passes = nullptr) {
-    Device device;
+    Device device{test::device_options()};
     Trainer trainer(device, t.dataset, t.photos, t.start(), options);
     for (int i = 0; i < steps; ++i) trainer.step();
     trainer.drain();
@@ -294,7 +295,7 @@ TEST(EffectTraining, cooperation_and_segments_change_no_bit) {
     always.crowds = Crowds::always;
     never.crowds = Crowds::never;
     EXPECT_EQ(trained(t, always, 3), trained(t, never, 3));
-    Device device;
+    Device device{test::device_options()};
     Trainer trainer(device, t.dataset, t.photos, t.start(), plain_options());
     trainer.step();
     trainer.drain();

@@ -34,8 +34,8 @@ TEST(TuningWalk, ways_change_bits_only_where_the_table_says_so) {
     const DeviceWalk usual = s.walk();
     ASSERT_GT(usual.status.pairs, 600U);
     for (const TuningGroup& group : tuning_groups(shared_device().info()))
-        for (const std::string& way : group.ways) {
-            if (way == group.ways.front()) continue;  // the usual one
+        for (const std::string& way : group.choices) {
+            if (way == group.choices.front()) continue;  // the usual one
             SCOPED_TRACE(group.name + "=" + way);
             const ScopedVariants variants(shared_device(), group.name + "=" + way);
             const DeviceWalk walk = s.walk();

@@ -1,4 +1,5 @@
 // blend.comp alone against the blending of the reference, on splats set by hand.
+#include "engine/plan/tuning_names.h"
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare.h"
 
@@ -146,8 +147,8 @@ TEST(BlendCases, every_shape_of_workgroup_gives_the_same_picture) {
     const std::vector<TuningGroup> groups = tuning_groups(shared_device().info());
     const TuningGroup& shapes = groups[2];
     ASSERT_EQ(shapes.name, "blend");
-    EXPECT_GE(shapes.ways.size(), 3U);
-    for (const std::string& shape : shapes.ways) {
+    EXPECT_GE(shapes.choices.size(), 3U);
+    for (const std::string& shape : shapes.choices) {
         SCOPED_TRACE(shape);
         scene.threads = static_cast<std::uint32_t>(std::stoul(shape));
         const BlendOutput out = blend_on_device(scene, lists);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/rng.h"
+#include "tests/support/device_options.h"
 
 namespace darb {
 namespace {
@@ -162,7 +163,7 @@ struct Output {
 
 Device& device() {
     static Device instance([] {
-        DeviceOptions options;
+        DeviceOptions options = test::device_options();
         options.validation = true;
         return options;
     }());

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "engine/core/rng.h"
+#include "tests/support/device_options.h"
 
 namespace darb {
 namespace {
@@ -40,7 +41,7 @@ struct Pairs {
 };
 
 struct SortRun {
-    Device device;
+    Device device{test::device_options()};
     Commands commands{device};
     RadixSort sort;
     Buffer keys, values, count;
@@ -179,13 +180,13 @@ INSTANTIATE_TEST_SUITE_P(All, RadixStrategies,
                          });
 
 TEST(RadixSort, automatic_is_columns_on_lavapipe_only) {
-    Device device;
+    Device device{test::device_options()};
     const RadixSort sort(device, 100);
     EXPECT_EQ(sort.strategy() == RadixSort::Strategy::columns, device.is_lavapipe());
 }
 
 TEST(RadixSort, validation_is_silent) {
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.validation = true;
     std::unique_ptr<Device> device;
     try {

@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
+#include "tests/support/device_options.h"
 
 namespace darb {
 namespace {
@@ -35,7 +36,7 @@ struct Outcome {
 };
 
 struct ScanRun {
-    Device device;
+    Device device{test::device_options()};
     Commands commands{device};
     Scan scan;
     Buffer counts, offsets, count, total;
@@ -161,7 +162,7 @@ INSTANTIATE_TEST_SUITE_P(All, ScanTeams, ::testing::Bool(), [](const auto& param
 });
 
 TEST(Scan, more_than_the_groups_of_the_device_is_an_error) {
-    Device device;
+    Device device{test::device_options()};
     for (const bool by_thread : {false, true}) {
         const Scan::Strategy strategy{by_thread, 0};
         const std::uint64_t most = Scan::max_capacity(device, strategy);
@@ -172,7 +173,7 @@ TEST(Scan, more_than_the_groups_of_the_device_is_an_error) {
 }
 
 TEST(Scan, validation_is_silent) {
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.validation = true;
     std::unique_ptr<Device> device;
     try {

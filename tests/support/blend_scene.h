@@ -8,7 +8,6 @@
 
 #include "engine/core/rng.h"
 #include "engine/gpu/commands.h"
-#include "engine/primitives/tuning.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/kernel_constants.h"
 #include "engine/reference/blend.h"

@@ -1,27 +1,26 @@
-// The ways of a device for the length of a block.
+// The tuning of a device for the length of a block.
 #pragma once
 
 #include <string>
-#include <utility>
 
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 
 namespace darb::test {
 
 class ScopedVariants {
   public:
-    /// text: as parse_variants reads it.
+    /// text: as parse_tuning reads it; what it leaves out is as it was.
     ScopedVariants(Device& device, const std::string& text)
-        : device_(&device), before_(device.variants()) {
-        device.set_variants(parse_variants(device.info(), text, "test"));
+        : device_(&device), before_(device.tuning()) {
+        device.set_tuning(with_names(before_, parse_tuning(device.info(), text, "test")));
     }
-    ~ScopedVariants() { device_->set_variants(before_); }
+    ~ScopedVariants() { device_->set_tuning(before_); }
     ScopedVariants(const ScopedVariants&) = delete;
     ScopedVariants& operator=(const ScopedVariants&) = delete;
 
   private:
     Device* device_;
-    Variants before_;
+    Tuning before_;
 };
 
 }  // namespace darb::test

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "engine/gpu/device.h"
+#include "tests/support/device_options.h"
 
 namespace darb::test {
 
@@ -28,7 +29,7 @@ inline testing::Environment* const kSharedDevice =
 
 inline Device& shared_device() {
     std::unique_ptr<Device>& slot = SharedDevice::slot();
-    if (!slot) slot = std::make_unique<Device>();
+    if (!slot) slot = std::make_unique<Device>(test::device_options());
     return *slot;
 }
 

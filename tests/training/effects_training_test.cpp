@@ -2,6 +2,7 @@
 // on bit by bit with all of them.
 #include "engine/plan/effect_plan.h"
 #include "tests/support/compare.h"
+#include "tests/support/device_options.h"
 #include "tests/support/tiny_training.h"
 
 namespace darb::test {
@@ -82,12 +83,12 @@ TEST(SphericalHarmonicsProbe, the_degrees_above_the_first_follow_it) {
 // Tiny memory: all that is there, and less than a degree more takes.
 TEST(SphericalHarmonicsProbe, a_degree_without_room_is_refused_unmeasured) {
     ProbeCase t = training_of(0.25f);
-    Device device;
+    Device device{test::device_options()};
     Trainer roomy(device, t.dataset, t.photos, t.start(), t.options);
     for (int i = 0; i < 149; ++i) roomy.step();
     roomy.drain();
     t.options.max_memory_bytes = device.allocated_bytes() + 1024;
-    Device narrow;
+    Device narrow{test::device_options()};
     Trainer trainer(narrow, t.dataset, t.photos, t.start(), t.options);
     for (int i = 0; i < 200; ++i) trainer.step();
     ASSERT_EQ(trainer.probes().size(), 1u);

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/files.h"
+#include "tests/support/device_options.h"
 #include "trainer/initial_model.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
@@ -110,7 +111,7 @@ TEST(SplitModel, keeps_place_and_area) {
 TEST(Forecast, measures_on_the_scratch_device) {
     TrainOptions options;
     options.max_splats = 8'000;
-    Device scratch;
+    Device scratch{test::device_options()};
     const Forecast f = forecast_training(scratch, small_scene(), options);
     EXPECT_EQ(f.start_splats, 4'000U);
     EXPECT_GT(f.start_ms, 0);
@@ -130,7 +131,7 @@ TEST(Forecast, a_random_start_goes_in_the_first_round) {
         options.iterations = 1'000;
         const std::uint32_t adc_ends_with = default_budget(dataset, options);
         if (strategy == Strategy::budget) options.max_splats = 60'000;
-        Device scratch;
+        Device scratch{test::device_options()};
         const Forecast f = forecast_training(scratch, dataset, options);
         EXPECT_EQ(f.start_splats, 60'000U);
         EXPECT_EQ(f.splats, strategy == Strategy::adc ? adc_ends_with : 60'000U);
@@ -158,7 +159,7 @@ TEST(Forecast, a_random_start_has_no_degree_before_the_first_probe) {
     options.random_points = 200'000;
     options.iterations = 1'000;
     options.probe_sh = true;
-    Device scratch;
+    Device scratch{test::device_options()};
     const auto peak = [&] { return forecast_training(scratch, dataset, options, false).peak; };
     EXPECT_EQ(peak().splats, 200'000U);
     EXPECT_EQ(peak().sh_degree, 0);
@@ -194,7 +195,7 @@ TEST(Forecast, stays_within_the_memory_budget) {
     TrainOptions options;
     use_strategy(Strategy::mcmc, options);
     options.max_splats = 16'000;
-    Device scratch;
+    Device scratch{test::device_options()};
     const auto predicted = [&](std::uint64_t budget) {
         options.max_memory_bytes = budget;
         return forecast_training(scratch, small_scene(), options);
@@ -216,7 +217,7 @@ TEST(Forecast, stays_within_the_memory_budget) {
 }
 
 TEST(Forecast, counts_the_smaller_photos_while_they_are_there) {
-    Device scratch;
+    Device scratch{test::device_options()};
     TrainOptions options;
     options.densify_until = 0;
     options.average_from = 1;  // a mean at the end would take more
@@ -236,7 +237,7 @@ TEST(Forecast, counts_the_smaller_photos_while_they_are_there) {
 }
 
 TEST(Forecast, counts_the_splats_that_stand_beside_smaller_photos) {
-    Device scratch;
+    Device scratch{test::device_options()};
     TrainOptions options;
     options.average_from = 1;
     const auto peak_of = [&] {
@@ -256,7 +257,7 @@ TEST(Forecast, counts_the_splats_that_stand_beside_smaller_photos) {
 }
 
 TEST(Forecast, few_random_splats_grow_beside_smaller_photos) {
-    Device scratch;
+    Device scratch{test::device_options()};
     Dataset dataset = small_scene(1);
     dataset.points = {};
     TrainOptions options;
@@ -270,7 +271,7 @@ TEST(Forecast, few_random_splats_grow_beside_smaller_photos) {
 }
 
 TEST(Forecast, counts_the_time_that_smaller_photos_save) {
-    Device scratch;
+    Device scratch{test::device_options()};
     TrainOptions options;
     options.densify_until = 0;
     const Forecast f = forecast_training(scratch, small_scene(1), options);
@@ -280,7 +281,7 @@ TEST(Forecast, counts_the_time_that_smaller_photos_save) {
 }
 
 TEST(Forecast, without_measuring_has_no_time) {
-    Device scratch;
+    Device scratch{test::device_options()};
     const Forecast f = forecast_training(scratch, small_scene(), {}, false);
     EXPECT_EQ(f.seconds, 0);
     EXPECT_GT(f.splats, 0U);

@@ -1,15 +1,16 @@
 // Where splats stop growing in number, and what a run does with the memory that there is.
 #include "engine/core/error.h"
+#include "tests/support/device_options.h"
 #include "tests/support/resumed_run.h"
+#include "tests/support/scoped_variants.h"
 
 namespace darb::test {
 namespace {
 
 std::unique_ptr<Device> faulty_device(const std::string& fault) {
-    ::setenv("DARB_FAULT", fault.c_str(), 1);
-    auto device = std::make_unique<Device>();
-    ::unsetenv("DARB_FAULT");
-    return device;
+    DeviceOptions options = device_options();
+    options.faults = parse_faults(fault);
+    return std::make_unique<Device>(options);
 }
 
 TEST(Limits, splats_stop_growing_at_the_limit) {
@@ -108,7 +109,7 @@ TEST(Limits, a_run_in_a_memory_budget_is_resumed_to_the_same_bits) {
     t.options.initial_scale = 4;  // the fullest frames are the first
     std::uint32_t unlimited = 0;
     t.options.max_memory_bytes = half_of_the_growth(t, unlimited);
-    Device own;
+    Device own{test::device_options()};
     Trainer whole(own, t.dataset, t.photos, t.start(), t.options);
     run_to(whole, 60);
     ASSERT_LT(whole.splat_count(), unlimited);
@@ -152,8 +153,10 @@ TEST(Limits, a_device_without_ample_room_for_the_backward_pass_gets_what_it_need
     TinyTraining t = tiny_training({.width = 320, .height = 200, .splats = 24, .close_up = 3});
     t.options.resolution_ramp = false;
     t.options.densify_until = 0;
+    std::string backward;
     const auto pairs = [&](const std::string& fault, std::uint64_t& peak) {
         const std::unique_ptr<Device> device = faulty_device(fault);
+        const ScopedVariants variants(*device, "backward=" + backward);
         Trainer trainer(*device, t.dataset, t.photos, t.start(), t.options);
         run_to(trainer, 10);
         trainer.drain();
@@ -163,12 +166,11 @@ TEST(Limits, a_device_without_ample_room_for_the_backward_pass_gets_what_it_need
     };
     for (const char* way : {"subgroup", "buckets"}) {
         SCOPED_TRACE(way);
-        ::setenv("DARB_TUNE", fmt::format("backward={}", way).c_str(), 1);
+        backward = way;
         std::uint64_t peak = 0, within = 0;
         const std::uint64_t ample = pairs("", peak);
         EXPECT_LT(pairs(fmt::format("memory:{}", peak - 1), within), ample);
         EXPECT_LT(within, peak);
-        ::unsetenv("DARB_TUNE");
     }
 }
 

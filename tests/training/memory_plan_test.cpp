@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/files.h"
+#include "tests/support/device_options.h"
 #include "tests/support/scoped_variants.h"
 #include "trainer/forecast.h"
 #include "trainer/initial_model.h"
@@ -42,7 +43,7 @@ TrainOptions options_of(int sh_degree, bool effects = false) {
 void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats,
                          const std::string& ways = "", int resolution = 2) {
     const Dataset dataset = small_scene(resolution);
-    Device device;
+    Device device{test::device_options()};
     const test::ScopedVariants variants(device, ways);
     SplatModel start = split_model(initial_model(dataset, options), splats, 1);
     start.resize(std::min<std::size_t>(start.size(), splats));
@@ -75,7 +76,7 @@ TEST(MemoryPlan, exposure_and_antialiasing_are_met_to_the_byte) {
     const Dataset dataset = small_scene();
     add_photos(dataset.views, options_of(0, true), with);
     add_photos(dataset.views, {}, without);
-    const Device device;
+    const Device device{test::device_options()};
     with.splats = without.splats = 4'000;
     EXPECT_GT(plan_memory(device, with).effects, 100U * 75U * 12U + 4'000U * 4U);
     EXPECT_LE(plan_memory(device, without).effects, 16U);
@@ -104,7 +105,7 @@ TEST(MemoryPlan, the_mean_of_the_last_iterations_is_met_to_the_byte) {
     options.iterations = 10;
     options.average_from = 0.5;
     const Dataset dataset = small_scene();
-    Device device;
+    Device device{test::device_options()};
     Trainer trainer(device, dataset, load_photos(dataset.views), initial_model(dataset, options),
                     options);
     for (int i = 1; i <= 10; ++i) {
@@ -127,7 +128,7 @@ TEST(MemoryPlan, no_splats_are_met_to_the_byte) {
 
 // The peak of a whole run, by the plans for all that the trainer went through.
 void compare_with_run(const Dataset& dataset, const TrainOptions& options, int degree) {
-    Device device;
+    Device device{test::device_options()};
     Trainer trainer(device, dataset, load_photos(dataset.views), initial_model(dataset, options),
                     options);
     const std::uint32_t start = trainer.splat_count();
@@ -181,7 +182,7 @@ TEST(MemoryPlan, the_log_of_a_run_holds_plan_and_peak) {
     run.output = std::filesystem::temp_directory_path() / fmt::format("darb_plan_{}", ::getpid());
     run.quiet = true;
     run.report = false;
-    Device device;
+    Device device{test::device_options()};
     run_training(device, small_scene(), options, run);
     const auto metrics = nlohmann::json::parse(read_text_file(run.output / "metrics.json"));
     const auto peak = metrics["peak_device_bytes"].get<double>();
@@ -199,7 +200,7 @@ TEST(RunTime, a_pause_is_left_out) {
     run.report = false;
     int steps = 0;
     run.on_step = [&](const LiveStep&) { return ++steps == 1 ? 1e6 : 0.0; };
-    Device device;
+    Device device{test::device_options()};
     const RunSummary summary = run_training(device, small_scene(), options, run);
     EXPECT_GT(steps, 0);
     EXPECT_LT(summary.seconds, 0);
@@ -219,7 +220,7 @@ TEST(MemoryPlan, photos_count_only_where_they_are_trained_on) {
 }
 
 TEST(MemoryPlan, splats_within_a_budget_meet_it) {
-    const Device device;
+    const Device device{test::device_options()};
     MemoryDemand demand;
     demand.splats = 1'000'000;
     demand.pairs = 3'000'000;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/core/files.h"
+#include "tests/support/device_options.h"
 #include "trainer/initial_model.h"
 
 namespace darb {
@@ -84,7 +85,7 @@ TEST(RunLog, a_resumed_run_reports_what_it_found_before) {
     run.report = false;
     const auto metrics = [&](std::uint64_t most_bytes) {
         options.max_memory_bytes = most_bytes;
-        Device device;
+        Device device{test::device_options()};
         run_training(device, dataset, options, run);
         return nlohmann::json::parse(read_text_file(run.output / "metrics.json"));
     };
@@ -92,7 +93,7 @@ TEST(RunLog, a_resumed_run_reports_what_it_found_before) {
     const auto peak = [&](int densify_until) {
         TrainOptions unlimited = options;
         unlimited.densify_until = densify_until;
-        Device device;
+        Device device{test::device_options()};
         Trainer trainer(device, dataset, photos, initial_model(dataset, unlimited), unlimited);
         while (trainer.iteration() < options.iterations) trainer.step();
         return device.peak_bytes();

@@ -2,6 +2,7 @@
 // never stopped, survive frames that need more room, and bring the loss down.
 #include "engine/core/error.h"
 #include "engine/data/metrics.h"
+#include "tests/support/device_options.h"
 #include "tests/support/resumed_run.h"
 #include "tests/support/tiny_training.h"
 
@@ -326,7 +327,7 @@ TEST(Training, a_device_of_small_bindings_trains_the_same_bits) {
         t.options.sh_rest_every = every;
         Trainer whole = t.trainer();
         ::setenv("DARB_FAULT", "binding:163840", 1);
-        Device narrow;
+        Device narrow{test::device_options()};
         ::unsetenv("DARB_FAULT");
         Trainer parts(narrow, t.dataset, t.photos, t.start(), t.options);
         ASSERT_GT(parts.splats().ranges().size(), 1U);
@@ -350,7 +351,7 @@ TEST(Training, a_device_whose_bindings_hold_few_pairs_trains_the_same_bits) {
         t.options.initial_scale = grows ? 2 : 5;
         Trainer whole = t.trainer();
         ::setenv("DARB_FAULT", "binding:20480", 1);  // 640 pairs a window
-        Device narrow;
+        Device narrow{test::device_options()};
         ::unsetenv("DARB_FAULT");
         Trainer windows(narrow, t.dataset, t.photos, t.start(), t.options);
         run_to(whole, 45);

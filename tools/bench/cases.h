@@ -38,7 +38,7 @@ std::vector<BenchCase> render_cases();
 std::vector<BenchCase> train_cases(bool full);
 /// Radix sort and scan.
 std::vector<BenchCase> sort_cases();
-/// The ways of the passes that have several (engine/primitives/tuning.h), a row each.
+/// The choices of the passes that have several (engine/plan/tuning_names.h), a row each.
 std::vector<BenchCase> tuning_cases();
 /// The first picture of a new process, shaders compiled or from the driver's cache.
 std::vector<BenchCase> start_cases();

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 #include "tools/bench/native_blend.h"
 
 namespace darb {
@@ -79,7 +79,7 @@ Json context_json(const Device& device, const DeviceRates& rates, const std::str
     context["executable"] = "darb bench";
     context["device"] = device.info().name;
     context["driver"] = device.info().driver;
-    context["tuning"] = variants_text(all_variants(device));
+    context["tuning"] = names_text(tuning_names(device.tuning()));
     context["copy_bytes_per_s"] = rates.bytes_per_s;
     context["fma_per_s"] = rates.fma_per_s;
     context["native_instructions"] = native_instructions();

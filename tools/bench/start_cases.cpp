@@ -11,7 +11,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
 
@@ -89,15 +89,16 @@ BenchResult measure(const Device& device, const BenchOptions& options, const fs:
     const fs::path cameras = scratch.path() / "cameras.json", caches = scratch.path() / "caches",
                    pictures = scratch.path() / "pictures";
     write_camera_list(cameras, {view});
-    std::vector<std::string> command = {options.program.string(),
-                                        "render",
-                                        scene.string(),
-                                        "--cameras",
-                                        cameras.string(),
-                                        "-o",
-                                        pictures.string(),
-                                        "--tune",
-                                        variants_text(all_variants(device))};  // nothing to measure
+    std::vector<std::string> command = {
+        options.program.string(),
+        "render",
+        scene.string(),
+        "--cameras",
+        cameras.string(),
+        "-o",
+        pictures.string(),
+        "--tune",
+        names_text(tuning_names(device.tuning()))};  // nothing to measure
     if (!options.device.empty()) {
         command.push_back("--device");
         command.push_back(options.device);

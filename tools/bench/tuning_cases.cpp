@@ -9,31 +9,30 @@ namespace darb {
 
 namespace {
 
-// Every way of one group on the tuner's scene, a row each; the case's own figures are those of the
-// way that runs on this device.
-BenchResult measure_ways(Device& device, const std::string& name, const Sampling& sampling) {
+// Every choice of one group on the tuner's scene, a row each; the case's own figures are those of
+// the one that runs on this device.
+BenchResult measure_choices(Device& device, const std::string& name, const Sampling& sampling) {
     const std::vector<TuningGroup> groups = tuning_groups(device.info());
     const auto group = std::find_if(groups.begin(), groups.end(),
                                     [&](const TuningGroup& g) { return g.name == name; });
-    const Variants before = device.variants(), usual = all_variants(device);
+    const Tuning before = device.tuning();
+    const TuningNames usual = tuning_names(before);
     BenchResult result;
     std::vector<PassFigure> rows;
-    for (const std::string& way : group->ways) {
-        Variants variants = usual;
-        variants[name] = way;
-        device.set_variants(variants);
+    for (const std::string& choice : group->choices) {
+        device.set_tuning(with_names(before, {{name, choice}}));
         TuningFrame frame(device);
         BenchResult one;
         take_samples(
             sampling, 1,
             [&] {
-                return std::vector<PassTime>{{name + "=" + way, frame.run({*group})[0]}};
+                return std::vector<PassTime>{{name + "=" + choice, frame.run({*group})[0]}};
             },
             one);
         rows.push_back(one.passes.at(0));
-        if (way == usual.at(name)) result = one;
+        if (choice == usual.at(name)) result = one;
     }
-    device.set_variants(before);
+    device.set_tuning(before);
     result.passes = std::move(rows);
     result.note = fmt::format("{}={} runs on this device; rows are {}", name, usual.at(name),
                               fmt::join(group->passes, " + "));
@@ -47,7 +46,7 @@ std::vector<BenchCase> tuning_cases() {
     for (const char* group : {"scan", "scatter", "blend", "backward"})
         cases.push_back({fmt::format("tuning/{}", group), "",
                          [group](Device& device, const DeviceRates&, const BenchOptions& o) {
-                             return measure_ways(device, group, o.sampling);
+                             return measure_choices(device, group, o.sampling);
                          }});
     return cases;
 }

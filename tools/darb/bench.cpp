@@ -15,6 +15,7 @@
 #include "tools/darb/bench_growth.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/tune_flags.h"
@@ -100,8 +101,7 @@ int bench(BenchFlags flags) {
         if (!flags.quiet) fmt::print(stderr, "{}\n", line);
     };
     if (!flags.growth.on) cases = possible_cases(std::move(cases), options);
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
     require_timestamps(device);

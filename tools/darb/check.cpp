@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
@@ -98,8 +99,7 @@ int dump_view(const CheckFlags& flags) {
     if (flags.reference) {
         check::dump_from_reference(model, view.camera, flags.dump);
     } else {
-        DeviceOptions options;
-        options.select = flags.device;
+        DeviceOptions options = command_device(flags.device);
         Device device(options);
         settle_tuning(device, flags.tune);
         check::dump_from_device(device, model, view.camera, flags.dump);
@@ -117,8 +117,7 @@ int check_command(const CheckFlags& flags) {
     if (flags.reference)
         throw Error("darb check --reference", "is for a view of a scene",
                     "Add --scene, --cameras and --dump.");
-    DeviceOptions options;
-    options.select = flags.device;
+    DeviceOptions options = command_device(flags.device);
     Device device(options);
     settle_tuning(device, flags.tune);
     return check_device(device, flags);

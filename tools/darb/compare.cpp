@@ -12,6 +12,7 @@
 #include "engine/gpu/device.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/compare_flags.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/train_run.h"
 
 namespace darb {
@@ -81,8 +82,7 @@ int compare(CompareFlags flags) {
     comparison.iterations = flags.iterations;
     comparison.seeds = flags.seeds;
     comparison.settings = settings_of(flags);
-    DeviceOptions options;
-    options.select = flags.device;
+    DeviceOptions options = command_device(flags.device);
     {
         const Device device(options);
         comparison.device = device.info().name + ", " + device.info().driver;

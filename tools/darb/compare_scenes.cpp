@@ -4,6 +4,7 @@
 
 #include "engine/data/metrics.h"
 #include "engine/render/renderer.h"
+#include "tools/darb/device_options.h"
 
 namespace darb {
 
@@ -15,8 +16,7 @@ constexpr double kEqualDb = 100;
 
 SceneDifference compare_scenes(const SplatModel& scene, const SplatModel& other,
                                const std::vector<View>& views, const std::string& device) {
-    DeviceOptions options;
-    options.select = device;
+    DeviceOptions options = command_device(device);
     Device chosen(options);
     Renderer first(chosen, scene), second(chosen, other);
     SceneDifference difference{0, 1e9, ""};

@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/compare_flags.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_run.h"
@@ -70,8 +71,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     if (state == RunState::finished) return note(title + ": is there");
     if (state == RunState::partial) f.run.resume_from = f.run.output / "checkpoint.darb";
     note(title);
-    DeviceOptions options;
-    options.select = flags_.device;
+    DeviceOptions options = command_device(flags_.device);
     Device device(options);  // of its own, so that the peak of memory is this run's
     settle_tuning(device);
     run_training(device, dataset_, f.train, f.run, &stop);
@@ -83,8 +83,7 @@ void Comparer::measure(ComparedRun& run) {
     attempt(run, "LPIPS", [&] { lpips_.measure(run); });
     if (flags_.blending_views == 0 || blended_.contains(run.kernel)) return;
     attempt(run, "blending", [&] {
-        DeviceOptions options;
-        options.select = flags_.device;
+        DeviceOptions options = command_device(flags_.device);
         Device device(options);
         settle_tuning(device);
         measure_blending_of(run, device, held_out(), flags_.blending_views);

@@ -10,6 +10,7 @@
 #include "tools/cost/report.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/pixel_size.h"
@@ -56,8 +57,7 @@ int cost(const CostFlags& flags) {
     if (model.size() == 0)
         throw Error(flags.scene, "holds no splats", "There is nothing to measure.");
     const CostViews views = views_of(flags, model, extent.views);
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
     require_timestamps(device);

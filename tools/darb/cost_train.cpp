@@ -6,6 +6,7 @@
 #include "engine/core/files.h"
 #include "tools/cost/train_cost.h"
 #include "tools/darb/cost_flags.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/train_run.h"
 
@@ -39,8 +40,7 @@ int train_cost(const CostFlags& flags) {
     if (flags.seeds > 0) plan.seeds = flags.seeds;
     Dataset dataset = load_dataset(run.dataset, run.data);
     if (!flags.quiet) print_notes(dataset.notes);
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
     plan_effects(dataset, run);

@@ -13,6 +13,7 @@
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
@@ -75,8 +76,7 @@ int eval(EvalFlags flags) {
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
     print_notes(dataset.notes);
     std::vector<View> views = views_of(dataset, flags);
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device);
     const EffectPlan plan = plan_rendering(model, views, {}, choice);

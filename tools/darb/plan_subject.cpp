@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
 #include "tools/cost/views.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 
@@ -96,8 +97,7 @@ std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags
 }
 
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {
-    DeviceOptions device;
-    device.select = flags.device;
+    DeviceOptions device = command_device(flags.device);
     if (s.training) {
         TrainOptions train;
         train.kernel = kernel_of(flags);

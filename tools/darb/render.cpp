@@ -15,6 +15,7 @@
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/depth_file.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
@@ -72,8 +73,7 @@ int render(RenderFlags flags) {
         files.push_back(flags.output / picture_name(view.name, used));
         keep_input(view.photo, files.back());
     }
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
     EffectPlan plan = plan_rendering(

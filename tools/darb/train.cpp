@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
@@ -59,8 +60,7 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     if (flags.dataset.empty())
         throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
 
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
     settle_tuning(device, tune);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "trainer/forecast.h"
 #include "trainer/progress.h"
@@ -89,10 +90,9 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
 }
 
 void print_forecast(const Device& device, const Dataset& dataset, const TrainFlags& flags) {
-    DeviceOptions options;
-    options.select = flags.device;
+    DeviceOptions options = command_device(flags.device);
     Device scratch(options);
-    scratch.set_variants(device.variants());
+    scratch.set_tuning(device.tuning());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
     fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train), memory_text(device, f));

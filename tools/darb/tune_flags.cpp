@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+
 #include "engine/plan/tuner.h"
 
 namespace darb {
@@ -15,14 +17,15 @@ void add_tune_flags(CLI::App& command, TuneFlags& flags) {
 }
 
 void settle_tuning(Device& device, const TuneFlags& flags) {
-    tune(device, {flags.choice, flags.retune,
+    const char* environment = std::getenv("DARB_TUNE");
+    tune(device, {flags.choice, environment != nullptr ? environment : "", flags.retune,
                   [](const std::string& line) { fmt::print(stderr, "{}\n", line); }});
 }
 
 std::string tuning_of_listed(const DeviceInfo& info) {
     if (const auto record = read_tuning(info, default_cache_folder()))
         return "measured: " + tuning_text(*record);
-    const std::string usual = variants_text(default_variants(info));
+    const std::string usual = names_text(tuning_names(usual_tuning(info)));
     return usual + (is_known_device(info) ? " (known; --retune measures)"
                                           : " (to be measured at the first use)");
 }

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
@@ -20,8 +21,7 @@ namespace {
 
 int without_window(const ViewFlags& flags, const ViewerOptions& options, const PixelSize& size,
                    const std::string& note) {
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
     Viewer viewer(device, options);
@@ -60,8 +60,7 @@ int view(ViewFlags flags) {
     if (!flags.screenshot.empty() || !flags.frames.empty())
         return without_window(flags, options, size, note);
     const WindowSystem windows;
-    DeviceOptions device_options;
-    device_options.select = flags.device;
+    DeviceOptions device_options = command_device(flags.device);
     windows.require(device_options);
     Device device(device_options);
     settle_tuning(device, flags.tune);

@@ -8,6 +8,7 @@
 #include "engine/gpu/shader_table.h"
 #include "engine/gpu/spirv_reflect.h"
 #include "shaders/shared/scan_args.h"
+#include "tests/support/device_options.h"
 
 namespace darb {
 namespace {
@@ -95,7 +96,7 @@ TEST(ReflectSpirv, every_shader_of_the_table_is_readable) {
 }
 
 TEST(Pipeline, spec_constants_are_set_by_name) {
-    Device device;
+    Device device{test::device_options()};
     const Pipeline pipeline(device, "scan_top", {{"THREADS", 64}, {"NOT_THERE", 1.5F}});
     EXPECT_EQ(pipeline.threads_x(), 64U);
     EXPECT_TRUE(pipeline.declares("THREADS"));
@@ -104,13 +105,13 @@ TEST(Pipeline, spec_constants_are_set_by_name) {
 
 TEST(PipelineDeathTest, unknown_shader_aborts_with_its_name) {
     GTEST_FLAG_SET(death_test_style, "threadsafe");
-    Device device;
+    Device device{test::device_options()};
     EXPECT_DEATH(Pipeline(device, "no_such_shader"), "no_such_shader");
 }
 
 TEST(CommandsDeathTest, wrong_buffers_or_arguments_abort) {
     GTEST_FLAG_SET(death_test_style, "threadsafe");
-    Device device;
+    Device device{test::device_options()};
     const Pipeline pipeline(device, "scan_prepare");
     const Buffer buffer(device, "buffer", 64);
     Commands commands(device);
@@ -122,7 +123,7 @@ TEST(CommandsDeathTest, wrong_buffers_or_arguments_abort) {
 }
 
 TEST(Commands, dispatch_reads_what_a_fill_wrote) {
-    Device device;
+    Device device{test::device_options()};
     const Pipeline pipeline(device, "scan_prepare");
     const Buffer count(device, "count", 8), plan(device, "plan", sizeof(gpu::ScanPlan));
     Commands commands(device);
@@ -142,7 +143,7 @@ TEST(Commands, dispatch_reads_what_a_fill_wrote) {
 }
 
 TEST(Commands, pass_times_have_a_row_per_pass_in_order) {
-    Device device;
+    Device device{test::device_options()};
     const Buffer buffer(device, "buffer", 1 << 20);
     Commands commands(device);
     commands.begin();
@@ -162,7 +163,7 @@ TEST(Commands, pass_times_have_a_row_per_pass_in_order) {
 }
 
 TEST(Commands, copies_and_fills_in_a_chain_are_ordered_and_validation_is_silent) {
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.validation = true;
     std::unique_ptr<Device> device;
     try {
@@ -198,7 +199,7 @@ TEST(Commands, copies_and_fills_in_a_chain_are_ordered_and_validation_is_silent)
 }
 
 TEST(Commands, many_dispatches_grow_the_descriptor_pools) {
-    Device device;
+    Device device{test::device_options()};
     const Pipeline pipeline(device, "scan_prepare");
     const Buffer count(device, "count", 16), plan(device, "plan", 32);
     Commands commands(device);
@@ -213,7 +214,7 @@ TEST(Commands, many_dispatches_grow_the_descriptor_pools) {
 }
 
 TEST(Commands, binding_more_than_the_device_allows_is_an_error) {
-    Device device;
+    Device device{test::device_options()};
     if (device.info().max_storage_buffer_bytes > (std::uint64_t{1} << 28)) GTEST_SKIP();
     const std::uint64_t bytes = device.info().max_storage_buffer_bytes + 4096;
     const Buffer large(device, "large", bytes), plan(device, "plan", 32);

@@ -14,6 +14,7 @@
 #include "engine/gpu/device_state.h"
 #include "engine/gpu/faults.h"
 #include "engine/gpu/shader_table.h"
+#include "tests/support/device_options.h"
 
 namespace darb {
 namespace {
@@ -44,7 +45,7 @@ struct Environment {
 };
 
 TEST(Device, an_extension_that_is_not_offered_is_an_error_with_both_names) {
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.device_extensions = {"VK_KHR_none"};
     const std::string text = error_of([&] { Device device(options); });
     EXPECT_NE(text.find(Device().info().name), std::string::npos) << text;
@@ -131,7 +132,7 @@ TEST(ListDevices, every_usable_device_has_its_limits) {
 }
 
 TEST(Buffer, upload_then_download_returns_the_bytes) {
-    Device device;
+    Device device{test::device_options()};
     for (const Memory memory : {Memory::device, Memory::host}) {
         Buffer buffer(device, "numbers", 4096 * 4, memory);
         std::vector<std::uint32_t> values(4096);
@@ -143,7 +144,7 @@ TEST(Buffer, upload_then_download_returns_the_bytes) {
 }
 
 TEST(Buffer, long_upload_crosses_the_staging_pieces) {
-    Device device;
+    Device device{test::device_options()};
     std::vector<std::uint32_t> values((40U << 20) / 4 + 3);
     for (std::uint32_t i = 0; i < values.size(); ++i) values[i] = i ^ 0xabcd;
     Buffer buffer(device, "long", values.size() * 4);
@@ -152,13 +153,13 @@ TEST(Buffer, long_upload_crosses_the_staging_pieces) {
 }
 
 TEST(Buffer, size_zero_is_legal) {
-    Device device;
+    Device device{test::device_options()};
     const Buffer buffer(device, "empty", 0);
     EXPECT_GT(buffer.bytes(), 0U);
 }
 
 TEST(Buffer, live_and_peak_bytes_are_counted) {
-    Device device;
+    Device device{test::device_options()};
     Buffer kept(device, "kept", 1000);
     {
         const Buffer other(device, "other", 2000);
@@ -170,7 +171,7 @@ TEST(Buffer, live_and_peak_bytes_are_counted) {
 }
 
 TEST(Buffer, over_the_budget_is_an_error_with_name_and_size) {
-    Device device;
+    Device device{test::device_options()};
     device.set_memory_budget(3 << 20);
     const Buffer first(device, "first", 2 << 20);
     const std::string text = error_of([&] { Buffer(device, "splat means", 2 << 20); });
@@ -180,7 +181,7 @@ TEST(Buffer, over_the_budget_is_an_error_with_name_and_size) {
 }
 
 TEST(Buffer, larger_than_the_device_allows_is_an_error) {
-    Device device;
+    Device device{test::device_options()};
     const std::string text = error_of([&] { Buffer(device, "huge", std::uint64_t{1} << 60); });
     EXPECT_NE(text.find("\"huge\""), std::string::npos) << text;
 }
@@ -211,7 +212,7 @@ TEST(Faults, text_that_is_no_fault_is_an_error) {
 
 TEST(Faults, out_of_memory_names_the_buffer_and_frees_nothing_else) {
     const Environment environment("oom:pairs");
-    Device device;
+    Device device{test::device_options()};
     const Buffer fine(device, "others", 64);
     const std::string text = error_of([&] { Buffer(device, "pairs", 1 << 20); });
     EXPECT_NE(text.find("buffer \"pairs\" (1.0 MiB): out of device memory"), std::string::npos)
@@ -221,7 +222,7 @@ TEST(Faults, out_of_memory_names_the_buffer_and_frees_nothing_else) {
 
 TEST(Faults, lost_device_names_the_passes) {
     const Environment environment("lost:2");
-    Device device;
+    Device device{test::device_options()};
     Buffer buffer(device, "buffer", 64);
     Commands commands(device);
     const auto run = [&] {
@@ -242,7 +243,7 @@ TEST(Faults, lost_device_names_the_passes) {
 TEST(PipelineCache, broken_file_is_ignored) {
     const auto folder = std::filesystem::path(::testing::TempDir()) / "darb_cache_test";
     std::filesystem::remove_all(folder);
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.cache_folder = folder;
     { const Device device(options); }
     std::filesystem::create_directories(folder);

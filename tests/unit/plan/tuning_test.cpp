@@ -1,18 +1,19 @@
-// engine/primitives/tuning, engine/plan/tuner: names, what a device allows, the record on disk,
+// engine/plan/tuning_names, tuner: names, what a device allows, the record on disk,
 // what wins.
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/plan/tuner.h"
+#include "engine/primitives/radix_sort.h"
+#include "tests/support/device_options.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/shared_device.h"
 
@@ -35,15 +36,15 @@ DeviceInfo some_gpu() {
     return info;
 }
 
-std::vector<std::string> ways(const DeviceInfo& info, const std::string& group) {
+std::vector<std::string> choices(const DeviceInfo& info, const std::string& group) {
     for (const TuningGroup& g : tuning_groups(info))
-        if (g.name == group) return g.ways;
+        if (g.name == group) return g.choices;
     return {};
 }
 
 std::string refusal(const std::string& text) {
     try {
-        parse_variants(some_gpu(), text, "--tune");
+        parse_tuning(some_gpu(), text, "--tune");
     } catch (const Error& e) {
         return e.what();
     }
@@ -56,7 +57,7 @@ class Tuner : public testing::Test {
     void SetUp() override { fs::create_directories(folder_); }
     void TearDown() override { fs::remove_all(folder_); }
     static TuningRecord record() {
-        return {parse_variants(some_gpu(), "backward=buckets,blend=256x1,scan=thread", "test"),
+        return {parse_tuning(some_gpu(), "backward=buckets,blend=256x1,scan=thread", "test"),
                 {{"blend", "128x2", 1.5}, {"blend", "256x1", 1.25}}};
     }
     fs::path only_file() const {
@@ -72,10 +73,10 @@ class Tuner : public testing::Test {
 };
 
 TEST(Tuning, names_come_back_in_one_order) {
-    const Variants variants =
-        parse_variants(some_gpu(), "backward=buckets,scatter=columns", "--tune");
-    EXPECT_EQ(variants_text(variants), "scatter=columns,backward=buckets");
-    EXPECT_EQ(parse_variants(some_gpu(), "", "--tune"), Variants{});
+    const TuningNames names =
+        parse_tuning(some_gpu(), "backward=buckets,scatter=columns", "--tune");
+    EXPECT_EQ(names_text(names), "scatter=columns,backward=buckets");
+    EXPECT_EQ(parse_tuning(some_gpu(), "", "--tune"), TuningNames{});
 }
 
 TEST(Tuning, unknown_names_are_errors_that_list_the_known_ones) {
@@ -92,32 +93,32 @@ TEST(Tuning, unknown_names_are_errors_that_list_the_known_ones) {
 TEST(Tuning, shapes_are_those_that_fit_the_device) {
     using Names = std::vector<std::string>;
     DeviceInfo info = some_gpu();
-    EXPECT_EQ(ways(info, "blend"), (Names{"128x2", "256x1", "64x4", "32x8"}));
+    EXPECT_EQ(choices(info, "blend"), (Names{"128x2", "256x1", "64x4", "32x8"}));
     info.subgroup_size = 64;
-    EXPECT_EQ(ways(info, "blend"), (Names{"256x1", "128x2", "64x4"}));
+    EXPECT_EQ(choices(info, "blend"), (Names{"256x1", "128x2", "64x4"}));
     info.subgroup_size = 4;  // a subgroup's list takes a kilobyte
     info.shared_memory_bytes = 32 * 1024;
-    EXPECT_EQ(ways(info, "blend"), (Names{"16x16", "128x2", "64x4", "32x8"}));
-    EXPECT_EQ(ways(info, "scatter").front(), "ballot");
+    EXPECT_EQ(choices(info, "blend"), (Names{"16x16", "128x2", "64x4", "32x8"}));
+    EXPECT_EQ(choices(info, "scatter").front(), "ballot");
     info.driver = "llvmpipe Mesa 25";
-    EXPECT_EQ(ways(info, "scatter").front(), "columns");
+    EXPECT_EQ(choices(info, "scatter").front(), "columns");
     EXPECT_TRUE(is_known_device(info));
 }
 
 TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
     Device& device = shared_device();
-    EXPECT_EQ(all_variants(device), default_variants(device.info()));
+    EXPECT_EQ(device.tuning(), usual_tuning(device.info()));
     const ScopedVariants some(device, "scatter=ballot,backward=buckets");
-    EXPECT_EQ(tuning_of(device).scatter, RadixSort::Strategy::ballot);
-    EXPECT_EQ(tuning_of(device).backward, BackwardBlend::buckets);
-    EXPECT_EQ(result_variants(device), "backward=buckets");
+    EXPECT_EQ(device.tuning().scatter_by_columns, false);
+    EXPECT_EQ(device.tuning().backward, BackwardBlend::buckets);
+    EXPECT_EQ(result_tuning(device), "backward=buckets");
     EXPECT_EQ(RadixSort(device, 100).strategy(), RadixSort::Strategy::ballot);
 }
 
 TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_pairs) {
     const auto taken = [](const char* group, const std::vector<TuningTime>& times) {
         for (const TuningGroup& g : tuning_groups(some_gpu()))
-            if (g.name == group) return fastest_way(g, times);
+            if (g.name == group) return fastest_choice(g, times);
         return std::string();
     };
     EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.98}}), "subgroup");
@@ -132,7 +133,7 @@ TEST_F(Tuner, a_record_is_read_back) {
     ASSERT_TRUE(read);
     EXPECT_EQ(read->choice, record().choice);
     ASSERT_EQ(read->times.size(), 2U);
-    EXPECT_EQ(read->times[1].way, "256x1");
+    EXPECT_EQ(read->times[1].choice, "256x1");
     EXPECT_EQ(read->times[1].ms, 1.25);
 }
 
@@ -191,60 +192,53 @@ TEST_F(Tuner, a_folder_that_cannot_be_written_is_no_error) {
 }
 
 TEST_F(Tuner, a_known_device_is_not_measured_unless_asked) {
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.cache_folder = folder_;
     Device device(options);
     if (!is_known_device(device.info())) GTEST_SKIP() << "a device that is always measured";
     std::string said;
-    tune(device, {"", false, [&](const std::string& line) { said += line; }});
+    tune(device, {"", "", false, [&](const std::string& line) { said += line; }});
     EXPECT_EQ(said, "");
-    EXPECT_EQ(all_variants(device), default_variants(device.info()));
+    EXPECT_EQ(device.tuning(), usual_tuning(device.info()));
     EXPECT_TRUE(fs::is_empty(folder_));
 }
 
-// What is forced wins over DARB_TUNE, that over the record, that over the default.
+// What is forced wins over what the environment asks for, that over the record, that over the
+// default.
 TEST_F(Tuner, the_nearest_word_wins) {
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.cache_folder = folder_;
     Device device(options);
-    TuningRecord record{default_variants(device.info()), {}};
-    record.choice["scan"] = ways(device.info(), "scan")[1];
+    TuningRecord record{tuning_names(usual_tuning(device.info())), {}};
+    record.choice["scan"] = choices(device.info(), "scan")[1];
     record.choice["scatter"] = "ballot";
     record.choice["backward"] = "buckets";
     write_tuning(device.info(), folder_, record);
-    const char* before = std::getenv("DARB_TUNE");
-    const std::string kept = before != nullptr ? before : "";
-    ::setenv("DARB_TUNE", "scatter=columns,backward=buckets", 1);
-    tune(device, {"backward=subgroup", false, {}});
-    EXPECT_EQ(device.variants().at("scan"), record.choice["scan"]);
-    EXPECT_EQ(device.variants().at("scatter"), "columns");
-    EXPECT_EQ(device.variants().at("backward"), "subgroup");
-    ::setenv("DARB_TUNE", "no_such=1", 1);
-    EXPECT_THROW(tune(device, {}), Error);
-    if (before != nullptr)
-        ::setenv("DARB_TUNE", kept.c_str(), 1);
-    else
-        ::unsetenv("DARB_TUNE");
+    tune(device, {"backward=subgroup", "scatter=columns,backward=buckets", false, {}});
+    EXPECT_EQ(tuning_names(device.tuning()).at("scan"), record.choice["scan"]);
+    EXPECT_TRUE(device.tuning().scatter_by_columns);
+    EXPECT_EQ(device.tuning().backward, BackwardBlend::subgroup);
+    EXPECT_THROW(tune(device, {"", "no_such=1", false, {}}), Error);
 }
 
 // Which way is the fastest is no matter here, only that all were measured and one of each is kept.
 TEST_F(Tuner, retuning_measures_every_way_and_keeps_the_choice_slow) {
-    DeviceOptions options;
+    DeviceOptions options = test::device_options();
     options.cache_folder = folder_;
     Device device(options);
     std::string said;
-    tune(device, {"", true, [&](const std::string& line) { said += line + "\n"; }});
+    tune(device, {"", "", true, [&](const std::string& line) { said += line + "\n"; }});
     EXPECT_NE(said.find("measuring"), std::string::npos);
     const auto record = read_tuning(device.info(), folder_);
     ASSERT_TRUE(record);
-    EXPECT_EQ(record->choice, device.variants());
+    EXPECT_EQ(record->choice, tuning_names(device.tuning()));
     std::size_t all = 0;
     for (const TuningGroup& group : tuning_groups(device.info())) {
-        all += group.ways.size();
-        for (const std::string& way : group.ways) {
-            const auto time =
-                std::find_if(record->times.begin(), record->times.end(),
-                             [&](const auto& t) { return t.group == group.name && t.way == way; });
+        all += group.choices.size();
+        for (const std::string& way : group.choices) {
+            const auto time = std::find_if(
+                record->times.begin(), record->times.end(),
+                [&](const auto& t) { return t.group == group.name && t.choice == way; });
             ASSERT_NE(time, record->times.end()) << group.name << "=" << way;
             EXPECT_GT(time->ms, 0) << group.name << "=" << way;
         }
@@ -252,7 +246,7 @@ TEST_F(Tuner, retuning_measures_every_way_and_keeps_the_choice_slow) {
     EXPECT_EQ(record->times.size(), all);
     Device next(options);
     tune(next, {});
-    EXPECT_EQ(next.variants(), record->choice);
+    EXPECT_EQ(tuning_names(next.tuning()), record->choice);
 }
 
 }  // namespace

@@ -1,12 +1,10 @@
-#include "engine/primitives/tuning.h"
+#include "engine/plan/tuning_names.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
-#include <cstdlib>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "shaders/shared/render_args.h"
 
@@ -43,24 +41,23 @@ std::string known_names(const std::vector<TuningGroup>& groups) {
     std::string text;
     for (const TuningGroup& group : groups)
         text += fmt::format("{}{}={}", text.empty() ? "" : ", ", group.name,
-                            fmt::join(group.ways, "|"));
+                            fmt::join(group.choices, "|"));
     return text;
 }
 
-Variants checked(const DeviceInfo& info, const Variants& variants, const std::string& where) {
+void check_names(const DeviceInfo& info, const TuningNames& names, const std::string& where) {
     const std::vector<TuningGroup> groups = tuning_groups(info);
-    for (const auto& variant : variants) {
-        const std::string &name = variant.first, &way = variant.second;
+    const std::string known = "Known here: " + known_names(groups) + ".";
+    for (const auto& named : names) {
+        const std::string &name = named.first, &choice = named.second;
         const auto group = std::find_if(groups.begin(), groups.end(),
                                         [&](const TuningGroup& g) { return g.name == name; });
-        const std::string known = "Known here: " + known_names(groups) + ".";
         if (group == groups.end())
             throw Error(where, fmt::format("'{}' names no choice", name), known);
-        if (std::find(group->ways.begin(), group->ways.end(), way) == group->ways.end())
-            throw Error(where, fmt::format("'{}' is no way of '{}' on {}", way, name, info.name),
+        if (std::find(group->choices.begin(), group->choices.end(), choice) == group->choices.end())
+            throw Error(where, fmt::format("'{}' is no way of '{}' on {}", choice, name, info.name),
                         known);
     }
-    return variants;
 }
 
 }  // namespace
@@ -82,14 +79,8 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
             {"backward", {"subgroup", "buckets"}, {"blend", "blend backward"}, true}};
 }
 
-Variants default_variants(const DeviceInfo& info) {
-    Variants variants;
-    for (const TuningGroup& group : tuning_groups(info)) variants[group.name] = group.ways.front();
-    return variants;
-}
-
-Variants parse_variants(const DeviceInfo& info, std::string_view text, const std::string& where) {
-    Variants variants;
+TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const std::string& where) {
+    TuningNames names;
     while (!text.empty()) {
         const std::string_view one = text.substr(0, text.find(','));
         text.remove_prefix(std::min(one.size() + 1, text.size()));
@@ -97,46 +88,45 @@ Variants parse_variants(const DeviceInfo& info, std::string_view text, const std
         if (equals == std::string_view::npos)
             throw Error(where, fmt::format("'{}' is not of the form NAME=WAY", one),
                         "Known here: " + known_names(tuning_groups(info)) + ".");
-        variants[std::string(one.substr(0, equals))] = one.substr(equals + 1);
+        names[std::string(one.substr(0, equals))] = one.substr(equals + 1);
     }
-    return checked(info, variants, where);
+    check_names(info, names, where);
+    return names;
 }
 
-std::string variants_text(const Variants& variants) {
+std::string names_text(const TuningNames& names) {
     std::string text;
     for (const char* name : {"scan", "scatter", "blend", "backward"})
-        if (const auto found = variants.find(name); found != variants.end())
+        if (const auto found = names.find(name); found != names.end())
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, found->second);
     return text;
 }
 
-Variants all_variants(const Device& device) {
-    const DeviceInfo& info = device.info();
-    Variants variants = checked(info, device.variants(), info.name);
-    if (const char* text = std::getenv("DARB_TUNE"); text != nullptr)
-        variants.merge(parse_variants(info, text, "DARB_TUNE"));
-    variants.merge(default_variants(info));
-    return variants;
+TuningNames tuning_names(const Tuning& tuning) {
+    return {{"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
+            {"scatter", tuning.scatter_by_columns ? "columns" : "ballot"},
+            {"blend", shape_name(tuning.blend_threads)},
+            {"backward", tuning.backward == BackwardBlend::buckets ? "buckets" : "subgroup"}};
 }
 
-Tuning tuning_of(const Device& device) {
-    const Variants variants = all_variants(device);
-    Tuning tuning;
-    tuning.scan_by_thread = variants.at("scan") == "thread";
-    tuning.scatter = variants.at("scatter") == "columns" ? RadixSort::Strategy::columns
-                                                         : RadixSort::Strategy::ballot;
-    const std::string& shape = variants.at("blend");
-    std::from_chars(shape.data(), shape.data() + shape.size(), tuning.blend_threads);
-    tuning.backward =
-        variants.at("backward") == "buckets" ? BackwardBlend::buckets : BackwardBlend::subgroup;
+Tuning with_names(Tuning tuning, const TuningNames& names) {
+    for (const auto& [name, choice] : names) {
+        if (name == "scan") tuning.scan_by_thread = choice == "thread";
+        if (name == "scatter") tuning.scatter_by_columns = choice == "columns";
+        if (name == "blend")
+            std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_threads);
+        if (name == "backward")
+            tuning.backward =
+                choice == "buckets" ? BackwardBlend::buckets : BackwardBlend::subgroup;
+    }
     return tuning;
 }
 
-std::string result_variants(const Device& device) {
-    Variants variants = all_variants(device);
+std::string result_tuning(const Device& device) {
+    TuningNames names = tuning_names(device.tuning());
     for (const TuningGroup& group : tuning_groups(device.info()))
-        if (!group.changes_bits) variants.erase(group.name);
-    return variants_text(variants);
+        if (!group.changes_bits) names.erase(group.name);
+    return names_text(names);
 }
 
 }  // namespace darb

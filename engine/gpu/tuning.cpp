@@ -1,0 +1,16 @@
+#include "engine/gpu/tuning.h"
+
+#include <algorithm>
+
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+Tuning usual_tuning(const DeviceInfo& info) {
+    constexpr std::uint32_t blocks = 4;  // of a tile; a subgroup a block is the best on lavapipe
+    const bool lavapipe = info.driver.starts_with("llvmpipe");
+    return {lavapipe, lavapipe, blocks * std::clamp(info.subgroup_size, 4u, 64u),
+            BackwardBlend::subgroup};
+}
+
+}  // namespace darb

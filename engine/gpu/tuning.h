@@ -1,0 +1,29 @@
+// Tuning: how the passes run that can be done in several equal forms, resolved. Which form is the
+// fastest differs between devices, so the choice belongs to the Device. engine/plan/tuning_names.h
+// knows the names on command lines and in files, engine/plan/tuner.h measures.
+#pragma once
+
+#include <cstdint>
+
+namespace darb {
+
+struct DeviceInfo;
+
+enum class BackwardBlend {
+    subgroup,  // a subgroup walks a tile's list, reductions over its pixels: blend_backward.comp
+    buckets,   // a thread owns an intersection, from checkpoints: blend_backward_buckets.comp
+};
+
+/// Each a specialization constant or a shader.
+struct Tuning {
+    bool scan_by_thread = false;      // Scan::Strategy::team_is_thread
+    bool scatter_by_columns = false;  // RadixSort::Strategy::columns, else ballot
+    std::uint32_t blend_threads = 0;  // of the forward blend's workgroup, which has a tile
+    BackwardBlend backward = BackwardBlend::subgroup;
+    bool operator==(const Tuning&) const = default;
+};
+
+/// What a device begins with: on lavapipe what was measured by hand at each of its vector widths.
+Tuning usual_tuning(const DeviceInfo& info);
+
+}  // namespace darb

@@ -1,0 +1,46 @@
+// The names of a Tuning: what --tune, DARB_TUNE, checkpoints and records say, and what a device
+// allows of it.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+/// Name of a group -> name of its choice; what is missing is left as it is.
+using TuningNames = std::map<std::string, std::string, std::less<>>;
+
+/// A group of passes and how they can run on a device.
+struct TuningGroup {
+    std::string name;
+    std::vector<std::string> choices;  // the usual one first
+    std::vector<std::string> passes;   // whose time it decides, as Commands::pass names them
+    bool changes_bits = false;         // results differ by the order of sums of floats
+};
+
+/// scan, scatter, blend and backward, with what the device allows.
+std::vector<TuningGroup> tuning_groups(const DeviceInfo& info);
+
+/// Whether the fastest choices are known without measuring: lavapipe, where measuring would take
+/// longer than most pictures.
+bool is_known_device(const DeviceInfo& info);
+
+/// "scatter=ballot,backward=buckets"; "" names none. Throws Error{where, ...} that lists the known
+/// names.
+TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const std::string& where);
+/// In the same form, in the order of the groups.
+std::string names_text(const TuningNames& names);
+
+/// Of every group.
+TuningNames tuning_names(const Tuning& tuning);
+/// names as parse_tuning gives them.
+Tuning with_names(Tuning tuning, const TuningNames& names);
+
+/// Of the groups that change bits, as text: what a run must keep to repeat.
+std::string result_tuning(const Device& device);
+
+}  // namespace darb

@@ -1,0 +1,14 @@
+// The device of a command: what --device says, and the environment: DARB_VALIDATION=1 turns the
+// validation layers on, DARB_FAULT injects faults for tests (engine/gpu/faults.h).
+#pragma once
+
+#include <string>
+
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+/// Throws Error where DARB_FAULT names no fault.
+DeviceOptions command_device(const std::string& select);
+
+}  // namespace darb
