@@ -5,7 +5,8 @@
 
 The arrows are the lines "PART -> PART PART ..." of the block fenced as ```arrows. A part is a
 folder; a file belongs to the longest part that holds it, and may always include its own part. The
-words in angle brackets are outside libraries that only the parts naming them may include.
+words in angle brackets are outside libraries that only the parts naming them may include. An arrow
+that no include uses is a violation, too.
 """
 
 import os
@@ -57,7 +58,8 @@ def resolve(root, file, included):
     return None
 
 
-def violations(root, file, arrows, libraries):
+def violations(root, file, arrows, libraries, used):
+    """Yields (line, message); adds to used the arrows (part, target) that the file takes."""
     part = part_of(file, arrows)
     if part is None:
         yield 1, "in no part that ARCHITECTURE.md names"
@@ -69,6 +71,7 @@ def violations(root, file, arrows, libraries):
         bracket, included = match.groups()
         if bracket == "<":
             library = f"<{included.split('/')[0]}>"
+            used.add((part, library))
             if library in libraries and library not in arrows[part]:
                 yield line, f"{part} may not include <{included}>"
             continue
@@ -77,6 +80,7 @@ def violations(root, file, arrows, libraries):
             yield line, f'"{included}" is neither beside this file nor under the root'
             continue
         target = part_of(target_file, arrows)
+        used.add((part, target))
         if target != part and target not in arrows[part]:
             yield line, f"{part} may not include {target_file}"
 
@@ -85,11 +89,16 @@ def main():
     root = sys.argv[1] if len(sys.argv) > 1 else "."
     arrows, libraries = read_arrows(os.path.join(root, "ARCHITECTURE.md"))
     files = list(source_files(root, arrows))
-    count = 0
+    count, used = 0, set()
     for file in files:
-        for line, message in violations(root, file, arrows, libraries):
+        for line, message in violations(root, file, arrows, libraries, used):
             print(f"{file}:{line}: {message}")
             count += 1
+    for part, targets in arrows.items():
+        for target in sorted(targets):
+            if (part, target) not in used:
+                print(f"ARCHITECTURE.md: no include uses {part} -> {target}")
+                count += 1
     print(f"includes: {len(files)} files, {count} violations")
     return 1 if count or not files else 0
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/core/files.h"
 
 namespace darb {
@@ -33,7 +34,10 @@ float first_channel(const ImageF& image, std::size_t pixel) {
 }  // namespace
 
 DepthRange write_depth_png(const std::filesystem::path& path, const ImageF& depth, double unit) {
-    DARB_CHECK(unit > 0 && depth.channels >= 1, "unit {}, {} channels", unit, depth.channels);
+    if (!(unit > 0) || depth.channels < 1)
+        throw Error(path.string(),
+                    fmt::format("depths of {} channels in units of {}", depth.channels, unit),
+                    "Use a unit above 0 and at least one channel.");
     DepthRange range;
     std::string rows;
     for (int y = 0; y < depth.height; ++y) {

@@ -7,7 +7,6 @@
 #include <fstream>
 #include <vector>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/exif.h"
@@ -42,8 +41,11 @@ PhotoHead photo_head(std::span<const std::byte> head, std::uint64_t bytes,
 }
 
 void check_picture(const ImageU8& image) {
-    DARB_CHECK(image.width > 0 && image.height > 0 && image.channels >= 1, "{}x{}x{}", image.width,
-               image.height, image.channels);
+    if (image.width <= 0 || image.height <= 0 || image.channels < 1)
+        throw Error(
+            "picture",
+            fmt::format("{}x{}x{} is nothing to write", image.width, image.height, image.channels),
+            "Give it a width, a height and channels.");
 }
 
 /// What stb_image_write calls with each piece of a file.
@@ -114,7 +116,9 @@ ImageU8 read_image(const std::filesystem::path& path, int orientation) {
 }
 
 ImageU8 orient_image(const ImageU8& image, int orientation) {
-    DARB_CHECK(orientation >= 1 && orientation <= 8, "orientation {}", orientation);
+    if (orientation < 1 || orientation > 8)
+        throw Error("picture", fmt::format("no orientation {}", orientation),
+                    "Exif counts them from 1 to 8.");
     if (orientation == 1) return image;
     const bool swap = orientation >= 5;
     const int w = image.width, h = image.height;

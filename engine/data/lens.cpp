@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 
 namespace darb {
@@ -53,6 +52,16 @@ const ModelRow* find_model(std::string_view name) {
     return nullptr;
 }
 
+const ModelRow& model_of(const LensModel& lens) {
+    const ModelRow* row = find_model(lens.model);
+    if (!row || static_cast<int>(lens.parameters.size()) != row->parameters)
+        throw Error(
+            "lens",
+            fmt::format("{} with {} parameters is no model", lens.model, lens.parameters.size()),
+            "check_lens tells what is wrong with it.");
+    return *row;
+}
+
 std::string_view parameter_name(const ModelRow& row, std::size_t i) {
     constexpr std::string_view kOne[] = {"f", "cx", "cy"}, kTwo[] = {"fx", "fy", "cx", "cy"};
     if (i >= (row.one_focal ? 3 : 4)) return "of the distortion";
@@ -72,11 +81,10 @@ int lens_parameter_count(std::string_view model) {
 }
 
 bool LensModel::distorted() const {
-    const ModelRow* row = find_model(model);
-    DARB_CHECK(row && static_cast<int>(parameters.size()) == row->parameters, "{}", model);
+    const ModelRow& row = model_of(*this);
     if (model.ends_with("FISHEYE")) return true;
     if (model == "FOV") return std::abs(parameters[4]) > kSmallOmega;
-    const auto first = parameters.begin() + (row->one_focal ? 3 : 4);
+    const auto first = parameters.begin() + (row.one_focal ? 3 : 4);
     return std::any_of(first, parameters.end(), [](double value) { return value != 0; });
 }
 
@@ -116,14 +124,16 @@ void check_lens(const LensModel& lens, const std::string& where) {
 
 LensModel scale_lens(const LensModel& lens, int width, int height) {
     if (width == lens.width && height == lens.height) return lens;
-    const ModelRow* row = find_model(lens.model);
-    DARB_CHECK(row && lens.width > 0 && lens.height > 0, "{}", lens.model);
+    const ModelRow& row = model_of(lens);
+    if (lens.width <= 0 || lens.height <= 0)
+        throw Error("lens " + lens.model, fmt::format("is of {}x{} px", lens.width, lens.height),
+                    "Name the size of its photo.");
     const double sx = static_cast<double>(width) / lens.width;
     const double sy = static_cast<double>(height) / lens.height;
     LensModel scaled = lens;
     scaled.width = width;
     scaled.height = height;
-    if (row->one_focal) {  // one focal length: sx and sy differ by rounding of the size at most
+    if (row.one_focal) {  // one focal length: sx and sy differ by rounding of the size at most
         scaled.parameters[0] *= 0.5 * (sx + sy);
         scaled.parameters[1] *= sx;
         scaled.parameters[2] *= sy;
@@ -149,12 +159,10 @@ Camera pinhole_camera(const LensModel& model) {
 }
 
 Lens::Lens(const LensModel& model) {
-    const ModelRow* row = find_model(model.model);
-    DARB_CHECK(row && static_cast<int>(model.parameters.size()) == row->parameters, "{}",
-               model.model);
+    const ModelRow& row = model_of(model);
     const double* p = model.parameters.data();
-    focal = row->one_focal ? glm::dvec2(p[0], p[0]) : glm::dvec2(p[0], p[1]);
-    p += row->one_focal ? 1 : 2;
+    focal = row.one_focal ? glm::dvec2(p[0], p[0]) : glm::dvec2(p[0], p[1]);
+    p += row.one_focal ? 1 : 2;
     principal = {p[0], p[1]};
     p += 2;
     if (model.model.ends_with("FISHEYE")) front_ = Front::equidistant;
@@ -167,7 +175,7 @@ Lens::Lens(const LensModel& model) {
     } else if (model.model == "FOV") {
         omega_ = p[0];
         if (std::abs(omega_) > kSmallOmega) front_ = Front::fov;
-    } else if (row->parameters >= 8) {  // OPENCV, FULL_OPENCV, THIN_PRISM_FISHEYE, FOUR_RADIAL
+    } else if (row.parameters >= 8) {  // OPENCV, FULL_OPENCV, THIN_PRISM_FISHEYE, FOUR_RADIAL
         k_ = {p[0], p[1], 0, 0};
         p1_ = p[2];
         p2_ = p[3];

@@ -1,5 +1,7 @@
 #include "engine/data/metrics.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 
@@ -38,9 +40,11 @@ int used_channels(const ImageF& image) {
 }
 
 void check_same_size(const ImageF& a, const ImageF& b) {
-    DARB_CHECK(
-        a.width == b.width && a.height == b.height && a.channels == b.channels && !a.data.empty(),
-        "{}x{}x{} and {}x{}x{}", a.width, a.height, a.channels, b.width, b.height, b.channels);
+    if (a.width != b.width || a.height != b.height || a.channels != b.channels || a.data.empty())
+        throw Error("comparison",
+                    fmt::format("pictures of {}x{}x{} and {}x{}x{}", a.width, a.height, a.channels,
+                                b.width, b.height, b.channels),
+                    "Compare pictures of one size and number of channels.");
 }
 
 /// The five moments of one image row, filtered along x: [kMoments][width].

@@ -1,10 +1,12 @@
 #include "engine/data/resample.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 
@@ -67,8 +69,11 @@ ImageU8 to_rgba(ImageU8 image) {
 }
 
 void apply_mask(ImageU8& rgba, const ImageU8& mask) {
-    DARB_CHECK(rgba.channels == 4 && mask.width > 0 && mask.height > 0, "{} channels",
-               rgba.channels);
+    if (rgba.channels != 4 || mask.width <= 0 || mask.height <= 0)
+        throw Error("mask",
+                    fmt::format("{}x{} px for a photo of {} channels", mask.width, mask.height,
+                                rgba.channels),
+                    "Use RGBA photos and masks that are not empty.");
     const auto channels = static_cast<std::size_t>(mask.channels);
     int largest = 0;
     for (std::size_t i = 0; i < mask.data.size(); i += channels)
@@ -87,9 +92,11 @@ void apply_mask(ImageU8& rgba, const ImageU8& mask) {
 }
 
 ImageU8 box_downscale(const ImageU8& rgba, int width, int height) {
-    DARB_CHECK(rgba.channels == 4 && width >= 1 && height >= 1 && width <= rgba.width &&
-                   height <= rgba.height,
-               "{}x{}x{} to {}x{}", rgba.width, rgba.height, rgba.channels, width, height);
+    if (rgba.channels != 4 || width < 1 || height < 1 || width > rgba.width || height > rgba.height)
+        throw Error(
+            "downscale",
+            fmt::format("{}x{}x{} to {}x{}", rgba.width, rgba.height, rgba.channels, width, height),
+            "Use RGBA, and a size of at least 1 px and at most the photo's.");
     if (width == rgba.width && height == rgba.height) return rgba;
     const std::vector<Coverage> columns = cover(rgba.width, width);
     const std::vector<Coverage> rows = cover(rgba.height, height);

@@ -1,8 +1,9 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/data/lens.h"
 #include "engine/data/resample.h"
@@ -132,9 +133,11 @@ UndistortedFrame undistorted_frame(const LensModel& model, const std::string& wh
 }
 
 ImageU8 undistort(const ImageU8& rgba, const LensModel& model, const Camera& camera) {
-    DARB_CHECK(rgba.channels == 4 && rgba.width == model.width && rgba.height == model.height,
-               "photo {}x{}x{}, lens {}x{}", rgba.width, rgba.height, rgba.channels, model.width,
-               model.height);
+    if (rgba.channels != 4 || rgba.width != model.width || rgba.height != model.height)
+        throw Error("undistort",
+                    fmt::format("a photo of {}x{}x{} and a lens for {}x{}", rgba.width, rgba.height,
+                                rgba.channels, model.width, model.height),
+                    "Use RGBA, and scale_lens for the size of the photo.");
     const Lens lens(model);
     ImageU8 out(camera.width, camera.height, 4);
     std::uint8_t* to = out.data.data();

@@ -317,9 +317,4 @@ std::vector<PassTime> Commands::pass_times() const {
     return times;
 }
 
-void Commands::enable_timestamps(bool on) {
-    DARB_CHECK(!state_->recording, "between recordings only");
-    state_->timed = on && state_->device.info().timestamp_period_ns > 0;
-}
-
 }  // namespace darb

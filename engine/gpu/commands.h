@@ -81,7 +81,6 @@ class Commands {
 
     /// After wait(): one row per pass() in order of recording, empty if timestamps are off.
     std::vector<PassTime> pass_times() const;
-    void enable_timestamps(bool on);  // default on where the device has them
 
   private:
     struct State;

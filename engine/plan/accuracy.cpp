@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_coefficients.h"
 
@@ -88,7 +87,8 @@ std::string accuracy_flag(const AccuracySetting& setting) {
 }
 
 const AccuracyChoice& Accuracy::of(int setting) const {
-    DARB_CHECK(setting >= 0 && setting < kAccuracyCount, "{}", setting);
+    if (setting < 0 || setting >= kAccuracyCount)
+        throw Error("accuracy", fmt::format("no setting {}", setting), "See AccuracySettingId.");
     return kSettings[setting].choices[static_cast<size_t>(choice[setting])];
 }
 

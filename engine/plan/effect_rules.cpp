@@ -100,11 +100,10 @@ EffectRow lens_rule(const std::vector<View>& views) {
     row.reason = "no cameras are named";
     if (views.empty()) return row;
     row.reason =
-        views.empty() ? "no cameras are named"
-        : row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),
-                               too_wide)
-                 : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
-                               distorted, views.size(), too_wide);
+        row.on ? fmt::format("{} of {} cameras keep their original lens{}", lenses, views.size(),
+                             too_wide)
+               : fmt::format("{} of {} photos are distorted and are straightened once, at load{}",
+                             distorted, views.size(), too_wide);
     return row;
 }
 

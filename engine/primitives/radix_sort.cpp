@@ -1,11 +1,12 @@
 #include "engine/primitives/radix_sort.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <utility>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "shaders/shared/radix_args.h"
 
@@ -58,7 +59,7 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, Strategy strategy,
     : capacity_(capacity),
       strategy_(resolve(device, strategy)),
       shape_(choose_shape(device, strategy_, subgroup_size)) {
-    DARB_CHECK(capacity > 0);
+    if (capacity == 0) throw Error("sort", "of no pairs", "Make it for at least one.");
     const std::uint64_t blocks = (std::uint64_t{capacity} + block() - 1) / block();
     if (blocks > device.info().max_groups_x)
         throw Error("sort",
@@ -107,9 +108,13 @@ void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& val
                        const Buffer& count_buffer, std::uint64_t count_offset, int key_bits,
                        bool iota_values) {
     const std::uint64_t bytes = std::uint64_t{capacity_} * 4;
-    DARB_CHECK(key_bits >= 1 && key_bits <= 32, "{} bits", key_bits);
-    DARB_CHECK(keys.bytes() >= bytes && values.bytes() >= bytes, "{} and {} bytes, capacity {}",
-               keys.bytes(), values.bytes(), capacity_);
+    if (key_bits < 1 || key_bits > 32)
+        throw Error("sort", fmt::format("keys of {} bits", key_bits), "Use 1 to 32.");
+    if (keys.bytes() < bytes || values.bytes() < bytes)
+        throw Error("sort",
+                    fmt::format("buffers of {} and {} bytes, a capacity of {} pairs", keys.bytes(),
+                                values.bytes(), capacity_),
+                    "Give it buffers of its capacity.");
     const gpu::RadixPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4),
                                      block()};
     commands.dispatch(prepare_, args, {count_buffer, plan_}, 1);

@@ -1,8 +1,9 @@
 #include "engine/primitives/scan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "shaders/shared/scan_args.h"
 
@@ -41,6 +42,12 @@ SpecConstants apply_constants(const Device& device, const Scan::Strategy& strate
     return result;
 }
 
+void check_word(const Buffer& buffer, std::uint64_t offset) {
+    if (offset % 4 != 0 || offset + 4 > buffer.bytes())
+        throw Error("scan", fmt::format("no word at byte {} of {}", offset, buffer.bytes()),
+                    "Use a multiple of 4 within the buffer.");
+}
+
 SpecConstants top_constants(const Device& device) {
     const std::uint32_t threads = device.is_lavapipe() ? kTopThreadsLavapipe : kTopThreads;
     return {{"THREADS", static_cast<std::int32_t>(threads)}};
@@ -64,7 +71,7 @@ Scan::Scan(Device& device, std::uint32_t capacity, const Strategy& strategy)
              strategy.subgroup_size),
       apply_in_place_(device, "scan_apply", apply_constants(device, strategy, true), true,
                       strategy.subgroup_size) {
-    DARB_CHECK(capacity > 0);
+    if (capacity == 0) throw Error("scan", "of no elements", "Make it for at least one.");
     if (capacity > max_capacity(device, strategy))
         throw Error(
             "scan",
@@ -89,7 +96,7 @@ std::uint64_t Scan::device_bytes(std::uint32_t capacity) {
 }
 
 void Scan::prepare(Commands& commands, const Buffer& count_buffer, std::uint64_t count_offset) {
-    DARB_CHECK(count_offset % 4 == 0 && count_offset + 4 <= count_buffer.bytes());
+    check_word(count_buffer, count_offset);
     const gpu::ScanPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4), kChunk,
                                     teams_per_group_};
     commands.dispatch(prepare_, args, {count_buffer, plan_}, 1);
@@ -98,9 +105,12 @@ void Scan::prepare(Commands& commands, const Buffer& count_buffer, std::uint64_t
 void Scan::run(Commands& commands, const Buffer& counts, const Buffer& offsets,
                const BufferRange& total) {
     const std::uint64_t bytes = std::uint64_t{capacity_} * sizeof(std::uint32_t);
-    DARB_CHECK(counts.bytes() >= bytes && offsets.bytes() >= bytes, "{} and {} bytes, capacity {}",
-               counts.bytes(), offsets.bytes(), capacity_);
-    DARB_CHECK(total.offset % 4 == 0 && total.offset + 4 <= total.buffer->bytes());
+    if (counts.bytes() < bytes || offsets.bytes() < bytes)
+        throw Error("scan",
+                    fmt::format("buffers of {} and {} bytes, a capacity of {} words",
+                                counts.bytes(), offsets.bytes(), capacity_),
+                    "Give it buffers of its capacity.");
+    check_word(*total.buffer, total.offset);
     const gpu::ScanTopArgs top_args{static_cast<std::uint32_t>(total.offset / 4)};
     commands.dispatch_indirect(reduce_, NoArgs{}, {plan_, counts, chunk_sums_}, plan_, 0);
     commands.dispatch(top_, top_args, {plan_, chunk_sums_, *total.buffer}, 1);

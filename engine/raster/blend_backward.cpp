@@ -1,8 +1,10 @@
 #include "engine/raster/blend_backward.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "engine/raster/forward.h"
 
@@ -96,8 +98,10 @@ BufferRange BlendBackward::partials(std::uint32_t window) const {
 void BlendBackward::record(Commands& commands, const FrameView& view, const Frame& frame,
                            const Buffer& d_image) {
     const FrameSize& size = frame.size;
-    DARB_CHECK(size.intersections <= capacity_, "{} intersections of {}", size.intersections,
-               capacity_);
+    if (size.intersections > capacity_)
+        throw Error("backward blend",
+                    fmt::format("{} intersections, buffers for {}", size.intersections, capacity_),
+                    "Call reserve after each growth of the frame.");
     if (size.list_segments > 1 && !segmented_) make_pipelines(true);
     if (size.list_segments > 1 && behind_.bytes() < size.pixels * 4)
         make_buffers(*device_, *this, segment_buffers(size), "blend backward");
@@ -140,7 +144,9 @@ void BlendBackward::record_buckets(Commands& commands, const Frame& frame, const
     const TileIntersections& t = frame.intersections;
     const FrameImages& images = frame.images;
     const std::uint32_t records = frame.checkpoint_records();
-    DARB_CHECK(records > 0, "the forward pass stores no checkpoints");
+    if (records == 0)
+        throw Error("backward blend", "the frame holds no checkpoints",
+                    "Make it with store_for_backward, and with the device's tuning of now.");
     reserve(capacity_, records);
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     const gpu::BucketArgs buckets{args.width, args.height, args.tiles_x, records};

@@ -1,10 +1,12 @@
 #include "engine/raster/forward.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cstddef>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/kernel_constants.h"
@@ -46,8 +48,9 @@ std::uint32_t add_block_constants(const Device& device, SpecConstants& constants
 
 Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
-    DARB_CHECK(!options.store_for_backward || options.depth_order != DEPTH_ORDER_PIXEL,
-               "a resorted pixel cannot be walked back");
+    if (options.store_for_backward && options.depth_order == DEPTH_ORDER_PIXEL)
+        throw Error("frame", "a resorted pixel cannot be walked back",
+                    "Use another depth order, or do not store for a backward pass.");
     const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
     SpecConstants of_splat = kernel_constants(options);
     of_splat["THREADS"] = SPLAT_GROUP;
@@ -111,9 +114,11 @@ void Forward::record_intersections(Commands& commands, const GpuSplats& splats,
                                    const FrameView& view, Frame& frame) {
     const gpu::CameraData& camera = view.camera;
     const std::uint32_t n = splats.count();
-    DARB_CHECK(
-        n <= frame.size.splats && std::uint64_t(camera.width) * camera.height <= frame.size.pixels,
-        "{} splats of {}, {} x {} px", n, frame.size.splats, camera.width, camera.height);
+    if (n > frame.size.splats || std::uint64_t(camera.width) * camera.height > frame.size.pixels)
+        throw Error("frame",
+                    fmt::format("{} splats at {} x {} px, buffers for {} and {} px", n,
+                                camera.width, camera.height, frame.size.splats, frame.size.pixels),
+                    "Call FrameBuffers::reserve for them first.");
     const gpu::PairArgs args{frame.size.intersections, camera.tiles_x,
                              camera.tiles_x * camera.tiles_y,
                              frame.size.list_segments * LIST_SEGMENT};
@@ -227,7 +232,9 @@ void Forward::record_blend(Commands& commands, const FrameView& view, Frame& fra
 
 void Forward::record_depth(Commands& commands, std::uint32_t splats, const FrameView& view,
                            Frame& frame) {
-    DARB_CHECK(options_.storage == STORAGE_FLOAT32, "depths need the range of float32");
+    if (options_.storage != STORAGE_FLOAT32)
+        throw Error("depth image", "16-bit storage does not hold depths",
+                    "Render it with storage float32.");
     if (!depth_light_)
         depth_light_.emplace(*device_, "depth_light", SpecConstants{{"THREADS", SPLAT_GROUP}});
     commands.pass("depth");

@@ -1,5 +1,7 @@
 #include "engine/raster/kernel_constants.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <string>
 
@@ -19,9 +21,12 @@ constexpr double kRoundingMargin = 1e-6, kBuiltinMargin = 1e-4;
 
 SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, int degree,
                                float alpha_cutoff) {
-    DARB_CHECK(evaluation == EVALUATION_POLYNOMIAL || evaluation == EVALUATION_BUILTIN,
-               "evaluation = {}", evaluation);
-    DARB_CHECK(alpha_cutoff > 0 && alpha_cutoff < 1, "alpha_cutoff = {}", alpha_cutoff);
+    if (evaluation != EVALUATION_POLYNOMIAL && evaluation != EVALUATION_BUILTIN)
+        throw Error("kernel", fmt::format("no evaluation {}", evaluation),
+                    "Use one of shaders/shared/accuracy_list.h.");
+    if (!(alpha_cutoff > 0 && alpha_cutoff < 1))
+        throw Error("kernel", fmt::format("an alpha cutoff of {}", alpha_cutoff),
+                    "Use one between 0 and 1.");
     if (footprint == Footprint::exact && !has_exact_footprint(kernel))
         throw Error(std::string(kernel_name(kernel)), "has no exact footprint",
                     "Use the footprint psi, or one pulse.");

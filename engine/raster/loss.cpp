@@ -1,11 +1,12 @@
 #include "engine/raster/loss.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <limits>
 #include <thread>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 
 namespace darb {
@@ -57,7 +58,9 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
       lanes_(cluster_lanes(device)),
       columns_(columns_of(device, lanes_, max_width, options)),
       rows_(options.rows) {
-    DARB_CHECK(max_width > 0 && max_height > 0, "{} x {}", max_width, max_height);
+    if (max_width <= 0 || max_height <= 0)
+        throw Error("loss", fmt::format("images of {} x {} px", max_width, max_height),
+                    "Use at least 1 px each way.");
     const DeviceInfo& info = device.info();
     if (device.is_lavapipe()) {
         threads_ = static_cast<int>(info.subgroup_size);
@@ -66,7 +69,9 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
         threads_ = static_cast<int>(std::max(64u, info.max_subgroup_size));
         wanted_works_ = 4096;
     }
-    DARB_CHECK(lanes_ * columns_ > 2 * LOSS_HALO, "{} lanes, {} columns", lanes_, columns_);
+    if (lanes_ * columns_ <= 2 * LOSS_HALO)
+        throw Error("loss", fmt::format("{} columns a thread, {} threads", columns_, lanes_),
+                    "Use more columns, or 0 for what suits the device.");
     const SpecConstants constants = {{"THREADS", threads_},
                                      {"LANES", lanes_},
                                      {"COLUMNS", columns_},
@@ -111,8 +116,11 @@ gpu::LossArgs Loss::arguments(int width, int height) const {
 
 void Loss::record(Commands& commands, const LossBuffers& buffers, int width, int height,
                   const glm::vec3& background, float lambda) {
-    DARB_CHECK(width > 0 && width <= max_width_ && height > 0 && height <= max_height_,
-               "{} x {}, made for {} x {}", width, height, max_width_, max_height_);
+    if (width <= 0 || width > max_width_ || height <= 0 || height > max_height_)
+        throw Error("loss",
+                    fmt::format("an image of {} x {} px, made for {} x {}", width, height,
+                                max_width_, max_height_),
+                    "Make a Loss for the largest image.");
     const float scale = 1.0f / (3.0f * static_cast<float>(width) * static_cast<float>(height));
     gpu::LossArgs args = arguments(width, height);
     args.l1_scale = (1.0f - lambda) * scale;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 
@@ -56,7 +56,9 @@ Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy&
 ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int sh_degree,
                         float near_plane) {
     const Camera rendered = accuracy_.halved ? halved(camera) : camera;
-    DARB_CHECK(!camera.lens.active || forward_.options().effects.lens, "a lens, not compiled in");
+    if (camera.lens.active && !forward_.options().effects.lens)
+        throw Error("render", "the camera has a lens and the effect is off",
+                    "Turn ProjectionEffects::lens on, or drop the camera's lens.");
     const int degree =
         sh_degree < 0 ? accuracy_.sh_degree : std::min(sh_degree, accuracy_.sh_degree);
     view_ = {camera_data(rendered, splats_.origin(), near_plane), &exchange_.cameras(), 0, degree,
@@ -82,7 +84,8 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
 }
 
 ImageF Renderer::render_depth() {
-    DARB_CHECK(view_.camera.width > 0, "no picture was rendered before");
+    if (view_.camera.width == 0)
+        throw Error("render", "depths of no picture", "Call render() first.");
     const int width = static_cast<int>(view_.camera.width);
     const int height = static_cast<int>(view_.camera.height);
     commands_.begin();

@@ -1,10 +1,11 @@
 #include "engine/scene/edit_splats.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/scene/infinite_values.h"
 #include "engine/scene/sh_rotation.h"
@@ -63,7 +64,9 @@ bool row_is_finite(const std::vector<float>& values, std::size_t row, std::size_
 }  // namespace
 
 void transform_splats(const Similarity& similarity, SplatModel& model) {
-    DARB_CHECK(similarity.scale > 0, "scale {}", similarity.scale);
+    if (!(similarity.scale > 0))
+        throw Error("transform", fmt::format("a scale of {}", similarity.scale),
+                    "Use a scale above 0.");
     std::vector<double> positions(model.position.size());
     for (std::size_t i = 0; i < model.size(); ++i) {
         const glm::dvec3 moved =

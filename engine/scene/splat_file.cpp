@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/text.h"
@@ -221,7 +220,8 @@ std::size_t drop_unwritable(SplatFormat format, SplatModel& model) {
 
 std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model,
                                      const std::string& where) {
-    DARB_CHECK(format != SplatFormat::sog);
+    if (format == SplatFormat::sog)
+        throw Error(where, "SOG is several files, not one", "Use save_splats.");
     if (format == SplatFormat::ply) return encode_ply(model);
     SplatModel kept = model;
     drop_unwritable(format, kept);

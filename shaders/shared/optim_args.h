@@ -37,7 +37,6 @@ struct ProjectBackwardArgs {
 #define DENSIFY_CLONE 1
 #define DENSIFY_SPLIT 2
 #define DENSIFY_PRUNE 3
-#define DENSIFY_ACTIONS 4
 
 struct DensifyArgs {
     uint splat_count;          // N before

@@ -17,6 +17,7 @@ fresh_tree() {
     printf '#pragma once\n' | tee "$root"/engine/{core,gpu}/a.h "$root"/shaders/shared/args.h >/dev/null
     printf '#include <vulkan/vulkan.h>\n\n#include "engine/core/a.h"\n' >"$root/engine/gpu/a.cpp"
     printf '#include "shared/args.h"\n' >"$root/shaders/forward/a.comp"
+    printf '#include "engine/core/a.h"\n#include "engine/gpu/a.h"\n' >"$root/tools/darb/a.cpp"
 }
 
 # expect NAME STATUS PATTERN: the check ends with STATUS and prints a line that matches PATTERN.
@@ -36,7 +37,7 @@ expect() {
 many_lines() { for ((i = 0; i < $1; ++i)); do echo "// line"; done; }
 
 fresh_tree
-expect "clean tree passes" 0 '^includes: 5 files, 0 violations'
+expect "clean tree passes" 0 '^includes: 6 files, 0 violations'
 
 fresh_tree
 printf '#include "engine/gpu/a.h"\n' >"$root/engine/core/bad.cpp"
@@ -57,6 +58,10 @@ expect "shader including host code" 1 'shaders/shared/bad.h:1: shaders/shared ma
 fresh_tree
 printf '#include "nowhere.h"\n' >"$root/engine/core/bad.cpp"
 expect "include that resolves to nothing" 1 'bad.cpp:1: "nowhere.h" is neither'
+
+fresh_tree
+sed -i 's/^tools -> .*/& shaders\/shared/' "$root/ARCHITECTURE.md"
+expect "arrow that no include uses" 1 'no include uses tools -> shaders/shared'
 
 fresh_tree
 mkdir "$root/engine/new" && printf '#pragma once\n' >"$root/engine/new/bad.h"
