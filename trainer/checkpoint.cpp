@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/plan/effect_plan.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -216,10 +217,7 @@ std::string settings_text(const TrainOptions& o) {
                    {{"probe_sh", o.probe_sh},
                     {"antialias", o.antialias},
                     {"exposure", o.exposure},
-                    {"off_centre", o.off_centre},
-                    {"lens", o.lens},
                     {"alpha", o.alpha},
-                    {"near", o.near_care},
                     {"exposure_lr", {o.exposure_lr_init, o.exposure_lr_final}}}},
                   {"white_background", o.white_background},
                   {"random_background", o.random_background},
@@ -249,6 +247,9 @@ std::string settings_text(const TrainOptions& o) {
                   {"regularisers", {o.opacity_weight, o.scale_weight}},
                   {"initial_opacity", o.initial_opacity},
                   {"random_points", o.random_points}};
+    for (const ProjectionSwitch& s : kProjectionSwitches)
+        if (s.effect != kNoEffect && s.effect != EFFECT_ANTIALIAS)
+            settings["effects"][effect_name(s.effect)] = o.projection.*s.on;
     // What the defaults do not have stands only where it is.
     if (o.strategy != Strategy::adc) {
         settings["strategy"] = strategy_name(o.strategy);

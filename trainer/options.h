@@ -36,10 +36,8 @@ struct TrainOptions {
     bool antialias = false;  // opacity compensation and the 3D smoothing filter of Mip-Splatting
     bool exposure = false;   // an affine map of colours per photo, trained beside the splats
     float exposure_lr_init = 0.001f, exposure_lr_final = 0.0001f;
-    bool off_centre = true;  // false: every principal point is the centre of its photo
-    bool lens = false;       // cameras have Camera::lens
-    bool alpha = true;       // false: every photo is opaque, its alpha is not read
-    bool near_care = true;   // false: no splat beside a photo reaches into it
+    ProjectionEffects projection;  // but for its antialias and smoothing, which are antialias
+    bool alpha = true;             // false: every photo is opaque, its alpha is not read
     Crowds crowds = Crowds::by_counters;
     bool white_background = false;  // what pictures are compared over; black otherwise
     bool random_background = true;  // train over another colour each iteration: no surface can

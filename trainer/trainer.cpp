@@ -47,8 +47,8 @@ ForwardOptions forward_options(const TrainOptions& options) {
     f.kernel = options.kernel;
     f.footprint = options.footprint;
     set_options(options.accuracy, f);
-    f.effects = {options.off_centre || options.lens, options.antialias, options.antialias,
-                 options.lens, options.near_care};
+    f.effects = options.projection;
+    f.effects.antialias = f.effects.smoothing = options.antialias;
     f.crowds = options.crowds;
     f.store_for_backward = true;
     return f;

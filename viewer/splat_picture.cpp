@@ -153,7 +153,6 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
     key.accuracy = moving ? preset_accuracy(kFast) : display.accuracy;
     key.accuracy.choice[kRenderScale] = 0;  // of the camera
     key.effects = display.effects;
-    key.effects.off_centre |= display.effects.lens;
     key.effects.antialias &= display.style == SplatStyle::splats;
     key.crowds = display.crowds;
     key.store = display.mode == VIEW_COUNT;

@@ -1,6 +1,7 @@
 #include "viewer/switches.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "engine/core/check.h"
 #include "engine/plan/effect_plan.h"
@@ -11,17 +12,11 @@ namespace {
 
 /// The switch of an effect that is on or off.
 bool& on_off(int row, ProjectionEffects& effects) {
-    switch (row - kAccuracyCount) {
-        case EFFECT_ANTIALIAS:
-            return effects.antialias;
-        case EFFECT_OFF_CENTRE:
-            return effects.off_centre;
-        case EFFECT_LENS:
-            return effects.lens;
-        default:
-            DARB_CHECK(row == effect_row(EFFECT_NEAR), "row {}", row);
-            return effects.near_care;
-    }
+    const auto found =
+        std::find_if(std::begin(kProjectionSwitches), std::end(kProjectionSwitches),
+                     [&](const ProjectionSwitch& s) { return effect_row(s.effect) == row; });
+    DARB_CHECK(found != std::end(kProjectionSwitches), "row {}", row);
+    return effects.*found->on;
 }
 
 /// Footprint is no part of a preset: another one shows another scene.

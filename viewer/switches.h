@@ -21,9 +21,23 @@ inline constexpr std::array kAccuracyRows = {
     kPresetRow,    int{kEvaluation}, int{kFootprint},  int{kAlphaCutoff}, int{kTransmittanceStop},
     int{kStorage}, int{kDepthOrder}, int{kRenderScale}};
 /// The effects of a view; of the others the plan has a reason alone.
-inline constexpr std::array kEffectRows = {
-    effect_row(EFFECT_VIEW_COLOUR), effect_row(EFFECT_ANTIALIAS), effect_row(EFFECT_OFF_CENTRE),
-    effect_row(EFFECT_LENS),        effect_row(EFFECT_HUGE),      effect_row(EFFECT_NEAR)};
+inline constexpr bool has_effect_row(int effect) {
+    for (const ProjectionSwitch& s : kProjectionSwitches)
+        if (s.effect == effect) return true;
+    return effect == EFFECT_VIEW_COLOUR || effect == EFFECT_HUGE;
+}
+inline constexpr std::size_t count_effect_rows() {
+    std::size_t count = 0;
+    for (int e = 0; e < EFFECT_COUNT; ++e) count += has_effect_row(e) ? 1 : 0;
+    return count;
+}
+inline constexpr std::array kEffectRows = [] {
+    std::array<int, count_effect_rows()> rows{};
+    std::size_t count = 0;
+    for (int e = 0; e < EFFECT_COUNT; ++e)
+        if (has_effect_row(e)) rows[count++] = effect_row(e);
+    return rows;
+}();
 
 std::string row_name(int row);
 /// sh_degree: highest of the scene.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "engine/core/error.h"
 #include "engine/scene/edit_splats.h"
@@ -12,8 +13,8 @@ namespace darb {
 
 namespace {
 
-constexpr std::string_view kNames[EFFECT_COUNT] = {
-    "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near"};
+constexpr std::string_view kNames[] = {EFFECT_NAMES};
+static_assert(std::size(kNames) == EFFECT_COUNT);
 
 std::string all_names() {
     std::string text;
@@ -61,6 +62,14 @@ EffectChoice parse_effects(std::string_view text) {
         choice.changed[static_cast<std::size_t>(*effect)] = word[0] == '+';
     }
     return choice;
+}
+
+ProjectionEffects EffectPlan::projection() const {
+    ProjectionEffects effects;
+    for (const ProjectionSwitch& s : kProjectionSwitches)
+        effects.*s.on = s.effect != kNoEffect && on(s.effect);
+    effects.off_centre |= effects.lens;
+    return effects;
 }
 
 void EffectPlan::note_frame(std::uint32_t huge_splats, std::uint32_t longest_list) {

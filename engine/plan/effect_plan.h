@@ -22,6 +22,12 @@ namespace darb {
 std::string_view effect_name(int effect);
 std::optional<int> effect_from_name(std::string_view name);
 
+/// What a plan is made for.
+enum class EffectUse { pictures, measuring, training };
+/// Effects that this use can do nothing with: those of photos alone in pictures, depths in
+/// training.
+std::vector<int> impossible_effects(EffectUse use);
+
 struct EffectRow {
     bool on = false;
     bool overridden = false;  // the command line said so
@@ -36,10 +42,8 @@ struct EffectPlan {
     bool on(int effect) const { return rows[static_cast<std::size_t>(effect)].on; }
     EffectRow& row(int effect) { return rows[static_cast<std::size_t>(effect)]; }
     const EffectRow& row(int effect) const { return rows[static_cast<std::size_t>(effect)]; }
-    ProjectionEffects projection() const {
-        return {on(EFFECT_OFF_CENTRE) || on(EFFECT_LENS), on(EFFECT_ANTIALIAS), false,
-                on(EFFECT_LENS), on(EFFECT_NEAR)};
-    }
+    /// Of a rendering: without the 3D filter, which training alone has.
+    ProjectionEffects projection() const;
     /// Counters decide, frame by frame, where the command line does not.
     Crowds crowds() const {
         if (!row(EFFECT_HUGE).overridden) return Crowds::by_counters;

@@ -292,6 +292,17 @@ void override_rows(const EffectChoice& choice, EffectPlan& plan, int most_degree
 
 }  // namespace
 
+std::vector<int> impossible_effects(EffectUse use) {
+    switch (use) {
+        case EffectUse::pictures:
+            return {EFFECT_EXPOSURE, EFFECT_ALPHA};
+        case EffectUse::measuring:
+            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH};
+        default:
+            return {EFFECT_DEPTH};
+    }
+}
+
 EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& views,
                           const RenderOutputs& outputs, const EffectChoice& choice) {
     EffectPlan plan;

@@ -4,6 +4,7 @@
 
 #include "engine/gpu/pipeline.h"
 #include "engine/scene/camera.h"
+#include "shaders/shared/effect_list.h"
 
 namespace darb {
 
@@ -20,18 +21,32 @@ struct ProjectionEffects {
     bool off_centre = true;  // false: every principal point is the centre of its image
     bool antialias = false;  // opacity compensation of the low-pass (SplatRenderMode mip)
     bool smoothing = false;  // the 3D filter of GpuSplats::smoothing()
-    bool lens = false;       // Camera::lens; needs off_centre
+    bool lens = false;       // Camera::lens
     bool near_care = true;   // false: no splat beside a picture reaches into it
 
     bool operator==(const ProjectionEffects&) const = default;
 };
 
+inline constexpr int kNoEffect = -1;
+
+/// A row for each switch: plans, options, files and the viewer follow this table.
+struct ProjectionSwitch {
+    bool ProjectionEffects::*on;
+    const char* constant;    // of shaders/effects/constants.glsl
+    int effect = kNoEffect;  // EFFECT_* that turns it on
+};
+inline constexpr ProjectionSwitch kProjectionSwitches[] = {
+    {&ProjectionEffects::off_centre, "OFF_CENTRE", EFFECT_OFF_CENTRE},
+    {&ProjectionEffects::antialias, "ANTIALIAS", EFFECT_ANTIALIAS},
+    {&ProjectionEffects::smoothing, "SMOOTHING"},
+    {&ProjectionEffects::lens, "LENS", EFFECT_LENS},
+    {&ProjectionEffects::near_care, "NEAR_CARE", EFFECT_NEAR},
+};
+
 inline void add_constants(const ProjectionEffects& effects, SpecConstants& constants) {
-    constants["OFF_CENTRE"] = effects.off_centre ? 1 : 0;
-    constants["ANTIALIAS"] = effects.antialias ? 1 : 0;
-    constants["SMOOTHING"] = effects.smoothing ? 1 : 0;
-    constants["LENS"] = effects.lens ? 1 : 0;
-    constants["NEAR_CARE"] = effects.near_care ? 1 : 0;
+    for (const ProjectionSwitch& s : kProjectionSwitches)
+        constants[s.constant] = effects.*s.on ? 1 : 0;
+    if (effects.lens) constants["OFF_CENTRE"] = 1;
 }
 
 }  // namespace darb

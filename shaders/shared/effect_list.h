@@ -15,4 +15,10 @@
 #define EFFECT_NEAR 8  // splats beside the picture that reach into it: the Jacobian is clamped
 #define EFFECT_COUNT 9
 
+#ifdef __cplusplus
+// On the command line and in files, by number.
+#define EFFECT_NAMES \
+    "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near"
+#endif
+
 #endif

@@ -270,8 +270,8 @@ TEST(EffectTraining, centred_pinholes_train_alike_with_off_centre_and_lens_compi
     EXPECT_FALSE(plan_training(t.dataset, t.photos, 0).projection().off_centre);
     EXPECT_FALSE(plan_training(t.dataset, t.photos, 0).projection().lens);
     TrainOptions plain = plain_options(), both = plain;
-    plain.off_centre = false;
-    both.lens = true;
+    plain.projection.off_centre = false;
+    both.projection.lens = true;
     EXPECT_EQ(trained(t, both, 5), trained(t, plain, 5));
     t.dataset.views[2].camera.cx += 3;
     EXPECT_TRUE(plan_training(t.dataset, t.photos, 0).on(EFFECT_OFF_CENTRE));

@@ -50,8 +50,8 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     const int views = static_cast<int>(dataset.views.size());
     BenchResult result = measure_steps(trainer, std::min(views, 10), options.sampling);
     const SplatModel model = trainer.model();
-    const ProjectionEffects effects{train.off_centre || train.lens, train.antialias, false,
-                                    train.lens, train.near_care};
+    ProjectionEffects effects = train.projection;
+    effects.antialias = train.antialias;
     const BlendFigures blend = measure_blend(device, model, some_cameras(dataset, kYardstickViews),
                                              effects, options.sampling);
     // The steps' own means; evaluated splat-pixels follow the pairs.

@@ -31,10 +31,9 @@ void add_lens_flag(CLI::App& command, DatasetOptions& data) {
         ->default_str("auto");
 }
 
-EffectChoice choose_effects(const std::string& text, const std::vector<int>& impossible,
-                            DatasetOptions& data) {
+EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptions& data) {
     const EffectChoice choice = parse_effects(text);
-    for (const int effect : impossible)
+    for (const int effect : impossible_effects(use))
         if (choice.changed[static_cast<std::size_t>(effect)].value_or(false))
             throw Error(
                 "--effects " + text,
@@ -78,10 +77,8 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
     options.probe_sh = colour.on && !colour.overridden;
     options.antialias = plan.on(EFFECT_ANTIALIAS);
     options.exposure = plan.on(EFFECT_EXPOSURE);
-    options.off_centre = plan.projection().off_centre;
-    options.lens = plan.on(EFFECT_LENS);
+    options.projection = plan.projection();
     options.alpha = plan.on(EFFECT_ALPHA);
-    options.near_care = plan.on(EFFECT_NEAR);
     options.crowds = plan.crowds();
 }
 

@@ -18,9 +18,8 @@ void add_effects_flag(CLI::App& command, std::string& text);
 void add_lens_flag(CLI::App& command, DatasetOptions& data);
 
 /// The words of --effects; without lenses the photos of data are straightened at load. Throws Error
-/// where they cannot be read, ask for an effect of impossible, or contradict --lens.
-EffectChoice choose_effects(const std::string& text, const std::vector<int>& impossible,
-                            DatasetOptions& data);
+/// where they cannot be read, ask for an effect that the use cannot have, or contradict --lens.
+EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptions& data);
 
 /// Adds --antialiasing and the rates of exposure.
 void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options);

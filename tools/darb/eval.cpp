@@ -70,8 +70,7 @@ int eval(EvalFlags flags) {
     for (const auto& input : {flags.scene, flags.dataset}) keep_input(input, flags.json);
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
-    const EffectChoice choice =
-        choose_effects(flags.effects, {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH}, flags.data);
+    const EffectChoice choice = choose_effects(flags.effects, EffectUse::measuring, flags.data);
     SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
     print_notes(dataset.notes);

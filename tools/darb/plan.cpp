@@ -33,9 +33,7 @@ json compare_choices(const PlanSubject& s, const PlanFlags& flags) {
 int run_plan(PlanFlags flags) {
     const bool scene = is_scene(flags.what);
     const EffectChoice choice = choose_effects(
-        flags.effects,
-        scene ? std::vector<int>{EFFECT_EXPOSURE, EFFECT_ALPHA} : std::vector<int>{EFFECT_DEPTH},
-        flags.data);
+        flags.effects, scene ? EffectUse::pictures : EffectUse::training, flags.data);
     const PlanSubject s = open_subject(flags);
     EffectPlan plan = plan_of(s, flags, choice);
     const bool empty = !s.training && s.model.size() == 0;

@@ -75,20 +75,12 @@ EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectCho
 }
 
 std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags) {
+    const std::vector<int> impossible =
+        impossible_effects(s.training ? EffectUse::training : EffectUse::pictures);
     const auto has = [&](int effect) {
-        switch (effect) {
-            case EFFECT_VIEW_COLOUR:
-                return degree_of(s, flags) > 0;
-            case EFFECT_LENS:
-                return !s.training || distorted(s.dataset);
-            case EFFECT_DEPTH:
-                return !s.training;
-            case EFFECT_EXPOSURE:
-            case EFFECT_ALPHA:
-                return s.training;
-            default:
-                return true;
-        }
+        if (effect == EFFECT_VIEW_COLOUR) return degree_of(s, flags) > 0;
+        if (effect == EFFECT_LENS) return !s.training || distorted(s.dataset);
+        return std::find(impossible.begin(), impossible.end(), effect) == impossible.end();
     };
     std::vector<int> effects;
     for (int e = 0; e < EFFECT_COUNT; ++e)

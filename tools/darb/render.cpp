@@ -59,8 +59,7 @@ double median(std::vector<double> values) {
 
 int render(RenderFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
-    const EffectChoice choice =
-        choose_effects(flags.effects, {EFFECT_EXPOSURE, EFFECT_ALPHA}, flags.data);
+    const EffectChoice choice = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     check_depth(flags.depth, accuracy, choice);
     SplatModel model = load_scene(flags.scene);
     std::vector<View> views = open_cameras(flags.cameras, flags.data);

@@ -53,7 +53,7 @@ void finish_train_flags(TrainFlags& f) {
         throw Error(fmt::format("--kernel {} --pulses {}", f.kernel, f.pulses),
                     "there is no such kernel",
                     "Only raised_cosine and sinc have --pulses 2 or 3; others have one.");
-    choose_effects(f.effects, {EFFECT_DEPTH}, f.data);
+    choose_effects(f.effects, EffectUse::training, f.data);
     finish_strategy(f);
     f.train.kernel = *row;
     f.train.accuracy = chosen_accuracy(f.accuracy, true);

@@ -50,7 +50,7 @@ int view(ViewFlags flags) {
     options.up = flags.up;
     options.gui_scale = flags.gui_scale;
     options.accuracy = chosen_accuracy(flags.accuracy);
-    options.effects = choose_effects(flags.effects, {EFFECT_EXPOSURE, EFFECT_ALPHA}, flags.data);
+    options.effects = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
     std::string note;
     options.views = find_views(flags, note);
