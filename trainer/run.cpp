@@ -12,6 +12,7 @@
 #include "engine/data/camera_list.h"
 #include "engine/plan/tuning_names.h"
 #include "engine/raster/frame_limit.h"
+#include "engine/scene/edit_splats.h"
 #include "engine/scene/ply.h"
 #include "trainer/checkpoint.h"
 #include "trainer/evaluation.h"
@@ -215,7 +216,13 @@ void Run::evaluate(int iteration) {
 void Run::save_model(int iteration) {
     stopwatch(false);
     summary_.model = model_path(iteration);
-    write_ply(summary_.model, trainer_.model());
+    SplatModel model = trainer_.model();
+    if (const std::size_t lost = drop_non_finite(model); lost > 0)
+        progress_.note(fmt::format("warning: {} splats with NaN or infinity are left out of {}",
+                                   lost, summary_.model.string()));
+    if (model.size() == 0)
+        progress_.note("warning: no splat is left: " + summary_.model.string() + " is empty");
+    write_ply(summary_.model, model);
     if (const auto maps = trainer_.exposures(); !maps.empty())
         write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
     stopwatch(true);

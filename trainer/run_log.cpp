@@ -10,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 #include "engine/plan/tuning_names.h"
 #include "trainer/checkpoint.h"
 #include "trainer/strategy.h"
@@ -62,11 +63,12 @@ double peak_host_bytes() {
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
                      const std::filesystem::path& output) {
     return fmt::format(
-        "Namespace(sh_degree={}, source_path='{}', model_path='{}', images='{}', "
+        "Namespace(sh_degree={}, source_path={}, model_path={}, images={}, "
         "resolution={}, white_background={}, data_device='cpu', eval={})",
-        options.sh_degree, std::filesystem::absolute(dataset.root).string(),
-        std::filesystem::absolute(output).string(), dataset.options.images_folder,
-        dataset.options.resolution, options.white_background ? "True" : "False",
+        options.sh_degree, python_string(std::filesystem::absolute(dataset.root).string()),
+        python_string(std::filesystem::absolute(output).string()),
+        python_string(dataset.options.images_folder), dataset.options.resolution,
+        options.white_background ? "True" : "False",
         std::any_of(dataset.views.begin(), dataset.views.end(),
                     [](const View& v) { return v.is_test; })
             ? "True"

@@ -14,7 +14,8 @@
 
 namespace darb {
 
-/// cfg_args as 3DGS writes it: one Python Namespace, which the ecosystem's viewers parse.
+/// cfg_args as 3DGS writes it: one Python Namespace, which the ecosystem's viewers parse and 3DGS
+/// evaluates; names are quoted so that nothing in them runs.
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
                      const std::filesystem::path& output);
 

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/data/point_cloud_ply.h"
 #include "engine/data/point_splats.h"
 #include "engine/scene/splat_file.h"
@@ -23,6 +24,7 @@ constexpr double kReadShare = 0.4, kDecodeShare = 0.5;  // of the time, by exper
 
 std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
                                       const LoadProgress& progress) {
+    check_is_file(file);
     std::error_code error;
     const std::uintmax_t size = std::filesystem::file_size(file, error);
     std::ifstream in(file, std::ios::binary);

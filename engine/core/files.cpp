@@ -1,6 +1,7 @@
 #include "engine/core/files.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -8,6 +9,9 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <limits>
+#include <new>
+#include <utility>
 
 #include "engine/core/error.h"
 
@@ -22,14 +26,39 @@ struct Descriptor {
     }
 };
 
+constexpr size_t kAll = std::numeric_limits<size_t>::max();
+
+const char* kind_name(mode_t mode) {
+    return S_ISDIR(mode)    ? "a folder"
+           : S_ISFIFO(mode) ? "a pipe"
+           : S_ISSOCK(mode) ? "a socket"
+                            : "a device";
+}
+
+void refuse_others(const std::filesystem::path& path, mode_t mode) {
+    if (!S_ISREG(mode))
+        throw Error(path.string(), fmt::format("is {}, not a file", kind_name(mode)),
+                    "Name a file.");
+}
+
+/// The kind counts before it is opened, which a pipe makes wait and a device may notice; and after.
+int open_to_read(const std::filesystem::path& path) {
+    check_is_file(path);
+    Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY)};
+    struct stat facts {};
+    if (file.fd < 0 || ::fstat(file.fd, &facts) != 0)
+        throw Error(path.string(), std::strerror(errno), "Check the path.");
+    refuse_others(path, facts.st_mode);
+    return std::exchange(file.fd, -1);
+}
+
 template <class Container>
-Container read_whole(const std::filesystem::path& path) {
-    const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
-    if (file.fd < 0) throw Error(path.string(), std::strerror(errno), "Check the path.");
+Container read_whole(const std::filesystem::path& path, size_t most = kAll) try {
+    const Descriptor file{open_to_read(path)};
     Container content;
     size_t used = 0;
-    for (;;) {
-        content.resize(used + (size_t{1} << 20) + used / 2);
+    while (used < most) {
+        content.resize(std::min(used + (size_t{1} << 20) + used / 2, most));
         const ssize_t got = ::read(file.fd, content.data() + used, content.size() - used);
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) throw Error(path.string(), std::strerror(errno), "Check the path.");
@@ -38,6 +67,9 @@ Container read_whole(const std::filesystem::path& path) {
     }
     content.resize(used);
     return content;
+} catch (const std::bad_alloc&) {
+    throw Error(path.string(), "is larger than the memory that is free",
+                "Free memory, or name a smaller file.");
 }
 
 /// PATH.tmp, or PATH.1.tmp and so on where that is somebody's.
@@ -88,8 +120,17 @@ bool has_extension(const std::filesystem::path& path, std::string_view extension
                       [](unsigned char a, unsigned char b) { return std::tolower(a) == b; });
 }
 
+void check_is_file(const std::filesystem::path& path) {
+    struct stat facts {};
+    if (::stat(path.c_str(), &facts) == 0) refuse_others(path, facts.st_mode);
+}
+
 std::vector<std::byte> read_file(const std::filesystem::path& path) {
     return read_whole<std::vector<std::byte>>(path);
+}
+
+std::vector<std::byte> read_file_head(const std::filesystem::path& path, std::size_t most) {
+    return read_whole<std::vector<std::byte>>(path, most);
 }
 
 std::string read_text_file(const std::filesystem::path& path) {

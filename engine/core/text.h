@@ -1,4 +1,4 @@
-// Text in files and on the command line: ASCII whatever the locale.
+// Text in files, on the command line and on terminals: ASCII whatever the locale.
 #pragma once
 
 #include <string>
@@ -13,5 +13,14 @@ inline std::string lower(std::string_view text) {
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
     return lowered;
 }
+
+/// Text with names from files, for a terminal: what would steer it (control characters, marks of
+/// direction, bytes that are no UTF-8) becomes \x1b, \u202e and so on. All else stays; line breaks
+/// stay where lines is true.
+std::string printable(std::string_view text, bool lines = false);
+
+/// As Python's ascii() of the name that os.fsdecode gives: a literal in quotes that evaluates to it
+/// and to nothing else, whatever its bytes are.
+std::string python_string(std::string_view bytes);
 
 }  // namespace darb

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <fstream>
+#include <cstring>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -50,13 +50,13 @@ bool is_colmap_model(const std::filesystem::path& folder) {
 }
 
 std::size_t count_colmap_images(const std::filesystem::path& folder) {
-    if (has_pair(folder, ".bin")) {
-        std::uint64_t count = 0;  // the head of the file
-        std::ifstream file(folder / "images.bin", std::ios::binary);
-        file.read(reinterpret_cast<char*>(&count), sizeof count);
-        return file ? count : 0;
-    }
     try {
+        if (has_pair(folder, ".bin")) {
+            std::uint64_t count = 0;  // the head of the file
+            const std::vector<std::byte> head = read_file_head(folder / "images.bin", sizeof count);
+            if (head.size() == sizeof count) std::memcpy(&count, head.data(), sizeof count);
+            return count;
+        }
         const auto images = folder / "images.txt";
         return parse_colmap_images_text(read_text_file(images), images.string()).size();
     } catch (const Error&) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <new>
 #include <numeric>
 #include <optional>
 #include <sstream>
@@ -201,7 +202,7 @@ glm::dvec3 mean_of(const std::vector<glm::dvec3>& centres) {
 
 }  // namespace
 
-Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) {
+Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
     DatasetOptions options = asked;
     options.images_folder = tidy_path(asked.images_folder).generic_string();
     size_at_resolution(1, 1, options.resolution);  // a bad option fails before any reading
@@ -212,7 +213,11 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) {
     index_tracks(dataset);
     if (options.hold_out) hold_out(dataset.views);
     fit_views(dataset, options);
+    note_odd_cameras(dataset);
     return dataset;
+} catch (const std::bad_alloc&) {
+    throw Error(path.string(), "does not fit into the memory that is left",
+                "Free memory, or use a smaller data set.");
 }
 
 double scene_extent(const Dataset& dataset) {

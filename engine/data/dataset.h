@@ -85,8 +85,11 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
 /// alpha 0.
 ImageU8 load_photo(const View& view);
 
-/// Loads all, on `threads` threads (0 = all cores), in the order of views.
-std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads = 0);
+/// Loads all, on `threads` threads (0 = all cores), in the order of views. As many at a time as
+/// take half of `memory` (bytes; 0: what is free) while they are read. Throws Error, before it
+/// reads the first, where all of them or one take more than that.
+std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads = 0,
+                                 std::uint64_t memory = 0);
 
 /// scene extent of 3DGS: 1.1 x the largest distance of a training camera from their mean centre.
 /// Where that says nothing, as one camera or several in one place stand there: the median distance

@@ -4,7 +4,6 @@
 #include <stb/stb_image_write.h>
 
 #include <algorithm>
-#include <fstream>
 #include <vector>
 
 #include "engine/core/error.h"
@@ -83,12 +82,7 @@ std::filesystem::path without_picture_extension(const std::filesystem::path& pat
 }
 
 ImageInfo read_image_info(const std::filesystem::path& path) {
-    std::vector<std::byte> head(kHeadBytes);
-    std::ifstream file(path, std::ios::binary);
-    if (!file)
-        throw Error(path.string(), "cannot be opened", "Check the path and its permissions.");
-    file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
-    head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+    std::vector<std::byte> head = read_file_head(path, kHeadBytes);
     const std::uint64_t bytes =
         head.size() < kHeadBytes ? head.size() : std::filesystem::file_size(path);
     PhotoHead found = photo_head(head, bytes, path.string());

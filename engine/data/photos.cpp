@@ -4,10 +4,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <condition_variable>
+#include <cstdint>
 #include <exception>
+#include <mutex>
+#include <new>
 #include <thread>
 
 #include "engine/core/error.h"
+#include "engine/core/memory.h"
 #include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
 #include "engine/data/resample.h"
@@ -42,9 +47,65 @@ ImageU8 load_mask(const View& view, const ImageU8& photo) {
         "Make masks of the same photos, or remove this one.");
 }
 
-}  // namespace
+/// The most that load_photo holds at a time: what libjpeg keeps of a progressive photo, its pixels
+/// as stored, as RGBA and undistorted.
+std::uint64_t bytes_while_loading(const View& view) {
+    constexpr std::uint64_t kBytesPerPixel = 16;
+    return kBytesPerPixel * static_cast<std::uint64_t>(std::max(view.lens.width, 1)) *
+           static_cast<std::uint64_t>(std::max(view.lens.height, 1));
+}
 
-ImageU8 load_photo(const View& view) {
+/// Lets photos through while the bytes that they take together are within a budget, and one in any
+/// case.
+class MemoryGate {
+  public:
+    explicit MemoryGate(std::uint64_t budget) : left_(budget), budget_(budget) {}
+
+    void enter(std::uint64_t bytes) {
+        std::unique_lock lock(mutex_);
+        changed_.wait(lock, [&] { return within(bytes) <= left_; });
+        left_ -= within(bytes);
+    }
+    void leave(std::uint64_t bytes) {
+        {
+            const std::lock_guard lock(mutex_);
+            left_ += within(bytes);
+        }
+        changed_.notify_all();
+    }
+
+  private:
+    std::uint64_t within(std::uint64_t bytes) const { return std::min(bytes, budget_); }
+
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::uint64_t left_;
+    const std::uint64_t budget_;
+};
+
+std::uint64_t bytes_loaded(const View& view) {
+    return 4 * static_cast<std::uint64_t>(view.camera.width) *
+           static_cast<std::uint64_t>(view.camera.height);
+}
+
+/// Before the first is read: what they take when all are there.
+void check_memory(const std::vector<View>& views, std::uint64_t free) {
+    std::uint64_t all = 0;
+    for (const View& view : views) {
+        all += bytes_loaded(view);
+        if (bytes_while_loading(view) <= free) continue;
+        throw Error(view.photo.string(),
+                    fmt::format("takes {} MB of memory while it is read, {} MB are free",
+                                bytes_while_loading(view) >> 20, free >> 20),
+                    "Free memory, or make the photo smaller.");
+    }
+    if (all > free)
+        throw Error(fmt::format("{} photos", views.size()),
+                    fmt::format("take {} MB of memory, {} MB are free", all >> 20, free >> 20),
+                    "Load them smaller with -r 2, 4 or 8, or free memory.");
+}
+
+ImageU8 decode_photo(const View& view) {
     ImageU8 photo = to_rgba(read_image(view.photo, view.orientation));
     if (photo.width != view.lens.width || photo.height != view.lens.height)
         throw Error(view.photo.string(),
@@ -59,18 +120,37 @@ ImageU8 load_photo(const View& view) {
     return box_downscale(photo, view.camera.width, view.camera.height);
 }
 
-std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads) {
+}  // namespace
+
+ImageU8 load_photo(const View& view) try {
+    return decode_photo(view);
+} catch (const std::bad_alloc&) {
+    throw Error(view.photo.string(),
+                fmt::format("does not fit into the memory that is left: {} x {} px",
+                            view.lens.width, view.lens.height),
+                "Free memory, or make the photo smaller.");
+}
+
+std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads,
+                                 std::uint64_t memory) {
+    if (memory == 0) memory = free_memory();
+    check_memory(views, memory);
+    MemoryGate gate(memory / 2);
     std::vector<ImageU8> photos(views.size());
     std::vector<std::exception_ptr> errors(views.size());
     std::atomic<std::size_t> next{0};
     std::atomic<bool> failed{false};
     const auto work = [&] {
-        for (std::size_t i; !failed && (i = next++) < views.size();) try {
+        for (std::size_t i; !failed && (i = next++) < views.size();) {
+            gate.enter(bytes_while_loading(views[i]));
+            try {
                 photos[i] = load_photo(views[i]);
             } catch (...) {
                 errors[i] = std::current_exception();
                 failed = true;
             }
+            gate.leave(bytes_while_loading(views[i]));
+        }
     };
     const std::size_t wanted = threads > 0 ? static_cast<std::size_t>(threads)
                                            : std::max(1u, std::thread::hardware_concurrency());

@@ -22,6 +22,9 @@ Dataset load_transforms(const std::filesystem::path& path, const DatasetOptions&
 /// sizes.
 void fit_views(Dataset& dataset, const DatasetOptions& options);
 
+/// Notes on cameras that see none of the points, and on intrinsics beyond reason.
+void note_odd_cameras(Dataset& dataset);
+
 /// Size at which a width x height photo is loaded: DatasetOptions::resolution.
 struct PhotoSize {
     int width = 0, height = 0;

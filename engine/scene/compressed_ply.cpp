@@ -105,10 +105,11 @@ float sh_of_byte(double byte) {
     return static_cast<float>((unit - 0.5) * 8);
 }
 
-void read_sh(std::span<const std::byte> file, const PlyHeader& header, const PlyElement& sh,
-             const std::string& where, SplatModel& model) {
+/// Returns what stands behind its rows, as ply_bytes_behind.
+std::string read_sh(std::span<const std::byte> file, const PlyHeader& header, const PlyElement& sh,
+                    const std::string& where, SplatModel& model) {
     const std::size_t rest = sh.properties.size(), per_channel = rest / 3;
-    if (rest == 0) return;  // gsplat's degree 0
+    if (rest == 0) return {};  // gsplat's degree 0
     if (rest != 9 && rest != 24 && rest != 45)
         throw Error(where,
                     fmt::format("element sh has {} properties; degree 1, 2, 3 has 9, 24, 45", rest),
@@ -124,11 +125,12 @@ void read_sh(std::span<const std::byte> file, const PlyHeader& header, const Ply
     check_ply_size(file, header, sh, where);
     model.sh_degree = rest == 9 ? 1 : rest == 24 ? 2 : 3;
     model.resize(model.size());
-    read_ply_rows(file, header, sh, where, [&](std::size_t row, const double* values) {
+    const PlyRow store = [&](std::size_t row, const double* values) {
         for (std::size_t i = 0; i < rest; ++i)
             model.sh_rest[row * rest + (i % per_channel) * 3 + i / per_channel] =
                 sh_of_byte(values[columns[i]]);
-    });
+    };
+    return ply_bytes_behind(file, header, sh, read_ply_rows(file, header, sh, where, store));
 }
 
 std::uint32_t to_unit(double value, double low, double high, int width) {
@@ -259,8 +261,10 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
             packed[word] = static_cast<std::uint32_t>(values[columns[word]]);
         unpack_splat(packed, chunks[i / kChunk], i, model);
     };
-    read_ply_rows(file, header, vertex, where, row, progress);
-    if (const PlyElement* sh = header.find("sh")) read_sh(file, header, *sh, where, model);
+    const std::size_t end = read_ply_rows(file, header, vertex, where, row, progress);
+    std::string behind = ply_bytes_behind(file, header, vertex, end);
+    if (const PlyElement* sh = header.find("sh")) behind = read_sh(file, header, *sh, where, model);
+    if (!behind.empty()) said.notes.push_back(behind);
     said.dropped = drop_non_finite(model);
     if (facts) *facts = std::move(said);
     return model;

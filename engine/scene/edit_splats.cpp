@@ -149,6 +149,13 @@ std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel
     return gone;
 }
 
+bool has_only_finite(const SplatModel& model) {
+    for (const std::vector<float>* values : {&model.position, &model.log_scale, &model.rotation,
+                                             &model.opacity, &model.sh_dc, &model.sh_rest})
+        if (!row_is_finite(*values, 0, values->size())) return false;
+    return true;
+}
+
 std::size_t drop_non_finite(SplatModel& model) {
     for (float& logit : model.opacity) logit = limit_infinite_logit(logit);
     for (float& scale : model.log_scale) scale = limit_infinite_log_scale(scale);

@@ -40,6 +40,8 @@ glm::dvec3 position_of(const SplatModel& model, std::size_t splat);
 SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>& splats);
 /// Keeps the splats for which keep(i) is true; returns the count of those that went.
 std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model);
+/// Whether no parameter is NaN or infinite.
+bool has_only_finite(const SplatModel& model);
 /// Drops splats with a NaN or infinite parameter, after the rule of infinite_values.h.
 std::size_t drop_non_finite(SplatModel& model);
 /// Whether a splat's rotation has a length; one without is never drawn.

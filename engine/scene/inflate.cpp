@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
@@ -93,8 +94,13 @@ std::vector<std::byte> unzstd(std::span<const std::byte> frame, std::size_t size
 
 std::vector<std::byte> zstd(std::span<const std::byte> bytes) {
     std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
+    const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
+                                                                          ZSTD_freeCCtx);
+    DARB_CHECK(context != nullptr);
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kZstdLevel);
+    ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
     const std::size_t size =
-        ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), kZstdLevel);
+        ZSTD_compress2(context.get(), out.data(), out.size(), bytes.data(), bytes.size());
     DARB_CHECK(!ZSTD_isError(size), "{}", ZSTD_getErrorName(size));
     out.resize(size);
     return out;

@@ -10,8 +10,9 @@
 
 namespace darb {
 
-/// The first `most` bytes of the gzip stream, fewer where it ends before. Memory grows with what
-/// comes out. Throws Error(where, ...) where the stream is damaged or cut off before that.
+/// The first `most` bytes of the gzip stream, fewer where it ends before: then its checksum is
+/// right. Memory grows with what comes out. Throws Error(where, ...) where the stream is damaged or
+/// cut off before that.
 std::vector<std::byte> gunzip(std::span<const std::byte> stream, std::size_t most,
                               const std::string& where);
 /// For the tests of the readers.

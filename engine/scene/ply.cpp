@@ -76,7 +76,11 @@ std::byte* put(std::byte* to, const T* values, std::size_t count) {
 
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where, PlyFacts* facts,
                      const ReadProgress& progress) {
-    const PlyHeader header = parse_ply_header(file, where);
+    return parse_ply(file, parse_ply_header(file, where), where, facts, progress);
+}
+
+SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
+                     const std::string& where, PlyFacts* facts, const ReadProgress& progress) {
     const PlyElement* vertex = header.find("vertex");
     if (!vertex) throw Error(where, "has no element vertex", "A splat scene is needed.");
     if (is_compressed_ply(header))
@@ -100,8 +104,10 @@ SplatModel parse_ply(std::span<const std::byte> file, const std::string& where, 
         for (const int column : columns.position) positions.push_back(values[column]);
         store_splat(values, columns, kept++, model);
     };
-    read_ply_rows(file, header, *vertex, where, row, progress);
+    const std::size_t end = read_ply_rows(file, header, *vertex, where, row, progress);
     if (facts) {
+        const std::string behind = ply_bytes_behind(file, header, *vertex, end);
+        if (!behind.empty()) said.notes.push_back(behind);
         const std::vector<std::string> notes = ply_notes(columns, has_normals);
         said.notes.insert(said.notes.end(), notes.begin(), notes.end());
         said.dropped = vertex->count - kept;

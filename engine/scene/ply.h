@@ -28,9 +28,11 @@ struct PlyFacts {
 /// reason.
 SplatModel read_ply(const std::filesystem::path& path);
 /// The same from memory; `where` stands for the file name in errors.
-/// progress as read_ply_rows takes it.
+/// progress as read_ply_rows takes it; header: parse_ply_header's, where that was called before.
 SplatModel parse_ply(std::span<const std::byte> file, const std::string& where,
                      PlyFacts* facts = nullptr, const ReadProgress& progress = {});
+SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
+                     const std::string& where, PlyFacts* facts, const ReadProgress& progress);
 
 /// Whether float32 does not resolve them (origin_for_float32: scenes at map coordinates).
 bool needs_double_positions(const SplatModel& model);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cstdlib>
@@ -184,6 +185,8 @@ class RowReader {
         }
     }
 
+    std::size_t at() const { return at_; }
+
   private:
     [[noreturn]] void fail(const PlyElement& element, std::size_t row, const char* reason) const {
         throw Error(
@@ -296,9 +299,9 @@ void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
     }
 }
 
-void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
-                   const PlyElement& element, const std::string& where, const PlyRow& row,
-                   const ReadProgress& progress) {
+std::size_t read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
+                          const PlyElement& element, const std::string& where, const PlyRow& row,
+                          const ReadProgress& progress) {
     check_ply_size(file, header, element, where);
     RowReader reader(file, header, where);
     for (const PlyElement& candidate : header.elements) {
@@ -311,8 +314,22 @@ void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
             reader.read(candidate, i, values.data());
             if (wanted) row(i, values.data());
         }
-        if (wanted) return;
+        if (wanted) break;
     }
+    return reader.at();
+}
+
+std::string ply_bytes_behind(std::span<const std::byte> file, const PlyHeader& header,
+                             const PlyElement& element, std::size_t end) {
+    if (header.elements.empty() || &header.elements.back() != &element) return {};
+    std::string_view rest(reinterpret_cast<const char*>(file.data()) + end, file.size() - end);
+    if (header.format == PlyFormat::ascii) {
+        const std::size_t text = rest.find_first_not_of(" \t\r\n");
+        rest.remove_prefix(std::min(text, rest.size()));
+    }
+    if (rest.empty()) return {};
+    return fmt::format("its header declares {} rows of {}; the {} bytes behind them were left out",
+                       element.count, element.name, rest.size());
 }
 
 }  // namespace darb

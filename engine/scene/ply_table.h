@@ -49,10 +49,17 @@ void check_ply_size(std::span<const std::byte> file, const PlyHeader& header,
 /// Calls row(i, values) for i = 0 .. count-1 of the element; values[c] is column c (0 for lists).
 /// Elements before it are skipped. Throws Error naming the row where the file ends or is no number.
 /// progress: called now and then with the share of its rows that are read; throws to stop.
+/// Returns where the rows end.
 using PlyRow = std::function<void(std::size_t row, const double* values)>;
 using ReadProgress = std::function<void(double share)>;
-void read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
-                   const PlyElement& element, const std::string& where, const PlyRow& row,
-                   const ReadProgress& progress = {});
+std::size_t read_ply_rows(std::span<const std::byte> file, const PlyHeader& header,
+                          const PlyElement& element, const std::string& where, const PlyRow& row,
+                          const ReadProgress& progress = {});
+
+/// What stands behind the last row of the last element, which ends at `end`, a sentence; empty
+/// where nothing does, or where `element` is not the last. Spaces and line ends are nothing in
+/// ascii.
+std::string ply_bytes_behind(std::span<const std::byte> file, const PlyHeader& header,
+                             const PlyElement& element, std::size_t end);
 
 }  // namespace darb

@@ -56,6 +56,13 @@ std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::
                         kCopyAgain);
         done += static_cast<std::size_t>(got);
     }
+    // The checksum counts where the end is met.
+    std::byte beyond{};
+    if (const zip_int64_t more = zip_fread(entry.get(), &beyond, 1); more != 0)
+        throw Error(place,
+                    more < 0 ? fmt::format("is damaged: {}", zip_file_strerror(entry.get()))
+                             : "is longer than the zip says",
+                    kCopyAgain);
     return bytes;
 }
 
@@ -66,6 +73,13 @@ std::string packed_scene(zip_t* archive) {
             for (const char* extension : {".ply", ".splat", ".spz"})
                 if (has_extension(name, extension)) return name;
     return {};
+}
+
+/// meta.json names files beside it, none in other folders.
+void check_part_name(const std::string& name, const std::string& meta) {
+    if (name.empty() || std::filesystem::path(name).filename() != name || name == "..")
+        throw Error(meta, "names '" + name + "', which is no file of its folder",
+                    "Put all files of the scene into one folder.");
 }
 
 }  // namespace
@@ -80,16 +94,14 @@ SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where) {
                     scene.empty() ? "Name a splat file." : "Unpack it and name that file.");
     }
     return [archive, size = zip.size(), where](const std::string& name) {
+        check_part_name(name, where + ", meta.json");
         return read_entry(archive.get(), name, size, where);
     };
 }
 
 SogPart open_sog_folder(const std::filesystem::path& folder) {
     return [folder](const std::string& name) {
-        if (name.empty() || std::filesystem::path(name).filename() != name || name == "..")
-            throw Error((folder / "meta.json").string(),
-                        "names '" + name + "', which is no file of its folder",
-                        "Put all files of the scene into one folder.");
+        check_part_name(name, (folder / "meta.json").string());
         return read_file(folder / name);
     };
 }

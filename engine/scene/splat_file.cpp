@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <new>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -40,12 +41,12 @@ SplatModel load_ply(Bytes bytes, const std::string& where, SplatFile& file,
     const PlyHeader header = parse_ply_header(bytes, where);
     file.format = is_compressed_ply(header) ? SplatFormat::compressed_ply : SplatFormat::ply;
     file.details = encoding_of(header);
-    if (is_point_cloud(bytes))
+    if (is_point_cloud(header))
         throw Error(where, "is a point cloud: its vertices have no opacity, scale and rotation",
                     "darb train starts from it where it lies beside the cameras; a viewer shows it "
                     "as points.");
     PlyFacts facts;
-    SplatModel model = parse_ply(bytes, where, &facts, progress);
+    SplatModel model = parse_ply(bytes, header, where, &facts, progress);
     file.dropped = facts.dropped;
     file.notes = facts.notes;
     return model;
@@ -120,8 +121,10 @@ bool is_sog_folder(const fs::path& path) {
 }
 
 bool is_point_cloud(Bytes bytes) {
-    if (!starts_with(bytes, "ply")) return false;
-    const PlyHeader header = parse_ply_header(bytes, "PLY");
+    return starts_with(bytes, "ply") && is_point_cloud(parse_ply_header(bytes, "PLY"));
+}
+
+bool is_point_cloud(const PlyHeader& header) {
     const PlyElement* vertex = header.find("vertex");
     return vertex && vertex->find("x") >= 0 && vertex->find("opacity") < 0 &&
            vertex->find("scale_0") < 0 && vertex->find("f_dc_0") < 0 && !is_compressed_ply(header);
@@ -147,7 +150,7 @@ SplatModel parse_splats(Bytes bytes, const std::string& where, SplatFile* file,
         "Check the path, or export the scene in one of these formats.");
 }
 
-SplatModel load_splats(const fs::path& path, SplatFile* file) {
+SplatModel load_splats(const fs::path& path, SplatFile* file) try {
     SplatFile unused;
     SplatFile& facts = file ? *file : unused;
     facts = {};
@@ -155,6 +158,9 @@ SplatModel load_splats(const fs::path& path, SplatFile* file) {
     if (path.filename() == "meta.json")
         return load_folder(path.has_parent_path() ? path.parent_path() : fs::path("."), facts);
     return parse_splats(read_file(path), path.string(), &facts);
+} catch (const std::bad_alloc&) {
+    throw Error(path.string(), "does not fit into the memory that is left",
+                "Free memory, or prune the scene first.");
 }
 
 std::optional<SplatFormat> format_to_write(const fs::path& path) {
@@ -170,6 +176,10 @@ std::vector<std::string> losses_of(SplatFormat format, const SplatModel& scene,
                                    const std::string& where) {
     std::vector<std::string> losses;
     if (format == SplatFormat::ply) {
+        SplatModel finite;  // a copy of what is large only where it is needed
+        if (!has_only_finite(scene)) finite = scene;
+        if (const std::size_t count = drop_unwritable(format, finite); count > 0)
+            losses.push_back(fmt::format("{} splats with NaN or infinity are left out", count));
         if (const glm::dvec3 to_0 = 0.0 - scene.origin; needs_double_positions(scene))
             losses.push_back(fmt::format(
                 "positions are written as double, which few other programs read, as float32 does "
@@ -213,7 +223,7 @@ std::vector<std::string> losses_of(SplatFormat format, const SplatModel& scene,
 }
 
 std::size_t drop_unwritable(SplatFormat format, SplatModel& model) {
-    if (format == SplatFormat::ply) return 0;
+    if (format == SplatFormat::ply) return drop_non_finite(model);
     return drop_non_finite(model) +
            keep_splats([&](std::size_t i) { return has_rotation(model, i); }, model);
 }
@@ -222,9 +232,10 @@ std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model
                                      const std::string& where) {
     if (format == SplatFormat::sog)
         throw Error(where, "SOG is several files, not one", "Use save_splats.");
-    if (format == SplatFormat::ply) return encode_ply(model);
+    if (format == SplatFormat::ply && has_only_finite(model)) return encode_ply(model);
     SplatModel kept = model;
     drop_unwritable(format, kept);
+    if (format == SplatFormat::ply) return encode_ply(kept);
     if (format == SplatFormat::compressed_ply) return encode_compressed_ply(kept);
     if (format == SplatFormat::dot_splat) return encode_dot_splat(kept);
     return encode_spz(kept, where);

@@ -43,6 +43,7 @@ SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& whe
 bool is_sog_folder(const std::filesystem::path& path);
 /// PLY whose vertices have positions and no opacity: opens as points (engine/data/point_splats.h).
 bool is_point_cloud(std::span<const std::byte> bytes);
+bool is_point_cloud(const PlyHeader& header);
 
 /// What a name asks for when writing: .compressed.ply, .ply, .splat, .spz; nothing for others.
 std::optional<SplatFormat> format_to_write(const std::filesystem::path& path);
@@ -50,7 +51,7 @@ std::optional<SplatFormat> format_to_write(const std::filesystem::path& path);
 /// sentence each. Throws as encode_splats does.
 std::vector<std::string> losses_of(SplatFormat format, const SplatModel& model,
                                    const std::string& where = "scene");
-/// Drops what is left out of all formats but PLY: splats with NaN or infinity, and those without a
+/// Drops what is left out: splats with NaN or infinity and, of all formats but PLY, those without a
 /// rotation, which are not drawn, and would be where a file holds no other length than 1.
 std::size_t drop_unwritable(SplatFormat format, SplatModel& model);
 /// All but sog, after drop_unwritable. `where` stands for the file name in errors.

@@ -93,8 +93,13 @@ void read_old(Bytes file, bool is_gzip, Content& content, const std::string& whe
         check_expansion(file.size(), size, where);
         // A byte more than needed: zlib then reaches the end of the stream and checks its sum.
         const bool extended = content.header.flags & spz::kFlagExtensions;
-        content.whole =
-            gunzip(file, spz::kOldHeader + size + (extended ? kMostExtensionBytes : 1), where);
+        const std::size_t most = spz::kOldHeader + size + (extended ? kMostExtensionBytes : 1);
+        content.whole = gunzip(file, most, where);
+        if (content.whole.size() == most)
+            throw Error(where,
+                        fmt::format("holds more than the {} splats that its header declares",
+                                    content.header.count),
+                        kCopyAgain);
     } else {
         content.whole.assign(file.begin(), file.end());
     }

@@ -3,6 +3,7 @@
 
 #include <sys/stat.h>
 
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -197,7 +198,10 @@ TEST(Convert, a_pipe_takes_the_scene_and_stderr_what_is_said) {
     const std::string ply = scene_file("piped.ply", sample_model(0, 30)), pipe = out("pipe.ply");
     ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
     std::vector<std::byte> got;
-    std::jthread reader([&] { got = read_file(pipe); });
+    std::jthread reader([&] {
+        std::ifstream file(pipe, std::ios::binary);
+        for (char c; file.get(c);) got.push_back(static_cast<std::byte>(c));
+    });
     const Outcome o = darb("convert " + ply + " " + pipe + " --crop 0,-9,-9,9,9,9");
     reader.join();
     EXPECT_EQ(o.code, 0) << o.err;

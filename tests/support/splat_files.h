@@ -42,6 +42,12 @@ inline std::string error_of(const std::function<void()>& action) {
     return "no error";
 }
 
+inline bool same_splats(const SplatModel& a, const SplatModel& b) {
+    return a.sh_degree == b.sh_degree && a.antialias == b.antialias && a.origin == b.origin &&
+           a.position == b.position && a.log_scale == b.log_scale && a.rotation == b.rotation &&
+           a.opacity == b.opacity && a.sh_dc == b.sh_dc && a.sh_rest == b.sh_rest;
+}
+
 inline void append_text(const std::string& text, FileBytes& to) {
     for (const char c : text) to.push_back(static_cast<std::byte>(c));
 }

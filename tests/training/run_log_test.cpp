@@ -24,6 +24,10 @@ TEST(CfgArgs, names_what_the_photos_were_loaded_with) {
               "Namespace(sh_degree=2, source_path='/photos', model_path='/out', "
               "images='images_4', resolution=2, white_background=False, data_device='cpu', "
               "eval=True)");
+    dataset.root = "/a', x=__import__('os').system('id'), b='";
+    EXPECT_NE(cfg_args(dataset, options, "/out")
+                  .find("source_path=\"/a', x=__import__('os').system('id'), b='\", model_path="),
+              std::string::npos);
 }
 
 TEST(RunLog, names_that_are_no_utf_8_and_numbers_that_are_not_finite_are_written_and_read) {

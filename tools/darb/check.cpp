@@ -10,6 +10,7 @@
 #include "engine/check/dump.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
@@ -106,8 +107,8 @@ int dump_view(const CheckFlags& flags) {
         from = device.info().name;
     }
     fmt::print("{}: image and gradients of view {} ({}), {} splats, {} x {} px, from {}\n",
-               flags.dump.string(), flags.view, view.name, model.size(), view.camera.width,
-               view.camera.height, from);
+               flags.dump.string(), flags.view, printable(view.name), model.size(),
+               view.camera.width, view.camera.height, from);
     return 0;
 }
 

@@ -6,6 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 #include "engine/scene/gaussian_scene.h"
 #include "tools/cost/views.h"
 #include "tools/darb/commands.h"
@@ -51,7 +52,7 @@ void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
         throw Error(flags.cameras.string(), "holds no cameras", "Name another list or data set.");
     const SceneDifference d = compare_scenes(scene, other, views, flags.device);
     fmt::print(say, "{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what,
-               d.mean_psnr_db, views.size(), d.worst_psnr_db, d.worst_view);
+               d.mean_psnr_db, views.size(), d.worst_psnr_db, printable(d.worst_view));
 }
 
 int convert(const ConvertFlags& flags) {

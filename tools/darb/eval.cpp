@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 #include "engine/data/dataset.h"
 #include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
@@ -57,12 +58,12 @@ nlohmann::json to_json(const Evaluation& evaluation) {
 void print_table(const Evaluation& evaluation) {
     const std::string mean = fmt::format("mean of {}", evaluation.views.size());
     size_t width = mean.size();
-    for (const ViewMetrics& v : evaluation.views) width = std::max(width, v.name.size());
+    for (const ViewMetrics& v : evaluation.views) width = std::max(width, printable(v.name).size());
     const auto row = [&](const std::string& name, double psnr_db, double ssim) {
         fmt::print("{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
     };
     fmt::print("{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
-    for (const ViewMetrics& v : evaluation.views) row(v.name, v.psnr_db, v.ssim);
+    for (const ViewMetrics& v : evaluation.views) row(printable(v.name), v.psnr_db, v.ssim);
     row(mean, evaluation.psnr_db, evaluation.ssim);
 }
 

@@ -107,14 +107,15 @@ int main(int argc, char** argv) {
     try {
         return run(argc, argv);
     } catch (const darb::Error& e) {
-        fmt::print(stderr, "error: {}\n", e.what());
+        fmt::print(stderr, "error: {}\n", darb::printable(e.what(), true));
         return 2;
     } catch (const std::filesystem::filesystem_error& e) {
         fmt::print(stderr, "error: {}: {}\n  Check the path and its permissions.\n",
-                   e.path1().empty() ? "a path" : e.path1().string(), e.code().message());
+                   e.path1().empty() ? "a path" : darb::printable(e.path1().string()),
+                   e.code().message());
         return 2;
     } catch (const std::exception& e) {
-        fmt::print(stderr, "internal error: {}\n", e.what());
+        fmt::print(stderr, "internal error: {}\n", darb::printable(e.what(), true));
         return 1;
     }
 }

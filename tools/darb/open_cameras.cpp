@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
+#include "engine/core/text.h"
 #include "engine/data/camera_list.h"
 
 namespace darb {
 
 void print_notes(const std::vector<std::string>& notes) {
-    for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", note);
+    for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", printable(note));
 }
 
 std::vector<View> open_cameras(const std::filesystem::path& path, const DatasetOptions& options) {

@@ -9,6 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 
 namespace darb {
 
@@ -99,9 +100,9 @@ SplatModel load_scene(const fs::path& path, SplatFile* facts) {
     SplatModel model = load_splats(file, &said);
     if (said.dropped > 0)
         fmt::print(stderr, "warning: {}: {} splats with NaN or infinity were dropped\n",
-                   file.string(), said.dropped);
+                   printable(file.string()), said.dropped);
     for (const std::string& note : said.notes)
-        fmt::print(stderr, "warning: {}: {}\n", file.string(), note);
+        fmt::print(stderr, "warning: {}: {}\n", printable(file.string()), printable(note));
     return model;
 }
 

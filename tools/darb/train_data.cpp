@@ -10,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/text.h"
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
 #include "engine/data/run_colmap.h"
@@ -34,8 +35,9 @@ void check_output(const fs::path& photos, const fs::path& output) {
 // Steps as lines of their own, and on a terminal what COLMAP says, in place.
 void show(std::string_view line) {
     const bool step = line.starts_with('['), terminal = ::isatty(STDERR_FILENO) == 1;
-    if (step) fmt::print(stderr, "{}{}\n", terminal ? "\r\033[K" : "", line);
-    if (!step && terminal) fmt::print(stderr, "\r{}\033[K", line.substr(0, kShownColumns));
+    const std::string text = printable(step ? line : line.substr(0, kShownColumns));
+    if (step) fmt::print(stderr, "{}{}\n", terminal ? "\r\033[K" : "", text);
+    if (!step && terminal) fmt::print(stderr, "\r{}\033[K", text);
 }
 
 // Undistorting leaves the masks behind; darb straightens them with the photos where it loads both.

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 #include "engine/data/image_io.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/device_options.h"
@@ -39,7 +40,7 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     }
     if (!flags.frames.empty()) {
         viewer.export_path_now();
-        fmt::print("{}\n", viewer.session().note);
+        fmt::print("{}\n", printable(viewer.session().note, true));
     }
     return 0;
 }
@@ -54,7 +55,7 @@ int view(ViewFlags flags) {
     if (!flags.up.empty()) up_from_name(flags.up);
     std::string note;
     options.views = find_views(flags, note);
-    if (!note.empty()) fmt::print(stderr, "warning: {}\n", note);
+    if (!note.empty()) fmt::print(stderr, "warning: {}\n", printable(note));
     options.resolve = find_scene;
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())

@@ -4,10 +4,14 @@
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <fstream>
 #include <string>
 #include <thread>
 
@@ -91,7 +95,63 @@ TEST_F(Files, Read_of_a_missing_file_names_it_and_the_reason) {
 }
 
 TEST_F(Files, Read_of_a_folder_is_an_error) {
-    expect_contains(error_text([&] { read_text_file(folder); }), "directory");
+    expect_contains(error_text([&] { read_text_file(folder); }), "is a folder, not a file");
+}
+
+TEST_F(Files, Read_of_pipes_devices_and_sockets_is_refused_without_waiting) {
+    ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+    fs::create_symlink("/dev/zero", folder / "zero.jpg");
+    fs::create_symlink(folder / "pipe", folder / "link");
+    const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    const std::string name = (folder / "s").string();
+    std::copy(name.begin(), name.end(), address.sun_path);
+    ASSERT_EQ(::bind(socket, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    const std::pair<const char*, const char*> kinds[] = {{"pipe", "is a pipe"},
+                                                         {"link", "is a pipe"},
+                                                         {"zero.jpg", "is a device"},
+                                                         {"s", "is a socket"}};
+    for (const auto& [file, kind] : kinds) {
+        expect_contains(error_text([&] { read_file(folder / file); }), kind);
+        expect_contains(error_text([&] { read_file_head(folder / file, 10); }), kind);
+        expect_contains(error_text([&] { check_is_file(folder / file); }), kind);
+    }
+    check_is_file(folder / "missing");
+    ::close(socket);
+}
+
+TEST_F(Files, Read_of_the_head_ends_there) {
+    write_file_atomic(folder / "a", "0123456789");
+    EXPECT_EQ(read_file_head(folder / "a", 4).size(), 4u);
+    EXPECT_EQ(read_file_head(folder / "a", 40).size(), 10u);
+}
+
+TEST_F(Files, Read_of_more_than_the_memory_names_the_file) {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "the sanitizer reserves all addresses";
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+    GTEST_SKIP() << "the sanitizer reserves all addresses";
+#endif
+#endif
+    write_file_atomic(folder / "huge", "");
+    fs::resize_file(folder / "huge", std::uintmax_t{1} << 38);
+    const pid_t child = ::fork();
+    if (child == 0) {
+        const rlimit limit{1u << 30, 1u << 30};
+        ::setrlimit(RLIMIT_AS, &limit);
+        try {
+            read_file(folder / "huge");
+        } catch (const Error& error) {
+            ::_exit(error.where.ends_with("huge") ? 7 : 1);
+        } catch (...) {
+        }
+        ::_exit(1);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 7) << status;
 }
 
 TEST_F(Files, Read_of_a_file_without_known_size_reads_to_the_end) {
@@ -184,7 +244,7 @@ TEST_F(Files, Write_to_a_pipe_or_a_device_leaves_it_one) {
     const fs::path pipe = folder / "pipe";
     ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
     std::string got;
-    std::jthread reader([&] { got = read_text_file(pipe); });
+    std::jthread reader([&] { std::getline(std::ifstream(pipe) >> std::ws, got); });
     write_file_atomic(pipe, "text");
     reader.join();
     EXPECT_EQ(got, "text");

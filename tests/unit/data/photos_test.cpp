@@ -228,7 +228,8 @@ TEST(ImageIo, damaged_files_are_errors_that_name_the_file) {
             << length;
     write_file_atomic(path, "no image");
     EXPECT_NE(error_of([&] { read_image_info(path); }).find("a.png"), std::string::npos);
-    EXPECT_NE(error_of([&] { read_image_info(path / "b"); }).find("opened"), std::string::npos);
+    EXPECT_NE(error_of([&] { read_image_info(path / "b"); }).find("Not a directory"),
+              std::string::npos);
 }
 
 TEST(BoxDownscale, whole_factor_is_the_mean) {
@@ -330,6 +331,24 @@ TEST(LoadPhotos, order_is_kept_and_errors_arrive) {
     EXPECT_TRUE(load_photos({}).empty());
     views[11].photo = folder / "missing.png";
     EXPECT_NE(error_of([&] { load_photos(views); }).find("missing.png"), std::string::npos);
+}
+
+TEST(LoadPhotos, what_does_not_fit_into_memory_is_said_before_anything_is_read) {
+    const auto folder = test_folder();
+    std::vector<View> views(6);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].photo = folder / (std::to_string(i) + ".png");
+        views[i].lens = {"PINHOLE", {1, 1, 1, 1}, 30, 20};
+        views[i].camera = {.width = 30, .height = 20};
+        write_png(views[i].photo, ImageU8(30, 20, 3));
+    }
+    constexpr std::uint64_t kOne = 16 * 30 * 20, kAll = 6 * 4 * 30 * 20;
+    EXPECT_EQ(load_photos(views, 6, kAll).size(), 6u);  // one at a time
+    EXPECT_NE(error_of([&] { load_photos(views, 6, kAll - 1); }).find("6 photos: take 0 MB"),
+              std::string::npos);
+    views[3].lens.width = 30'000, views[3].lens.height = 20'000;
+    EXPECT_NE(error_of([&] { load_photos(views, 6, 1000 * kOne); }).find("3.png: takes 9155 MB"),
+              std::string::npos);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "engine/scene/splat_file.h"
 #include "shaders/shared/limits.h"
 #include "tests/support/test_data.h"
 
@@ -205,6 +206,44 @@ TEST(Ply, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
     EXPECT_EQ(read.log_scale[7], -LOG_SCALE_LIMIT);
     model.log_scale[7] = kInfinity;
     EXPECT_EQ(parse_ply(encode_ply(model), "memory", &facts).size(), 2u);
+}
+
+TEST(Ply, bytes_behind_the_last_row_are_left_out_and_said) {
+    PlyFacts facts;
+    std::vector<std::byte> file = encode_ply(random_model(1, 2));
+    EXPECT_EQ(parse_ply(file, "test", &facts).size(), 2u);
+    EXPECT_TRUE(facts.notes.empty());
+    file.resize(file.size() + 92);
+    EXPECT_EQ(parse_ply(file, "test", &facts).size(), 2u);
+    ASSERT_EQ(facts.notes.size(), 1u);
+    EXPECT_EQ(facts.notes[0],
+              "its header declares 2 rows of vertex; the 92 bytes behind them were left out");
+    std::vector<std::byte> packed = encode_splats(SplatFormat::compressed_ply, random_model(1, 2));
+    parse_ply(packed, "test", &facts);
+    EXPECT_TRUE(facts.notes.empty());
+    packed.push_back({});
+    parse_ply(packed, "test", &facts);
+    ASSERT_EQ(facts.notes.size(), 1u);
+    EXPECT_NE(facts.notes[0].find("2 rows of sh; the 1 bytes"), std::string::npos);
+    parse(ascii_file("1", kAsciiRow + "\n \n"), &facts);
+    EXPECT_TRUE(facts.notes.empty());
+    parse(ascii_file("1", kAsciiRow + kAsciiRow), &facts);
+    EXPECT_EQ(facts.notes.size(), 1u);
+}
+
+TEST(Ply, what_is_not_finite_is_not_written_and_said) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    SplatModel model = random_model(1, 3);
+    EXPECT_TRUE(losses_of(SplatFormat::ply, model).empty());
+    model.position[4] = kInfinity;
+    model.opacity[2] = kInfinity;  // an opacity of 1
+    PlyFacts facts;
+    const SplatModel read = parse_ply(encode_splats(SplatFormat::ply, model), "memory", &facts);
+    EXPECT_EQ(facts.dropped, 0u);
+    ASSERT_EQ(read.size(), 2u);
+    EXPECT_EQ(read.opacity[1], OPACITY_LOGIT_LIMIT);
+    ASSERT_EQ(losses_of(SplatFormat::ply, model).size(), 1u);
+    EXPECT_NE(losses_of(SplatFormat::ply, model)[0].find("1 splats with NaN"), std::string::npos);
 }
 
 TEST(Ply, truncated_anywhere_is_an_error_that_names_the_file) {

@@ -227,6 +227,32 @@ TEST(Sog, large_pictures_for_few_splats_are_refused) {
     EXPECT_NE(error_of([&] { kRead(zip_of(parts)); }).find("no WebP"), std::string::npos);
 }
 
+TEST(Sog, a_flipped_bit_is_an_error_or_changes_nothing) {
+    const FileBytes whole = zip_of(sample_parts(sample_meta()));
+    const SplatModel model = parse_sog(whole, "test");
+    std::size_t changed = 0, refused = 0;
+    for (std::size_t bit = 0; bit < 8 * whole.size(); ++bit) {
+        FileBytes file = whole;
+        file[bit / 8] ^= std::byte(1 << bit % 8);
+        try {
+            changed += same_splats(parse_sog(file, "test"), model) ? 0 : 1;
+        } catch (const Error&) {
+            ++refused;
+        }
+    }
+    EXPECT_EQ(changed, 0u) << "of " << 8 * whole.size() << ", " << refused << " refused";
+    EXPECT_GT(refused, 4 * whole.size());
+}
+
+TEST(Sog, a_zip_names_no_file_in_another_folder) {
+    json meta = sample_meta();
+    meta["quats"]["files"] = {"a/quats.webp"};
+    Parts parts = sample_parts(meta);
+    parts["a/quats.webp"] = parts["quats.webp"];
+    EXPECT_NE(error_of([&] { parse_sog(zip_of(parts), "test"); }).find("no file of its folder"),
+              std::string::npos);
+}
+
 TEST(Sog, truncated_or_damaged_is_an_error) {
     const FileBytes zip = zip_of(sample_parts(sample_meta()));
     expect_truncation_is_refused(zip, kRead);
