@@ -14,6 +14,7 @@ namespace {
 constexpr double kLeastFocal = 0.05, kMostFocal = 50;  // of the larger side: 169 and 1.1 degrees
 constexpr double kMostAspect = 4;                      // of the focal lengths
 constexpr double kMostShift = 1;         // principal point beyond the frame, of its side
+constexpr std::size_t kFewPoints = 100;  // that may well be out of a good camera's view
 constexpr std::size_t kLooked = 20'000;  // points, evenly picked
 
 /// How many and the first of them.
@@ -61,7 +62,7 @@ void note_odd_cameras(Dataset& dataset) {
     for (const View& view : dataset.views) {
         if (has_odd_focal_length(view.camera)) focal.add(view);
         if (has_odd_principal_point(view.camera)) principal.add(view);
-        if (dataset.points.size() > 0 && !sees_a_point(view.camera, dataset.points, step))
+        if (dataset.points.size() >= kFewPoints && !sees_a_point(view.camera, dataset.points, step))
             blind.add(view);
     }
     std::vector<std::string>& notes = dataset.notes;

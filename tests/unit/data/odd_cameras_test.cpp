@@ -14,8 +14,10 @@ Dataset good() {
         dataset.views.back().camera = {
             .width = 80, .height = 60, .fx = 70, .fy = 71, .cx = 40, .cy = 30};
     }
-    dataset.points.position = {0, 0, -5, 0.1, 0.2, 5};
-    dataset.points.colour.assign(6, 0);
+    for (int i = 0; i < 100; ++i)
+        for (const double value : {0.01 * i, 0.1, i % 2 == 0 ? -5.0 : 5.0})
+            dataset.points.position.push_back(value);
+    dataset.points.colour.assign(300, 0);
     return dataset;
 }
 
@@ -40,6 +42,9 @@ TEST(OddCameras, that_see_no_point_are_counted) {
               "may be of different reconstructions.");
     dataset.views[1].camera.translation = {500, 0, 0};
     EXPECT_NE(note_on(dataset), "");
+    dataset.points.position.resize(3 * 99);
+    dataset.points.colour.resize(3 * 99);
+    EXPECT_EQ(note_on(dataset), "") << "few points say nothing";
 }
 
 TEST(OddCameras, focal_lengths_and_principal_points_beyond_reason_are_named) {
