@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/plan/effect_plan.h"
+#include "trainer/schedule.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -206,13 +207,14 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
 }
 
 std::string settings_text(const TrainOptions& o) {
+    const Schedule s(o);
     Json settings{{"iterations", o.iterations},
                   {"seed", o.seed},
                   {"kernel", kernel_name(o.kernel)},
                   {"footprint", footprint_name(o.footprint)},
                   {"accuracy", accuracy_text(o.accuracy)},
                   {"sh_degree", o.sh_degree},
-                  {"sh_interval", o.degree_interval()},
+                  {"sh_interval", s.degree_interval},
                   {"effects",
                    {{"probe_sh", o.probe_sh},
                     {"antialias", o.antialias},
@@ -223,41 +225,41 @@ std::string settings_text(const TrainOptions& o) {
                   {"random_background", o.random_background},
                   {"resolution_ramp", o.resolution_ramp},
                   {"lambda_dssim", o.lambda_dssim},
-                  {"position_lr", {o.position_lr_start(), o.position_lr_end()}},
-                  {"scale_lr", o.scale_rate()},
-                  {"rotation_lr", o.rotation_rate()},
-                  {"opacity_lr", o.opacity_rate()},
-                  {"sh_lr", {o.sh_dc_lr, o.sh_rest_rate(o.sh_rest_every)}},
-                  {"sh_rest_every", o.sh_rest_every},
-                  {"position_lr_falls", o.position_falls_for()},
-                  {"final_lr_share", o.last_share()},
-                  {"average_begin", o.average_begin()},
-                  {"densify_from", o.densify_begin()},
-                  {"densify_until", o.densify_end()},
-                  {"densify_interval", o.round_interval()},
+                  {"position_lr", {static_cast<float>(s.first.position), s.last_position_rate}},
+                  {"scale_lr", s.first.scale},
+                  {"rotation_lr", s.first.rotation},
+                  {"opacity_lr", s.first.opacity},
+                  {"sh_lr", {s.first.sh_dc, s.first.sh_rest}},
+                  {"sh_rest_every", s.rest_every},
+                  {"position_lr_falls", s.position_falls_for},
+                  {"final_lr_share", s.last_share},
+                  {"average_begin", s.average_begin},
+                  {"densify_from", s.rounds.begin},
+                  {"densify_until", s.rounds.end},
+                  {"densify_interval", s.rounds.interval},
                   {"densify_grad_threshold", o.densify_grad_threshold},
                   {"clone_split_extent", o.clone_split_extent},
-                  {"prune_opacity", o.prune_opacity},
+                  {"prune_opacity", s.prune_opacity},
                   {"prune_extent", o.prune_extent},
-                  {"largest_scale", o.scale_limit()},
+                  {"largest_scale", s.largest_scale},
                   {"clearance", o.clearance},
-                  {"opacity_reset", {o.opacity_reset_interval, o.opacity_reset_to()}},
-                  {"last_opacity_reset", o.last_opacity_reset()},
-                  {"max_splats", o.max_splats},
+                  {"opacity_reset", {s.resets.interval, s.resets.to}},
+                  {"last_opacity_reset", s.resets.last},
+                  {"max_splats", o.max_splats.value_or(kAnyNumberOfSplats)},
                   {"regularisers", {o.opacity_weight, o.scale_weight}},
-                  {"initial_opacity", o.initial_opacity},
-                  {"random_points", o.random_points}};
-    for (const ProjectionSwitch& s : kProjectionSwitches)
-        if (s.effect != kNoEffect && s.effect != EFFECT_ANTIALIAS)
-            settings["effects"][effect_name(s.effect)] = o.projection.*s.on;
+                  {"initial_opacity", s.initial_opacity},
+                  {"random_points", o.random_points.value_or(0)}};
+    for (const ProjectionSwitch& p : kProjectionSwitches)
+        if (p.effect != kNoEffect && p.effect != EFFECT_ANTIALIAS)
+            settings["effects"][effect_name(p.effect)] = o.projection.*p.on;
     // What the defaults do not have stands only where it is.
     if (o.strategy != Strategy::adc) {
         settings["strategy"] = strategy_name(o.strategy);
-        settings["initial_scale"] = o.initial_scale;
+        settings["initial_scale"] = s.initial_scale;
     }
-    if (o.length_scale() != 1) settings["length_scale"] = o.length_scale();
+    if (s.length_scale != 1) settings["length_scale"] = s.length_scale;
     if (o.strategy == Strategy::mcmc) settings["noise_lr"] = o.noise_lr;
-    if (o.strategy == Strategy::budget) settings["opacity_decay"] = o.opacity_decay;
+    if (o.strategy == Strategy::budget) settings["opacity_decay"] = s.opacity_decay;
     if (o.morton_order) settings["morton_order"] = true;
     return settings.dump();
 }

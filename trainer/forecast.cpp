@@ -9,6 +9,7 @@
 #include "engine/raster/gpu_splats.h"
 #include "trainer/initial_model.h"
 #include "trainer/resolution_ramp.h"
+#include "trainer/schedule.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
@@ -47,12 +48,12 @@ struct Measurement {
 };
 
 // The first round of density control, in which random splats go that no photo holds up.
-int first_round(const TrainOptions& options) {
-    return options.densify_begin() + options.round_interval();
+int first_round(const Schedule& schedule) {
+    return schedule.rounds.begin + schedule.rounds.interval;
 }
 
-bool has_rounds(const TrainOptions& options) {
-    return options.densify_end() > options.densify_begin();
+bool has_rounds(const Schedule& schedule) {
+    return schedule.rounds.end > schedule.rounds.begin;
 }
 
 // A few training views, evenly picked.
@@ -103,8 +104,9 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     placeholder.origin = model.origin;
     Trainer trainer(device, few, grey_photos(few.views), placeholder, options);
     Trainer::State state;
-    state.iteration = options.sh_degree * options.degree_interval();
-    if (const int every = options.sh_rest_every; every > 1)  // both ways of a step run at first
+    const Schedule schedule(options);
+    state.iteration = options.sh_degree * schedule.degree_interval;
+    if (const int every = schedule.rest_every; every > 1)  // both ways of a step run at first
         state.iteration += every - 1 - state.iteration % every;
     state.model = model;
     state.moments.resize(kAttributeCount);
@@ -139,11 +141,11 @@ void settle_size(const Device& device, const TrainOptions& options, std::uint32_
     };
     f.splats = wanted;
     demand_for(wanted);
-    if (options.max_memory_bytes == 0) return;
+    if (!options.max_memory_bytes) return;
     MemoryDemand grown = f.demand;
     grown.pairs += grown.pairs / 2;
     const std::uint64_t within = std::max<std::uint64_t>(
-        splats_within(device, grown, options.max_memory_bytes), f.start_splats);
+        splats_within(device, grown, *options.max_memory_bytes), f.start_splats);
     f.splats = static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, within));
     demand_for(f.splats);
 }
@@ -152,8 +154,9 @@ void settle_size(const Device& device, const TrainOptions& options, std::uint32_
 // they save beyond that. Where most of the start goes they save the same share of what is left.
 void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
-    int at_start = f.falls ? first_round(options) : options.iterations;
-    for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height))) {
+    const Schedule schedule(options);
+    int at_start = f.falls ? first_round(schedule) : options.iterations;
+    for (const RampStep& step : schedule.ramp_steps(std::max(f.demand.width, f.demand.height))) {
         Dataset smaller = few;
         for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
         const Measurement measured = measure_training(device, smaller, start, options);
@@ -183,7 +186,10 @@ SplatModel surface_model(const Dataset& dataset, TrainOptions options, const Spl
 
 // How much of the run is as slow as its end, the rest as its start; in the mean.
 double share_of_the_end(const TrainOptions& options, const Forecast& f) {
-    if (f.falls) return 1 - std::clamp(double(first_round(options)) / options.iterations, 0.0, 1.0);
+    if (f.falls) {
+        const double before = first_round(Schedule(options));
+        return 1 - std::clamp(before / options.iterations, 0.0, 1.0);
+    }
     if (f.splats == f.start_splats) return 0;
     return (mean_splats(f.start_splats, f.splats, options) - f.start_splats) /
            (double(f.splats) - f.start_splats);
@@ -217,19 +223,19 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
 }
 
 // The iterations with smaller photos.
-int ramp_end(const TrainOptions& options, const Forecast& f) {
+int ramp_end(const Schedule& schedule, const Forecast& f) {
     int last = 0;
-    for (const RampStep& step : ramp_steps(options, std::max(f.demand.width, f.demand.height)))
+    for (const RampStep& step : schedule.ramp_steps(std::max(f.demand.width, f.demand.height)))
         last += step.iterations;
     return last;
 }
 
 // Splats in the last iteration with smaller photos, at most: adc's grow evenly while density
 // control runs.
-std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Forecast& f) {
-    if (options.strategy != Strategy::adc) return f.splats;
-    const double rounds = std::max(1, options.densify_end() - options.densify_begin());
-    const double until = ramp_end(options, f) - options.densify_begin();
+std::uint64_t splats_with_smaller_photos(const Schedule& schedule, const Forecast& f) {
+    if (schedule.strategy != Strategy::adc) return f.splats;
+    const double rounds = std::max(1, schedule.rounds.end - schedule.rounds.begin);
+    const double until = ramp_end(schedule, f) - schedule.rounds.begin;
     const double share = std::clamp(until / rounds, 0.0, 1.0), from = f.falls ? 0 : f.start_splats;
     const auto grown = static_cast<std::uint64_t>(from + share * (f.splats - from));
     return std::max<std::uint64_t>(f.start_splats, grown);
@@ -240,6 +246,7 @@ std::uint64_t splats_with_smaller_photos(const TrainOptions& options, const Fore
 // goes. photos: as add_photos counts them, the ramp's smaller ones among them.
 void settle_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
                  Forecast& f) {
+    const Schedule schedule(options);
     f.peak = f.demand;
     f.peak.densifies = false;
     const auto take_larger = [&](const MemoryDemand& demand) {
@@ -248,23 +255,23 @@ void settle_peak(const Device& device, const TrainOptions& options, const Memory
     };
     MemoryDemand rounds = f.demand;
     rounds.averages = false;
-    rounds.sh_degree = predict_degree(options, options.densify_end());
+    rounds.sh_degree = predict_degree(options, schedule.rounds.end);
     if (rounds.densifies) take_larger(rounds);
     if (photos.small_cameras == 0 && !f.falls) return;
     MemoryDemand early = rounds;
     early.small_pixels = photos.small_pixels;
     early.small_cameras = photos.small_cameras;
     early.sh_degree =
-        predict_degree(options, f.falls ? first_round(options) + 1 : ramp_end(options, f));
-    early.splats = splats_with_smaller_photos(options, f);
+        predict_degree(options, f.falls ? first_round(schedule) + 1 : ramp_end(schedule, f));
+    early.splats = splats_with_smaller_photos(schedule, f);
     const double room = f.falls ? pair_room(f.start_pairs)
                                 : double(f.demand.pairs) / std::max(1.0, double(f.demand.splats));
     early.pairs = static_cast<std::uint64_t>(room * double(early.splats));
-    if (options.max_memory_bytes > 0)  // growth stops before it
+    if (options.max_memory_bytes)  // growth stops before it
         early.splats =
             std::min(early.splats,
-                     std::max<std::uint64_t>(splats_within(device, early, options.max_memory_bytes),
-                                             f.start_splats));
+                     std::max<std::uint64_t>(
+                         splats_within(device, early, *options.max_memory_bytes), f.start_splats));
     take_larger(early);
 }
 
@@ -274,8 +281,9 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit, bool random_start) {
     if (options.strategy != Strategy::adc)
         return std::max(start, simulate_growth(options, start, limit).end);
-    const int first = options.densify_begin() / options.round_interval();
-    const int last = std::max(options.densify_end() - 1, 0) / options.round_interval();
+    const Schedule::Rounds every = Schedule(options).rounds;
+    const int first = every.begin / every.interval;
+    const int last = std::max(every.end - 1, 0) / every.interval;
     const int rounds = std::max(0, last - first);
     const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
     const double most = std::min(growth * start, static_cast<double>(limit));
@@ -286,24 +294,27 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
 
 int predict_degree(const TrainOptions& options, int iterations) {
     if (!options.probe_sh) return options.sh_degree;
-    return std::min(options.sh_degree, std::max(iterations - 1, 0) / options.degree_interval());
+    return std::min(options.sh_degree,
+                    std::max(iterations - 1, 0) / Schedule(options).degree_interval);
 }
 
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
     TrainOptions adc = options;
-    use_strategy(Strategy::adc, adc);
+    adc.strategy = Strategy::adc;
     std::uint64_t pixels = 0;
     for (const View& view : dataset.views)
         if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
-    return predict_splats(initial_count(dataset, adc), pixels, adc, options.max_splats,
+    return predict_splats(initial_count(dataset, adc), pixels, adc,
+                          options.max_splats.value_or(kAnyNumberOfSplats),
                           dataset.points.size() == 0);
 }
 
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
     if (options.strategy != Strategy::adc) return simulate_growth(options, start, end).mean;
     const double all = options.iterations;
-    const double to = std::clamp<double>(options.densify_end(), 0, all);
-    const double from = std::clamp<double>(options.densify_begin(), 0, to);
+    const Schedule::Rounds rounds = Schedule(options).rounds;
+    const double to = std::clamp<double>(rounds.end, 0, all);
+    const double from = std::clamp<double>(rounds.begin, 0, to);
     return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;
 }
 
@@ -337,6 +348,7 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
 Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainOptions& options,
                            bool measure) {
     SplatModel start = initial_model(dataset, options);
+    const Schedule schedule(options);
     Forecast f;
     add_photos(dataset.views, options, f.demand);
     const MemoryDemand photos = f.demand;
@@ -345,17 +357,17 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     start.sh_degree = f.demand.sh_degree;  // of the times
     if (options.probe_sh)
         start.sh_degree =
-            std::min(start.sh_degree, options.iterations / 2 / options.degree_interval());
+            std::min(start.sh_degree, options.iterations / 2 / schedule.degree_interval);
     start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
     f.start_splats = static_cast<std::uint32_t>(start.size());
-    const std::uint32_t limit =
-        std::min(options.max_splats, GpuSplats::max_count(scratch, options.sh_degree, true));
+    const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
+                                         GpuSplats::max_count(scratch, options.sh_degree, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit,
                               dataset.points.size() == 0);
-    f.demand.densifies = has_rounds(options);
+    f.demand.densifies = has_rounds(schedule);
     f.falls =
-        dataset.points.size() == 0 && has_rounds(options) && options.strategy != Strategy::mcmc;
-    f.demand.averages = options.averages();
+        dataset.points.size() == 0 && has_rounds(schedule) && options.strategy != Strategy::mcmc;
+    f.demand.averages = schedule.averages();
     settle_size(scratch, options, f.splats, 0, f);
     if (measure && f.demand.photo_pixels > 0) try {
             measure_both(scratch, dataset, start, options, f);

@@ -7,6 +7,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/scene/edit_splats.h"
+#include "trainer/schedule.h"
 
 namespace darb {
 
@@ -56,7 +57,7 @@ std::uint64_t random_count(const Dataset& dataset, const TrainOptions& options) 
     std::uint64_t pixels = 0;
     for (const View& v : dataset.views)
         if (!v.is_test) pixels += std::uint64_t(v.camera.width) * v.camera.height;
-    return options.random_points ? options.random_points
+    return options.random_points ? *options.random_points
                                  : std::clamp<std::uint64_t>(pixels / 32, 1'000, 100'000);
 }
 
@@ -95,7 +96,8 @@ PointCloud drawn_from(const PointCloud& cloud, std::uint32_t count, std::uint64_
 std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options) {
     const std::uint64_t points =
         dataset.points.size() > 0 ? dataset.points.size() : random_count(dataset, options);
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(points, options.max_splats));
+    return static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(points, options.max_splats.value_or(kAnyNumberOfSplats)));
 }
 
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
@@ -103,8 +105,9 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     const bool random = dataset.points.size() == 0;
     if (random) drawn = random_points(dataset, options);
     const PointCloud& given = random ? drawn : dataset.points;
-    const bool too_many = given.size() > options.max_splats;
-    if (too_many) drawn = drawn_from(given, options.max_splats, options.seed);
+    const std::uint32_t most = options.max_splats.value_or(kAnyNumberOfSplats);
+    const bool too_many = given.size() > most;
+    if (too_many) drawn = drawn_from(given, most, options.seed);
     const PointCloud& points = random || too_many ? drawn : given;
     const std::vector<double> distance2 = neighbour_distance2(points.position);
     SplatModel model;
@@ -113,10 +116,11 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     model.footprint = options.footprint;
     model.origin = choose_origin(points.position, kFarOff);
     model.resize(points.size());
+    const Schedule schedule(options);
     // A hair above: the default is what is pruned, too, and a point that no frame has shown stays.
-    const double opacity = std::min(1.001 * options.initial_opacity, 0.999);
+    const double opacity = std::min(1.001 * schedule.initial_opacity, 0.999);
     const auto logit = static_cast<float>(std::log(opacity / (1 - opacity)));
-    const double initial_scale = options.initial_scale * options.length_scale();
+    const double initial_scale = schedule.initial_scale * schedule.length_scale;
     for (size_t i = 0; i < model.size(); ++i) {
         model.rotation[4 * i] = 1.0f;
         model.opacity[i] = logit;

@@ -9,8 +9,8 @@
 namespace darb {
 
 /// Scale: root mean square distance to the 3 nearest neighbours, squared distance at least 1e-7;
-/// times options.initial_scale and length_scale(); rotation identity; opacity a hair above
-/// options.initial_opacity; colour of the point. Without points: random colours and positions in
+/// times Schedule::initial_scale and length_scale; rotation identity; opacity a hair above
+/// Schedule::initial_opacity; colour of the point. Without points: random colours and positions in
 /// the cube around the point that the optical axes come closest to, as wide as the photos show
 /// there, or in the box of the cameras where the axes are parallel. The model's origin is set where
 /// coordinates are large. Of more points than options.max_splats a drawn part.

@@ -12,6 +12,7 @@
 #include "trainer/densify/round_buffers.h"
 #include "trainer/exposure.h"
 #include "trainer/resolution_ramp.h"
+#include "trainer/schedule.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -136,8 +137,9 @@ std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
 }
 
 void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand) {
+    const Schedule schedule(options);
     demand.sh_degree = options.sh_degree;
-    demand.rest_sum = options.sh_rest_every > 1;
+    demand.rest_sum = schedule.rest_every > 1;
     demand.frame = forward_options(options);
     std::uint32_t training = 0;
     for (const View& view : views) {
@@ -159,7 +161,7 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
     }
     demand.relocates = options.strategy == Strategy::mcmc;
     demand.scores = options.strategy == Strategy::budget;
-    const std::vector<RampStep> steps = ramp_steps(options, std::max(demand.width, demand.height));
+    const std::vector<RampStep> steps = schedule.ramp_steps(std::max(demand.width, demand.height));
     if (steps.empty()) return;
     for (const View& view : views) {
         const Camera small = divided(view.camera, steps.back().divisor);  // the largest

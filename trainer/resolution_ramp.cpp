@@ -8,38 +8,6 @@
 
 namespace darb {
 
-namespace {
-
-struct Size {
-    int divisor;
-    double until;  // share of the run
-};
-constexpr Size kSizes[] = {{4, 0.1}, {2, 0.3}};
-constexpr int kSmallestSide = 100;  // px
-
-}  // namespace
-
-std::vector<RampStep> ramp_steps(const TrainOptions& options, int longest_side) {
-    std::vector<RampStep> steps;
-    if (!options.resolution_ramp) return steps;
-    int before = 0;
-    for (const Size& size : kSizes) {
-        const int until = static_cast<int>(size.until * options.iterations);
-        if (longest_side < kSmallestSide * size.divisor || until == before) continue;
-        steps.push_back({size.divisor, until - before});
-        before = until;
-    }
-    return steps;
-}
-
-int ramp_divisor(const TrainOptions& options, int iteration, int longest_side) {
-    for (const RampStep& step : ramp_steps(options, longest_side)) {
-        if (iteration <= step.iterations) return step.divisor;
-        iteration -= step.iterations;
-    }
-    return 1;
-}
-
 Camera divided(const Camera& camera, int divisor) {
     Camera smaller = camera;
     smaller.width = std::max(1, static_cast<int>(std::lround(double(camera.width) / divisor)));

@@ -13,6 +13,7 @@
 #include "engine/core/text.h"
 #include "engine/plan/tuning_names.h"
 #include "trainer/checkpoint.h"
+#include "trainer/schedule.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -118,7 +119,7 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
                    const TrainOptions& options, std::uint32_t splats,
                    const std::string& effects_json) {
     rates_ = rates;
-    counts_.rest_every = options.sh_rest_every;
+    counts_.rest_every = Schedule(options).rest_every;
     const auto held_out = std::ranges::count_if(dataset.views, &View::is_test);
     start_ = {{"event", "start"},
               {"version", DARB_VERSION},

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "trainer/schedule.h"
 
 namespace darb {
 
@@ -13,7 +14,6 @@ constexpr std::pair<Strategy, std::string_view> kNames[] = {
     {Strategy::adc, "adc"}, {Strategy::mcmc, "mcmc"}, {Strategy::budget, "budget"}};
 
 constexpr double kGrowth = 1.05;  // of mcmc, a round, and more where that misses the limit
-constexpr std::size_t kPhotosThatBear = 50;
 
 }  // namespace
 
@@ -29,23 +29,18 @@ std::optional<Strategy> strategy_from_name(std::string_view name) {
     return std::nullopt;
 }
 
-void use_strategy(Strategy strategy, TrainOptions& options) {
-    const TrainOptions adc;
-    options.strategy = strategy;
-    options.initial_opacity = adc.initial_opacity;
-    options.initial_scale = adc.initial_scale;
-    options.prune_opacity = adc.prune_opacity;
-    options.opacity_decay = adc.opacity_decay;
-    options.sh_rest_every = adc.sh_rest_every;
+StrategyDefaults strategy_defaults(Strategy strategy) {
+    StrategyDefaults d;
     if (strategy == Strategy::mcmc) {  // its authors' values
-        options.initial_opacity = 0.5f;
-        options.initial_scale = 0.1f;
-        options.prune_opacity = 0.005f;
+        d.initial_opacity = 0.5f;
+        d.initial_scale = 0.1f;
+        d.prune_opacity = 0.005f;
     }
     if (strategy == Strategy::budget) {
-        options.opacity_decay = 0.01f;
-        options.sh_rest_every = 16;
+        d.opacity_decay = 0.01f;
+        d.sh_rest_every = 16;
     }
+    return d;
 }
 
 void use_3dgs_schedule(TrainOptions& options) {
@@ -64,39 +59,15 @@ void use_3dgs_schedule(TrainOptions& options) {
     options.clearance = 0;
 }
 
-bool refines_after(const TrainOptions& options, int iteration) {
-    return iteration > options.densify_begin() && iteration < options.densify_end() &&
-           iteration % options.round_interval() == 0;
-}
-
-bool resets_after(const TrainOptions& options, int iteration) {
-    if (options.strategy != Strategy::adc || iteration <= 0) return false;
-    const bool first_round_follows =
-        options.densify_begin() + options.round_interval() < options.densify_end();
-    const bool at_start = options.white_background && !options.random_background &&
-                          iteration == options.densify_begin() && first_round_follows;
-    return at_start || (iteration % options.opacity_reset_interval == 0 &&
-                        iteration <= options.last_opacity_reset());
-}
-
-bool prunes_by_size(const TrainOptions& options, int iteration) {
-    return options.prune_extent > 0 && iteration > options.opacity_reset_interval;
-}
-
-bool regularises_unseen(const TrainOptions& options, std::size_t photos, int iteration) {
-    const auto interval = static_cast<int>((photos + kPhotosThatBear - 1) / kPhotosThatBear);
-    return options.strategy == Strategy::mcmc || iteration % std::max(interval, 1) == 0;
-}
-
-std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uint32_t count,
-                            std::uint32_t limit) {
-    const int interval = options.round_interval();
-    const int last = (options.densify_end() - 1) / interval * interval;
+std::uint32_t growth_target(const TrainOptions& options, const Schedule& schedule, int iteration,
+                            std::uint32_t count, std::uint32_t limit) {
+    const int interval = schedule.rounds.interval;
+    const int last = (schedule.rounds.end - 1) / interval * interval;
     const double rounds = std::max(1, (last - iteration) / interval + 1);  // this one counted
     if (options.strategy == Strategy::mcmc) {
-        const bool asked = options.max_splats != std::numeric_limits<std::uint32_t>::max();
         const double needed = std::pow(double(limit) / std::max(count, 1U), 1 / rounds);
-        const double grown = std::ceil((asked ? std::max(kGrowth, needed) : kGrowth) * count);
+        const double growth = options.max_splats ? std::max(kGrowth, needed) : kGrowth;
+        const double grown = std::ceil(growth * count);
         return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
     }
     if (options.strategy != Strategy::budget || count >= limit) return limit;
@@ -105,14 +76,16 @@ std::uint32_t growth_target(const TrainOptions& options, int iteration, std::uin
 }
 
 Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit) {
+    const Schedule schedule(options);
     double count = start, sum = 0;
     int since = 0;
-    const int interval = options.round_interval();
+    const int interval = schedule.rounds.interval;
     for (int i = interval; i < options.iterations; i += interval) {
-        if (!refines_after(options, i)) continue;
+        if (!schedule.refines_after(i)) continue;
         sum += count * (i - since);
         since = i;
-        const auto target = growth_target(options, i, static_cast<std::uint32_t>(count), limit);
+        const auto target =
+            growth_target(options, schedule, i, static_cast<std::uint32_t>(count), limit);
         if (count < limit) count = std::min<double>(2 * count, target);
     }
     sum += count * (options.iterations - since);

@@ -10,7 +10,6 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/render/renderer.h"
-#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -63,12 +62,13 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
                  const SplatModel& start, const TrainOptions& options)
     : device_(&device),
       options_(options),
+      schedule_(options),
       background_(options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset)),
       reach_(scene_reach(dataset)),
       nearest_(nearest_points(dataset)),
-      next_probe_(options.degree_interval()),
-      splats_(device, start_model(start, options), true, options.sh_rest_every > 1),
+      next_probe_(schedule_.degree_interval),
+      splats_(device, start_model(start, options), true, schedule_.rest_every > 1),
       buffers_(device, forward_options(options)),
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options), BackwardResult::update),
@@ -78,7 +78,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       density_(device, options.kernel),
       average_(device),
       flights_{Flight(device), Flight(device)} {
-    if (options_.max_memory_bytes > 0) device.set_memory_budget(options_.max_memory_bytes);
+    if (options_.max_memory_bytes) device.set_memory_budget(*options_.max_memory_bytes);
     add_photos(dataset.views, options, demand_);
     DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
                dataset.views.size());
@@ -118,7 +118,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
 
 int Trainer::degree_at(int iteration) const {
     if (options_.probe_sh) return splats_.sh_degree();
-    return std::min(options_.sh_degree, iteration / options_.degree_interval());
+    return schedule_.sh_degree(iteration);
 }
 
 int Trainer::sh_degree() const {
@@ -146,24 +146,16 @@ glm::vec3 Trainer::background_for(int iteration) const {
     return colour;
 }
 
-double Trainer::position_rate(int iteration) const {
-    const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0,
-                                options_.position_falls_for());
-    return std::exp((1 - t) * std::log(options_.position_lr_start()) +
-                    t * std::log(options_.position_lr_end()));
-}
-
 AdamStep Trainer::rates(int iteration) const {
-    const double t = std::clamp(double(iteration) / std::max(options_.iterations, 1), 0.0, 1.0);
-    const auto late = static_cast<float>(std::pow(options_.last_share(), std::max(0.0, 2 * t - 1)));
+    const Schedule::Rates now = schedule_.rates(iteration);
     AdamStep step;
-    step.position = static_cast<float>(position_rate(iteration) * extent_);
-    step.scale = options_.scale_rate() * late;
-    step.rotation = options_.rotation_rate() * late;
-    step.opacity = options_.opacity_rate() * late;
-    step.sh_dc = options_.sh_dc_lr * late;
-    step.rest_every = options_.sh_rest_every;
-    step.sh_rest = options_.sh_rest_rate(step.rest_every) * late;
+    step.position = static_cast<float>(now.position * extent_);
+    step.scale = now.scale;
+    step.rotation = now.rotation;
+    step.opacity = now.opacity;
+    step.sh_dc = now.sh_dc;
+    step.rest_every = schedule_.rest_every;
+    step.sh_rest = now.sh_rest;
     if (!probe_views_.empty()) {
         step.rest_every = 1;
         step.sh_rest = kProbeRestRate * step.sh_dc;
@@ -174,11 +166,11 @@ AdamStep Trainer::rates(int iteration) const {
     step = adam_step(step, iteration);
     step.opacity_weight = options_.opacity_weight;
     step.scale_weight =
-        options_.scale_weight / static_cast<float>(options_.length_scale() * extent_);
-    if (options_.scale_limit() > 0)
+        options_.scale_weight / static_cast<float>(schedule_.length_scale * extent_);
+    if (schedule_.largest_scale > 0)
         step.largest_log_scale =
-            static_cast<float>(std::log(options_.scale_limit() * options_.length_scale() * reach_));
-    step.regularise_unseen = regularises_unseen(options_, train_views_.size(), iteration);
+            static_cast<float>(std::log(schedule_.largest_scale * schedule_.length_scale * reach_));
+    step.regularise_unseen = schedule_.regularises_unseen(train_views_.size(), iteration);
     return step;
 }
 
@@ -194,7 +186,7 @@ void Trainer::step() {
     settle(flights_[(iteration_ + 1) & 1]);
     smoothing_stale_ |= iteration_ % kFilterInterval == 0;
     refresh_smoothing();
-    if (options_.average_after(iteration_)) settle_average();
+    if (schedule_.averages_after(iteration_)) settle_average();
 }
 
 // The last iteration leaves the mean itself. Where there is no room for one the run goes on
@@ -270,9 +262,7 @@ void Trainer::record(Commands& commands, int view, int iteration, int degree, co
     loss_.record(commands, {compared, photo_pixels, d_image_, loss}, static_cast<int>(data.width),
                  static_cast<int>(data.height), seen.background, options_.lambda_dssim);
     if (exposure_) {
-        const double t = std::clamp(double(iteration) / options_.iterations, 0.0, 1.0);
-        const double rate = options_.exposure_lr_init *
-                            std::pow(options_.exposure_lr_final / options_.exposure_lr_init, t);
+        const double rate = schedule_.exposure_rate(iteration);
         const int visits = (iteration - 1) / static_cast<int>(train_views_.size()) + 1;
         exposure_->record_backward(commands, image, d_image_, frame.counters.status, photo, pixels,
                                    static_cast<float>(rate), visits);
@@ -346,9 +336,9 @@ void Trainer::check_gradients(int iteration, const gpu::FrameStatus& status) con
 }
 
 void Trainer::density_control(int iteration) {
-    if (iteration >= options_.densify_end()) return;
-    const bool round = refines_after(options_, iteration);
-    const bool reset = resets_after(options_, iteration);
+    if (iteration >= schedule_.rounds.end) return;
+    const bool round = schedule_.refines_after(iteration);
+    const bool reset = schedule_.resets_after(iteration);
     if (!round && !reset) return;
     drain();
     if (round) {
@@ -358,14 +348,14 @@ void Trainer::density_control(int iteration) {
             counters_.most_pairs > kMostPairs * FrameBuffers::max_intersections(*device_);
         if (pairs_are_near && stopped_by_pairs_ == 0) stopped_by_pairs_ = splats_.count();
         const std::uint32_t limit =
-            std::min({options_.max_splats, within_memory,
+            std::min({options_.max_splats.value_or(kAnyNumberOfSplats), within_memory,
                       GpuSplats::max_count(*device_, options_.sh_degree, true),
                       pairs_are_near ? splats_.count() : 0xFFFFFFFFu});
         args.gradient_threshold = options_.densify_grad_threshold;
-        const double length = options_.length_scale() * extent_;
+        const double length = schedule_.length_scale * extent_;
         args.clone_split_scale = static_cast<float>(options_.clone_split_extent * length);
-        args.prune_opacity = options_.prune_opacity;
-        args.prune_scale = prunes_by_size(options_, iteration)
+        args.prune_opacity = schedule_.prune_opacity;
+        args.prune_scale = schedule_.prunes_by_size(iteration)
                                ? static_cast<float>(options_.prune_extent * length)
                                : 0.0f;
         args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
@@ -383,7 +373,7 @@ void Trainer::density_control(int iteration) {
         backward_.clear_gradient_sum(commands);
         commands.submit_and_wait();
     }
-    if (reset) density_.reset_opacity(splats_, options_.opacity_reset_to());
+    if (reset) density_.reset_opacity(splats_, schedule_.resets.to);
 }
 
 SplatModel Trainer::model() {
@@ -453,7 +443,7 @@ Trainer::State Trainer::state() {
 void Trainer::restore(const State& s) {
     drain();
     splats_ = GpuSplats();  // first, so that there are never two
-    splats_ = GpuSplats(*device_, s.model, true, options_.sh_rest_every > 1);
+    splats_ = GpuSplats(*device_, s.model, true, schedule_.rest_every > 1);
     if (s.next_probe > 0) next_probe_ = s.next_probe;
     if (smoothing_) {
         update_smoothing();

@@ -27,6 +27,7 @@
 #include "trainer/memory_plan.h"
 #include "trainer/options.h"
 #include "trainer/resolution_ramp.h"
+#include "trainer/schedule.h"
 #include "trainer/smoothing.h"
 
 namespace darb {
@@ -177,7 +178,6 @@ class Trainer {
     const gpu::CameraData& camera_data_of(int view) const;
     const Buffer& cameras_now() const;
     const Buffer& pixels_of_photo(int view) const;
-    double position_rate(int iteration) const;
     glm::vec3 background_for(int iteration) const;
     MemoryDemand growth_demand() const;
     std::uint64_t bytes_to_plan() const;
@@ -192,6 +192,7 @@ class Trainer {
 
     Device* device_;
     TrainOptions options_;
+    Schedule schedule_;
     glm::vec3 background_;
     double extent_, reach_;           // of the scene
     std::vector<double> nearest_;     // points, from each camera

@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -69,7 +68,7 @@ double Trainer::probe_arm(const State& start, int degree, const std::vector<int>
     State state = start;
     set_degree(state, degree);
     restore(state);
-    const auto iterations = std::lround(kProbeIterations / std::sqrt(options_.pace()));
+    const auto iterations = std::lround(kProbeIterations / std::sqrt(schedule_.pace));
     for (long i = 0; i < iterations; ++i) {
         probe_rate_ = std::min(1.0f, 2 * static_cast<float>(iterations - i) / float(iterations));
         launch(++iteration_);
@@ -133,11 +132,11 @@ void Trainer::probe_degree() {
         on_result = listener;
     }
     if (probe.admitted) set_degree(before, degree + 1);
-    const int interval = options_.degree_interval();
+    const int interval = schedule_.degree_interval;
     before.next_probe =
         probe.admitted ? before.iteration + interval : 2 * std::max(before.iteration, 1);
     // Not while opacities come back from a reset.
-    if (before.model.sh_degree == 0 && resets_after(options_, before.next_probe))
+    if (before.model.sh_degree == 0 && schedule_.resets_after(before.next_probe))
         before.next_probe += (interval + 1) / 2;
     restore(before);
     probes_.push_back(probe);

@@ -68,7 +68,7 @@ MemoryDemand Trainer::growth_demand() const {
     demand.list_segments = counters_.longest_list > LIST_SEGMENT ? 2 : demand_.list_segments;
     demand.cooperates = demand_.cooperates || counters_.huge_splats > 0;
     demand.densifies = true;
-    demand.averages = options_.averages();
+    demand.averages = schedule_.averages();
     return demand;
 }
 
@@ -77,20 +77,20 @@ std::uint64_t Trainer::bytes_to_plan() const {
     const std::uint64_t in_use = device_->allocated_bytes();
     const std::uint64_t planned = plan_memory(*device_, memory_demand()).resident();
     const std::uint64_t extra = in_use - std::min(in_use, planned);
-    return options_.max_memory_bytes - std::min(options_.max_memory_bytes, extra);
+    return *options_.max_memory_bytes - std::min(*options_.max_memory_bytes, extra);
 }
 
 std::uint32_t Trainer::splats_within_memory() const {
-    if (options_.max_memory_bytes == 0 || splats_.count() == 0) return 0xFFFFFFFFu;
+    if (!options_.max_memory_bytes || splats_.count() == 0) return 0xFFFFFFFFu;
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(
         splats_within(*device_, growth_demand(), bytes_to_plan()), 0xFFFFFFFFu));
 }
 
 bool Trainer::has_room_for_degree(int degree) const {
-    if (options_.max_memory_bytes == 0) return true;
+    if (!options_.max_memory_bytes) return true;
     MemoryDemand demand = memory_demand();
     demand.sh_degree = degree;
-    demand.averages = options_.averages();
+    demand.averages = schedule_.averages();
     if (divisor_ > 1) demand.small_pixels = std::max(demand.small_pixels, demand_.small_pixels);
     return plan_memory(*device_, demand).total() <= bytes_to_plan();
 }

@@ -42,29 +42,31 @@ void Trainer::make_strategy(const Dataset& dataset) {
 DensityResult Trainer::refine(int iteration, gpu::DensifyArgs args, std::uint32_t limit) {
     if (options_.strategy == Strategy::adc)
         return density_.run(splats_, backward_.gradient_sum(), args, limit);
-    const std::uint32_t target = growth_target(options_, iteration, splats_.count(), limit);
+    const std::uint32_t target =
+        growth_target(options_, schedule_, iteration, splats_.count(), limit);
     if (options_.strategy == Strategy::mcmc)
         return mcmc_->run(splats_, density_, args.prune_opacity, target - splats_.count(),
                           args.seed);
     args.gradient_threshold = FLT_MIN;  // whatever has a share may grow, the largest shares first
     const DensityResult result = density_.run(splats_, score_->shares(), args, target);
-    if (options_.opacity_decay > 0) density_.decay_opacity(splats_, 1.0f - options_.opacity_decay);
+    if (schedule_.opacity_decay > 0)
+        density_.decay_opacity(splats_, 1.0f - schedule_.opacity_decay);
     score_->reset(splats_.count());
     return result;
 }
 
 // Evenly over the iterations between two rounds; with few, in each.
 bool Trainer::scores(int iteration) const {
-    return score_ && probe_views_.empty() && iteration < options_.densify_end() &&
-           iteration % std::max(1, options_.round_interval() / kScoresPerRound) == 0;
+    return score_ && probe_views_.empty() && iteration < schedule_.rounds.end &&
+           iteration % std::max(1, schedule_.rounds.interval / kScoresPerRound) == 0;
 }
 
 void Trainer::record_noise(Commands& commands, int iteration) {
-    const double rate =
-        options_.noise_lr * position_rate(iteration) * kNoiseExtent * kNoiseExtent / extent_;
+    const double rate = options_.noise_lr * schedule_.position_rate(iteration) * kNoiseExtent *
+                        kNoiseExtent / extent_;
     Pcg32 random(options_.seed, 0x6E6F697Eull << 32 | static_cast<std::uint32_t>(iteration));
     mcmc_->record_noise(commands, splats_, buffers_.frame().counters.status,
-                        static_cast<float>(rate), options_.prune_opacity, random.next());
+                        static_cast<float>(rate), schedule_.prune_opacity, random.next());
 }
 
 const gpu::CameraData& Trainer::camera_data_of(int view) const {
@@ -82,7 +84,7 @@ const Buffer& Trainer::pixels_of_photo(int view) const {
 // Both iterations under way end with the photos that they began with. Where there is no room for
 // smaller ones beside the whole ones the run goes on with these.
 void Trainer::settle_resolution(int iteration) {
-    const int divisor = ramp_ ? ramp_divisor(options_, iteration, longest_side_) : 1;
+    const int divisor = ramp_ ? schedule_.resolution_divisor(iteration, longest_side_) : 1;
     if (divisor == divisor_) return;
     drain();
     use_whole_photos();

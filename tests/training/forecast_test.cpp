@@ -79,7 +79,7 @@ TEST(PredictSplats, of_a_random_start_fewer_may_be_left) {
     EXPECT_LT(predicted(true), 50'000U);
     options.densify_until = 0;  // nothing goes without rounds
     EXPECT_EQ(predicted(true), 100'000U);
-    use_strategy(Strategy::mcmc, options);
+    options.strategy = Strategy::mcmc;
     EXPECT_GE(predicted(true), 100'000U);
 }
 
@@ -126,7 +126,7 @@ TEST(Forecast, a_random_start_goes_in_the_first_round) {
     dataset.points = {};
     for (const Strategy strategy : {Strategy::adc, Strategy::budget}) {
         TrainOptions options;
-        use_strategy(strategy, options);
+        options.strategy = strategy;
         options.random_points = 60'000;
         options.iterations = 1'000;
         const std::uint32_t adc_ends_with = default_budget(dataset, options);
@@ -139,7 +139,8 @@ TEST(Forecast, a_random_start_goes_in_the_first_round) {
         EXPECT_EQ(f.demand.splats, f.splats);
         EXPECT_EQ(f.peak.splats, 60'000U);
         ASSERT_EQ(f.ramp_ms.size(), 1U);  // half the sides, for 300 of 1,000
-        const int first = options.densify_begin() + options.round_interval();
+        const Schedule::Rounds rounds = Schedule(options).rounds;
+        const int first = rounds.begin + rounds.interval;
         ASSERT_LT(first, 300);
         const double half = f.ramp_ms[0] / f.start_ms;
         EXPECT_NEAR(f.seconds * 1e3,
@@ -173,7 +174,7 @@ TEST(Forecast, the_memory_of_a_given_count_is_met) {
     const Dataset dataset = small_scene(2);
     for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
         TrainOptions options;
-        use_strategy(strategy, options);
+        options.strategy = strategy;
         options.iterations = strategy == Strategy::budget ? 400 : 80;
         options.max_splats = 12'000;
         options.probe_sh = true;
@@ -193,14 +194,14 @@ TEST(Forecast, the_memory_of_a_given_count_is_met) {
 
 TEST(Forecast, stays_within_the_memory_budget) {
     TrainOptions options;
-    use_strategy(Strategy::mcmc, options);
+    options.strategy = Strategy::mcmc;
     options.max_splats = 16'000;
     Device scratch{test::device_options()};
-    const auto predicted = [&](std::uint64_t budget) {
+    const auto predicted = [&](std::optional<std::uint64_t> budget) {
         options.max_memory_bytes = budget;
         return forecast_training(scratch, small_scene(), options);
     };
-    const Forecast free = predicted(0);
+    const Forecast free = predicted({});
     const std::uint64_t all = plan_memory(scratch, free.demand).total();
     MemoryDemand start = free.demand;
     start.splats = free.start_splats;
@@ -248,7 +249,7 @@ TEST(Forecast, counts_the_splats_that_stand_beside_smaller_photos) {
     EXPECT_GT(early.small_pixels, 0U);
     EXPECT_GT(early.splats, 4'000U);
     const std::uint64_t all = plan_memory(scratch, early).total();
-    options.densify_until = -1;  // its last round is after them
+    options.densify_until.reset();  // its last round is after them
     EXPECT_EQ(peak_of().small_pixels, 0U);
     options.densify_until = options.iterations / 5;
     options.max_memory_bytes = all - 500'000;

@@ -88,12 +88,9 @@ Result train(const Training& t, const SplatModel& start) {
 std::vector<double> losses_in_double(const Training& t, const check::HardCase& c, double extent) {
     SplatModel model = c.scene.model;
     const TrainOptions& o = t.options;
-    const double rates[] = {o.position_lr_init * extent,
-                            o.scale_rate(),
-                            o.rotation_rate(),
-                            o.opacity_rate(),
-                            o.sh_dc_lr,
-                            o.sh_rest_rate(1)};
+    const Schedule::Rates first = Schedule(o).first;
+    const double rates[] = {first.position * extent, first.scale, first.rotation,
+                            first.opacity,           first.sh_dc, first.sh_rest};
     std::array<std::vector<double>, kAttributeCount> value, m1, m2;
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& from = attribute_values(model, a);

@@ -89,7 +89,7 @@ TEST(MemoryPlan, checkpoints_of_buckets_are_met_to_the_byte) {
 TEST(MemoryPlan, strategies_are_met_to_the_byte) {
     for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
         TrainOptions options = options_of(2);
-        use_strategy(strategy, options);
+        options.strategy = strategy;
         options.densify_until = 0;
         options.iterations = 10;
         options.resolution_ramp = strategy == Strategy::budget;
@@ -138,7 +138,7 @@ void compare_with_run(const Dataset& dataset, const TrainOptions& options, int d
     EXPECT_NEAR(static_cast<double>(trainer.planned_bytes()), peak, kTolerance * peak)
         << trainer.splat_count() << " splats";
     EXPECT_EQ(trainer.memory_demand().sh_degree, degree);
-    if (options.densify_end() > 0) {
+    if (Schedule(options).rounds.end > 0) {
         EXPECT_GT(trainer.splat_count(), start);
     }
 }

@@ -102,13 +102,13 @@ TEST(RunLog, a_resumed_run_reports_what_it_found_before) {
         while (trainer.iteration() < options.iterations) trainer.step();
         return device.peak_bytes();
     };
-    const std::uint64_t still = peak(0), grown = peak(options.densify_until);
+    const std::uint64_t still = peak(0), grown = peak(*options.densify_until);
     ASSERT_GT(grown, still);
     const nlohmann::json whole = metrics(still + (grown - still) / 2);
     ASSERT_EQ(whole["sh_probes"].size(), 2U) << whole["sh_probes"];
     ASSERT_GT(whole["splats_stopped_by_memory"].get<int>(), 0);
     run.resume_from = run.output / "chkpnt7.darb";
-    const nlohmann::json resumed = metrics(options.max_memory_bytes);
+    const nlohmann::json resumed = metrics(*options.max_memory_bytes);
     std::filesystem::remove_all(run.output);
     for (const char* name : {"sh_probes", "splats_stopped_by_memory", "splats", "sh_degree"})
         EXPECT_EQ(resumed[name], whole[name]) << name;

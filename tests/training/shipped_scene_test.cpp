@@ -48,7 +48,7 @@ TEST(ShippedScene, a_short_run_of_mcmc_gains_3_db) {
     const Dataset dataset =
         load_dataset(kSources / "assets/scene", {.resolution = 8, .hold_out = true});
     TrainOptions options;
-    use_strategy(Strategy::mcmc, options);
+    options.strategy = Strategy::mcmc;
     options.iterations = 400;
     options.densify_from = 50;
     options.densify_interval = 50;

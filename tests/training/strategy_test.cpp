@@ -11,7 +11,9 @@ namespace {
 
 TinyTraining tiny_with(Strategy strategy, const TinyOptions& tiny = {}) {
     TinyTraining t = tiny_training(tiny);
-    use_strategy(strategy, t.options);
+    t.options.strategy = strategy;
+    t.options.initial_opacity.reset();
+    t.options.prune_opacity.reset();
     t.options.max_splats = 90;
     return t;
 }
@@ -131,8 +133,7 @@ TEST(Strategy, a_run_does_not_resume_without_what_it_had) {
 TEST(Strategy, adc_has_the_settings_that_it_always_had) {
     TrainOptions options;
     EXPECT_EQ(settings_text(options).find("strategy"), std::string::npos);
-    options.prune_opacity = 0.3f;
-    use_strategy(Strategy::adc, options);
+    options.strategy = Strategy::adc;
     EXPECT_EQ(settings_text(options), settings_text({}));
 }
 
@@ -157,22 +158,6 @@ TEST(Strategy, budget_ends_at_its_budget) {
     EXPECT_EQ(trainer.splat_count(), 90U);
 }
 
-// At 50 frames in a round of the photos at most, but for mcmc.
-TEST(Regularisers, act_on_the_unseen_by_the_number_of_photos) {
-    TrainOptions adc, mcmc;
-    use_strategy(Strategy::mcmc, mcmc);
-    for (const auto& [photos, expected] :
-         {std::pair<std::size_t, int>{1, 600}, {50, 600}, {51, 300}, {100, 300}, {1000, 30}}) {
-        int at_adc = 0, at_mcmc = 0;
-        for (int i = 1; i <= 600; ++i) {
-            at_adc += regularises_unseen(adc, photos, i);
-            at_mcmc += regularises_unseen(mcmc, photos, i);
-        }
-        EXPECT_EQ(at_adc, expected) << photos;
-        EXPECT_EQ(at_mcmc, 600) << photos;
-    }
-}
-
 TEST(Regularisers, fade_what_no_photo_shows) {
     for (const int views : {6, 60}) {
         const TinyTraining t = tiny_training({.views = views});
@@ -191,137 +176,35 @@ TEST(Regularisers, fade_what_no_photo_shows) {
     }
 }
 
-TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
-    TrainOptions options;
-    EXPECT_EQ(options.last_opacity_reset(), 12'000);
-    options.iterations = 12'000;
-    EXPECT_EQ(options.last_opacity_reset(), 3'000);
-    options.iterations = 7'000;
-    EXPECT_EQ(options.last_opacity_reset(), 0);
-    options.iterations = 1;
-    EXPECT_EQ(options.last_opacity_reset(), 0);
-    options.iterations = 7'000;
-    options.densify_until = 15'000;  // of a longer run: growth ends with this one
-    EXPECT_EQ(options.last_opacity_reset(), 3'000);
-    options.densify_until = -1;
-    use_3dgs_schedule(options);
-    EXPECT_EQ(options.last_opacity_reset(), 3'000);
-}
-
-TEST(Pace, a_short_run_learns_and_grows_faster) {
-    TrainOptions options;
-    for (const int iterations : {30'000, 4'000}) {
-        options.iterations = iterations;
-        EXPECT_FLOAT_EQ(options.scale_rate(), 0.005f);
-        EXPECT_FLOAT_EQ(options.rotation_rate(), 0.001f);
-        EXPECT_FLOAT_EQ(options.opacity_rate(), 0.05f);
-        EXPECT_EQ(options.degree_interval(), 1'000);
-        EXPECT_FALSE(refines_after(options, 500));
-        EXPECT_TRUE(refines_after(options, 600));
-    }
-    options.iterations = 1'000;
-    EXPECT_EQ(options.degree_interval(), 250);
-    EXPECT_FLOAT_EQ(options.scale_rate(), 0.02f);
-    EXPECT_FLOAT_EQ(options.rotation_rate(), 0.004f);
-    EXPECT_FLOAT_EQ(options.opacity_rate(), 0.1f);
-    EXPECT_FALSE(refines_after(options, 125));
-    EXPECT_TRUE(refines_after(options, 150));
-    options.iterations = 1;
-    EXPECT_FLOAT_EQ(options.scale_rate(), 0.025f) << "five times at the most";
-    EXPECT_EQ(options.densify_begin(), 100);
-    EXPECT_EQ(options.round_interval(), 20);
-}
-
-TEST(Pace, colours_that_change_with_the_view_learn_faster_the_shorter_the_run) {
-    TrainOptions options;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), 1.25e-4f);
-    options.iterations = 7'500;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), 5e-4f);
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(4), 1e-3f) << "steps of means are steadier";
-    options.iterations = 1'000;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), 1.25e-3f);
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(16), options.sh_dc_lr) << "at most the first band's";
-    use_3dgs_schedule(options);
-    options.sh_dc_lr = 0.002f;
-    EXPECT_FLOAT_EQ(options.sh_rest_rate(1), 0.0001f);
-}
-
-TEST(Pace, is_not_for_what_is_given_nor_for_3dgs) {
-    TrainOptions given;
-    given.iterations = 1'000;
-    given.scale_lr = given.rotation_lr = given.opacity_lr = 0.01f;
-    given.densify_from = given.densify_interval = 30;
-    given.sh_interval = 700;
-    EXPECT_EQ(given.degree_interval(), 700);
-    EXPECT_FLOAT_EQ(given.scale_rate(), 0.01f);
-    EXPECT_FLOAT_EQ(given.rotation_rate(), 0.01f);
-    EXPECT_FLOAT_EQ(given.opacity_rate(), 0.01f);
-    EXPECT_TRUE(refines_after(given, 60));
-    TrainOptions theirs;
-    theirs.iterations = 1'000;
-    use_3dgs_schedule(theirs);
-    EXPECT_FLOAT_EQ(theirs.scale_rate(), 0.005f);
-    EXPECT_FLOAT_EQ(theirs.rotation_rate(), 0.001f);
-    EXPECT_FLOAT_EQ(theirs.opacity_rate(), 0.025f);
-    EXPECT_EQ(theirs.densify_begin(), 500);
-    EXPECT_EQ(theirs.round_interval(), 100);
-    EXPECT_EQ(theirs.degree_interval(), 1'000);
-    EXPECT_EQ(theirs.clearance, 0);
-}
-
-TEST(OpacityReset, only_adc_has_them) {
-    TrainOptions options;
-    EXPECT_TRUE(resets_after(options, 12'000));
-    EXPECT_FALSE(resets_after(options, 15'000));
-    options.iterations = 7'000;
-    EXPECT_FALSE(resets_after(options, 3'000));
-    use_strategy(Strategy::budget, options);
-    options.iterations = 30'000;
-    EXPECT_FALSE(resets_after(options, 12'000));
-}
-
-TEST(PruneBySize, only_3dgs_does_and_after_its_first_reset) {
-    TrainOptions options;
-    EXPECT_FALSE(prunes_by_size(options, 3'100));
-    use_3dgs_schedule(options);
-    EXPECT_FALSE(prunes_by_size(options, 3'000));
-    EXPECT_TRUE(prunes_by_size(options, 3'100));
-}
-
-TEST(OpacityReset, over_white_where_growth_begins_if_it_does) {
-    TrainOptions options;
-    EXPECT_FALSE(resets_after(options, 500));
-    options.white_background = true;
-    options.random_background = false;
-    EXPECT_TRUE(resets_after(options, 500));
-    options.iterations = 1'200;  // growth would end with the round of iteration 600
-    EXPECT_FALSE(resets_after(options, 500));
-}
-
 TEST(GrowthTarget, follows_its_rule_to_the_limit) {
     TrainOptions options;
-    use_strategy(Strategy::mcmc, options);
-    EXPECT_EQ(growth_target(options, 600, 1000, 5000), 1050U);
-    EXPECT_EQ(growth_target(options, 600, 1000, 1020), 1020U);
-    EXPECT_EQ(growth_target(options, 600, 1000, 900), 1000U) << "never below what is there";
-    EXPECT_EQ(options.densify_end(), 25'000);
-    EXPECT_EQ(growth_target(options, 24'800, 1000, 4000), 1050U) << "nobody asked for a number";
+    options.strategy = Strategy::mcmc;
+    EXPECT_EQ(growth_target(options, Schedule(options), 600, 1000, 5000), 1050U);
+    EXPECT_EQ(growth_target(options, Schedule(options), 600, 1000, 1020), 1020U);
+    EXPECT_EQ(growth_target(options, Schedule(options), 600, 1000, 900), 1000U)
+        << "never below what is there";
+    EXPECT_EQ(Schedule(options).rounds.end, 25'000);
+    EXPECT_EQ(growth_target(options, Schedule(options), 24'800, 1000, 4000), 1050U)
+        << "nobody asked for a number";
     options.max_splats = 4000;
-    EXPECT_EQ(growth_target(options, 24'800, 1000, 4000), 2000U) << "two rounds are left";
-    EXPECT_EQ(growth_target(options, 24'900, 1000, 4000), 4000U) << "this is the last";
-    use_strategy(Strategy::budget, options);
-    const int last = options.densify_end() - options.round_interval();
-    EXPECT_EQ(growth_target(options, last, 1000, 5000), 5000U);
-    EXPECT_EQ(growth_target(options, last - options.round_interval(), 1000, 5000), 4000U)
+    EXPECT_EQ(growth_target(options, Schedule(options), 24'800, 1000, 4000), 2000U)
+        << "two rounds are left";
+    EXPECT_EQ(growth_target(options, Schedule(options), 24'900, 1000, 4000), 4000U)
+        << "this is the last";
+    options.strategy = Strategy::budget;
+    const Schedule::Rounds rounds = Schedule(options).rounds;
+    const int last = rounds.end - rounds.interval;
+    EXPECT_EQ(growth_target(options, Schedule(options), last, 1000, 5000), 5000U);
+    EXPECT_EQ(growth_target(options, Schedule(options), last - rounds.interval, 1000, 5000), 4000U)
         << "a quarter of the gap is left for the last of two rounds";
-    EXPECT_EQ(growth_target(options, 600, 7000, 5000), 5000U);
+    EXPECT_EQ(growth_target(options, Schedule(options), 600, 7000, 5000), 5000U);
 }
 
 TEST(GrowthTarget, the_forecast_knows_it) {
     TrainOptions options;
     for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
         SCOPED_TRACE(std::string(strategy_name(strategy)));
-        use_strategy(strategy, options);
+        options.strategy = strategy;
         EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 100'000U);
         const double mean = mean_splats(4'000, 100'000, options);
         EXPECT_GT(mean, 50'000);
@@ -332,18 +215,6 @@ TEST(GrowthTarget, the_forecast_knows_it) {
     EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 4'000U);
     options.iterations = 1'300;
     EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 8'000U);
-}
-
-TEST(ResolutionRamp, divisors_follow_the_run_and_the_size_of_the_photos) {
-    TrainOptions options, theirs;
-    use_3dgs_schedule(theirs);
-    EXPECT_EQ(ramp_divisor(theirs, 1, 1600), 1);
-    EXPECT_EQ(ramp_divisor(options, 1, 1600), 4);
-    EXPECT_EQ(ramp_divisor(options, 3'000, 1600), 4);
-    EXPECT_EQ(ramp_divisor(options, 3'001, 1600), 2);
-    EXPECT_EQ(ramp_divisor(options, 9'001, 1600), 1);
-    EXPECT_EQ(ramp_divisor(options, 1, 399), 2);
-    EXPECT_EQ(ramp_divisor(options, 1, 199), 1);
 }
 
 TEST(ResolutionRamp, a_divided_camera_sees_the_same) {

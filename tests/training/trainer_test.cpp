@@ -121,29 +121,6 @@ TEST(Training, ends_with_the_mean_of_its_last_iterations) {
     EXPECT_NE(raw.model().position, whole.model().position);
 }
 
-TEST(Training, rates_fall_where_no_mean_settles_what_they_scatter) {
-    TrainOptions o;
-    EXPECT_TRUE(o.averages());
-    EXPECT_EQ(o.average_begin(), 25'500);
-    EXPECT_EQ(o.last_share(), 1);
-    EXPECT_LT(o.position_falls_for(), 0.5);
-    for (const int after : {25'501, 25'509, 25'511, 29'999}) EXPECT_FALSE(o.average_after(after));
-    for (const int after : {25'510, 29'990, 30'000}) EXPECT_TRUE(o.average_after(after));
-    o.strategy = Strategy::mcmc;
-    EXPECT_EQ(o.position_falls_for(), 1) << "with the noise";
-    EXPECT_EQ(o.last_share(), 1);
-    o = {};
-    o.densify_until = o.iterations;  // splats come until the end
-    EXPECT_FALSE(o.averages());
-    EXPECT_FALSE(o.average_after(o.iterations));
-    EXPECT_LT(o.last_share(), 0.5);
-    EXPECT_EQ(o.position_falls_for(), 1);
-    o.final_lr_share = 0.75;
-    o.position_lr_falls = 0.25;
-    EXPECT_EQ(o.last_share(), 0.75);
-    EXPECT_EQ(o.position_falls_for(), 0.25);
-}
-
 TEST(Training, the_mean_begins_anew_where_a_degree_is_added) {
     TinyTraining t = with_rates_given();
     t.options.probe_sh = true;  // too few photos for a trial: each degree is admitted
@@ -396,12 +373,12 @@ TEST(Training, a_kernel_that_covers_less_has_longer_lengths) {
     const auto trained = [&](bool by_area, double times) {
         TinyTraining own = t;
         own.options.lengths_by_area = by_area;
-        own.options.initial_scale *= static_cast<float>(times);
+        own.options.initial_scale = static_cast<float>(times);
         own.options.clone_split_extent *= static_cast<float>(times);
         own.options.prune_extent *= static_cast<float>(times);
         own.options.largest_scale = static_cast<float>(times);
         own.options.scale_weight /= static_cast<float>(times);
-        if (times > 1) own.options.scale_lr = 1.5f * own.options.scale_rate();
+        if (times > 1) own.options.scale_lr = 1.5f * Schedule(own.options).first.scale;
         Trainer trainer = own.trainer();
         run_to(trainer, 40);
         EXPECT_GT(trainer.counters().cloned_or_split, 5U);
@@ -427,7 +404,7 @@ TEST(Training, no_scale_grows_beyond_the_largest) {
         run_to(trainer, 40);
         const SplatModel model = trainer.model();
         const double log_scale = *std::max_element(model.log_scale.begin(), model.log_scale.end());
-        return std::exp(log_scale) / (scene_reach(t.dataset) * t.options.length_scale());
+        return std::exp(log_scale) / (scene_reach(t.dataset) * Schedule(t.options).length_scale);
     };
     EXPECT_GT(largest(0), 0.11) << "0: no limit";
     EXPECT_LE(largest(0.1f), 0.1 * (1 + 1e-6));

@@ -6,6 +6,7 @@
 #include "tools/bench/cases.h"
 #include "tools/bench/yardstick.h"
 #include "trainer/initial_model.h"
+#include "trainer/schedule.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -36,7 +37,7 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     train.iterations = kScheduled;
     train.resolution_ramp = false;  // what is measured are steps of whole photos
     if (options.plan_training) options.plan_training(dataset, photos, train);
-    train.densify_until = std::min(one.after, train.densify_end());
+    train.densify_until = std::min(one.after, Schedule(train).rounds.end);
     Trainer trainer(device, dataset, photos, initial_model(dataset, train), train);
     const auto start = std::chrono::steady_clock::now();
     while (trainer.iteration() < one.after) {

@@ -12,6 +12,7 @@
 #include "engine/reference/loss.h"
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
+#include "trainer/schedule.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
 
@@ -33,6 +34,7 @@ struct TrainedRun {
 // What training does beside the accuracy settings that changes a gradient or a picture, each turned
 // the other way.
 std::vector<TrainCostRow> departures(const TrainOptions& options) {
+    const Schedule schedule(options);
     std::vector<TrainCostRow> rows;
     const auto add = [&](std::string name, std::function<void(TrainOptions&)> change) {
         rows.emplace_back();
@@ -43,7 +45,8 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         if (options.probe_sh || degree < options.sh_degree)
             add(fmt::format("sh degree {} by the iteration", degree), [degree](TrainOptions& o) {
                 o.sh_degree = degree;
-                o.sh_interval = std::max(1, std::min(o.degree_interval(), o.iterations / 8));
+                o.sh_interval =
+                    std::max(1, std::min(Schedule(o).degree_interval, o.iterations / 8));
                 o.probe_sh = false;
             });
     add(options.antialias ? "without antialias" : "with antialias",
@@ -53,21 +56,20 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
     add(options.resolution_ramp ? "without resolution ramp" : "with resolution ramp",
         [](TrainOptions& o) { o.resolution_ramp = !o.resolution_ramp; });
     if (options.sh_degree > 0)
-        add(options.sh_rest_every > 1 ? "harmonics step in every iteration"
-                                      : "harmonics step in every 16th",
-            [](TrainOptions& o) { o.sh_rest_every = o.sh_rest_every > 1 ? 1 : 16; });
+        add(schedule.rest_every > 1 ? "harmonics step in every iteration"
+                                    : "harmonics step in every 16th",
+            [](TrainOptions& o) { o.sh_rest_every = Schedule(o).rest_every > 1 ? 1 : 16; });
     if (options.random_background)
         add("one background", [](TrainOptions& o) { o.random_background = false; });
     if (options.opacity_weight > 0 || options.scale_weight > 0)
         add("no regularisers", [](TrainOptions& o) { o.opacity_weight = o.scale_weight = 0; });
     if (options.clearance > 0)
         add("splats beside photos", [](TrainOptions& o) { o.clearance = 0; });
-    if (options.pace() > 1)
+    if (schedule.pace > 1)
         add("rates and rounds of a long run", [](TrainOptions& o) { o.paced = false; });
     TrainOptions late = options;
     late.late_resets = true;
-    if (options.strategy == Strategy::adc &&
-        late.last_opacity_reset() != options.last_opacity_reset())
+    if (options.strategy == Strategy::adc && Schedule(late).resets.last != schedule.resets.last)
         add("late opacity resets", [](TrainOptions& o) { o.late_resets = true; });
     if (options.strategy == Strategy::adc)
         add("schedule of 3DGS", [](TrainOptions& o) { use_3dgs_schedule(o); });

@@ -25,11 +25,9 @@ struct TrainFlags {
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
     std::string kernel = "gaussian", strategy = "adc";
-    std::string schedule = "darb";   // or 3dgs
-    std::string resolution_ramp;     // on, off, or empty: as the schedule has it
-    int sh_rest_every = 0;           // 0: as the strategy has it
-    std::string strategy_note;       // what plan_strategy decided, for people
-    bool own_prune_opacity = false;  // --prune-opacity was given
+    std::string schedule = "darb";  // or 3dgs
+    std::string resolution_ramp;    // on, off, or empty: as the schedule has it
+    std::string strategy_note;      // what plan_strategy decided, for people
     // Options that were given and the strategies that know them.
     std::vector<std::pair<std::string, std::string>> of_strategies;
     int pulses = 1;

@@ -46,7 +46,7 @@ void add_strategy_flags(CLI::App& command, TrainFlags& f) {
                     "--schedule 3dgs off)")
         ->check(CLI::IsMember({"on", "off"}));
     command
-        .add_option("--sh-rest-every", f.sh_rest_every,
+        .add_option("--sh-rest-every", t.sh_rest_every,
                     "harmonics above the first band make a step in every so many iterations, of "
                     "the mean gradient of these; default: 1, with budget 16")
         ->check(CLI::Range(1, 1'000));
@@ -68,8 +68,10 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
         .add_option("--densify-from-iter", t.densify_from,
                     "default 500; sooner in runs below 4,000 iterations, down to 100")
         ->check(CLI::NonNegativeNumber);
-    command.add_option("--densify-until-iter", t.densify_until,
-                       "default: half of the run, at most 15,000; mcmc: 5/6 of it, at most 25,000");
+    command
+        .add_option("--densify-until-iter", t.densify_until,
+                    "default: half of the run, at most 15,000; mcmc: 5/6 of it, at most 25,000")
+        ->check(CLI::NonNegativeNumber);
     only_with("adc",
               command.add_option("--opacity-reset-interval", t.opacity_reset_interval,
                                  "none where density control ends before the next one would come"),
@@ -87,8 +89,7 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
     command
         .add_option("--prune-opacity", t.prune_opacity,
                     "splats below this opacity go, with mcmc elsewhere (default 0.1; mcmc 0.005)")
-        ->check(CLI::Range(0.0, 1.0))
-        ->each([&f](const std::string&) { f.own_prune_opacity = true; });
+        ->check(CLI::Range(0.0, 1.0));
     command.add_option("--opacity-reg", t.opacity_weight, "weight of the mean opacity in the loss")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
@@ -126,16 +127,11 @@ void finish_strategy(TrainFlags& f) {
     if (f.schedule == "3dgs" && *strategy != Strategy::adc)
         throw Error("--schedule 3dgs", fmt::format("means nothing with --strategy {}", f.strategy),
                     "Leave one of the two out.");
-    const TrainOptions given = f.train;
-    use_strategy(*strategy, f.train);
-    if (f.own_prune_opacity || f.schedule == "3dgs") f.train.prune_opacity = given.prune_opacity;
-    for (const auto& [name, strategies] : f.of_strategies) {
+    f.train.strategy = *strategy;
+    for (const auto& [name, strategies] : f.of_strategies)
         if (strategies.find(f.strategy) == std::string::npos)
             throw Error(name, fmt::format("means nothing with --strategy {}", f.strategy),
                         fmt::format("Leave it out; it goes with --strategy {}.", strategies));
-        if (name == "--opacity-decay") f.train.opacity_decay = given.opacity_decay;
-    }
-    if (f.sh_rest_every > 0) f.train.sh_rest_every = f.sh_rest_every;
     if (!f.resolution_ramp.empty()) f.train.resolution_ramp = f.resolution_ramp == "on";
 }
 

@@ -10,7 +10,7 @@
 #include "tools/darb/open_cameras.h"
 #include "trainer/forecast.h"
 #include "trainer/progress.h"
-#include "trainer/strategy.h"
+#include "trainer/schedule.h"
 
 namespace darb {
 
@@ -100,13 +100,14 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
 }
 
 void print_growth(const TrainOptions& options) {
+    const Schedule schedule(options);
     for (int i = 1; i < options.iterations; ++i)
-        if (refines_after(options, i)) return;
-    if (options.densify_end() > 0)
+        if (schedule.refines_after(i)) return;
+    if (schedule.rounds.end > 0)
         fmt::print(stderr,
                    "growth: none, it would end after {} iterations and begin after {}: a longer "
                    "run or --densify-from-iter changes that\n",
-                   options.densify_end(), options.densify_begin());
+                   schedule.rounds.end, schedule.rounds.begin);
 }
 
 }  // namespace

@@ -1,0 +1,185 @@
+#include "trainer/schedule.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/kernels/kernel_family.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kPacedBelow = 4'000;  // iterations
+constexpr float kMostPace = 5, kMostHaste = 10;
+constexpr std::size_t kPhotosThatBear = 50;
+
+struct RampSize {
+    int divisor;
+    double until;  // share of the run
+};
+constexpr RampSize kRampSizes[] = {{4, 0.1}, {2, 0.3}};
+constexpr int kSmallestSide = 100;  // px
+
+// A run that is shorter than kPacedBelow is that run in fast motion, at most kMostPace times.
+float pace_of(const TrainOptions& o) {
+    const float times = float(kPacedBelow) / static_cast<float>(std::max(o.iterations, 1));
+    return o.paced ? std::clamp(times, 1.0f, kMostPace) : 1.0f;
+}
+
+// Of what would not settle in a run shorter than the 30,000 iterations of 3DGS.
+float haste_of(const TrainOptions& o) {
+    return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(o.iterations, 1))));
+}
+
+int paced(std::optional<int> given, int usual, float pace) {
+    return given ? *given : static_cast<int>(std::lround(static_cast<float>(usual) / pace));
+}
+
+// Harmonics above the first band: of steps of the mean of so many iterations.
+float rest_rate(const TrainOptions& o, int every) {
+    float times = std::sqrt(static_cast<float>(every));
+    const float haste = haste_of(o);
+    if (o.sh_rest_hastens) times *= std::min(haste * haste, kMostHaste);
+    return o.sh_dc_lr * std::min(1.0f, times / 20);
+}
+
+int rounds_end(const TrainOptions& o) {
+    if (o.densify_until) return std::min(*o.densify_until, o.iterations);
+    if (o.strategy == Strategy::mcmc) return std::min(o.iterations / 6 * 5, 25'000);
+    return std::min(o.iterations / 2, 15'000);
+}
+
+// What is reset keeps twice the opacity that is pruned, as 3DGS does, and at least 0.01, its value,
+// or twice what is drawn at all: what is not seen never comes back.
+Schedule::Resets resets_of(const TrainOptions& o, float prune_opacity,
+                           const Schedule::Rounds& rounds) {
+    Schedule::Resets resets;
+    resets.interval = o.opacity_reset_interval;
+    const int last = rounds.end - (o.late_resets ? 1 : resets.interval);
+    resets.last = std::max(last, 0) / resets.interval * resets.interval;
+    const auto seen = static_cast<float>(2 * o.accuracy.value(kAlphaCutoff));
+    resets.to = std::clamp(2.0f * prune_opacity, std::max(0.01f, seen), 0.9f);
+    const bool first_round_follows = rounds.begin + rounds.interval < rounds.end;
+    resets.at_begin = o.white_background && !o.random_background && first_round_follows;
+    return resets;
+}
+
+}  // namespace
+
+Schedule::Schedule(const TrainOptions& o)
+    : iterations(o.iterations),
+      strategy(o.strategy),
+      pace(pace_of(o)),
+      prune_extent_(o.prune_extent),
+      exposure_lr_init_(o.exposure_lr_init),
+      exposure_lr_final_(o.exposure_lr_final),
+      sh_degree_(o.sh_degree),
+      ramp_(o.resolution_ramp) {
+    const StrategyDefaults defaults = strategy_defaults(strategy);
+    initial_opacity = o.initial_opacity.value_or(defaults.initial_opacity);
+    initial_scale = o.initial_scale.value_or(defaults.initial_scale);
+    prune_opacity = o.prune_opacity.value_or(defaults.prune_opacity);
+    opacity_decay = o.opacity_decay.value_or(defaults.opacity_decay);
+    rest_every = o.sh_rest_every.value_or(defaults.sh_rest_every);
+
+    degree_interval = paced(o.sh_interval, 1'000, pace);
+    rounds.begin = paced(o.densify_from, 500, pace);
+    rounds.interval = paced(o.densify_interval, 100, pace);
+    degree_interval = std::max(degree_interval, 1);
+    rounds.interval = std::max(rounds.interval, 1);
+    rounds.end = rounds_end(o);
+    resets = resets_of(o, prune_opacity, rounds);
+    average_begin = std::max(static_cast<int>(o.average_from * iterations), rounds.end);
+
+    // A kernel that covers less of the picture than a Gaussian has its lengths longer, learns its
+    // scales faster, and gains from a limit of them; a Gaussian loses with one.
+    if (o.lengths_by_area) length_scale = std::max(1.0, equal_area_scale(o.kernel, o.footprint));
+    largest_scale = o.largest_scale.value_or(length_scale > 1 ? 1.0f : 0.0f);
+
+    const float haste = haste_of(o), first_position = o.position_lr_init.value_or(1.6e-4f * haste);
+    first.position = first_position;
+    last_position_rate = o.position_lr_final.value_or(1.6e-6f * haste);
+    first.scale = o.scale_lr.value_or(0.005f * pace) * (length_scale > 1 ? 1.5f : 1.0f);
+    first.rotation = o.rotation_lr.value_or(0.001f * pace);
+    // The root of the pace: with the whole, fewer splats and less time, but 0.8 dB less.
+    first.opacity = o.opacity_lr.value_or(0.05f * std::sqrt(pace));
+    first.sh_dc = o.sh_dc_lr;
+    first.sh_rest = rest_rate(o, rest_every);
+    // A mean settles what large steps scatter; the noise of mcmc falls with the position's rate.
+    const bool mean_settles = averages() && strategy != Strategy::mcmc;
+    position_falls_for = o.position_lr_falls.value_or(mean_settles ? 0.35 : 1.0);
+    last_share = o.final_lr_share.value_or(averages() ? 1.0 : 0.3);
+}
+
+double Schedule::position_rate(int iteration) const {
+    const double t =
+        std::clamp(double(iteration) / std::max(iterations, 1), 0.0, position_falls_for);
+    const auto from = static_cast<float>(first.position);
+    return std::exp((1 - t) * std::log(from) + t * std::log(last_position_rate));
+}
+
+Schedule::Rates Schedule::rates(int iteration) const {
+    const double t = std::clamp(double(iteration) / std::max(iterations, 1), 0.0, 1.0);
+    const auto late = static_cast<float>(std::pow(last_share, std::max(0.0, 2 * t - 1)));
+    Rates now = first;
+    now.position = position_rate(iteration);
+    for (float* rate : {&now.scale, &now.rotation, &now.opacity, &now.sh_dc, &now.sh_rest})
+        *rate *= late;
+    return now;
+}
+
+double Schedule::exposure_rate(int iteration) const {
+    const double t = std::clamp(double(iteration) / iterations, 0.0, 1.0);
+    return exposure_lr_init_ * std::pow(exposure_lr_final_ / exposure_lr_init_, t);
+}
+
+int Schedule::sh_degree(int iteration) const {
+    return std::min(sh_degree_, iteration / degree_interval);
+}
+
+bool Schedule::refines_after(int iteration) const {
+    return iteration > rounds.begin && iteration < rounds.end && iteration % rounds.interval == 0;
+}
+
+bool Schedule::resets_after(int iteration) const {
+    if (strategy != Strategy::adc || iteration <= 0) return false;
+    return (resets.at_begin && iteration == rounds.begin) ||
+           (iteration % resets.interval == 0 && iteration <= resets.last);
+}
+
+bool Schedule::prunes_by_size(int iteration) const {
+    return prune_extent_ > 0 && iteration > resets.interval;
+}
+
+bool Schedule::regularises_unseen(std::size_t photos, int iteration) const {
+    const auto interval = static_cast<int>((photos + kPhotosThatBear - 1) / kPhotosThatBear);
+    return strategy == Strategy::mcmc || iteration % std::max(interval, 1) == 0;
+}
+
+bool Schedule::averages_after(int iteration) const {
+    const int interval = std::clamp(iterations / 160, 1, 10);
+    return iteration > average_begin && (iterations - iteration) % interval == 0;
+}
+
+std::vector<RampStep> Schedule::ramp_steps(int longest_side) const {
+    std::vector<RampStep> steps;
+    if (!ramp_) return steps;
+    int before = 0;
+    for (const RampSize& size : kRampSizes) {
+        const int until = static_cast<int>(size.until * iterations);
+        if (longest_side < kSmallestSide * size.divisor || until == before) continue;
+        steps.push_back({size.divisor, until - before});
+        before = until;
+    }
+    return steps;
+}
+
+int Schedule::resolution_divisor(int iteration, int longest_side) const {
+    for (const RampStep& step : ramp_steps(longest_side)) {
+        if (iteration <= step.iterations) return step.divisor;
+        iteration -= step.iterations;
+    }
+    return 1;
+}
+
+}  // namespace darb
