@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/plan/effect_plan.h"
+#include "engine/raster/gpu_splats.h"
 #include "trainer/schedule.h"
 #include "trainer/strategy.h"
 
@@ -108,7 +109,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     n.culled = h.at("culled").get<decltype(n.culled)>();
 }
 
-std::uint64_t floats_per_splat(const Trainer::State& s) {
+std::uint64_t floats_per_splat(const TrainerState& s) {
     const std::uint64_t parameters = 14 + static_cast<std::uint64_t>(s.model.rest_count());
     return parameters * (s.averaged > 0 ? 4 : 3) + 2;
 }
@@ -253,13 +254,14 @@ std::string settings_text(const TrainOptions& o) {
         if (p.effect != kNoEffect && p.effect != EFFECT_ANTIALIAS)
             settings["effects"][effect_name(p.effect)] = o.projection.*p.on;
     // What the defaults do not have stands only where it is.
-    if (o.strategy != Strategy::adc) {
+    if (o.strategy != Strategy{}) {
         settings["strategy"] = strategy_name(o.strategy);
         settings["initial_scale"] = s.initial_scale;
     }
     if (s.length_scale != 1) settings["length_scale"] = s.length_scale;
-    if (o.strategy == Strategy::mcmc) settings["noise_lr"] = o.noise_lr;
-    if (o.strategy == Strategy::budget) settings["opacity_decay"] = s.opacity_decay;
+    const StrategyRow& strategy = strategy_row(o.strategy);
+    if (strategy.has_setting("noise_lr")) settings["noise_lr"] = o.noise_lr;
+    if (strategy.has_setting("opacity_decay")) settings["opacity_decay"] = s.opacity_decay;
     if (o.morton_order) settings["morton_order"] = true;
     return settings.dump();
 }
@@ -300,7 +302,7 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
     Json before = Json::parse(checkpoint.settings, nullptr, false);
     if (!before.is_object()) before = Json::object();
     const Json now = Json::parse(settings_text(options));
-    const std::string strategy = before.value("strategy", "adc");
+    const std::string strategy = before.value("strategy", std::string(strategy_name(Strategy{})));
     if (strategy != strategy_name(options.strategy))
         throw Error(path.string(),
                     fmt::format("was written with --strategy {}, this is --strategy {}", strategy,

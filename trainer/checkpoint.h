@@ -7,13 +7,14 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "engine/data/dataset.h"
 #include "trainer/options.h"
-#include "trainer/trainer.h"
+#include "trainer/trainer_state.h"
 
 namespace darb {
 
 struct Checkpoint {
-    Trainer::State state;
+    TrainerState state;
     std::string settings;                      // settings_text() of the run that wrote it
     std::string dataset;                       // dataset_fingerprint() of it
     double seconds = 0;                        // of training until then

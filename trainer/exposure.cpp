@@ -52,16 +52,15 @@ void Exposure::record(Commands& commands, const Buffer& image, std::uint32_t pho
 }
 
 void Exposure::record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
-                               const Buffer& status, std::uint32_t photo, std::uint32_t pixels,
-                               float rate, int visits) {
+                               const Buffer& status, const ExposureStep& step) {
     commands.pass("exposure");
-    const std::uint32_t groups = groups_of(pixels);
-    commands.dispatch(backward_, gpu::ExposureArgs{pixels, photo, groups},
+    const std::uint32_t groups = groups_of(step.pixels);
+    commands.dispatch(backward_, gpu::ExposureArgs{step.pixels, step.photo, groups},
                       {maps_, image, d_image, partials_}, groups);
-    const double correction1 = 1.0 - std::pow(0.9, visits),
-                 correction2 = 1.0 - std::pow(0.999, visits);
-    const gpu::ExposureUpdateArgs args{photo, photos_, groups,
-                                       static_cast<float>(rate / correction1),
+    const double correction1 = 1.0 - std::pow(0.9, step.visits),
+                 correction2 = 1.0 - std::pow(0.999, step.visits);
+    const gpu::ExposureUpdateArgs args{step.photo, photos_, groups,
+                                       static_cast<float>(step.rate / correction1),
                                        static_cast<float>(1.0 / std::sqrt(correction2))};
     commands.dispatch(update_, args, {partials_, maps_, moments_, status}, 1);
 }

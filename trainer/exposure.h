@@ -12,6 +12,13 @@
 
 namespace darb {
 
+/// The step of one photo's map.
+struct ExposureStep {
+    std::uint32_t photo = 0, pixels = 0;
+    float rate = 0;  // of Adam
+    int visits = 1;  // of this photo, this one counted
+};
+
 class Exposure {
   public:
     /// For `photos` photos of at most `pixels` pixels, all identities.
@@ -24,11 +31,10 @@ class Exposure {
     void record(Commands& commands, const Buffer& image, std::uint32_t photo, std::uint32_t pixels);
     const Buffer& mapped() const { return mapped_; }
 
-    /// d_image, dL/d(mapped), becomes dL/d(image); then the photo's Adam step. visits: of this
-    /// photo, from 1. status: gpu::FrameStatus of the frame.
+    /// d_image, dL/d(mapped), becomes dL/d(image); then the photo's Adam step. status:
+    /// gpu::FrameStatus of the frame.
     void record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
-                         const Buffer& status, std::uint32_t photo, std::uint32_t pixels,
-                         float rate, int visits);
+                         const Buffer& status, const ExposureStep& step);
 
     std::vector<ColourMap> maps() const;
     /// maps and moments as one array, for checkpoints: [photos][12] maps, [photos][12][2] moments.

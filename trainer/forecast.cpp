@@ -17,13 +17,6 @@ namespace darb {
 
 namespace {
 
-// Rule of thumb for density control, of nine runs on photos of 200 and 400 px: splats go up to
-// about so many times the root of the photos' pixels (photos of the same scene show each other's
-// pixels), up to so many for one point of the start, and not faster than so much a round.
-constexpr double kSplatsPerRootPixel = 25;
-constexpr double kMaxGrowth = 60;
-constexpr double kGrowthPerRound = 1.4;
-
 // The stand-in for a trained scene: most trained splats are more opaque than those at the start.
 constexpr float kTrainedLogit = 0;  // of an opacity of a half
 // Trainer's buffers grow to 1.5 times the pairs that did not fit.
@@ -132,8 +125,8 @@ double pair_room(double pairs) {
 
 // Splats and pairs at the end: of the splats that are wanted no more than a budget of memory leaves
 // room for, where Trainer's growth stops.
-void settle_size(const Device& device, const TrainOptions& options, std::uint32_t wanted,
-                 double pairs, Forecast& f) {
+void fit_size(const Device& device, const TrainOptions& options, std::uint32_t wanted, double pairs,
+              Forecast& f) {
     const double room = pair_room(pairs);
     const auto demand_for = [&](std::uint64_t splats) {
         f.demand.splats = splats;
@@ -203,14 +196,14 @@ void measure_both(Device& device, const Dataset& dataset, const SplatModel& star
     f.start_ms = f.end_ms = at_start.ms;
     f.start_pairs = pairs_per_splat(at_start, start);
     const std::uint32_t wanted = f.splats;
-    settle_size(device, options, wanted, f.start_pairs, f);
+    fit_size(device, options, wanted, f.start_pairs, f);
     const std::uint32_t most = device.info().type == "cpu" ? kMostMeasuredCpu : kMostMeasuredGpu;
     const std::uint32_t count = std::min(f.splats, most);
     const SplatModel later = f.falls ? surface_model(dataset, options, start, count)
                                      : split_model(start, count, options.seed);
     if (f.falls || later.size() != start.size()) {
         const Measurement at_end = measure_training(device, few, later, options);
-        settle_size(device, options, wanted, pairs_per_splat(at_end, later), f);
+        fit_size(device, options, wanted, pairs_per_splat(at_end, later), f);
         const auto measured = static_cast<double>(later.size());
         const double ms = f.falls ? at_end.ms : std::max(at_end.ms, at_start.ms);
         const double per_splat = f.falls ? ms / std::max(1.0, measured)
@@ -230,22 +223,20 @@ int ramp_end(const Schedule& schedule, const Forecast& f) {
     return last;
 }
 
-// Splats in the last iteration with smaller photos, at most: adc's grow evenly while density
-// control runs.
+// Splats in the last iteration with smaller photos, at most.
 std::uint64_t splats_with_smaller_photos(const Schedule& schedule, const Forecast& f) {
-    if (schedule.strategy != Strategy::adc) return f.splats;
-    const double rounds = std::max(1, schedule.rounds.end - schedule.rounds.begin);
-    const double until = ramp_end(schedule, f) - schedule.rounds.begin;
-    const double share = std::clamp(until / rounds, 0.0, 1.0), from = f.falls ? 0 : f.start_splats;
-    const auto grown = static_cast<std::uint64_t>(from + share * (f.splats - from));
+    const double from = f.falls ? 0 : f.start_splats;
+    const std::uint64_t grown =
+        strategy_row(schedule.strategy)
+            .forecast_until(schedule, ramp_end(schedule, f), from, f.splats);
     return std::max<std::uint64_t>(f.start_splats, grown);
 }
 
 // The most of what the end takes; of the last rounds of density control, with the colour that there
 // is by then; and of the first iterations, with smaller photos or before most of a random start
 // goes. photos: as add_photos counts them, the ramp's smaller ones among them.
-void settle_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
-                 Forecast& f) {
+void find_peak(const Device& device, const TrainOptions& options, const MemoryDemand& photos,
+               Forecast& f) {
     const Schedule schedule(options);
     f.peak = f.demand;
     f.peak.densifies = false;
@@ -279,17 +270,8 @@ void settle_peak(const Device& device, const TrainOptions& options, const Memory
 
 std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit, bool random_start) {
-    if (options.strategy != Strategy::adc)
-        return std::max(start, simulate_growth(options, start, limit).end);
-    const Schedule::Rounds every = Schedule(options).rounds;
-    const int first = every.begin / every.interval;
-    const int last = std::max(every.end - 1, 0) / every.interval;
-    const int rounds = std::max(0, last - first);
-    const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
-    const double most = std::min(growth * start, static_cast<double>(limit));
-    const double wanted = kSplatsPerRootPixel * std::sqrt(static_cast<double>(photo_pixels));
-    const auto end = static_cast<std::uint32_t>(std::min(wanted, most));
-    return random_start && rounds > 0 ? end : std::max(start, end);
+    return strategy_row(options.strategy)
+        .forecast_end(options, {start, photo_pixels, limit, random_start});
 }
 
 int predict_degree(const TrainOptions& options, int iterations) {
@@ -299,23 +281,18 @@ int predict_degree(const TrainOptions& options, int iterations) {
 }
 
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
-    TrainOptions adc = options;
-    adc.strategy = Strategy::adc;
+    TrainOptions usual = options;
+    usual.strategy = Strategy{};
     std::uint64_t pixels = 0;
     for (const View& view : dataset.views)
         if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
-    return predict_splats(initial_count(dataset, adc), pixels, adc,
+    return predict_splats(initial_count(dataset, usual), pixels, usual,
                           options.max_splats.value_or(kAnyNumberOfSplats),
                           dataset.points.size() == 0);
 }
 
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
-    if (options.strategy != Strategy::adc) return simulate_growth(options, start, end).mean;
-    const double all = options.iterations;
-    const Schedule::Rounds rounds = Schedule(options).rounds;
-    const double to = std::clamp<double>(rounds.end, 0, all);
-    const double from = std::clamp<double>(rounds.begin, 0, to);
-    return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;
+    return strategy_row(options.strategy).forecast_mean(options, start, end);
 }
 
 SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64_t seed) {
@@ -365,15 +342,15 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit,
                               dataset.points.size() == 0);
     f.demand.densifies = has_rounds(schedule);
-    f.falls =
-        dataset.points.size() == 0 && has_rounds(schedule) && options.strategy != Strategy::mcmc;
+    f.falls = dataset.points.size() == 0 && has_rounds(schedule) &&
+              strategy_row(options.strategy).prunes_random_start;
     f.demand.averages = schedule.averages();
-    settle_size(scratch, options, f.splats, 0, f);
+    fit_size(scratch, options, f.splats, 0, f);
     if (measure && f.demand.photo_pixels > 0) try {
             measure_both(scratch, dataset, start, options, f);
         } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
         }
-    settle_peak(scratch, options, photos, f);
+    find_peak(scratch, options, photos, f);
     return f;
 }
 

@@ -6,14 +6,13 @@
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/frame_view.h"
 #include "engine/raster/loss.h"
-#include "trainer/densify/density_control.h"
-#include "trainer/densify/error_score.h"
-#include "trainer/densify/mcmc.h"
-#include "trainer/densify/round_buffers.h"
+#include "trainer/density/density_control.h"
+#include "trainer/density/round_buffers.h"
 #include "trainer/exposure.h"
 #include "trainer/resolution_ramp.h"
 #include "trainer/schedule.h"
-#include "trainer/trainer.h"
+#include "trainer/step.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -72,11 +71,9 @@ std::uint64_t effect_bytes(const MemoryDemand& demand) {
 std::uint64_t strategy_bytes(const MemoryDemand& demand) {
     std::uint64_t bytes = demand.small_pixels * 4;
     if (demand.small_cameras > 0) bytes += cameras_bytes(demand.small_cameras);
-    if (demand.relocates) bytes += Mcmc::device_bytes();
-    if (demand.scores)
-        bytes += ErrorScore::device_bytes(
-            demand.splats, std::uint64_t(demand.width) * demand.height, demand.list_segments);
-    return bytes;
+    const std::uint64_t pixels = std::uint64_t(demand.width) * demand.height;
+    return bytes + strategy_row(demand.strategy)
+                       .device_bytes({demand.splats, pixels, demand.list_segments});
 }
 
 MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
@@ -159,8 +156,7 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
         demand.cooperates = true;
         demand.list_segments = 2;
     }
-    demand.relocates = options.strategy == Strategy::mcmc;
-    demand.scores = options.strategy == Strategy::budget;
+    demand.strategy = options.strategy;
     const std::vector<RampStep> steps = schedule.ramp_steps(std::max(demand.width, demand.height));
     if (steps.empty()) return;
     for (const View& view : views) {

@@ -32,8 +32,7 @@ struct MemoryDemand {
     std::uint64_t photo_pixels = 0;      // of all training photos together
     std::uint32_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
     std::uint32_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
-    bool relocates = false;              // Strategy::mcmc
-    bool scores = false;                 // Strategy::budget
+    Strategy strategy{};
     // Of the resolution ramp: its smaller photos, of all training photos together, and cameras.
     std::uint64_t small_pixels = 0;
     std::uint32_t small_cameras = 0;

@@ -9,11 +9,9 @@
 #include "engine/kernels/kernel_family.h"
 #include "engine/plan/accuracy.h"
 #include "engine/raster/effects.h"
+#include "trainer/density/strategy_list.h"
 
 namespace darb {
-
-/// How the splats grow in number; see trainer/strategy.h.
-enum class Strategy { adc, mcmc, budget };
 
 constexpr std::uint32_t kAnyNumberOfSplats = std::numeric_limits<std::uint32_t>::max();
 
@@ -71,12 +69,12 @@ struct TrainOptions {
     bool paced = true;
 
     // Density control. Absent: rounds after 500 iterations and then every 100, over the pace, until
-    // half of the run, at most 15,000; mcmc: 5/6 of it, at most 25,000.
-    Strategy strategy = Strategy::adc;
+    // the part of the run that the strategy has.
+    Strategy strategy{};  // the first of the table
     std::optional<int> densify_from, densify_until, densify_interval;
     float densify_grad_threshold = 2e-4f;  // NDC units
     float clone_split_extent = 0.01f;      // share of the scene extent
-    // Absent, here and below: as the strategy has it, see strategy_defaults().
+    // Absent, here and below: as the strategy has it, see StrategyDefaults.
     std::optional<float> prune_opacity;
     // Pruning by size from the first opacity reset on, share of the scene extent; 0: none. 3DGS has
     // 0.1; what fills the holes stays as veils over other views: the shipped scene after 7,000

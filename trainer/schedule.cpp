@@ -45,8 +45,8 @@ float rest_rate(const TrainOptions& o, int every) {
 
 int rounds_end(const TrainOptions& o) {
     if (o.densify_until) return std::min(*o.densify_until, o.iterations);
-    if (o.strategy == Strategy::mcmc) return std::min(o.iterations / 6 * 5, 25'000);
-    return std::min(o.iterations / 2, 15'000);
+    const StrategyDefaults& d = strategy_row(o.strategy).defaults;
+    return std::min(o.iterations / d.rounds_of * d.rounds_part, d.rounds_latest);
 }
 
 // What is reset keeps twice the opacity that is pruned, as 3DGS does, and at least 0.01, its value,
@@ -75,7 +75,7 @@ Schedule::Schedule(const TrainOptions& o)
       exposure_lr_final_(o.exposure_lr_final),
       sh_degree_(o.sh_degree),
       ramp_(o.resolution_ramp) {
-    const StrategyDefaults defaults = strategy_defaults(strategy);
+    const StrategyDefaults& defaults = strategy_row(strategy).defaults;
     initial_opacity = o.initial_opacity.value_or(defaults.initial_opacity);
     initial_scale = o.initial_scale.value_or(defaults.initial_scale);
     prune_opacity = o.prune_opacity.value_or(defaults.prune_opacity);
@@ -105,9 +105,9 @@ Schedule::Schedule(const TrainOptions& o)
     first.opacity = o.opacity_lr.value_or(0.05f * std::sqrt(pace));
     first.sh_dc = o.sh_dc_lr;
     first.sh_rest = rest_rate(o, rest_every);
-    // A mean settles what large steps scatter; the noise of mcmc falls with the position's rate.
-    const bool mean_settles = averages() && strategy != Strategy::mcmc;
-    position_falls_for = o.position_lr_falls.value_or(mean_settles ? 0.35 : 1.0);
+    // A mean settles what large steps scatter.
+    position_falls_for =
+        o.position_lr_falls.value_or(averages() ? defaults.position_lr_falls : 1.0);
     last_share = o.final_lr_share.value_or(averages() ? 1.0 : 0.3);
 }
 
@@ -142,7 +142,7 @@ bool Schedule::refines_after(int iteration) const {
 }
 
 bool Schedule::resets_after(int iteration) const {
-    if (strategy != Strategy::adc || iteration <= 0) return false;
+    if (!strategy_row(strategy).follows_3dgs || iteration <= 0) return false;
     return (resets.at_begin && iteration == rounds.begin) ||
            (iteration % resets.interval == 0 && iteration <= resets.last);
 }
@@ -153,7 +153,8 @@ bool Schedule::prunes_by_size(int iteration) const {
 
 bool Schedule::regularises_unseen(std::size_t photos, int iteration) const {
     const auto interval = static_cast<int>((photos + kPhotosThatBear - 1) / kPhotosThatBear);
-    return strategy == Strategy::mcmc || iteration % std::max(interval, 1) == 0;
+    return strategy_row(strategy).defaults.regularises_all ||
+           iteration % std::max(interval, 1) == 0;
 }
 
 bool Schedule::averages_after(int iteration) const {

@@ -36,7 +36,7 @@ class Schedule {
 
     /// Whether density control has a round after this iteration.
     bool refines_after(int iteration) const;
-    /// Whether adc resets opacities after this iteration: every so many up to resets.last, and, as
+    /// Whether opacities are reset after this iteration: every so many up to resets.last, and, as
     /// 3DGS does, where growth begins over a white background.
     bool resets_after(int iteration) const;
     /// Whether a round after this iteration prunes by size: as 3DGS does after its first opacity
@@ -45,7 +45,7 @@ class Schedule {
     /// Whether the regularisers act at this iteration on what its frame does not show too. A splat
     /// that few photos show is worth less than one that many show: in sets of up to 50 photos at
     /// each, in larger ones at 50 in a round of the photos, so that what ten of a thousand show
-    /// stays; with mcmc at each, as its authors do.
+    /// stays; at each where the strategy wants it.
     bool regularises_unseen(std::size_t photos, int iteration) const;
 
     /// Whether the run ends with the mean of its last splats, and whether that takes in what this
@@ -73,7 +73,7 @@ class Schedule {
     struct Rounds {
         int begin = 0, end = 0, interval = 1;
     } rounds;
-    /// Opacity resets of adc. last: the last iteration that ends with one; 0: none does.
+    /// Opacity resets. last: the last iteration that ends with one; 0: none does.
     struct Resets {
         int interval = 1, last = 0;
         float to = 0;           // opacity

@@ -9,6 +9,10 @@
 
 namespace darb {
 
+namespace {
+constexpr int kFilterInterval = 100;  // iterations, as Mip-Splatting
+}
+
 SmoothingFilter::SmoothingFilter(Device& device, const ProjectionEffects& effects)
     : device_(&device), commands_(device) {
     SpecConstants constants{{"THREADS", SPLAT_GROUP}};
@@ -29,6 +33,21 @@ void SmoothingFilter::update(GpuSplats& splats, const Buffer& cameras, std::uint
     commands_.dispatch(filter_, gpu::SmoothingArgs{splats.count(), camera_count},
                        {cameras, splats.parameters(kPosition), splats.smoothing()}, g.x, g.y);
     commands_.submit_and_wait();
+}
+
+TrainedSmoothing::TrainedSmoothing(Device& device, const ProjectionEffects& effects,
+                                   const std::vector<gpu::CameraData>& cameras)
+    : filter_(device, effects),
+      cameras_(upload_cameras(device, cameras)),
+      camera_count_(static_cast<std::uint32_t>(cameras.size())) {}
+
+void TrainedSmoothing::advance(int iteration) {
+    if (iteration % kFilterInterval == 0) stale_ = true;
+}
+
+void TrainedSmoothing::update(GpuSplats& splats) {
+    filter_.update(splats, cameras_, camera_count_);
+    stale_ = false;
 }
 
 SplatModel bake_smoothing(const SplatModel& model, const std::vector<float>& filter) {

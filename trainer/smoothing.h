@@ -2,6 +2,8 @@
 // with the filter worked in for files.
 #pragma once
 
+#include <vector>
+
 #include "engine/gpu/commands.h"
 #include "engine/raster/forward.h"
 
@@ -18,6 +20,27 @@ class SmoothingFilter {
     Device* device_;
     Pipeline filter_;
     Commands commands_;
+};
+
+/// The filter of a run: it follows the splats as they move, come and go.
+class TrainedSmoothing {
+  public:
+    /// cameras: of the training photos at their whole size.
+    TrainedSmoothing(Device& device, const ProjectionEffects& effects,
+                     const std::vector<gpu::CameraData>& cameras);
+
+    /// After every iteration: whether it is one that the filter follows.
+    void advance(int iteration);
+    void mark_stale() { stale_ = true; }
+    bool is_stale() const { return stale_; }
+    /// The queue must be idle.
+    void update(GpuSplats& splats);
+
+  private:
+    SmoothingFilter filter_;
+    Buffer cameras_;
+    std::uint32_t camera_count_;
+    bool stale_ = true;
 };
 
 /// The same splats without a filter beside them: standard deviations widened, opacities lowered.

@@ -1,46 +1,52 @@
 #include "trainer/strategy.h"
 
 #include <algorithm>
-#include <cmath>
-#include <utility>
 
 #include "trainer/schedule.h"
 
 namespace darb {
 
-namespace {
+#define DARB_STRATEGY(name) const StrategyRow& name##_row();
+DARB_STRATEGIES(DARB_STRATEGY)
+#undef DARB_STRATEGY
 
-constexpr std::pair<Strategy, std::string_view> kNames[] = {
-    {Strategy::adc, "adc"}, {Strategy::mcmc, "mcmc"}, {Strategy::budget, "budget"}};
+const StrategyRow& strategy_row(Strategy strategy) {
+    switch (strategy) {
+#define DARB_STRATEGY(name) \
+    case Strategy::name:    \
+        return name##_row();
+        DARB_STRATEGIES(DARB_STRATEGY)
+#undef DARB_STRATEGY
+    }
+    return strategy_row(Strategy{});
+}
 
-constexpr double kGrowth = 1.05;  // of mcmc, a round, and more where that misses the limit
-
-}  // namespace
+std::vector<Strategy> all_strategies() {
+    return {
+#define DARB_STRATEGY(name) Strategy::name,
+        DARB_STRATEGIES(DARB_STRATEGY)
+#undef DARB_STRATEGY
+    };
+}
 
 std::string_view strategy_name(Strategy strategy) {
-    for (const auto& [row, name] : kNames)
-        if (row == strategy) return name;
-    return "";
+    return strategy_row(strategy).name;
 }
 
 std::optional<Strategy> strategy_from_name(std::string_view name) {
-    for (const auto& [strategy, row] : kNames)
-        if (row == name) return strategy;
+    for (const Strategy strategy : all_strategies())
+        if (strategy_name(strategy) == name) return strategy;
     return std::nullopt;
 }
 
-StrategyDefaults strategy_defaults(Strategy strategy) {
-    StrategyDefaults d;
-    if (strategy == Strategy::mcmc) {  // its authors' values
-        d.initial_opacity = 0.5f;
-        d.initial_scale = 0.1f;
-        d.prune_opacity = 0.005f;
+std::string strategy_names() {
+    const std::vector<Strategy> all = all_strategies();
+    std::string names;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        if (i > 0) names += i + 1 < all.size() ? ", " : " or ";
+        names += strategy_name(all[i]);
     }
-    if (strategy == Strategy::budget) {
-        d.opacity_decay = 0.01f;
-        d.sh_rest_every = 16;
-    }
-    return d;
+    return names;
 }
 
 void use_3dgs_schedule(TrainOptions& options) {
@@ -61,18 +67,13 @@ void use_3dgs_schedule(TrainOptions& options) {
 
 std::uint32_t growth_target(const TrainOptions& options, const Schedule& schedule, int iteration,
                             std::uint32_t count, std::uint32_t limit) {
+    return strategy_row(options.strategy).target(options, schedule, iteration, count, limit);
+}
+
+int rounds_left(const Schedule& schedule, int iteration) {
     const int interval = schedule.rounds.interval;
     const int last = (schedule.rounds.end - 1) / interval * interval;
-    const double rounds = std::max(1, (last - iteration) / interval + 1);  // this one counted
-    if (options.strategy == Strategy::mcmc) {
-        const double needed = std::pow(double(limit) / std::max(count, 1U), 1 / rounds);
-        const double growth = options.max_splats ? std::max(kGrowth, needed) : kGrowth;
-        const double grown = std::ceil(growth * count);
-        return std::max(count, static_cast<std::uint32_t>(std::min<double>(grown, limit)));
-    }
-    if (options.strategy != Strategy::budget || count >= limit) return limit;
-    const double stays = (rounds - 1) / rounds;
-    return limit - static_cast<std::uint32_t>((limit - count) * stays * stays);
+    return std::max(1, (last - iteration) / interval + 1);
 }
 
 Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit) {
@@ -90,6 +91,18 @@ Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::ui
     }
     sum += count * (options.iterations - since);
     return {static_cast<std::uint32_t>(count), sum / std::max(options.iterations, 1)};
+}
+
+std::uint32_t simulated_end(const TrainOptions& options, const GrowthStart& start) {
+    return std::max(start.splats, simulate_growth(options, start.splats, start.limit).end);
+}
+
+double simulated_mean(const TrainOptions& options, std::uint32_t start, std::uint32_t end) {
+    return simulate_growth(options, start, end).mean;
+}
+
+std::uint64_t end_at_once(const Schedule&, int, double, std::uint32_t end) {
+    return end;
 }
 
 }  // namespace darb

@@ -1,19 +1,22 @@
-// The strategies by which splats grow in number, by name, with their defaults and their growth:
-//   adc     clone, split and prune by the screen gradient, reset opacities (3DGS)
-//   mcmc    move dead splats onto live ones, grow by 5 % a round, add noise (3DGS-MCMC,
-//           arXiv 2404.09591)
-//   budget  grow to a fixed count where the photos' error is, let opacities decay
+// The strategies by which splats grow in number, by name, with what is known of them before a run.
+// Their table is density/strategy_list.h; each is one file of density/.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "trainer/options.h"
 
 namespace darb {
 
-std::string_view strategy_name(Strategy strategy);
-std::optional<Strategy> strategy_from_name(std::string_view name);
+class DensityStrategy;
+class Schedule;
+struct StrategySetup;
 
 /// What options take from the strategy where they are not given.
 struct StrategyDefaults {
@@ -25,8 +28,26 @@ struct StrategyDefaults {
     float prune_opacity = 0.1f;
     float opacity_decay = 0;
     int sh_rest_every = 1;
+    // Density control ends after this part of the run, and at this iteration at the latest.
+    int rounds_part = 1, rounds_of = 2, rounds_latest = 15'000;
+    // The share of a run that ends with a mean, over which the position's rate falls.
+    double position_lr_falls = 0.35;
+    bool regularises_all = false;  // at each iteration also what its frame does not show
 };
-StrategyDefaults strategy_defaults(Strategy strategy);
+
+/// What the device memory of a strategy depends on.
+struct StrategySize {
+    std::uint64_t splats = 0, pixels = 0;  // pixels: of the largest picture
+    std::uint32_t list_segments = 1;
+};
+
+/// What a forecast of the splats at the end goes by.
+struct GrowthStart {
+    std::uint32_t splats = 0;
+    std::uint64_t photo_pixels = 0;  // of all training photos
+    std::uint32_t limit = 0;
+    bool random = false;  // without points
+};
 
 /// What 3DGS does where the defaults depart from it (ARCHITECTURE says why they do): constant rates
 /// but the position's, those of its paper, pruning below 0.005, no regularisers, one background,
@@ -35,20 +56,66 @@ StrategyDefaults strategy_defaults(Strategy strategy);
 /// nor exposure.
 void use_3dgs_schedule(TrainOptions& options);
 
-class Schedule;
-
-/// Splats after the round of this iteration, for `count` before it and at most `limit` in the end:
-/// mcmc grows by 5 %; budget comes to the limit with the last round, the gap closing as a parabola,
-/// fast at first. Never below count for mcmc; adc has no target: the limit.
+/// StrategyRow::target of the options' strategy.
 std::uint32_t growth_target(const TrainOptions& options, const Schedule& schedule, int iteration,
                             std::uint32_t count, std::uint32_t limit);
 
-/// What growth_target makes of `start` splats up to an iteration, for forecasts: budget at most
-/// doubles in a round. mean: the mean count over the run.
+/// Splats that a row's target makes of `start`, for forecasts: at most twice as many in a round.
+/// mean: the mean count over the run.
 struct Growth {
     std::uint32_t end = 0;
     double mean = 0;
 };
 Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit);
+
+// Forecasts of strategies that have a target.
+std::uint32_t simulated_end(const TrainOptions& options, const GrowthStart& start);
+double simulated_mean(const TrainOptions& options, std::uint32_t start, std::uint32_t end);
+std::uint64_t end_at_once(const Schedule& schedule, int iteration, double start, std::uint32_t end);
+/// Rounds of density control from this one to the last, both counted; at least 1.
+int rounds_left(const Schedule& schedule, int iteration);
+
+/// One row of the table.
+struct StrategyRow {
+    std::string_view name;
+    std::string_view summary;  // for people, a few words
+    StrategyDefaults defaults;
+
+    /// Settings that nothing else reads, by their names in a checkpoint.
+    std::vector<std::string_view> settings = {};
+    bool has_setting(std::string_view setting) const {
+        return std::find(settings.begin(), settings.end(), setting) != settings.end();
+    }
+
+    /// It resets opacities, and the schedule of 3DGS means something with it.
+    bool follows_3dgs = false;
+    /// Splats grow to a number that is given, or that the first row is forecast to end with.
+    bool grows_to_limit = true;
+    /// The first round takes most of a random start.
+    bool prunes_random_start = true;
+
+    /// Splats after the round of this iteration, for `count` before it and at most `limit` in the
+    /// end; the limit where it has no target.
+    std::uint32_t (*target)(const TrainOptions& options, const Schedule& schedule, int iteration,
+                            std::uint32_t count, std::uint32_t limit);
+    // Forecasts: splats at the end; the mean count over the run; the most up to an iteration.
+    std::uint32_t (*forecast_end)(const TrainOptions& options,
+                                  const GrowthStart& start) = simulated_end;
+    double (*forecast_mean)(const TrainOptions& options, std::uint32_t start,
+                            std::uint32_t end) = simulated_mean;
+    std::uint64_t (*forecast_until)(const Schedule& schedule, int iteration, double start,
+                                    std::uint32_t end) = end_at_once;
+
+    /// Between rounds.
+    std::uint64_t (*device_bytes)(const StrategySize& size);
+    std::unique_ptr<DensityStrategy> (*make)(const StrategySetup& setup);
+};
+
+const StrategyRow& strategy_row(Strategy strategy);
+std::string_view strategy_name(Strategy strategy);
+std::optional<Strategy> strategy_from_name(std::string_view name);
+std::vector<Strategy> all_strategies();
+/// Their names as people list them: "adc, mcmc or budget".
+std::string strategy_names();
 
 }  // namespace darb

@@ -9,7 +9,7 @@
 #include "engine/reference/density_control.h"
 #include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
-#include "trainer/densify/density_control.h"
+#include "trainer/density/density_control.h"
 
 namespace darb::test {
 namespace {

@@ -1,6 +1,6 @@
 // Shares of the error against the reference's backward blend, the opacity's decay, and smaller
 // photos against area means in double.
-#include "trainer/densify/error_score.h"
+#include "trainer/density/error_score.h"
 
 #include "engine/core/rng.h"
 #include "engine/reference/density_control.h"
@@ -10,7 +10,7 @@
 #include "tests/support/random_scene.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/shared_device.h"
-#include "trainer/densify/density_control.h"
+#include "trainer/density/density_control.h"
 #include "trainer/resolution_ramp.h"
 
 namespace darb::test {

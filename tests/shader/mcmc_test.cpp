@@ -1,6 +1,6 @@
 // The passes of the strategy mcmc against double precision, one after the other and together; and
 // the law that they are for: a splat that several take the place of looks as it did.
-#include "trainer/densify/mcmc.h"
+#include "trainer/density/relocation.h"
 
 #include "engine/core/rng.h"
 #include "engine/kernels/relocation.h"
@@ -214,9 +214,9 @@ Round run_round(const SplatModel& model, std::uint32_t grown, std::uint32_t seed
     for (int a = 0; a < kAttributeCount; ++a)
         splats.moments(a).upload(std::vector<float>(attribute_values(model, a).size() * 2, 1.0f));
     DensityControl density(d, model.kernel);
-    Mcmc mcmc(d, model.kernel, model.footprint);
+    Relocation relocation(d, model.kernel, model.footprint);
     Round round;
-    round.result = mcmc.run(splats, density, kDead, grown, seed);
+    round.result = relocation.run(splats, density, kDead, grown, seed);
     round.model = splats.download();
     for (int a = 0; a < kAttributeCount; ++a)
         round.moments[a] =
@@ -225,7 +225,7 @@ Round run_round(const SplatModel& model, std::uint32_t grown, std::uint32_t seed
 }
 
 // Opacities of exactly 1/2, so that the weights are those of the reference to the bit.
-TEST(Mcmc, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_changed) {
+TEST(Relocation, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_changed) {
     SplatModel model = population(500);
     std::uint32_t dead = 0;
     for (size_t i = 0; i < 500; ++i) {
@@ -258,7 +258,7 @@ TEST(Mcmc, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_changed) 
     }
 }
 
-TEST(Mcmc, a_round_repeats_with_its_seed_and_differs_with_another) {
+TEST(Relocation, a_round_repeats_with_its_seed_and_differs_with_another) {
     const SplatModel model = population(400);
     const Round one = run_round(model, 20, 8), same = run_round(model, 20, 8),
                 other = run_round(model, 20, 9);
@@ -267,7 +267,7 @@ TEST(Mcmc, a_round_repeats_with_its_seed_and_differs_with_another) {
     EXPECT_NE(one.model.position, other.model.position);
 }
 
-TEST(Mcmc, without_a_live_splat_or_without_work_nothing_happens) {
+TEST(Relocation, without_a_live_splat_or_without_work_nothing_happens) {
     SplatModel model = population(50);
     model.opacity.assign(50, -9.0f);
     EXPECT_EQ(run_round(model, 5).model.opacity, model.opacity);

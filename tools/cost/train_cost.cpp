@@ -69,10 +69,10 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         add("rates and rounds of a long run", [](TrainOptions& o) { o.paced = false; });
     TrainOptions late = options;
     late.late_resets = true;
-    if (options.strategy == Strategy::adc && Schedule(late).resets.last != schedule.resets.last)
+    const bool follows_3dgs = strategy_row(options.strategy).follows_3dgs;
+    if (follows_3dgs && Schedule(late).resets.last != schedule.resets.last)
         add("late opacity resets", [](TrainOptions& o) { o.late_resets = true; });
-    if (options.strategy == Strategy::adc)
-        add("schedule of 3DGS", [](TrainOptions& o) { use_3dgs_schedule(o); });
+    if (follows_3dgs) add("schedule of 3DGS", [](TrainOptions& o) { use_3dgs_schedule(o); });
     return rows;
 }
 

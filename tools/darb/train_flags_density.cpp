@@ -123,8 +123,9 @@ void add_density_flags(CLI::App& command, TrainFlags& f) {
 void finish_strategy(TrainFlags& f) {
     const auto strategy = strategy_from_name(f.strategy);
     if (!strategy)
-        throw Error("--strategy " + f.strategy, "no such strategy", "Use adc, mcmc or budget.");
-    if (f.schedule == "3dgs" && *strategy != Strategy::adc)
+        throw Error("--strategy " + f.strategy, "no such strategy",
+                    fmt::format("Use {}.", strategy_names()));
+    if (f.schedule == "3dgs" && !strategy_row(*strategy).follows_3dgs)
         throw Error("--schedule 3dgs", fmt::format("means nothing with --strategy {}", f.strategy),
                     "Leave one of the two out.");
     f.train.strategy = *strategy;

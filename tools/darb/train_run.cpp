@@ -43,12 +43,15 @@ void plan_effects(Dataset& dataset, TrainFlags& flags) {
 
 void plan_strategy(const Dataset& dataset, TrainFlags& flags) {
     TrainOptions& t = flags.train;
-    if (t.strategy == Strategy::adc) return;
+    if (!strategy_row(t.strategy).grows_to_limit) return;
     const bool given = t.max_splats.has_value();
     if (!given) t.max_splats = default_budget(dataset, t);
     flags.strategy_note =
         fmt::format("strategy: {}, up to {} splats{}", strategy_name(t.strategy), *t.max_splats,
-                    given ? "" : ", what adc is forecast to end with; --budget sets another count");
+                    given ? ""
+                          : fmt::format(", what {} is forecast to end with; --budget sets another "
+                                        "count",
+                                        strategy_name(Strategy{})));
 }
 
 std::atomic<bool>& stop_on_signals() {

@@ -1,4 +1,4 @@
-#include "trainer/densify/round_buffers.h"
+#include "trainer/density/round_buffers.h"
 
 #include <algorithm>
 #include <vector>

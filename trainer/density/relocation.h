@@ -1,16 +1,16 @@
-// Density control `mcmc` on the device: dead splats move onto live ones, new ones grow there, and
-// nearly transparent ones wander. Source: 3DGS-MCMC, arXiv 2404.09591, with the relocation of any
-// kernel (engine/kernels/relocation.h).
+// Relocation: a round of density control and noise on the device. Dead splats move onto live ones,
+// new ones grow there, and nearly transparent ones wander. Source: 3DGS-MCMC, arXiv 2404.09591,
+// with the relocation of any kernel (engine/kernels/relocation.h).
 #pragma once
 
-#include "trainer/densify/density_control.h"
+#include "trainer/density/density_control.h"
 
 namespace darb {
 
-class Mcmc {
+class Relocation {
   public:
     /// The table of scales takes about 0.1 s.
-    Mcmc(Device& device, int kernel, Footprint footprint);
+    Relocation(Device& device, int kernel, Footprint footprint);
 
     /// Device memory between rounds. A round takes a little less than one of DensityControl.
     static std::uint64_t device_bytes();

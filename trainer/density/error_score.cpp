@@ -1,4 +1,4 @@
-#include "trainer/densify/error_score.h"
+#include "trainer/density/error_score.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "trainer/densify/density_control.h"
+#include "trainer/density/density_control.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "engine/core/check.h"
 #include "engine/primitives/groups.h"
 #include "shaders/shared/strategy_args.h"
-#include "trainer/densify/round_buffers.h"
+#include "trainer/density/round_buffers.h"
 
 namespace darb {
 

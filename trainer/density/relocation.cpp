@@ -1,4 +1,4 @@
-#include "trainer/densify/mcmc.h"
+#include "trainer/density/relocation.h"
 
 #include <algorithm>
 
@@ -18,7 +18,8 @@ float weight_scale(std::uint32_t splats) {
 
 }  // namespace
 
-Mcmc::Mcmc(Device& device, int kernel, Footprint footprint) : device_(&device), commands_(device) {
+Relocation::Relocation(Device& device, int kernel, Footprint footprint)
+    : device_(&device), commands_(device) {
     const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
     weight_ = Pipeline(device, "relocation_weight", threads);
     draw_ = Pipeline(device, "relocation_draw", threads);
@@ -31,12 +32,12 @@ Mcmc::Mcmc(Device& device, int kernel, Footprint footprint) : device_(&device), 
     table_.upload(table);
 }
 
-std::uint64_t Mcmc::device_bytes() {
+std::uint64_t Relocation::device_bytes() {
     return std::uint64_t{RELOCATION_OPACITIES} * RELOCATION_COUNTS * sizeof(float);
 }
 
-DensityResult Mcmc::run(GpuSplats& splats, DensityControl& density, float dead_opacity,
-                        std::uint32_t grown, std::uint32_t seed) {
+DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float dead_opacity,
+                              std::uint32_t grown, std::uint32_t seed) {
     const std::uint32_t n = splats.count();
     DensityResult result{n, n, 0, 0};
     if (n == 0) return result;
@@ -85,8 +86,8 @@ DensityResult Mcmc::run(GpuSplats& splats, DensityControl& density, float dead_o
     return result;
 }
 
-void Mcmc::record_noise(Commands& commands, GpuSplats& splats, const Buffer& status, float rate,
-                        float dead_opacity, std::uint32_t seed) {
+void Relocation::record_noise(Commands& commands, GpuSplats& splats, const Buffer& status,
+                              float rate, float dead_opacity, std::uint32_t seed) {
     if (splats.count() == 0 || rate <= 0) return;
     const Groups g = groups_for(splats.count());
     commands.pass("position noise");

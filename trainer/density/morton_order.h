@@ -6,7 +6,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "trainer/densify/density_control.h"
+#include "trainer/density/density_control.h"
 
 namespace darb {
 

@@ -1,4 +1,4 @@
-#include "trainer/densify/morton_order.h"
+#include "trainer/density/morton_order.h"
 
 #include "engine/primitives/groups.h"
 #include "engine/primitives/radix_sort.h"

@@ -1,0 +1,58 @@
+#include "trainer/optimizer.h"
+
+#include <cmath>
+
+namespace darb {
+
+namespace {
+// In a trial, the rate of the bands above the first over that of the first.
+constexpr float kTrialRestRate = 0.2f;
+}  // namespace
+
+Optimizer::Optimizer(const TrainOptions& options, const Schedule& schedule, double extent,
+                     double reach, std::size_t photos)
+    : schedule_(schedule),
+      opacity_weight_(options.opacity_weight),
+      scale_weight_(options.scale_weight),
+      extent_(extent),
+      reach_(reach),
+      photos_(photos) {}
+
+AdamStep Optimizer::rates(int iteration) const {
+    const Schedule::Rates now = schedule_.rates(iteration);
+    AdamStep step;
+    step.position = static_cast<float>(now.position * extent_);
+    step.scale = now.scale;
+    step.rotation = now.rotation;
+    step.opacity = now.opacity;
+    step.sh_dc = now.sh_dc;
+    step.sh_rest = now.sh_rest;
+    step.rest_every = schedule_.rest_every;
+    return step;
+}
+
+AdamStep Optimizer::with_regularisers(AdamStep step, int iteration) const {
+    step.opacity_weight = opacity_weight_;
+    step.scale_weight = scale_weight_ / static_cast<float>(length());
+    if (schedule_.largest_scale > 0)
+        step.largest_log_scale =
+            static_cast<float>(std::log(schedule_.largest_scale * schedule_.length_scale * reach_));
+    step.regularise_unseen = schedule_.regularises_unseen(photos_, iteration);
+    return step;
+}
+
+AdamStep Optimizer::step(int iteration) const {
+    return with_regularisers(adam_step(rates(iteration), iteration), iteration);
+}
+
+AdamStep Optimizer::trial_step(int iteration, float share) const {
+    AdamStep step = rates(iteration);
+    step.rest_every = 1;
+    step.sh_rest = kTrialRestRate * step.sh_dc;
+    for (float* rate :
+         {&step.position, &step.scale, &step.rotation, &step.opacity, &step.sh_dc, &step.sh_rest})
+        *rate *= share;
+    return with_regularisers(adam_step(step, iteration), iteration);
+}
+
+}  // namespace darb

@@ -1,0 +1,96 @@
+#include "trainer/photos.h"
+
+#include <algorithm>
+#include <span>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+
+namespace darb {
+
+TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
+                               const std::vector<ImageU8>& photos, const glm::dvec3& origin)
+    : device_(&device), origin_(origin), nearest_(nearest_points(dataset)) {
+    DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
+               dataset.views.size());
+    for (size_t i = 0; i < dataset.views.size(); ++i) {
+        const View& view = dataset.views[i];
+        view_cameras_.push_back(view.camera);
+        names_.push_back(view.name);
+        width_ = std::max(width_, view.camera.width);
+        height_ = std::max(height_, view.camera.height);
+        whole_.data.push_back(camera_data(view.camera, origin_));
+        whole_.photos.emplace_back();
+        if (view.is_test) continue;
+        views_.push_back(static_cast<int>(i));
+        const std::uint64_t count = std::uint64_t(view.camera.width) * view.camera.height;
+        DARB_CHECK(photos[i].channels == 4 && photos[i].data.size() == count * 4, "{}", view.name);
+        whole_.photos.back() = Buffer(device, "photo " + view.name, count * 4);
+        whole_.photos.back().upload(std::as_bytes(std::span(photos[i].data)));
+        pixels_ = std::max(pixels_, count);
+    }
+    longest_side_ = std::max(width_, height_);
+    if (views_.empty())
+        throw Error(dataset.root.string(), "no photo is left to train on",
+                    "Every view is held out: add photos, or leave out --eval of darb train.");
+    whole_.cameras = upload_cameras(device, whole_.data);
+}
+
+TrainingView TrainingPhotos::view(int view, int sh_degree, const glm::vec3& background) const {
+    const Size& size = divisor_ > 1 ? small_ : whole_;
+    const auto photo = std::lower_bound(views_.begin(), views_.end(), view) - views_.begin();
+    return {
+        {size.data[view], &size.cameras, static_cast<std::uint32_t>(view), sh_degree, background},
+        static_cast<std::uint32_t>(photo),
+        &size.photos[view]};
+}
+
+std::vector<gpu::CameraData> TrainingPhotos::training_cameras() const {
+    std::vector<gpu::CameraData> cameras;
+    for (const int view : views_) cameras.push_back(whole_.data[view]);
+    return cameras;
+}
+
+glm::vec3 TrainingPhotos::mean_centre() const {
+    glm::vec3 centre(0);
+    for (const int view : views_)
+        centre += whole_.data[view].centre / static_cast<float>(views_.size());
+    return centre;
+}
+
+void TrainingPhotos::set_divisor(int divisor) {
+    const auto make_whole = [this] {
+        divisor_ = 1;
+        small_ = {};
+    };
+    make_whole();
+    if (divisor == 1) return;
+    ResolutionRamp ramp(*device_);
+    try {
+        make_smaller(ramp, divisor);
+    } catch (const Error&) {
+        make_whole();
+        room_for_smaller_ = false;
+    }
+}
+
+void TrainingPhotos::make_smaller(ResolutionRamp& ramp, int divisor) {
+    divisor_ = divisor;
+    for (size_t v = 0; v < view_cameras_.size(); ++v) {
+        const Camera& camera = view_cameras_[v];
+        const Camera smaller = divided(camera, divisor);
+        small_.data.push_back(camera_data(smaller, origin_));
+        small_.photos.emplace_back();
+        if (whole_.photos[v])
+            small_.photos.back() = ramp.downsample(whole_.photos[v], camera, smaller);
+    }
+    small_.cameras = upload_cameras(*device_, small_.data);
+}
+
+std::uint64_t TrainingPhotos::small_pixels() const {
+    std::uint64_t pixels = 0;
+    for (const Buffer& photo : small_.photos) pixels += photo.bytes() / 4;
+    return pixels;
+}
+
+}  // namespace darb

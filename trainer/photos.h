@@ -1,0 +1,86 @@
+// TrainingPhotos: photos and cameras on the device, whole or, while the resolution ramp lasts, with
+// their sides divided.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/data/dataset.h"
+#include "engine/raster/frame_view.h"
+#include "trainer/resolution_ramp.h"
+
+namespace darb {
+
+/// A training view as an iteration sees it, at the size that photos have then. It points into
+/// TrainingPhotos until their size changes.
+struct TrainingView {
+    FrameView frame;
+    std::uint32_t photo = 0;         // among the training photos
+    const Buffer* pixels = nullptr;  // uint [H][W], R in the low byte
+
+    int width() const { return static_cast<int>(frame.camera.width); }
+    int height() const { return static_cast<int>(frame.camera.height); }
+    std::uint32_t size() const { return frame.camera.width * frame.camera.height; }
+};
+
+class TrainingPhotos {
+  public:
+    /// photos: as load_photos gives them, in the order of dataset.views. origin: of the splats.
+    /// Throws Error where no view is left to train on.
+    TrainingPhotos(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
+                   const glm::dvec3& origin);
+
+    /// The training views among all, ascending.
+    const std::vector<int>& views() const { return views_; }
+    std::uint32_t count() const { return static_cast<std::uint32_t>(views_.size()); }
+    TrainingView view(int view, int sh_degree, const glm::vec3& background) const;
+    /// The name of a view.
+    const std::string& name(int view) const { return names_[view]; }
+    /// Distance of the nearest points from the camera of a view; infinity: there are none.
+    double nearest_distance(int view) const { return nearest_[view]; }
+
+    int longest_side() const { return longest_side_; }       // px, of all views
+    int largest_width() const { return width_; }             // px, of all views
+    int largest_height() const { return height_; }           // px, of all views
+    std::uint64_t largest_photo() const { return pixels_; }  // pixels, of the training photos
+
+    /// The cameras of the training photos at their whole size, on the host.
+    std::vector<gpu::CameraData> training_cameras() const;
+    /// The mean of their centres.
+    glm::vec3 mean_centre() const;
+
+    /// What the sides are divided by now.
+    int divisor() const { return divisor_; }
+    /// Divides them anew; 1: whole photos. Where the device has no room for smaller ones beside the
+    /// whole ones these stay, and has_room_for_smaller() is false from then on. The queue must be
+    /// idle.
+    void set_divisor(int divisor);
+    bool has_room_for_smaller() const { return room_for_smaller_; }
+    /// Of the smaller photos that are there now.
+    std::uint64_t small_pixels() const;
+    std::uint32_t small_cameras() const { return static_cast<std::uint32_t>(small_.data.size()); }
+
+  private:
+    struct Size {
+        std::vector<gpu::CameraData> data;  // [view]
+        Buffer cameras;
+        std::vector<Buffer> photos;  // [view]; empty for views that are held out
+    };
+    void make_smaller(ResolutionRamp& ramp, int divisor);
+
+    Device* device_;
+    glm::dvec3 origin_;
+    std::vector<Camera> view_cameras_;  // [view]
+    std::vector<std::string> names_;    // [view]
+    std::vector<double> nearest_;       // [view]
+    std::vector<int> views_;
+    int longest_side_ = 1, width_ = 1, height_ = 1;
+    std::uint64_t pixels_ = 1;
+    Size whole_, small_;
+    int divisor_ = 1;
+    bool room_for_smaller_ = true;
+};
+
+}  // namespace darb

@@ -1,0 +1,209 @@
+#include "trainer/step.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "engine/core/check.h"
+#include "engine/render/renderer.h"
+
+namespace darb {
+
+ForwardOptions forward_options(const TrainOptions& options) {
+    ForwardOptions f;
+    f.kernel = options.kernel;
+    f.footprint = options.footprint;
+    set_options(options.accuracy, f);
+    f.effects = options.projection;
+    f.effects.antialias = f.effects.smoothing = options.antialias;
+    f.crowds = options.crowds;
+    f.store_for_backward = true;
+    return f;
+}
+
+LossOptions loss_options(const TrainOptions& options, const Dataset& dataset) {
+    return {.use_alpha = options.alpha, .use_mask = options.alpha && dataset.alpha_is_mask};
+}
+
+TrainingStep::Flight::Flight(Device& device)
+    : loss(device, "loss result", sizeof(gpu::LossResult), Memory::host),
+      status(device, "status result", sizeof(gpu::FrameStatus), Memory::host),
+      commands(device) {}
+
+TrainingStep::TrainingStep(Device& device, GpuSplats& splats, const TrainingPhotos& photos,
+                           const LossOptions& loss, const TrainOptions& options)
+    : device_(&device),
+      splats_(&splats),
+      buffers_(device, forward_options(options)),
+      forward_(device, forward_options(options)),
+      backward_(device, forward_options(options), BackwardResult::update),
+      loss_(device, photos.largest_width(), photos.largest_height(), loss),
+      lambda_dssim_(options.lambda_dssim),
+      d_image_(device, "d_image", photos.largest_photo() * 12),
+      flights_{Flight(device), Flight(device)} {
+    if (options.exposure) exposure_.emplace(device, photos.count(), photos.largest_photo());
+}
+
+void TrainingStep::reserve(int width, int height) {
+    const std::uint32_t room = std::max(buffers_.size().intersections, splats_->count() * 4);
+    buffers_.reserve(splats_->count(), room, width, height);
+}
+
+void TrainingStep::reserve_backward() {
+    backward_.reserve(splats_->count(), buffers_.size().intersections,
+                      buffers_.frame().checkpoint_records());
+}
+
+bool TrainingStep::make_room(const gpu::FrameStatus& status) {
+    return buffers_.make_room(status, [this] { reserve_backward(); });
+}
+
+void TrainingStep::run(const StepInput& input) {
+    Flight& flight = flights_[input.iteration & 1];
+    launch(flight, input);
+    complete(flights_[(input.iteration + 1) & 1]);
+}
+
+void TrainingStep::drain() {
+    const bool in_order = flights_[0].input.iteration < flights_[1].input.iteration;
+    complete(flights_[in_order ? 0 : 1]);
+    complete(flights_[in_order ? 1 : 0]);
+}
+
+void TrainingStep::launch(Flight& flight, const StepInput& input) {
+    DARB_CHECK(!flight.busy, "iteration {} is still in flight", flight.input.iteration);
+    reserve(input.view.width(), input.view.height());
+    reserve_backward();
+    if (on_reserved) on_reserved();
+    flight.input = input;
+    flight.busy = true;
+    flight.commands.begin();
+    record(flight.commands, input, flight.loss);
+    flight.commands.copy(buffers_.frame().counters.status, flight.status, sizeof(gpu::FrameStatus));
+    flight.commands.submit();
+}
+
+void TrainingStep::record(Commands& commands, const StepInput& input, const Buffer& loss) {
+    const TrainingView& view = input.view;
+    Frame& frame = buffers_.frame();
+    const Buffer& image = frame.images.image;
+    forward_.record(commands, *splats_, view.frame, frame);
+    if (exposure_) exposure_->record(commands, image, view.photo, view.size());
+    const Buffer& compared = exposure_ ? exposure_->mapped() : image;
+    const StepFrame step{commands, view.frame,   frame,    backward_,      *splats_,
+                         compared, *view.pixels, d_image_, input.iteration};
+    if (input.strategy && input.measures) input.strategy->record_before_loss(step);
+    loss_.record(commands, {compared, *view.pixels, d_image_, loss}, view.width(), view.height(),
+                 view.frame.background, lambda_dssim_);
+    if (exposure_)
+        exposure_->record_backward(
+            commands, image, d_image_, frame.counters.status,
+            {view.photo, view.size(), input.exposure_rate, input.exposure_visits});
+    backward_.record(commands, view.frame, frame, *splats_, d_image_, input.adam);
+    if (input.strategy) input.strategy->record_after_update(step);
+}
+
+// Where the step overflowed it changed nothing and tells nothing.
+gpu::FrameStatus TrainingStep::finish(Flight& flight, StepOutcome& outcome) {
+    flight.commands.wait();
+    flight.busy = false;
+    gpu::LossResult loss;
+    std::memcpy(&outcome.status, flight.status.mapped(), sizeof outcome.status);
+    std::memcpy(&loss, flight.loss.mapped(), sizeof loss);
+    if (outcome.status.overflow != 0) return outcome.status;
+    buffers_.note_status(outcome.status);
+    outcome.iteration = flight.input.iteration;
+    outcome.loss = Loss::value(loss, lambda_dssim_);
+    outcome.mse = double(loss.mse) / std::max(double(loss.weight), 1e-12);
+    outcome.pixels = flight.input.view.size();
+    outcome.passes = flight.commands.pass_times();
+    if (on_finished) on_finished(outcome);
+    return outcome.status;
+}
+
+// The overflow flag is sticky: whatever was submitted after the step that overflowed changed
+// nothing either.
+void TrainingStep::complete(Flight& flight) {
+    if (!flight.busy) return;
+    StepOutcome outcome;
+    gpu::FrameStatus status = finish(flight, outcome);
+    if (status.overflow == 0) return;
+    std::vector<StepInput> undone{flight.input};
+    for (Flight& later : flights_) {
+        if (!later.busy) continue;
+        later.commands.wait();
+        later.busy = false;
+        undone.push_back(later.input);
+    }
+    for (const StepInput& input : undone) status = redo(input, status);
+}
+
+// status: of the frame before, which says for how much there must be room.
+gpu::FrameStatus TrainingStep::redo(const StepInput& input, gpu::FrameStatus status) {
+    StepOutcome outcome;
+    do {
+        outcome.overflows += status.overflow != 0 ? 1 : 0;
+        ++outcome.redone;
+        make_room(status);
+        Flight& flight = flights_[input.iteration & 1];
+        launch(flight, input);
+        status = finish(flight, outcome);
+    } while (status.overflow != 0);
+    return status;
+}
+
+ImageF TrainingStep::render(const Camera& camera, int sh_degree, const glm::vec3& background) {
+    FrameView view{camera_data(camera, splats_->origin()), nullptr, 0, sh_degree, background};
+    const Buffer cameras = upload_cameras(*device_, {view.camera});
+    view.cameras = &cameras;
+    Commands& commands = flights_[0].commands;
+    Frame& frame = buffers_.frame();
+    reserve(camera.width, camera.height);
+    do {
+        commands.begin();
+        forward_.record(commands, *splats_, view, frame);
+        commands.submit_and_wait();
+    } while (make_room(frame.read_status()));
+    return planes_to_image(
+        frame.images.image.download<float>(size_t(camera.width) * camera.height * 3), camera.width,
+        camera.height);
+}
+
+double TrainingStep::photo_mse(const TrainingView& view) {
+    Flight& flight = flights_[0];
+    Frame& frame = buffers_.frame();
+    const Buffer& image = frame.images.image;
+    reserve(view.width(), view.height());
+    do {
+        flight.commands.begin();
+        forward_.record(flight.commands, *splats_, view.frame, frame);
+        if (exposure_) exposure_->record(flight.commands, image, view.photo, view.size());
+        loss_.record(flight.commands,
+                     {exposure_ ? exposure_->mapped() : image, *view.pixels, d_image_, flight.loss},
+                     view.width(), view.height(), view.frame.background, lambda_dssim_);
+        flight.commands.submit_and_wait();
+    } while (make_room(frame.read_status()));
+    gpu::LossResult loss;
+    std::memcpy(&loss, flight.loss.mapped(), sizeof loss);
+    return double(loss.mse) / std::max(double(loss.weight), 1e-12);
+}
+
+std::vector<float> TrainingStep::gradient_sum_values() {
+    const size_t floats = size_t{splats_->count()} * 2;
+    if (!backward_.gradient_sum()) return std::vector<float>(floats);
+    return backward_.gradient_sum().download<float>(floats);
+}
+
+void TrainingStep::restore_gradient_sum(const std::vector<float>& values) {
+    backward_.reserve(splats_->count(), 0);
+    if (!values.empty()) backward_.gradient_sum().upload(values);
+}
+
+void TrainingStep::clear_gradient_sum() {
+    backward_.reserve(splats_->count(), 0);
+    Commands& commands = flights_[0].commands;
+    commands.begin();
+    backward_.clear_gradient_sum(commands);
+    commands.submit_and_wait();
+}
+
+}  // namespace darb

@@ -1,0 +1,118 @@
+// TrainingStep: one training view forward, its loss, and back into the splats. Steps overlap: run()
+// submits one while the one before still runs, and the host reads a step's result after the next
+// is on its way. A step whose pairs did not fit changes nothing, nor do those behind it: the
+// buffers grow and all of them are done again, in order.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/gpu/commands.h"
+#include "engine/raster/backward.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
+#include "engine/raster/loss.h"
+#include "trainer/density/density_strategy.h"
+#include "trainer/exposure.h"
+#include "trainer/photos.h"
+
+namespace darb {
+
+/// The frames that training takes.
+ForwardOptions forward_options(const TrainOptions& options);
+/// How its loss reads photos.
+LossOptions loss_options(const TrainOptions& options, const Dataset& dataset);
+
+/// All that a step depends on beside the splats. The caller decides on each of it: the step knows
+/// no schedule.
+struct StepInput {
+    int iteration = 0;  // from 1
+    TrainingView view;
+    AdamStep adam;
+    float exposure_rate = 0;
+    int exposure_visits = 1;              // of this photo, this step counted
+    DensityStrategy* strategy = nullptr;  // that records into the step
+    bool measures = true;                 // false: not before the loss, for its rounds
+};
+
+/// What one finished step tells.
+struct StepOutcome {
+    int iteration = 0;
+    gpu::FrameStatus status;
+    double loss = 0, mse = 0;  // mse: mean squared error of the picture
+    std::uint32_t pixels = 0;  // of the photo
+    std::vector<PassTime> passes;
+    std::uint32_t redone = 0, overflows = 0;  // how often this step was done again, and why
+};
+
+class TrainingStep {
+  public:
+    /// splats: trained by run(); the object must outlive the step, its buffers may change between
+    /// two steps. photos: of the largest sizes that steps will have.
+    TrainingStep(Device& device, GpuSplats& splats, const TrainingPhotos& photos,
+                 const LossOptions& loss, const TrainOptions& options);
+
+    /// Submits the step, then waits for the one before. The outcomes of finished steps go to
+    /// on_finished, in order.
+    void run(const StepInput& input);
+    /// Waits for what is under way.
+    void drain();
+
+    /// Called with the outcome of each step. What it throws comes out of run() and drain().
+    std::function<void(const StepOutcome&)> on_finished;
+    /// Called when a step's buffers have the size that it takes.
+    std::function<void()> on_reserved;
+
+    // The queue must be idle for all below.
+
+    /// Buffers for pictures of this size, px.
+    void reserve(int width, int height);
+    /// A picture, RGB not clamped.
+    ImageF render(const Camera& camera, int sh_degree, const glm::vec3& background);
+    /// Mean squared error of a photo's picture as the loss sees it; nothing is updated.
+    double photo_mse(const TrainingView& view);
+
+    /// [N][2] of Backward: on the device, on the host, from there, and back to zeros.
+    const Buffer& gradient_sum() { return backward_.gradient_sum(); }
+    std::vector<float> gradient_sum_values();
+    void restore_gradient_sum(const std::vector<float>& values);
+    void clear_gradient_sum();
+
+    std::optional<Exposure>& exposure() { return exposure_; }
+    /// What the buffers of a frame are made for now.
+    const FrameSize& frame_size() const { return buffers_.size(); }
+
+  private:
+    struct Flight {
+        explicit Flight(Device& device);
+        Buffer loss;    // gpu::LossResult, host
+        Buffer status;  // gpu::FrameStatus, host
+        StepInput input;
+        bool busy = false;
+        Commands commands;  // last: they are waited for before anything that they use goes
+    };
+    void reserve_backward();
+    void launch(Flight& flight, const StepInput& input);
+    void record(Commands& commands, const StepInput& input, const Buffer& loss);
+    gpu::FrameStatus finish(Flight& flight, StepOutcome& outcome);
+    void complete(Flight& flight);
+    gpu::FrameStatus redo(const StepInput& input, gpu::FrameStatus status);
+    bool make_room(const gpu::FrameStatus& status);
+
+    Device* device_;
+    GpuSplats* splats_;
+    FrameBuffers buffers_;
+    Forward forward_;
+    Backward backward_;
+    Loss loss_;
+    float lambda_dssim_;
+    std::optional<Exposure> exposure_;  // options.exposure
+    Buffer d_image_;
+    std::array<Flight, 2> flights_;
+};
+
+}  // namespace darb
