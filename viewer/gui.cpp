@@ -6,6 +6,8 @@
 #include <backends/imgui_impl_vulkan.h>
 #include <imgui.h>
 
+#include "engine/gpu/commands.h"
+
 namespace darb {
 
 namespace {
@@ -73,31 +75,11 @@ float pixels_per_unit(GLFWwindow* window) {
 // From 1.90 on the backend uploads them itself.
 void Gui::upload_fonts([[maybe_unused]] Device& device) {
 #if IMGUI_VERSION_NUM < 19000
-    VkCommandPool pool = VK_NULL_HANDLE;
-    VkCommandPoolCreateInfo pool_info{};
-    pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-    pool_info.queueFamilyIndex = device.queue_family();
-    check_vulkan(vkCreateCommandPool(device_, &pool_info, nullptr, &pool), "panels");
-    VkCommandBuffer commands = VK_NULL_HANDLE;
-    VkCommandBufferAllocateInfo allocate{};
-    allocate.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-    allocate.commandPool = pool;
-    allocate.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    allocate.commandBufferCount = 1;
-    check_vulkan(vkAllocateCommandBuffers(device_, &allocate, &commands), "panels");
-    VkCommandBufferBeginInfo begin{};
-    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-    check_vulkan(vkBeginCommandBuffer(commands, &begin), "panels");
-    ImGui_ImplVulkan_CreateFontsTexture(commands);
-    check_vulkan(vkEndCommandBuffer(commands), "panels");
-    VkSubmitInfo submit{};
-    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
-    submit.commandBufferCount = 1;
-    submit.pCommandBuffers = &commands;
-    check_vulkan(vkQueueSubmit(device.queue(), 1, &submit, VK_NULL_HANDLE), "panels");
-    check_vulkan(vkQueueWaitIdle(device.queue()), "panels");
+    Commands commands(device);
+    commands.begin();
+    ImGui_ImplVulkan_CreateFontsTexture(commands.handle());
+    commands.submit_and_wait();
     ImGui_ImplVulkan_DestroyFontUploadObjects();
-    vkDestroyCommandPool(device_, pool, nullptr);
 #endif
 }
 

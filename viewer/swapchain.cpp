@@ -101,9 +101,14 @@ void Swapchain::create(int width, int height) {
     chain_ = next;
     std::uint32_t count = 0;
     vkGetSwapchainImagesKHR(device_->handle(), chain_, &count, nullptr);
-    images_.resize(count);
-    vkGetSwapchainImagesKHR(device_->handle(), chain_, &count, images_.data());
-    for (std::uint32_t i = 0; i < count; ++i) drawn_.push_back(make_semaphore(device_->handle()));
+    std::vector<VkImage> handles(count);
+    vkGetSwapchainImagesKHR(device_->handle(), chain_, &count, handles.data());
+    for (const VkImage image : handles) {
+        images_.push_back(DeviceImage::of_another(image, static_cast<int>(extent_.width),
+                                                  static_cast<int>(extent_.height),
+                                                  format_.format));
+        drawn_.push_back(make_semaphore(device_->handle()));
+    }
     stale_ = false;
 }
 
@@ -123,31 +128,13 @@ bool Swapchain::acquire(int width, int height, std::uint32_t& index) {
     return true;
 }
 
-bool Swapchain::finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t index) {
-    const VkImage target = images_[index];
-    image_barrier(commands, target, VK_IMAGE_LAYOUT_UNDEFINED,
-                  VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
-    const VkImageSubresourceLayers layer{VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
-    const bool same_size = extent_.width == static_cast<std::uint32_t>(canvas.width()) &&
-                           extent_.height == static_cast<std::uint32_t>(canvas.height());
-    if (format_.format == kCanvasFormat && same_size) {
-        VkImageCopy copy{};
-        copy.srcSubresource = copy.dstSubresource = layer;
-        copy.extent = {extent_.width, extent_.height, 1};
-        vkCmdCopyImage(commands, canvas.image(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, target,
-                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &copy);
-    } else {
-        VkImageBlit blit{};
-        blit.srcSubresource = blit.dstSubresource = layer;
-        blit.srcOffsets[1] = {canvas.width(), canvas.height(), 1};
-        blit.dstOffsets[1] = {static_cast<std::int32_t>(extent_.width),
-                              static_cast<std::int32_t>(extent_.height), 1};
-        vkCmdBlitImage(commands, canvas.image(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, target,
-                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &blit, VK_FILTER_NEAREST);
-    }
-    image_barrier(commands, target, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-                  VK_IMAGE_LAYOUT_PRESENT_SRC_KHR);
-    canvas.submit_and_wait(acquired_, drawn_[index]);
+bool Swapchain::finish(Canvas& canvas, std::uint32_t index) {
+    DeviceImage& target = images_[index];
+    Commands& commands = canvas.commands();
+    commands.copy(canvas.image(), target, VK_FILTER_NEAREST);
+    commands.change_layout(target, VK_IMAGE_LAYOUT_PRESENT_SRC_KHR);
+    commands.submit(acquired_, drawn_[index]);
+    commands.wait();
     VkPresentInfoKHR info{};
     info.sType = VK_STRUCTURE_TYPE_PRESENT_INFO_KHR;
     info.waitSemaphoreCount = 1;

@@ -25,12 +25,13 @@ class Swapchain {
     bool present(Canvas& canvas, const Compose& compose) {
         std::uint32_t index = 0;
         if (!acquire(canvas.width(), canvas.height(), index)) return false;
-        return finish(canvas, compose(), index);
+        compose();
+        return finish(canvas, index);
     }
 
   private:
     bool acquire(int width, int height, std::uint32_t& index);
-    bool finish(Canvas& canvas, VkCommandBuffer commands, std::uint32_t index);
+    bool finish(Canvas& canvas, std::uint32_t index);
     void choose_format();
     void create(int width, int height);
     void release_images();
@@ -40,7 +41,7 @@ class Swapchain {
     VkSurfaceFormatKHR format_{};
     VkPresentModeKHR mode_ = VK_PRESENT_MODE_FIFO_KHR;
     VkSwapchainKHR chain_ = VK_NULL_HANDLE;
-    std::vector<VkImage> images_;
+    std::vector<DeviceImage> images_;
     std::vector<VkSemaphore> drawn_;  // one an image
     VkSemaphore acquired_ = VK_NULL_HANDLE;
     VkExtent2D extent_{};

@@ -8,6 +8,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
 #include "engine/gpu/full_barrier.h"
 
@@ -16,30 +17,6 @@ namespace darb {
 namespace {
 
 constexpr std::uint64_t kStagingBytes = 32 << 20;  // long copies go in pieces of this size
-
-constexpr VkMemoryPropertyFlags kDeviceLocal = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
-constexpr VkMemoryPropertyFlags kMappable =
-    VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-constexpr VkMemoryPropertyFlags kCached = VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
-
-// The first memory type that has the earliest of the wanted sets of flags.
-int find_memory_type(const VkPhysicalDeviceMemoryProperties& memory, std::uint32_t allowed,
-                     std::initializer_list<VkMemoryPropertyFlags> wanted) {
-    for (const VkMemoryPropertyFlags flags : wanted)
-        for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i)
-            if ((allowed >> i & 1) && (memory.memoryTypes[i].propertyFlags & flags) == flags)
-                return static_cast<int>(i);
-    return -1;
-}
-
-int choose_memory_type(const Device::State& state, std::uint32_t allowed, Memory kind) {
-    if (kind == Memory::host)
-        return find_memory_type(state.memory, allowed, {kMappable | kCached, kMappable});
-    if (state.info.unified_memory)
-        return find_memory_type(state.memory, allowed,
-                                {kDeviceLocal | kMappable | kCached, kDeviceLocal, 0});
-    return find_memory_type(state.memory, allowed, {kDeviceLocal, 0});
-}
 
 std::string describe(const std::string& name, std::uint64_t bytes) {
     return fmt::format("buffer \"{}\" ({:.1f} MiB)", name, static_cast<double>(bytes) / (1 << 20));
@@ -91,16 +68,10 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
         buffer_ = create_handle(state, whole_words, what);
         VkMemoryRequirements needs{};
         vkGetBufferMemoryRequirements(state.device, buffer_, &needs);
-        const int type = choose_memory_type(state, needs.memoryTypeBits, kind);
-        DARB_CHECK(type >= 0, "{}: no memory type in {:#x}", what, needs.memoryTypeBits);
-        VkMemoryAllocateInfo info{};
-        info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
-        info.allocationSize = needs.size;
-        info.memoryTypeIndex = static_cast<std::uint32_t>(type);
-        check_vulkan(vkAllocateMemory(state.device, &info, nullptr, &memory_), what);
+        const DeviceMemory memory = allocate_memory(state, needs, kind, what);
+        memory_ = memory.handle;
         check_vulkan(vkBindBufferMemory(state.device, buffer_, memory_, 0), what);
-        const VkMemoryPropertyFlags flags = state.memory.memoryTypes[type].propertyFlags;
-        if (kind == Memory::host || (flags & (kMappable | kCached)) == (kMappable | kCached))
+        if (kind == Memory::host || (memory.flags & (kMappable | kCached)) == (kMappable | kCached))
             check_vulkan(vkMapMemory(state.device, memory_, 0, VK_WHOLE_SIZE, 0, &direct_), what);
         if (kind == Memory::host) mapped_ = direct_;
     } catch (...) {

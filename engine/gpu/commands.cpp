@@ -22,6 +22,27 @@ constexpr VkPipelineStageFlags2 kCompute = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BI
 // Not CLEAR and COPY: validation layers before 1.3.250 take a fill for a copy.
 constexpr VkPipelineStageFlags2 kTransfer = VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
 
+constexpr VkImageSubresourceRange kWholeColour{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+constexpr VkImageSubresourceLayers kColourLayer{VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+constexpr VkImageLayout kSource = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
+constexpr VkImageLayout kTarget = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
+
+VkExtent3D extent_of(const DeviceImage& image) {
+    return {static_cast<std::uint32_t>(image.width()), static_cast<std::uint32_t>(image.height()),
+            1};
+}
+
+VkBufferImageCopy whole_image(const DeviceImage& image) {
+    VkBufferImageCopy region{};
+    region.imageSubresource = kColourLayer;
+    region.imageExtent = extent_of(image);
+    return region;
+}
+
+std::uint64_t bytes_of(const DeviceImage& image) {
+    return std::uint64_t(image.width()) * std::uint64_t(image.height()) * 4;
+}
+
 }  // namespace
 
 struct Commands::State {
@@ -275,7 +296,87 @@ void Commands::copy(const BufferRange& from, const BufferRange& to, std::uint64_
     vkCmdCopyBuffer(s.commands, from.buffer->handle(), to.buffer->handle(), 1, &region);
 }
 
-void Commands::submit() {
+// All memory is ordered with it: buffers that it is copied from or to need no barrier of their own.
+void Commands::change_layout(DeviceImage& image, VkImageLayout layout) {
+    DARB_CHECK(state_->recording, "begin() first");
+    const VkMemoryBarrier2 memory = full_barrier();
+    VkImageMemoryBarrier2 barrier{};
+    barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2;
+    barrier.srcStageMask = memory.srcStageMask;
+    barrier.srcAccessMask = memory.srcAccessMask;
+    barrier.dstStageMask = memory.dstStageMask;
+    barrier.dstAccessMask = memory.dstAccessMask;
+    barrier.oldLayout = std::exchange(image.layout_, layout);
+    barrier.newLayout = layout;
+    barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.image = image.handle();
+    barrier.subresourceRange = kWholeColour;
+    VkDependencyInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
+    info.memoryBarrierCount = 1;
+    info.pMemoryBarriers = &memory;
+    info.imageMemoryBarrierCount = 1;
+    info.pImageMemoryBarriers = &barrier;
+    vkCmdPipelineBarrier2(state_->commands, &info);
+}
+
+void Commands::overwrite(DeviceImage& image) {
+    image.layout_ = VK_IMAGE_LAYOUT_UNDEFINED;  // what it held is not needed
+    change_layout(image, kTarget);
+}
+
+void Commands::clear(DeviceImage& image, const std::array<float, 4>& colour) {
+    overwrite(image);
+    const VkClearColorValue value{{colour[0], colour[1], colour[2], colour[3]}};
+    vkCmdClearColorImage(state_->commands, image.handle(), kTarget, &value, 1, &kWholeColour);
+}
+
+void Commands::copy(const Buffer& from, DeviceImage& to) {
+    State& s = *state_;
+    DARB_CHECK(from.bytes() >= bytes_of(to), "\"{}\", {} bytes to {} x {}", from.name(),
+               from.bytes(), to.width(), to.height());
+    s.barriers.use({from.handle(), kTransfer, VK_ACCESS_2_TRANSFER_READ_BIT, 0});
+    s.place_barriers();
+    overwrite(to);
+    const VkBufferImageCopy region = whole_image(to);
+    vkCmdCopyBufferToImage(s.commands, from.handle(), to.handle(), kTarget, 1, &region);
+}
+
+void Commands::copy(DeviceImage& from, const Buffer& to) {
+    State& s = *state_;
+    DARB_CHECK(to.bytes() >= bytes_of(from), "{} x {} to \"{}\", {} bytes", from.width(),
+               from.height(), to.name(), to.bytes());
+    s.barriers.use({to.handle(), kTransfer, 0, VK_ACCESS_2_TRANSFER_WRITE_BIT});
+    s.place_barriers();
+    change_layout(from, kSource);
+    const VkBufferImageCopy region = whole_image(from);
+    vkCmdCopyImageToBuffer(s.commands, from.handle(), kSource, to.handle(), 1, &region);
+}
+
+void Commands::copy(DeviceImage& from, DeviceImage& to, VkFilter filter) {
+    State& s = *state_;
+    change_layout(from, kSource);
+    overwrite(to);
+    if (from.format() == to.format() && from.same_size(to)) {
+        VkImageCopy region{};
+        region.srcSubresource = region.dstSubresource = kColourLayer;
+        region.extent = extent_of(to);
+        vkCmdCopyImage(s.commands, from.handle(), kSource, to.handle(), kTarget, 1, &region);
+        return;
+    }
+    VkImageBlit region{};
+    region.srcSubresource = region.dstSubresource = kColourLayer;
+    region.srcOffsets[1] = {from.width(), from.height(), 1};
+    region.dstOffsets[1] = {to.width(), to.height(), 1};
+    vkCmdBlitImage(s.commands, from.handle(), kSource, to.handle(), kTarget, 1, &region, filter);
+}
+
+VkCommandBuffer Commands::handle() const {
+    DARB_CHECK(state_->recording, "begin() first");
+    return state_->commands;
+}
+
+void Commands::submit(VkSemaphore wait_for, VkSemaphore signal) {
     State& s = *state_;
     DARB_CHECK(s.recording, "begin() first");
     s.finish_pass();
@@ -290,7 +391,7 @@ void Commands::submit() {
     s.recording = false;
     check_vulkan(vkEndCommandBuffer(s.commands), s.all_passes());
     check_vulkan(vkResetFences(s.device.handle(), 1, &s.fence), s.all_passes());
-    check_vulkan(s.device.state().submit(s.commands, s.fence), s.all_passes());
+    check_vulkan(s.device.state().submit(s.commands, s.fence, wait_for, signal), s.all_passes());
     s.in_flight = true;
 }
 

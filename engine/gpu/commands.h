@@ -4,6 +4,7 @@
 
 #include <vulkan/vulkan.h>
 
+#include <array>
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
@@ -14,6 +15,7 @@
 
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/device.h"
+#include "engine/gpu/device_image.h"
 #include "engine/gpu/pipeline.h"
 
 namespace darb {
@@ -69,9 +71,21 @@ class Commands {
     void fill(const BufferRange& range, std::uint32_t word);  // size and offset multiples of 4
     void copy(const BufferRange& from, const BufferRange& to, std::uint64_t bytes);
 
+    /// Whole images, each after all that was recorded before it. Buffers hold [height][width]
+    /// texels.
+    void clear(DeviceImage& image, const std::array<float, 4>& colour);
+    void copy(const Buffer& from, DeviceImage& to);
+    void copy(DeviceImage& from, const Buffer& to);
+    /// Scaled with this filter where the sizes differ, converted where the formats do.
+    void copy(DeviceImage& from, DeviceImage& to, VkFilter filter);
+    /// For what others do with it; what it holds stays.
+    void change_layout(DeviceImage& image, VkImageLayout layout);
+    /// For what others record, between begin() and submit().
+    VkCommandBuffer handle() const;
+
     /// Ends the recording and gives it to the queue; host reads of Memory::host buffers are made
-    /// visible. Does not wait.
-    void submit();
+    /// visible. Does not wait. It begins after wait_for and ends with signal; either may be null.
+    void submit(VkSemaphore wait_for = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
     /// Blocks (no spinning) until the last submit is done. Throws Error on a lost device.
     void wait();
     void submit_and_wait() {
@@ -83,6 +97,7 @@ class Commands {
     std::vector<PassTime> pass_times() const;
 
   private:
+    void overwrite(DeviceImage& image);
     struct State;
     std::unique_ptr<State> state_;
 };

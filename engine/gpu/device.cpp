@@ -204,7 +204,8 @@ void Device::State::set_name(VkObjectType type, std::uint64_t handle,
     instance.debug().set_name(device, &name_info);
 }
 
-VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence) {
+VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for,
+                               VkSemaphore signal) {
     if (faults.fails_submit(++submits)) return VK_ERROR_DEVICE_LOST;
     VkCommandBufferSubmitInfo buffer_info{};
     buffer_info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO;
@@ -213,6 +214,17 @@ VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence) {
     submit_info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO_2;
     submit_info.commandBufferInfoCount = 1;
     submit_info.pCommandBufferInfos = &buffer_info;
+    VkSemaphoreSubmitInfo semaphores[2]{};
+    for (VkSemaphoreSubmitInfo& one : semaphores) {
+        one.sType = VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO;
+        one.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
+    }
+    semaphores[0].semaphore = wait_for;
+    semaphores[1].semaphore = signal;
+    submit_info.waitSemaphoreInfoCount = wait_for != VK_NULL_HANDLE ? 1 : 0;
+    submit_info.pWaitSemaphoreInfos = &semaphores[0];
+    submit_info.signalSemaphoreInfoCount = signal != VK_NULL_HANDLE ? 1 : 0;
+    submit_info.pSignalSemaphoreInfos = &semaphores[1];
     const std::lock_guard lock(queue_mutex);
     return vkQueueSubmit2(queue, 1, &submit_info, fence);
 }

@@ -73,8 +73,9 @@ struct Device::State {
     VkCommandBuffer copy_commands = VK_NULL_HANDLE;
 
     void set_name(VkObjectType type, std::uint64_t handle, const std::string& name) const;
-    /// One submit under the mutex, with the fault injection.
-    VkResult submit(VkCommandBuffer commands, VkFence fence);
+    /// One submit under the mutex, with the fault injection. The semaphores may be null.
+    VkResult submit(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for = VK_NULL_HANDLE,
+                    VkSemaphore signal = VK_NULL_HANDLE);
     VkResult wait_idle();
     /// Records one copy, runs it and waits.
     void copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer to, std::uint64_t to_offset,

@@ -232,5 +232,46 @@ TEST(Commands, binding_more_than_the_device_allows_is_an_error) {
     }
 }
 
+// Through two images, the second twice as large, and back.
+TEST(Commands, images_are_copied_scaled_and_cleared_in_order) {
+    Device device;
+    constexpr VkFormat kFormat = VK_FORMAT_B8G8R8A8_UNORM;
+    const std::vector<std::uint32_t> texels = {0x01020304, 0xFF000000, 0x00FF00FF, 0xFFFFFFFF};
+    Buffer from(device, "from", 16);
+    from.upload(texels);
+    const Buffer small_back(device, "back", 16, Memory::host), large_back(device, "back", 64);
+    DeviceImage small(device, "small", 2, 2, kFormat), large(device, "large", 4, 4, kFormat);
+    Commands commands(device);
+    for (int again = 0; again < 2; ++again) {  // layouts go on from the recording before
+        commands.begin();
+        commands.clear(small, {1, 0, 0, 1});
+        commands.copy(from, small);
+        commands.copy(small, large, VK_FILTER_NEAREST);
+        commands.copy(small, small_back);
+        commands.copy(large, large_back);
+        commands.submit_and_wait();
+    }
+    EXPECT_EQ(small_back.download<std::uint32_t>(4), texels);
+    const auto* mapped = static_cast<const std::uint32_t*>(small_back.mapped());
+    EXPECT_EQ(std::vector<std::uint32_t>(mapped, mapped + 4), texels);
+    const auto scaled = large_back.download<std::uint32_t>(16);
+    for (std::size_t i = 0; i < 16; ++i)
+        EXPECT_EQ(scaled[i], texels[i / 8 * 2 + i % 4 / 2]) << "texel " << i;
+    commands.begin();
+    commands.clear(small, {0, 1, 0, 1});
+    commands.copy(small, small_back);
+    commands.submit_and_wait();
+    EXPECT_EQ(mapped[3], 0xFF00FF00U);
+}
+
+TEST(Commands, a_buffer_smaller_than_the_image_is_a_check_failure) {
+    Device device;
+    const Buffer buffer(device, "short", 12);
+    DeviceImage image(device, "image", 2, 2, VK_FORMAT_B8G8R8A8_UNORM);
+    Commands commands(device);
+    commands.begin();
+    EXPECT_DEATH(commands.copy(buffer, image), "short");
+}
+
 }  // namespace
 }  // namespace darb

@@ -1,0 +1,48 @@
+// DeviceImage: a two-dimensional colour image of the device, with its memory, its view where it is
+// drawn to, and the layout that it is in, which Commands changes.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <string>
+
+#include "engine/gpu/device.h"
+
+namespace darb {
+
+class DeviceImage {
+  public:
+    DeviceImage() = default;
+    /// Texels of 4 bytes. usage: besides copies from and to it. Its memory does not count as
+    /// Device::allocated_bytes: images are a window's, and the budget is a run's. Throws Error
+    /// naming the image and its size.
+    DeviceImage(Device& device, const std::string& name, int width, int height, VkFormat format,
+                VkImageUsageFlags usage = 0);
+    ~DeviceImage();
+    DeviceImage(DeviceImage&&) noexcept;
+    DeviceImage& operator=(DeviceImage&&) noexcept;
+    /// One that somebody else owns, as a swapchain does; what it holds is not needed.
+    static DeviceImage of_another(VkImage image, int width, int height, VkFormat format);
+
+    VkImage handle() const { return image_; }
+    VkImageView view() const { return view_; }  // null where it is not drawn to
+    VkFormat format() const { return format_; }
+    int width() const { return width_; }
+    int height() const { return height_; }
+    bool same_size(const DeviceImage& other) const {
+        return width_ == other.width_ && height_ == other.height_;
+    }
+
+  private:
+    friend class Commands;
+    void release() noexcept;
+    Device* device_ = nullptr;  // null where it is not owned
+    VkImage image_ = VK_NULL_HANDLE;
+    VkDeviceMemory memory_ = VK_NULL_HANDLE;
+    VkImageView view_ = VK_NULL_HANDLE;
+    VkFormat format_ = VK_FORMAT_UNDEFINED;
+    int width_ = 0, height_ = 0;
+    VkImageLayout layout_ = VK_IMAGE_LAYOUT_UNDEFINED;  // after what is recorded
+};
+
+}  // namespace darb
