@@ -1,4 +1,4 @@
-// Session: everything that the panels show and edit. Panels change it, the viewer acts on it.
+// Session: everything that the panels show and edit. Panels change it and ask, the viewer acts.
 #pragma once
 
 #include <deque>
@@ -8,8 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "engine/data/dataset.h"
-#include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/plan/effect_plan.h"
 #include "viewer/camera_path.h"
@@ -18,21 +16,11 @@
 #include "viewer/input.h"
 #include "viewer/motion.h"
 #include "viewer/navigation.h"
+#include "viewer/photo_compare.h"
+#include "viewer/requests.h"
 #include "viewer/scene.h"
 
 namespace darb {
-
-/// Cameras of a data set, and the photo of the one that is looked through.
-struct Photos {
-    std::vector<View> views;
-    int current = -1;      // -1: free camera
-    bool compare = false;  // photo left of the split
-    float split = 0.5f;    // share of the window's width
-    Buffer buffer;         // uint [height][width]
-    int width = 0, height = 0;
-    int loaded = -1;      // the view that buffer holds
-    bool failed = false;  // this view's photo could not be read
-};
 
 struct PathState {
     CameraPath path;
@@ -72,16 +60,16 @@ struct MeasuredChoice {
     double psnr_db = 0;       // of its 8-bit picture against the exact one; infinity where equal
 };
 
-/// What panels and keys ask for; the viewer does it after the panels of a frame and clears it.
-struct Requests {
-    /// Of unsaved edits, where session.leaving asks.
-    bool save_and_leave = false, leave = false, stay = false;
-    bool frame_all = false, take_picture = false, save = false, quit = false;
-    bool full_screen = false, leave_full_screen = false, cancel_load = false, load_path = false,
-         save_path = false;
-    bool measure = false, follow_plan = false, leave_photo = false;
-    int choose_camera = -1;  // of the data set
-    bool export_path = false, cancel_export = false, opacity_changed = false;
+/// Shares of 0 to 1; below 0 where nothing of the kind goes on.
+struct Progress {
+    double load = -1, exporting = -1, measuring = -1;
+    std::string load_stage;
+};
+
+/// Splats that the next edit deletes.
+struct Selection {
+    Region region;
+    bool shown = false;
 };
 
 /// Quit, or another scene: asked for while edits are not saved.
@@ -93,8 +81,7 @@ struct Leaving {
 struct Session {
     std::unique_ptr<Scene> scene;  // null: none yet, or a training run is shown
     Edit edit;
-    Region region;
-    bool show_region = false;
+    Selection selection;
     std::filesystem::path save_file;
     Navigation navigation;
     double fly_speed = 1;            // world units a second
@@ -104,20 +91,20 @@ struct Session {
     PathState path;
     TrainingCurves training;
     FrameTimes times;
-    Requests requests;
-    std::optional<Leaving> leaving;  // waits for an answer
-    std::string title;               // of what is shown, for a window
-    std::string error;               // shown until dismissed
-    std::string note;                // shown in the status line
+    RequestQueue requests;
+    std::vector<WindowRequest> for_window;  // of the last frame
+    std::optional<Leaving> leaving;         // waits for an answer
+    std::string title;                      // of what is shown, for a window
+    std::string error;                      // shown until dismissed
+    std::string note;                       // shown in the status line
     std::string device_name;
-    double load_share = -1;  // below 0: nothing is being loaded
-    std::string load_stage;
-    double export_share = -1;
-    double measure_share = -1;
+    Progress progress;
     std::vector<MeasuredChoice> measured;
     int sh_degree = 0;  // highest of the scene or the run
     bool panels = true;
     float gui_scale = 1;
+
+    void ask(const Request& request) { requests.push_back(request); }
 };
 
 /// The panels of one frame; progress, errors and questions also where session.panels is off. Needs

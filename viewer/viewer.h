@@ -3,16 +3,15 @@
 
 #include <chrono>
 #include <functional>
-#include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "viewer/accuracy_measure.h"
 #include "viewer/canvas.h"
 #include "viewer/gui.h"
-#include "viewer/motion.h"
-#include "viewer/path_export.h"
+#include "viewer/picture_pacing.h"
+#include "viewer/picture_work.h"
+#include "viewer/saved_files.h"
+#include "viewer/scene_loader.h"
 #include "viewer/session.h"
 #include "viewer/splat_picture.h"
 
@@ -42,7 +41,7 @@ class Viewer {
     /// Loads in the background; the scene before stays until the new one is there, and also when
     /// that fails: session().error then says why. An earlier load is cancelled.
     void open(const std::filesystem::path& path);
-    bool loading() const { return job_ != nullptr; }
+    bool loading() const { return loader_.loading(); }
     /// Waits for the load. Throws its Error.
     void finish_loading();
     /// Follows splats that someone else changes; see TrainingCurves for the rest.
@@ -64,7 +63,7 @@ class Viewer {
     void presented();
 
     /// Records the canvas's commands; run by the caller (Canvas::submit_and_wait).
-    VkCommandBuffer compose();
+    void compose();
     Canvas& canvas() { return canvas_; }
     Session& session() { return session_; }
     const SplatPicture& picture() const { return picture_; }
@@ -80,72 +79,53 @@ class Viewer {
 
   private:
     using Clock = std::chrono::steady_clock;
-    /// The panels show a picture's times in the next frame, and have their size in the one after.
-    static constexpr int kSettlingFrames = 2;
-    struct PictureKey {  // what a picture depends on
-        Camera camera;
-        DisplaySettings display;
-        int photo = -1;
-        float split = 0;
-        int version = 0;
-        bool operator==(const PictureKey& other) const;
-    };
 
+    // viewer_scene.cpp: what is shown.
     void start_load(const std::filesystem::path& path, bool dropped);
-    void poll_load();
+    void take_loaded();
     void drop(const std::filesystem::path& path);
-    void adopt(Scene scene);
-    void find_own_cameras(Scene& scene);
-    void set_pivot(const Bounds& bounds);
+    void show(LoadedScene loaded);
+    void find_own_cameras(const std::filesystem::path& scene, std::vector<std::string>& notes);
     void show_as_meant(const Scene& scene, bool first);
     void follow_plan();
-    void handle_keys(const Input& input);
-    void move(const Input& input, double seconds, int width, int height);
-    void leave_photo();
-    bool act_on_requests(int width, int height);
+    void set_pivot(const Bounds& bounds);
+    void lose_scene(const char* why);
+
+    // viewer_requests.cpp: what is asked for.
+    void act_on_requests(int width, int height);
     bool attempt(const std::function<void()>& step);
     void need_scene(const char* what) const;
     void frame_all(int width, int height);
-    void cancel_load();
-    void apply_edits();
+    void load_path();
+    void save_path();
     void save_scene();
-    void answer_leaving(const Requests& requests, bool saved);
+    void quit();
+    void leave();
+    void save_and_leave();
     void take_picture(int width, int height);
     void start_export();
-    void stop_work(const char* why);
-    void load_current_photo();
-    void play_path(double seconds);
-    Camera frame_camera(int width, int height) const;
-    PhotoOverlay overlay(const Camera& camera, int width, int height) const;
-    void draw_picture(const PictureKey& key, std::optional<MotionQuality> less = {});
-    bool preview_pays() const;
-    void rehearse_motion(const PictureKey& key);
-    double settle_panels(bool changed);
+    void step_work();
     void step_export(bool wait);
-    void step_measure();
-    void report(const std::exception& error);
+
+    // viewer_picture.cpp: the picture of a frame.
+    void load_current_photo();
+    void pace_picture(int width, int height, bool full, bool works);
+    void draw_picture(const PictureKey& key, PictureStep step);
+    void rehearse_motion(const PictureKey& key);
 
     Device* device_;
     ViewerOptions options_;
     Session session_;
+    SceneLoader loader_;
+    SavedFiles saved_;
     Canvas canvas_;
     Gui gui_;
     SplatPicture picture_;
-    MotionControl motion_;
-    std::unique_ptr<LoadJob> job_;
-    std::filesystem::path named_;  // what job_ loads, as it was asked for
-    bool dropped_ = false;         // it was dropped
-    std::vector<std::unique_ptr<LoadJob>> cancelled_;
-    std::optional<PathExport> export_;
-    std::optional<AccuracyMeasure> measure_;
-    PictureKey drawn_, last_;
-    // What the picture now is; a preview has all pixels and the most important splats.
-    bool drawn_any_ = false, drawn_moving_ = false, drawn_preview_ = false;
-    int version_ = 0;                  // of the scene and its edits
-    bool drew_moving_ = false;         // in this frame
-    bool continuous_ = false;          // the last frame wanted this one at once
-    int unsettled_ = kSettlingFrames;  // frames until the panels have settled
-    Clock::time_point frame_start_, changed_at_, last_frame_;
+    PicturePacing pacing_;
+    PictureWork work_;
+    int version_ = 0;          // of the scene and its edits
+    bool continuous_ = false;  // the last frame wanted this one at once
+    Clock::time_point frame_start_, last_frame_;
 };
 
 }  // namespace darb

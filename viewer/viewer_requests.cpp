@@ -1,35 +1,35 @@
-// What panels and keys asked for: files, edits, paths.
+// What panels, keys and the window asked for: files, edits, paths.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
 #include "engine/scene/splat_file.h"
+#include "viewer/controls.h"
 #include "viewer/viewer.h"
 
 namespace darb {
 
 namespace {
 
-ImageU8 read_pixels(const SplatPicture& picture) {
-    ImageU8 image(picture.width(), picture.height(), 3);
-    const size_t pixels = size_t(picture.width()) * picture.height();
-    const std::vector<std::uint32_t> bgra = picture.pixels().download<std::uint32_t>(pixels);
-    for (size_t p = 0; p < pixels; ++p)
-        for (size_t c = 0; c < 3; ++c)
-            image.data[3 * p + c] = static_cast<std::uint8_t>(bgra[p] >> (16 - 8 * c));
-    return image;
-}
+namespace fs = std::filesystem;
 
-std::filesystem::path free_name() {
+// Not one of a link either, to whatever it leads.
+fs::path free_picture_name() {
     for (int n = 1;; ++n) {
-        const std::filesystem::path file = fmt::format("darb_{:03d}.png", n);
-        if (!std::filesystem::exists(file)) return file;
+        const fs::path file = fmt::format("darb_{:03d}.png", n);
+        if (fs::symlink_status(file).type() == fs::file_type::not_found) return file;
     }
 }
+
+template <class... Kinds>
+struct ByKind : Kinds... {
+    using Kinds::operator()...;
+};
+template <class... Kinds>
+ByKind(Kinds...) -> ByKind<Kinds...>;
 
 }  // namespace
 
@@ -39,54 +39,50 @@ bool Viewer::attempt(const std::function<void()>& step) {
         step();
         return true;
     } catch (const std::exception& e) {
-        report(e);
+        session_.error = e.what();
         return false;
     }
 }
 
-// True where the picture is now one of an export or a measurement.
-bool Viewer::act_on_requests(int width, int height) {
+void Viewer::act_on_requests(int width, int height) {
     Session& s = session_;
-    const Requests r = s.requests;
-    s.requests = Requests();
-    s.requests.full_screen = r.full_screen;  // the window's
-    s.requests.leave_full_screen = r.leave_full_screen;
-    if (r.leave_photo) leave_photo();
-    if (r.frame_all) frame_all(width, height);
-    if (r.choose_camera >= 0) attempt([&] { choose_camera(r.choose_camera); });
-    if (r.cancel_load && job_) cancel_load();
-    if (r.opacity_changed && s.scene) attempt([&] { apply_edits(); });
-    const bool saves = (r.save || r.save_and_leave) && s.scene;
-    answer_leaving(r, saves && attempt([&] { save_scene(); }));
-    if (r.take_picture) attempt([&] { take_picture(width, height); });
-    if (r.load_path)
-        attempt([&] {
-            s.path.path = read_camera_path(s.path.file);
-            s.note =
-                fmt::format("{} key frames from {}", s.path.path.keys.size(), s.path.file.string());
-        });
-    if (r.save_path)
-        attempt([&] {
-            write_camera_path(s.path.file, s.path.path);
-            s.note = "path in " + s.path.file.string();
-        });
-    if (r.follow_plan && s.plan) follow_plan();
-    if (r.cancel_export) {
-        export_.reset();
-        measure_.reset();
-    }
-    if (r.export_path) attempt([&] { start_export(); });
-    if (r.measure)
-        attempt([&] {
+    s.for_window.clear();
+    const ByKind act{
+        [&](request::FrameAll) { frame_all(width, height); },
+        [&](request::TakePicture) { take_picture(width, height); },
+        [&](request::ChooseCamera camera) { choose_camera(camera.view); },
+        [&](request::LeavePhoto) { leave_photo(s); },
+        [&](request::FollowPlan) { follow_plan(); },
+        [&](request::Measure) {
             need_scene("measurement");
-            measure_.emplace(frame_camera(width, height), s.display, s.own);
-        });
-    const bool works = measure_ || (export_ && !export_->has_frames());
-    if (export_ && !attempt([&] { step_export(false); })) export_.reset();
-    if (measure_ && !attempt([&] { step_measure(); })) measure_.reset();
-    s.export_share = export_ ? export_->share() : -1;
-    s.measure_share = measure_ ? measure_->share() : -1;
-    return works;
+            work_.start_measure(camera_in_window(s.photos, s.navigation, width, height), s.display,
+                                s.own);
+        },
+        [&](request::ShowEdits) {
+            if (!s.scene) return;
+            lose_scene("the scene was edited");
+            picture_.set_removed(s.edit.removed());
+        },
+        [&](request::Save) { save_scene(); },
+        [&](request::LoadPath) { load_path(); },
+        [&](request::SavePath) { save_path(); },
+        [&](request::ExportPath) { start_export(); },
+        [&](request::CancelLoad) {
+            loader_.cancel();
+            s.progress.load = -1;
+        },
+        [&](request::CancelWork) { work_.cancel(); },
+        [&](request::Quit) { quit(); },
+        [&](request::SaveAndLeave) { save_and_leave(); },
+        [&](request::Leave) { leave(); },
+        [&](request::Stay) { s.leaving.reset(); },
+        [&](request::ToggleFullScreen) {
+            s.for_window.push_back(WindowRequest::toggle_full_screen);
+        },
+        [&](request::LeaveFullScreen) { s.for_window.push_back(WindowRequest::leave_full_screen); },
+    };
+    for (const Request& request : std::exchange(s.requests, {}))
+        attempt([&] { std::visit(act, request); });
 }
 
 void Viewer::need_scene(const char* what) const {
@@ -96,58 +92,72 @@ void Viewer::need_scene(const char* what) const {
 }
 
 void Viewer::frame_all(int width, int height) {
-    leave_photo();
+    leave_photo(session_);
     const Bounds bounds = picture_.bounds();
     session_.navigation.frame(bounds.centre, bounds.radius, double(width) / height);
 }
 
-void Viewer::cancel_load() {
-    job_->cancel();
-    cancelled_.push_back(std::move(job_));
-    session_.load_share = -1;
+void Viewer::load_path() {
+    PathState& p = session_.path;
+    p.path = read_camera_path(p.file);
+    session_.note = fmt::format("{} key frames from {}", p.path.keys.size(), p.file.string());
 }
 
-void Viewer::apply_edits() {
-    stop_work("the scene was edited");
-    picture_.set_removed(session_.edit.removed());
-    ++version_;
+void Viewer::save_path() {
+    PathState& p = session_.path;
+    saved_.check(p.file);
+    write_camera_path(p.file, p.path);
+    saved_.wrote(p.file);
+    session_.note = "path in " + p.file.string();
 }
 
 void Viewer::save_scene() {
     Session& s = session_;
+    if (!s.scene) return;
     const std::optional<SplatFormat> format = format_to_write(s.save_file);
     if (!format)
         throw Error(s.save_file.string(), "its ending names no format to write",
                     "Use .ply, .compressed.ply, .spz or .splat.");
+    saved_.check(s.save_file);
     const SplatModel model = s.edit.apply(s.scene->model);
     save_splats(s.save_file, *format, model);
+    saved_.wrote(s.save_file);
     s.edit.mark_saved();
     s.note = fmt::format("saved {} splats to {}", model.size(), s.save_file.string());
     for (const std::string& loss : losses_of(*format, model)) s.note += "\n" + loss;
 }
 
-// Quitting, or another scene, would take edits away that are not saved.
-void Viewer::answer_leaving(const Requests& r, bool saved) {
-    Session& s = session_;
-    const bool unsaved = s.scene && s.edit.unsaved();
-    if (r.quit && unsaved) s.leaving = Leaving{true, {}};
-    s.requests.quit = r.quit && !unsaved;
-    if (!s.leaving) return;
-    const bool leaves = r.leave || (r.save_and_leave && saved);
-    if (!leaves && !r.stay && !r.save_and_leave) return;
-    const Leaving leaving = *std::exchange(s.leaving, std::nullopt);
-    if (!leaves) return;
+// Not with edits that are not saved, without a question.
+void Viewer::quit() {
+    if (session_.scene && session_.edit.unsaved())
+        session_.leaving = Leaving{true, {}};
+    else
+        session_.for_window.push_back(WindowRequest::close);
+}
+
+void Viewer::leave() {
+    if (!session_.leaving) return;
+    const Leaving leaving = *std::exchange(session_.leaving, std::nullopt);
     if (leaving.quit)
-        s.requests.quit = true;
+        session_.for_window.push_back(WindowRequest::close);
     else
         start_load(leaving.open, true);
 }
 
+// Where it cannot be saved one stays, with the message.
+void Viewer::save_and_leave() {
+    const std::optional<Leaving> leaving = std::exchange(session_.leaving, std::nullopt);
+    save_scene();
+    session_.leaving = leaving;
+    leave();
+}
+
 void Viewer::take_picture(int width, int height) {
     need_scene("picture");
-    const Camera camera = frame_camera(width, height);
-    picture_.render(camera, session_.display, overlay(camera, width, height));
-    const std::filesystem::path file = free_name();
+    const Photos& photos = session_.photos;
+    const Camera camera = camera_in_window(photos, session_.navigation, width, height);
+    picture_.render(camera, session_.display, overlay_of(photos, camera, width, height));
+    const fs::path file = free_picture_name();
     write_png(file, read_pixels(picture_));
     session_.note = "picture in " + file.string();
 }
@@ -155,54 +165,29 @@ void Viewer::take_picture(int width, int height) {
 void Viewer::start_export() {
     need_scene("export");
     const PathState& p = session_.path;
-    export_.reset();  // an earlier one may be writing the same video
-    export_.emplace(
-        p.path, ExportOptions{p.folder, p.fps, p.export_width, p.export_height, session_.display});
-}
-
-// The frames of an export, and the pictures of a measurement, are of one scene.
-void Viewer::stop_work(const char* why) {
-    measure_.reset();
-    if (!export_ || export_->has_frames()) return;
-    session_.note = fmt::format("the export ended after {} of {} frames: {}", export_->written(),
-                                export_->frame_count(), why);
-    export_.reset();
+    work_.start_export(p.path,
+                       {p.folder, p.fps, p.export_width, p.export_height, session_.display});
 }
 
 void Viewer::step_export(bool wait) {
-    export_->step(
-        [&](const Camera& camera, const DisplaySettings& display) {
-            drawn_any_ = false;  // the picture is one of the export now
-            picture_.render(camera, display, {});
-            return read_pixels(picture_);
-        },
-        wait);
-    if (!export_->done()) return;
-    session_.note = export_->summary();
-    export_.reset();
-    unsettled_ = kSettlingFrames + 1;  // the panels say so
+    const std::optional<std::string> summary = work_.step_export(picture_, wait);
+    if (!summary) return;
+    session_.note = *summary;
+    pacing_.unsettle(PicturePacing::kSettlingFrames + 1);  // the panels say so
 }
 
-void Viewer::step_measure() {
-    drawn_any_ = false;
-    measure_->step([&](const Camera& camera, const DisplaySettings& display) {
-        double ms = 0;
-        for (int i = 0; i < 3; ++i) {  // the first may compile; the lesser of the others counts
-            picture_.render(camera, display, {});
-            double sum = 0;
-            for (const PassTime& pass : picture_.pass_times())
-                if (pass.name != "display") sum += pass.ms;
-            if (i > 0) ms = i == 1 ? sum : std::min(ms, sum);
-        }
-        return AccuracyMeasure::Frame{read_pixels(picture_), ms};
-    });
-    session_.measured = measure_->results();
-    if (measure_->done()) measure_.reset();
+void Viewer::step_work() {
+    if (work_.draws()) pacing_.forget();  // the picture is one of its own then
+    if (work_.exports()) attempt([&] { step_export(false); });
+    if (work_.measures()) attempt([&] { session_.measured = work_.step_measure(picture_); });
+    session_.progress.exporting = work_.export_share();
+    session_.progress.measuring = work_.measure_share();
 }
 
 void Viewer::export_path_now() {
     start_export();
-    while (export_) step_export(true);
+    pacing_.forget();
+    while (work_.exports()) step_export(true);
 }
 
 }  // namespace darb

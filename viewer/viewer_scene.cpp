@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "engine/core/error.h"
+#include "viewer/controls.h"
 #include "viewer/viewer.h"
 
 namespace darb {
@@ -35,69 +36,48 @@ void Viewer::drop(const std::filesystem::path& path) {
 }
 
 void Viewer::start_load(const std::filesystem::path& path, bool dropped) {
-    try {
-        const std::filesystem::path file = options_.resolve ? options_.resolve(path) : path;
-        if (job_) {
-            job_->cancel();
-            cancelled_.push_back(std::move(job_));
-        }
+    attempt([&] {
+        loader_.start(path, dropped);
         session_.error.clear();
         if (dropped) session_.note.clear();
-        named_ = path;
-        dropped_ = dropped;
-        job_ = std::make_unique<LoadJob>(file, options_.wake);
-    } catch (const std::exception& e) {
-        report(e);
-    }
+    });
 }
 
 void Viewer::finish_loading() {
-    if (!job_) {
+    if (!loading()) {
         if (!session_.error.empty()) throw Error("darb view", session_.error);
         return;
     }
-    job_->wait();
-    std::optional<Scene> scene = std::exchange(job_, nullptr)->take();
-    if (scene) adopt(std::move(*scene));
+    if (std::optional<LoadedScene> loaded = loader_.wait()) show(std::move(*loaded));
 }
 
-void Viewer::report(const std::exception& error) {
-    session_.error = error.what();
-}
-
-void Viewer::poll_load() {
-    std::erase_if(cancelled_, [](const auto& job) { return job->done(); });
-    session_.load_share = job_ ? job_->share() : -1;
-    if (!job_) return;
-    session_.load_stage = fmt::format("{}: {}", job_->file().filename().string(), job_->stage());
-    if (!job_->done()) return;
-    session_.load_share = -1;
-    const std::unique_ptr<LoadJob> job = std::move(job_);
-    try {
-        if (std::optional<Scene> scene = job->take()) adopt(std::move(*scene));
-    } catch (const std::exception& e) {
-        report(e);
-    }
+void Viewer::take_loaded() {
+    attempt([&] {
+        if (std::optional<LoadedScene> loaded = loader_.poll()) show(std::move(*loaded));
+    });
+    session_.progress.load = loader_.share();
+    session_.progress.load_stage = loader_.stage();
 }
 
 // The device's copy first: when that fails, the scene before is still there.
-void Viewer::adopt(Scene loaded) {
-    auto scene = std::make_unique<Scene>(std::move(loaded));
+void Viewer::show(LoadedScene loaded) {
+    auto scene = std::make_unique<Scene>(std::move(loaded.scene));
     picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
-    stop_work("another scene was opened");
-    motion_.start(picture_.splat_count(), picture_.most_moving());
+    lose_scene("another scene was opened");
+    pacing_.motion().start(picture_.splat_count(), picture_.most_moving());
     // The scene of a run that was shown: from where the user looked at the run.
     const bool of_run = session_.scene == nullptr && session_.training.finished;
     const bool first = session_.scene == nullptr && !of_run;
     session_.leaving.reset();
-    if (dropped_) find_own_cameras(*scene);
+    if (loaded.dropped) find_own_cameras(loaded.asked_for, scene->notes);
     session_.scene = std::move(scene);
-    const std::filesystem::path shown = named_.has_filename() ? named_ : named_.parent_path();
-    session_.title = shown.filename().string() + " - darb";
+    const std::filesystem::path& asked = loaded.asked_for;
+    session_.title =
+        (asked.has_filename() ? asked : asked.parent_path()).filename().string() + " - darb";
     const Scene& s = *session_.scene;
     session_.sh_degree = s.model.sh_degree;
     session_.edit = Edit(s.model.size());
-    session_.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
+    session_.selection.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
     session_.save_file = s.file;
     session_.save_file.replace_filename(s.file.stem().string() + "_edited.ply");
     session_.fly_speed = s.bounds.radius / 2;
@@ -105,21 +85,33 @@ void Viewer::adopt(Scene loaded) {
     fmt::print("loaded {}: {} splats in {:.2f} s\neffects: {}\n", s.file.string(), s.model.size(),
                s.load_s, plan_line(*session_.plan));
     std::fflush(stdout);
-    ++version_;
     if (first) session_.navigation.level();
-    if (session_.photos.current < 0 && !of_run) session_.requests.frame_all = true;
+    if (session_.photos.current < 0 && !of_run) session_.ask(request::FrameAll{});
     set_pivot(s.bounds);
 }
 
+// The frames of an export, and the pictures of a measurement, are of one scene.
+void Viewer::lose_scene(const char* why) {
+    const std::string note = work_.lose_scene(why);
+    if (!note.empty()) session_.note = note;
+    ++version_;
+}
+
+// As far as the scene is: orbits turn around it, pans follow the hand.
+void Viewer::set_pivot(const Bounds& bounds) {
+    Navigation& n = session_.navigation;
+    n.distance = std::max(glm::distance(n.eye, bounds.centre), bounds.radius * 0.1);
+}
+
 // Cameras belong to the scene that they were opened with.
-void Viewer::find_own_cameras(Scene& scene) {
+void Viewer::find_own_cameras(const std::filesystem::path& scene, std::vector<std::string>& notes) {
     if (!options_.find_cameras) return;
-    leave_photo();
+    leave_photo(session_);
     session_.photos = Photos();
     try {
-        session_.photos.views = options_.find_cameras(named_);
+        session_.photos.views = options_.find_cameras(scene);
     } catch (const std::exception& e) {
-        scene.notes.emplace_back(e.what());
+        notes.emplace_back(e.what());
     }
 }
 
@@ -153,6 +145,7 @@ void Viewer::show_as_meant(const Scene& s, bool first) {
 }
 
 void Viewer::follow_plan() {
+    if (!session_.plan) return;
     const EffectPlan& plan = *session_.plan;
     DisplaySettings& d = session_.display;
     d.effects = plan.projection();
@@ -173,19 +166,19 @@ void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
     session_.display.effects.smoothing = session_.own.effects.smoothing =
         splats.antialias() && smoothing;
     if (!first) return;
-    motion_.start(splats.count(), 1);
+    pacing_.motion().start(splats.count(), 1);
     session_.display.kernel = splats.kernel();
     session_.display.footprint = splats.footprint();
     session_.display.effects.antialias = splats.antialias();
     session_.display.effects.lens = any_lens(session_.photos.views);
     session_.own = session_.display;
     session_.fly_speed = bounds.radius / 2;
-    session_.requests.frame_all = session_.photos.current < 0;
+    if (session_.photos.current < 0) session_.ask(request::FrameAll{});
     set_pivot(bounds);
 }
 
 void Viewer::end_live() {
-    stop_work("the run is over");
+    lose_scene("the run is over");
     picture_.clear();
     session_.training.finished = true;
 }

@@ -144,6 +144,7 @@ struct ViewerWindow::State {
     bool* held_key(int key);  // its flag in input, or null
     void draw();
     void close_minimised();
+    void obey(WindowRequest request);
     void toggle_full_screen();
     static State& of(GLFWwindow* w) { return *static_cast<State*>(glfwGetWindowUserPointer(w)); }
 
@@ -199,7 +200,7 @@ void ViewerWindow::State::install_callbacks() {
     });
     glfwSetWindowCloseCallback(w, [](GLFWwindow* from) {  // the viewer may have a question
         State& s = of(from);
-        if (s.viewer) s.viewer->session().requests.quit = true;
+        if (s.viewer) s.viewer->session().ask(request::Quit{});
         s.dirty = true;
         glfwSetWindowShouldClose(from, GLFW_FALSE);
     });
@@ -283,7 +284,7 @@ void ViewerWindow::State::toggle_full_screen() {
 // Without a frame that could ask.
 void ViewerWindow::State::close_minimised() {
     const Session& session = viewer->session();
-    if (!session.requests.quit) return;
+    if (!asks_for<request::Quit>(session.requests)) return;
     if (session.edit.unsaved())
         glfwRestoreWindow(window.handle);
     else
@@ -306,18 +307,21 @@ void ViewerWindow::State::draw() {
     const double wanted_in = viewer->frame(input, width, height, false);
     next_frame_at = glfwGetTime() + wanted_in;
     input = Input();
-    if (!swapchain.present(viewer->canvas(), [&] { return viewer->compose(); })) dirty = true;
+    if (!swapchain.present(viewer->canvas(), [&] { viewer->compose(); })) dirty = true;
     viewer->presented();
     if (title != viewer->session().title) {
         title = viewer->session().title;
         glfwSetWindowTitle(window.handle, title.c_str());
     }
-    Requests& requests = viewer->session().requests;
-    const bool leave = std::exchange(requests.leave_full_screen, false);
-    if (std::exchange(requests.full_screen, false) ||
-        (leave && glfwGetWindowMonitor(window.handle) != nullptr))
+    for (const WindowRequest request : viewer->session().for_window) obey(request);
+}
+
+void ViewerWindow::State::obey(WindowRequest request) {
+    const bool is_full = glfwGetWindowMonitor(window.handle) != nullptr;
+    if (request == WindowRequest::close)
+        glfwSetWindowShouldClose(window.handle, GLFW_TRUE);
+    else if (request == WindowRequest::toggle_full_screen || is_full)
         toggle_full_screen();
-    if (requests.quit) glfwSetWindowShouldClose(window.handle, GLFW_TRUE);
 }
 
 ViewerWindow::ViewerWindow(Device& device, ViewerOptions options, int width, int height)

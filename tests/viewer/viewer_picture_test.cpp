@@ -67,7 +67,7 @@ TEST_F(ViewerTest, Background_is_seen_where_nothing_is) {
     load(file_);
     viewer_->session().edit.remove(scene_.model, {Region::Shape::box, {0, 0, 0}, glm::dvec3(1e3)},
                                    true);
-    viewer_->session().requests.opacity_changed = true;
+    viewer_->session().ask(request::ShowEdits{});
     viewer_->session().display.background = {1, 0.4f, 0};
     const ImageU8 image = shot();
     EXPECT_EQ(image.at(5, 5, 0), 255);
@@ -213,9 +213,9 @@ TEST_F(ViewerTest, Accuracy_switch_changes_the_picture_and_its_measure_says_how_
     load(file_);
     Session& s = viewer_->session();
     const ImageU8 before = shot();
-    s.requests.measure = true;
+    s.ask(request::Measure{});
     do shot();
-    while (s.measure_share >= 0);
+    while (s.progress.measuring >= 0);
     size_t choices = 0;
     for (const int row : kAccuracyRows) choices += row_choices(row, 3).size();
     for (const int row : kEffectRows) choices += row_choices(row, s.sh_degree).size();
@@ -282,7 +282,7 @@ TEST_F(ViewerTest, Accuracy_and_effects_are_those_of_the_command_line) {
     EXPECT_FALSE(s.plan->on(EFFECT_NEAR));
     EXPECT_TRUE(s.plan->row(EFFECT_ANTIALIAS).reason.starts_with("--effects"));
     viewer_->session().display.effects.near_care = true;
-    viewer_->session().requests.follow_plan = true;
+    viewer_->session().ask(request::FollowPlan{});
     shot();
     EXPECT_FALSE(s.display.effects.near_care);
 }

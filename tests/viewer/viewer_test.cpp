@@ -55,7 +55,7 @@ TEST_F(ViewerTest, Missing_file_without_a_window_is_an_error) {
 TEST_F(ViewerTest, Cancelled_load_keeps_the_scene) {
     load(file_);
     viewer_->open(file_);
-    viewer_->session().requests.cancel_load = true;
+    viewer_->session().ask(request::CancelLoad{});
     shot();
     EXPECT_FALSE(viewer_->loading());
     EXPECT_TRUE(viewer_->session().scene);
@@ -110,15 +110,15 @@ TEST_F(ViewerTest, Delete_undo_and_save) {
     load(file_);
     Session& s = viewer_->session();
     const ImageU8 before = shot();
-    s.region = {Region::Shape::sphere, {0, 0, 0}, glm::dvec3(0.8)};
-    s.show_region = true;
+    s.selection.region = {Region::Shape::sphere, {0, 0, 0}, glm::dvec3(0.8)};
+    s.selection.shown = true;
     Input input;
     input.pressed = {Key::remove};
     const ImageU8 after = shot(true, input);
     EXPECT_GT(s.edit.removed_count(), 0u);
     EXPECT_GT(largest_difference(after, before), 20);
     s.save_file = folder_ / "edited.ply";
-    s.requests.save = true;
+    s.ask(request::Save{});
     shot();
     const SplatModel saved = read_ply(s.save_file);
     EXPECT_EQ(saved.size(), scene_.model.size() - s.edit.removed_count());
@@ -179,9 +179,9 @@ TEST_F(ViewerTest, The_scene_is_shown_again_after_an_export) {
     s.path.folder = folder_ / "frames";
     s.path.export_width = 2 * kWidth;
     s.path.export_height = kHeight / 2;
-    s.requests.export_path = true;
+    s.ask(request::ExportPath{});
     EXPECT_GT(largest_difference(shot(false), before), 20);  // the frame that is exported
-    while (s.export_share >= 0) viewer_->frame({}, kWidth, kHeight, false);
+    while (s.progress.exporting >= 0) viewer_->frame({}, kWidth, kHeight, false);
     EXPECT_EQ(largest_difference(shot(false), before), 0);
 }
 

@@ -16,6 +16,11 @@ class ViewerWork : public ViewerTest {
   protected:
     Session& session() { return viewer_->session(); }
     void frame(const Input& input = {}) { viewer_->frame(input, kWidth, kHeight, true); }
+    // The window is asked to.
+    bool closes() {
+        const auto& asked = session().for_window;
+        return std::find(asked.begin(), asked.end(), WindowRequest::close) != asked.end();
+    }
     void press(Key key) {
         Input input;
         input.pressed = {key};
@@ -44,8 +49,8 @@ class ViewerWork : public ViewerTest {
         return fs::exists(session().path.folder / fmt::format("frame_{:05d}.png", n));
     }
     void delete_something() {
-        session().region = {Region::Shape::sphere, {0, 0, 0}, glm::dvec3(0.8)};
-        session().show_region = true;
+        session().selection.region = {Region::Shape::sphere, {0, 0, 0}, glm::dvec3(0.8)};
+        session().selection.shown = true;
         press(Key::remove);
         ASSERT_TRUE(session().edit.unsaved());
     }
@@ -54,8 +59,9 @@ class ViewerWork : public ViewerTest {
 TEST_F(ViewerWork, Without_a_scene_it_says_so) {
     make_path(2);
     for (const int what : {0, 1, 2}) {
-        Requests& r = session().requests;
-        (what == 0 ? r.export_path : what == 1 ? r.measure : r.take_picture) = true;
+        session().ask(what == 0   ? Request(request::ExportPath{})
+                      : what == 1 ? Request(request::Measure{})
+                                  : Request(request::TakePicture{}));
         session().error.clear();
         frame();
         EXPECT_NE(session().error.find("there is no scene"), std::string::npos) << what;
@@ -65,21 +71,21 @@ TEST_F(ViewerWork, Without_a_scene_it_says_so) {
 
 TEST_F(ViewerWork, A_measurement_keeps_the_size_that_it_began_with) {
     load(file_);
-    session().requests.measure = true;
+    session().ask(request::Measure{});
     frame();
-    ASSERT_GE(session().measure_share, 0);
+    ASSERT_GE(session().progress.measuring, 0);
     viewer_->frame({}, kWidth / 2, kHeight / 2, true);
-    EXPECT_GE(session().measure_share, 0);
+    EXPECT_GE(session().progress.measuring, 0);
     EXPECT_TRUE(session().error.empty()) << session().error;
     delete_something();
-    EXPECT_LT(session().measure_share, 0) << "it goes on, with another scene";
+    EXPECT_LT(session().progress.measuring, 0) << "it goes on, with another scene";
 }
 
 TEST_F(ViewerWork, An_export_keeps_its_size_and_display_and_ends_with_its_scene) {
     load(file_);
     make_path(3);
     frame();
-    session().requests.export_path = true;
+    session().ask(request::ExportPath{});
     frame();
     session().path.export_width = 2 * kWidth;
     session().display.style = SplatStyle::points;
@@ -90,7 +96,7 @@ TEST_F(ViewerWork, An_export_keeps_its_size_and_display_and_ends_with_its_scene)
     load(file_);
     frame();
     EXPECT_FALSE(is_frame(2));
-    EXPECT_LT(session().export_share, 0);
+    EXPECT_LT(session().progress.exporting, 0);
     EXPECT_NE(session().note.find("2 of 3 frames"), std::string::npos) << session().note;
 }
 
@@ -114,12 +120,12 @@ TEST_F(ViewerWork, The_folder_holds_the_frames_of_the_last_export_alone) {
 TEST_F(ViewerWork, A_request_that_fails_leaves_an_export_alone) {
     load(file_);
     make_path(3);
-    session().requests.export_path = true;
-    session().requests.load_path = true;
+    session().ask(request::ExportPath{});
+    session().ask(request::LoadPath{});
     session().path.file = folder_ / "none.json";
     frame();
     EXPECT_NE(session().error.find("none.json"), std::string::npos);
-    EXPECT_GE(session().export_share, 0);
+    EXPECT_GE(session().progress.exporting, 0);
 }
 
 // Pictures of a run while an export and a measurement of it go on; then its scene.
@@ -127,16 +133,17 @@ TEST_F(ViewerWork, A_run_that_ends_takes_its_work_along_and_keeps_the_view) {
     const GpuSplats splats(shared_device(), scene_.model, false);
     viewer_->show_live(splats, {{0, 0, 0}, 2});
     make_path(3);
-    session().requests.export_path = session().requests.measure = true;
+    session().ask(request::ExportPath{});
+    session().ask(request::Measure{});
     frame();
-    EXPECT_GE(session().export_share, 0);
+    EXPECT_GE(session().progress.exporting, 0);
     drop(file_);
     EXPECT_FALSE(viewer_->loading()) << "dropped on a run";
     EXPECT_FALSE(session().note.empty());
     viewer_->end_live();
     frame();
-    EXPECT_LT(session().export_share, 0);
-    EXPECT_LT(session().measure_share, 0);
+    EXPECT_LT(session().progress.exporting, 0);
+    EXPECT_LT(session().progress.measuring, 0);
     EXPECT_TRUE(session().error.empty()) << session().error;
     session().navigation.orbit(0.3, 0.1);
     const glm::dvec3 eye = session().navigation.eye;
@@ -149,7 +156,7 @@ TEST_F(ViewerWork, Unsaved_edits_are_asked_about_before_another_scene_and_the_en
     load(file_);
     delete_something();
     press(Key::quit);
-    EXPECT_FALSE(session().requests.quit);
+    EXPECT_FALSE(closes());
     ASSERT_TRUE(session().leaving && session().leaving->quit);
     press(Key::escape);
     EXPECT_FALSE(session().leaving);
@@ -157,22 +164,22 @@ TEST_F(ViewerWork, Unsaved_edits_are_asked_about_before_another_scene_and_the_en
     EXPECT_FALSE(viewer_->loading());
     ASSERT_TRUE(session().leaving);
     session().save_file = folder_ / "edited.nothing";  // cannot be saved: stays
-    session().requests.save_and_leave = true;
+    session().ask(request::SaveAndLeave{});
     frame();
     EXPECT_FALSE(session().leaving || viewer_->loading());
     EXPECT_FALSE(session().error.empty());
     session().save_file = folder_ / "edited.splat";
     drop(file_);
-    session().requests.save_and_leave = true;
+    session().ask(request::SaveAndLeave{});
     frame();
     finish_load();
     EXPECT_TRUE(fs::exists(session().save_file.parent_path() / "edited.splat"));
     EXPECT_EQ(session().edit.removed_count(), 0u) << "the other scene";
     delete_something();
     press(Key::quit);
-    session().requests.leave = true;
+    session().ask(request::Leave{});
     frame();
-    EXPECT_TRUE(session().requests.quit);
+    EXPECT_TRUE(closes());
 }
 
 TEST_F(ViewerWork, A_save_says_what_the_format_loses_and_is_not_asked_about) {
@@ -185,7 +192,7 @@ TEST_F(ViewerWork, A_save_says_what_the_format_loses_and_is_not_asked_about) {
     ASSERT_FALSE(losses.empty());
     EXPECT_NE(session().note.find(losses[0]), std::string::npos) << session().note;
     press(Key::quit);
-    EXPECT_TRUE(session().requests.quit);
+    EXPECT_TRUE(closes());
 }
 
 TEST_F(ViewerWork, A_dropped_scene_brings_its_own_cameras) {
@@ -231,7 +238,7 @@ TEST_F(ViewerWork, Leaving_the_photo_leaves_its_error_map) {
     viewer_->choose_camera(0);
     session().display.mode = VIEW_ERROR;
     frame();
-    session().requests.leave_photo = true;
+    session().ask(request::LeavePhoto{});
     frame();
     EXPECT_EQ(session().display.mode, VIEW_COLOUR);
     EXPECT_EQ(session().photos.current, -1);

@@ -40,7 +40,7 @@ void choices(Session& s, int row) {
 }
 
 void measure_button(Session& s) {
-    if (ImGui::Button("Measure here")) s.requests.measure = true;
+    if (ImGui::Button("Measure here")) s.ask(request::Measure{});
     ImGui::TextWrapped("Time on the device, error of the 8-bit picture against the exact one.");
 }
 
@@ -61,7 +61,7 @@ void effects_panel(Session& s) {
     if (!ImGui::CollapsingHeader("Effects")) return;
     ImGui::PushID("effects");
     measure_button(s);
-    if (s.plan && ImGui::Button("As planned")) s.requests.follow_plan = true;
+    if (s.plan && ImGui::Button("As planned")) s.ask(request::FollowPlan{});
     for (int effect = 0; effect < EFFECT_COUNT; ++effect) {
         const int row = effect_row(effect);
         bool has_switch = false;

@@ -32,7 +32,8 @@ void data_set(Session& s) {
         for (int i = 0; i < static_cast<int>(p.views.size()); ++i) {
             const View& view = p.views[static_cast<size_t>(i)];
             ImGui::PushID(i);
-            if (ImGui::Selectable(view.name.c_str(), i == p.current)) s.requests.choose_camera = i;
+            if (ImGui::Selectable(view.name.c_str(), i == p.current))
+                s.ask(request::ChooseCamera{i});
             ImGui::PopID();
         }
         ImGui::EndCombo();
@@ -49,9 +50,9 @@ void data_set(Session& s) {
 
 void camera_panel(Session& s) {
     if (!ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) return;
-    if (ImGui::Button("Frame all (F)")) s.requests.frame_all = true;
+    if (ImGui::Button("Frame all (F)")) s.ask(request::FrameAll{});
     ImGui::SameLine();
-    if (ImGui::Button("Picture (P)")) s.requests.take_picture = true;
+    if (ImGui::Button("Picture (P)")) s.ask(request::TakePicture{});
     if (s.photos.current < 0) {
         float degrees = static_cast<float>(glm::degrees(s.navigation.fov_y));
         if (ImGui::SliderFloat("field of view", &degrees, 10, 120, "%.0f deg", kClamped))

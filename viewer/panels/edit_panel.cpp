@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "viewer/panels/panels.h"
-#include "viewer/view_camera.h"
 
 namespace darb {
 
@@ -67,9 +66,10 @@ void draw_sphere(const Camera& camera, const Region& r) {
 void buttons(Session& s) {
     const SplatModel& model = s.scene->model;
     bool changed = false;
-    if (ImGui::Button("Delete inside")) changed = s.edit.remove(model, s.region, true) > 0;
+    if (ImGui::Button("Delete inside"))
+        changed = s.edit.remove(model, s.selection.region, true) > 0;
     ImGui::SameLine();
-    if (ImGui::Button("Crop to it")) changed = s.edit.remove(model, s.region, false) > 0;
+    if (ImGui::Button("Crop to it")) changed = s.edit.remove(model, s.selection.region, false) > 0;
     ImGui::BeginDisabled(!s.edit.can_undo());
     if (ImGui::Button("Undo")) {
         s.edit.undo();
@@ -85,47 +85,44 @@ void buttons(Session& s) {
     ImGui::EndDisabled();
     ImGui::SameLine();
     ImGui::Text("%zu deleted", s.edit.removed_count());
-    if (changed) s.requests.opacity_changed = true;
+    if (changed) s.ask(request::ShowEdits{});
 }
 
 }  // namespace
 
 void draw_region(const Session& s, int width, int height) {
-    const Photos& p = s.photos;
-    const Camera camera =
-        p.current < 0 ? s.navigation.camera(width, height)
-                      : fitted(p.views[static_cast<size_t>(p.current)].camera, width, height);
-    if (s.region.shape == Region::Shape::box)
-        draw_box(camera, s.region);
+    const Camera camera = camera_in_window(s.photos, s.navigation, width, height);
+    if (s.selection.region.shape == Region::Shape::box)
+        draw_box(camera, s.selection.region);
     else
-        draw_sphere(camera, s.region);
+        draw_sphere(camera, s.selection.region);
 }
 
 void edit_panel(Session& s) {
     if (!s.scene || !ImGui::CollapsingHeader("Edit")) return;
-    ImGui::Checkbox("show the selection", &s.show_region);
-    int shape = s.region.shape == Region::Shape::sphere ? 1 : 0;
+    ImGui::Checkbox("show the selection", &s.selection.shown);
+    int shape = s.selection.region.shape == Region::Shape::sphere ? 1 : 0;
     if (ImGui::Combo("shape", &shape, "box\0sphere\0"))
-        s.region.shape = shape == 1 ? Region::Shape::sphere : Region::Shape::box;
+        s.selection.region.shape = shape == 1 ? Region::Shape::sphere : Region::Shape::box;
     const float speed = static_cast<float>(s.scene->bounds.radius / 200);
-    bool moved = edit_vector("centre", s.region.centre, speed, 3);
-    moved |= edit_vector(shape == 1 ? "radius" : "half size", s.region.half_size, speed,
+    bool moved = edit_vector("centre", s.selection.region.centre, speed, 3);
+    moved |= edit_vector(shape == 1 ? "radius" : "half size", s.selection.region.half_size, speed,
                          shape == 1 ? 1 : 3);
-    s.region.half_size = glm::max(s.region.half_size, glm::dvec3(1e-6));
+    s.selection.region.half_size = glm::max(s.selection.region.half_size, glm::dvec3(1e-6));
     if (ImGui::Button("Centre on the pivot")) {
-        s.region.centre = s.navigation.pivot();
+        s.selection.region.centre = s.navigation.pivot();
         moved = true;
     }
-    if (moved) s.show_region = true;
+    if (moved) s.selection.shown = true;
     if (ImGui::Button("Count")) {
-        const size_t inside = count_inside(s.scene->model, s.region, s.edit);
+        const size_t inside = count_inside(s.scene->model, s.selection.region, s.edit);
         s.note = std::to_string(inside) + " splats are inside";
     }
     ImGui::SameLine();
     buttons(s);
     path_field("file", s.save_file);
     ImGui::SameLine();
-    if (ImGui::Button("Save")) s.requests.save = true;
+    if (ImGui::Button("Save")) s.ask(request::Save{});
 }
 
 }  // namespace darb

@@ -12,21 +12,23 @@ namespace {
 constexpr float kWidth = 330;  // px at scale 1
 
 void progress_window(Session& s, float width, float height) {
-    if (s.load_share < 0 && s.export_share < 0 && s.measure_share < 0) return;
+    const Progress& p = s.progress;
+    if (p.load < 0 && p.exporting < 0 && p.measuring < 0) return;
     ImGui::SetNextWindowPos(ImVec2(width / 2, height - 20), 0, ImVec2(0.5f, 1));
     ImGui::Begin("progress", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize);
-    const bool loads = s.load_share >= 0;
-    const bool exports = s.export_share >= 0;
-    ImGui::TextUnformatted(loads     ? s.load_stage.c_str()
+    const bool loads = p.load >= 0;
+    const bool exports = p.exporting >= 0;
+    ImGui::TextUnformatted(loads     ? p.load_stage.c_str()
                            : exports ? "exporting frames"
                                      : "measuring settings and effects");
-    ImGui::ProgressBar(static_cast<float>(loads     ? s.load_share
-                                          : exports ? s.export_share
-                                                    : s.measure_share),
+    ImGui::ProgressBar(static_cast<float>(loads     ? p.load
+                                          : exports ? p.exporting
+                                                    : p.measuring),
                        ImVec2(kWidth * s.gui_scale, 0));
     ImGui::SameLine();
-    if (ImGui::Button("Cancel")) (loads ? s.requests.cancel_load : s.requests.cancel_export) = true;
+    if (ImGui::Button("Cancel"))
+        s.ask(loads ? Request(request::CancelLoad{}) : Request(request::CancelWork{}));
     ImGui::End();
 }
 
@@ -54,11 +56,11 @@ void leaving_window(Session& s, float width, float height) {
     ImGui::Text("%zu splats are deleted and not saved.", s.edit.removed_count());
     path_field("file", s.save_file);
     const bool quit = s.leaving->quit;
-    if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.requests.save_and_leave = true;
+    if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
     ImGui::SameLine();
-    if (ImGui::Button(quit ? "Quit" : "Open")) s.requests.leave = true;
+    if (ImGui::Button(quit ? "Quit" : "Open")) s.ask(request::Leave{});
     ImGui::SameLine();
-    if (ImGui::Button("Stay (Esc)")) s.requests.stay = true;
+    if (ImGui::Button("Stay (Esc)")) s.ask(request::Stay{});
     ImGui::End();
 }
 
@@ -83,7 +85,7 @@ void help(const Session& s) {
 }
 
 void empty_hint(const Session& s, float width, float height) {
-    if (s.scene || s.training.live || s.load_share >= 0) return;
+    if (s.scene || s.training.live || s.progress.load >= 0) return;
     const char* text = "Drop a splat file here";
     const ImVec2 size = ImGui::CalcTextSize(text);
     ImGui::GetBackgroundDrawList()->AddText(ImVec2((width - size.x) / 2, (height - size.y) / 2),
@@ -128,7 +130,7 @@ void draw_panels(Session& s) {
     const auto [width, height] = ImGui::GetIO().DisplaySize;
     empty_hint(s, width, height);
     if (s.panels) {
-        if (s.show_region) draw_region(s, static_cast<int>(width), static_cast<int>(height));
+        if (s.selection.shown) draw_region(s, static_cast<int>(width), static_cast<int>(height));
         side_panel(s, height);
     }
     progress_window(s, width, height);

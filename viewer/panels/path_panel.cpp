@@ -22,16 +22,16 @@ void path_panel(Session& s) {
                            "%.2f s", kClamped) &&
         !p.path.keys.empty()) {
         p.at_s = at;
-        s.requests.leave_photo = true;
+        s.ask(request::LeavePhoto{});
         apply(p.path.sample(at), s.navigation);
     }
     ImGui::EndDisabled();
     ImGui::SliderFloat("s per key", &p.seconds_per_key, 0.2f, 10, "%.1f", kClamped);
     path_field("path file", p.file);
-    if (ImGui::Button("Load")) s.requests.load_path = true;
+    if (ImGui::Button("Load")) s.ask(request::LoadPath{});
     ImGui::SameLine();
     ImGui::BeginDisabled(p.path.keys.empty());
-    if (ImGui::Button("Save path")) s.requests.save_path = true;
+    if (ImGui::Button("Save path")) s.ask(request::SavePath{});
     path_field("folder", p.folder);
     ImGui::SliderInt("frames/s", &p.fps, 1, 120, "%d", kClamped);
     int size[2] = {p.export_width, p.export_height};
@@ -39,7 +39,7 @@ void path_panel(Session& s) {
         p.export_width = std::clamp(size[0], 16, 8192);
         p.export_height = std::clamp(size[1], 16, 8192);
     }
-    if (ImGui::Button("Export frames and video")) s.requests.export_path = true;
+    if (ImGui::Button("Export frames and video")) s.ask(request::ExportPath{});
     ImGui::EndDisabled();
 }
 

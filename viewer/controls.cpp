@@ -1,0 +1,159 @@
+#include "viewer/controls.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+
+#include "viewer/view_camera.h"
+
+namespace darb {
+
+namespace {
+
+bool run_goes_on(const Session& s) {
+    return s.training.live && !s.training.finished;
+}
+
+// From the free camera to the first or the last.
+void step_camera(Session& s, bool next) {
+    const int count = static_cast<int>(s.photos.views.size());
+    if (count == 0) return;
+    const int from = s.photos.current >= 0 ? s.photos.current : next ? count - 1 : 0;
+    s.ask(request::ChooseCamera{(from + (next ? 1 : count - 1)) % count});
+}
+
+void play_or_pause(Session& s) {
+    if (run_goes_on(s))
+        s.training.paused = !s.training.paused;
+    else
+        s.path.playing = !s.path.playing && !s.path.path.keys.empty();
+}
+
+void step_training(Session& s) {
+    if (!run_goes_on(s)) return;
+    s.training.paused = true;
+    ++s.training.steps_to_go;
+}
+
+void remove_selected(Session& s) {
+    if (s.scene && s.selection.shown && s.edit.remove(s.scene->model, s.selection.region, true) > 0)
+        s.ask(request::ShowEdits{});
+}
+
+void stop_and_close(Session& s) {
+    s.path.playing = false;
+    s.error.clear();
+    s.ask(request::CancelLoad{});
+    s.ask(request::CancelWork{});
+    s.ask(request::Stay{});
+    s.ask(request::LeaveFullScreen{});
+}
+
+struct KeyRow {
+    Key key;
+    void (*act)(Session&);
+};
+
+constexpr KeyRow kKeys[] = {
+    {Key::frame_all, [](Session& s) { s.ask(request::FrameAll{}); }},
+    {Key::level, [](Session& s) { s.navigation.level(); }},
+    {Key::hide_panels, [](Session& s) { s.panels = !s.panels; }},
+    {Key::full_screen, [](Session& s) { s.ask(request::ToggleFullScreen{}); }},
+    {Key::picture, [](Session& s) { s.ask(request::TakePicture{}); }},
+    {Key::next_camera, [](Session& s) { step_camera(s, true); }},
+    {Key::last_camera, [](Session& s) { step_camera(s, false); }},
+    {Key::add_key, [](Session& s) { s.path.path.add(s.navigation, s.path.seconds_per_key); }},
+    {Key::play, play_or_pause},
+    {Key::step, step_training},
+    {Key::remove, remove_selected},
+    {Key::undo,
+     [](Session& s) {
+         s.edit.undo();
+         s.ask(request::ShowEdits{});
+     }},
+    {Key::redo,
+     [](Session& s) {
+         s.edit.redo();
+         s.ask(request::ShowEdits{});
+     }},
+    {Key::save, [](Session& s) { s.ask(request::Save{}); }},
+    {Key::quit, [](Session& s) { s.ask(request::Quit{}); }},
+    {Key::escape, stop_and_close},
+};
+
+// Right, up, ahead; a key and its opposite cancel.
+glm::dvec3 flight(const Input& in) {
+    return {double(in.to_right) - double(in.to_left), double(in.rise) - double(in.sink),
+            double(in.ahead) - double(in.back)};
+}
+
+void drag(const Input& in, int height, Session& s) {
+    Navigation& n = s.navigation;
+    const bool pans = in.middle || (in.left && in.shift);
+    if (!pans && !in.left && !in.right) return;
+    const double turn = glm::pi<double>() / std::max(height, 1);  // half a turn a window's height
+    leave_photo(s);
+    if (pans)
+        n.pan(in.dx, in.dy, height);
+    else if (in.right)
+        n.look(in.dx * turn, in.dy * turn);
+    else
+        n.orbit(in.dx * turn, in.dy * turn);
+}
+
+// While flying the wheel changes the speed.
+void turn_wheel(const Input& in, Session& s) {
+    if (in.right || (flight(in) != glm::dvec3(0.0) && !in.control)) {
+        s.fly_speed *= std::pow(1.25, in.wheel);
+    } else {
+        leave_photo(s);
+        s.navigation.zoom(std::pow(0.9, in.wheel));
+    }
+}
+
+}  // namespace
+
+void press(Key key, Session& s) {
+    for (const KeyRow& row : kKeys)
+        if (row.key == key) row.act(s);
+}
+
+bool holds_a_key(const Input& in) {
+    return in.ahead || in.back || in.to_left || in.to_right || in.rise || in.sink;
+}
+
+void leave_photo(Session& s) {
+    s.photos.current = -1;
+    if (s.display.mode == VIEW_ERROR) s.display.mode = VIEW_COLOUR;
+}
+
+void move_camera(const Input& in, const ControlFrame& frame, Session& s) {
+    if (!frame.panels_want_mouse) {
+        if (in.dx != 0 || in.dy != 0) drag(in, frame.height, s);
+        if (in.wheel != 0) turn_wheel(in, s);
+        if (in.double_click && s.scene) {
+            const Camera camera =
+                camera_in_window(s.photos, s.navigation, frame.width, frame.height);
+            if (const auto hit = pick(s.scene->model, s.edit.removed(), camera, in.x, in.y))
+                s.navigation.set_pivot_depth(*hit);
+        }
+    }
+    const glm::dvec3 direction = flight(in);
+    if (direction == glm::dvec3(0.0) || in.control || frame.panels_want_keys) return;
+    leave_photo(s);
+    s.navigation.fly(glm::normalize(direction) * s.fly_speed * std::min(frame.seconds, 0.25));
+}
+
+void play_path(double seconds, Session& s) {
+    PathState& p = s.path;
+    p.playing = p.playing && !p.path.keys.empty();
+    if (!p.playing) return;
+    p.at_s += seconds;
+    leave_photo(s);
+    apply(p.path.sample(p.at_s), s.navigation);
+    if (p.at_s < p.path.duration()) return;
+    p.at_s = 0;
+    p.playing = false;
+}
+
+}  // namespace darb

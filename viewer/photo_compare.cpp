@@ -1,0 +1,46 @@
+#include "viewer/photo_compare.h"
+
+#include <cstring>
+
+#include "engine/core/error.h"
+#include "viewer/splat_picture.h"
+#include "viewer/view_camera.h"
+
+namespace darb {
+
+Camera camera_in_window(const Photos& photos, const Navigation& free, int width, int height) {
+    if (photos.current < 0) return free.camera(width, height);
+    return fitted(photos.view().camera, width, height);
+}
+
+PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, int width, int height) {
+    PhotoOverlay o;
+    if (photos.current < 0 || photos.loaded != photos.current) return o;
+    const Camera& of = photos.view().camera;
+    const double share = double(camera.width) / width;
+    o.scale = fit_scale(of, width, height) * share;
+    o.x = 0.5 * (camera.width - o.scale * of.width);
+    o.y = 0.5 * (camera.height - o.scale * of.height);
+    o.photo = &photos.buffer;
+    o.width = photos.width;
+    o.height = photos.height;
+    o.split = photos.compare ? photos.split : 0;
+    return o;
+}
+
+void load_photo_of_view(Device& device, Photos& photos) {
+    const View& view = photos.view();
+    if (view.photo.empty())
+        throw Error(view.name, "this camera has no photo",
+                    "Name the data set with its photos: --cameras DATASET.");
+    const ImageU8 photo = load_photo(view);
+    std::vector<std::uint32_t> texels(photo.data.size() / 4);
+    std::memcpy(texels.data(), photo.data.data(), photo.data.size());
+    photos.buffer = Buffer(device, "photo", texels.size() * 4);
+    photos.buffer.upload(texels);
+    photos.width = photo.width;
+    photos.height = photo.height;
+    photos.loaded = photos.current;
+}
+
+}  // namespace darb

@@ -1,0 +1,35 @@
+// Cameras of a data set, the one that is looked through, and its photo beside the picture.
+#pragma once
+
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/gpu/buffer.h"
+#include "viewer/navigation.h"
+
+namespace darb {
+
+struct PhotoOverlay;
+
+struct Photos {
+    std::vector<View> views;
+    int current = -1;      // -1: free camera
+    bool compare = false;  // photo left of the split
+    float split = 0.5f;    // share of the window's width
+    Buffer buffer;         // uint [height][width]
+    int width = 0, height = 0;
+    int loaded = -1;      // the view that buffer holds
+    bool failed = false;  // this view's photo could not be read
+
+    const View& view() const { return views[static_cast<size_t>(current)]; }
+};
+
+/// The photo's camera fitted into a window of this size; where none is looked through, the free
+/// camera.
+Camera camera_in_window(const Photos& photos, const Navigation& free, int width, int height);
+/// Where the photo lies in a picture by `camera`, which may have fewer px than the window.
+PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, int width, int height);
+/// The photo of the camera that is looked through. Throws Error where it has none.
+void load_photo_of_view(Device& device, Photos& photos);
+
+}  // namespace darb
