@@ -22,6 +22,22 @@ struct Cancelled {};
 constexpr std::size_t kReadBlock = 8 << 20;             // bytes between two reports
 constexpr double kReadShare = 0.4, kDecodeShare = 0.5;  // of the time, by experience
 
+// A pipe would be waited for until somebody writes to it, which nobody can cancel.
+void refuse_by_kind(const std::filesystem::path& file) {
+    std::error_code error;
+    const std::filesystem::file_type kind = std::filesystem::status(file, error).type();
+    using enum std::filesystem::file_type;
+    if (kind == regular || is_sog_folder(file)) return;
+    const char* const what = kind == not_found   ? "is not there"
+                             : kind == directory ? "is a folder without a scene"
+                             : kind == fifo      ? "is a pipe"
+                             : kind == socket    ? "is a socket"
+                             : kind == character ? "is a device"
+                             : kind == block     ? "is a device"
+                                                 : "cannot be read";
+    throw Error(file.string(), what, "Name a splat file, for example a .ply.");
+}
+
 std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
                                       const LoadProgress& progress) {
     check_is_file(file);
@@ -48,6 +64,7 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = file;
+    refuse_by_kind(file);
     SplatFile facts;
     if (is_sog_folder(file) || file.filename() == "meta.json") {
         if (progress) progress(kReadShare, "decoding");

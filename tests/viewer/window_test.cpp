@@ -1,6 +1,7 @@
 // The viewer in a real window under Xvfb, driven by mouse, keys and drops; what the display shows
 // is compared with a headless screenshot.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 
@@ -77,6 +78,22 @@ TEST_F(WindowTest, Accuracy_and_effects_of_the_command_line_show_in_the_screensh
     Process wrong(command(scene, {"--effects", "fog"}), folder_ / "wrong.log");
     EXPECT_EQ(wrong.wait(), 2);
     EXPECT_NE(log("wrong.log").find("'fog' is no effect"), std::string::npos) << log("wrong.log");
+}
+
+// Closing waited for whoever would write to the pipe.
+TEST_F(WindowTest, A_dropped_pipe_is_refused_and_the_window_closes_slow) {
+    const fs::path pipe = folder_ / "pipe.ply";
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    start();
+    const ImageU8 before = headless();
+    ASSERT_TRUE(shows(before));
+    ASSERT_TRUE(drop_on_window("darb", pipe));
+    EXPECT_TRUE(changes_from(before, 100)) << "no message";
+    xdo({"key", "Escape"});
+    EXPECT_TRUE(shows(before)) << "the scene before is gone";
+    xdo({"key", "ctrl+q"});
+    EXPECT_TRUE(eventually([&] { return !program_->running(); }));
+    EXPECT_EQ(program_->wait(), 0) << log("view.log");
 }
 
 TEST_F(WindowTest, Mouse_and_keys_move_the_camera_slow) {
