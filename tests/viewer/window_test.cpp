@@ -80,6 +80,28 @@ TEST_F(WindowTest, Accuracy_and_effects_of_the_command_line_show_in_the_screensh
     EXPECT_NE(log("wrong.log").find("'fog' is no effect"), std::string::npos) << log("wrong.log");
 }
 
+TEST_F(WindowTest, A_screenshot_is_what_its_name_says) {
+    const Words size = {"--size", "64x48", "--screenshot"};
+    const auto shot = [&](const std::string& name, const Words& more = {}) {
+        Words words = command(folder_ / "scene.ply", size);
+        words.push_back((folder_ / name).string());
+        words.insert(words.end(), more.begin(), more.end());
+        Process run(words, folder_ / "shot.log");
+        return run.wait();
+    };
+    const std::vector<std::pair<std::string, std::string>> heads = {
+        {"a.png", "\x89PNG"}, {"a.JPG", "\xFF\xD8\xFF"}, {"a.jpeg", "\xFF\xD8\xFF"}};
+    for (const auto& [name, head] : heads) {
+        ASSERT_EQ(shot(name), 0) << log("shot.log");
+        EXPECT_TRUE(read_text_file(folder_ / name).starts_with(head)) << name;
+    }
+    EXPECT_EQ(shot("a.webp"), 2);
+    EXPECT_FALSE(fs::exists(folder_ / "a.webp"));
+    EXPECT_EQ(shot("b.png", {"--compare"}), 2);
+    EXPECT_NE(log("shot.log").find("--compare: needs a photo"), std::string::npos)
+        << log("shot.log");
+}
+
 // Closing waited for whoever would write to the pipe.
 TEST_F(WindowTest, A_dropped_pipe_is_refused_and_the_window_closes_slow) {
     const fs::path pipe = folder_ / "pipe.ply";

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
 #include "tools/darb/commands.h"
@@ -19,6 +20,26 @@
 namespace darb {
 
 namespace {
+
+constexpr int kJpegQuality = 95;
+
+bool is_jpeg_name(const std::filesystem::path& file) {
+    return has_extension(file, ".jpg") || has_extension(file, ".jpeg");
+}
+
+void refuse_other_pictures(const std::filesystem::path& file) {
+    if (!file.has_extension() || has_extension(file, ".png") || is_jpeg_name(file)) return;
+    throw Error(file.string(), "its ending names no picture that can be written",
+                "Use .png or .jpg.");
+}
+
+// As its ending says; PNG where it has none.
+void write_screenshot(const std::filesystem::path& file, const ImageU8& image) {
+    if (is_jpeg_name(file))
+        write_file_atomic(file, encode_jpeg(image, kJpegQuality));
+    else
+        write_png(file, image);
+}
 
 int without_window(const ViewFlags& flags, const ViewerOptions& options, const PixelSize& size,
                    const std::string& note) {
@@ -35,7 +56,7 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     if (!flags.screenshot.empty()) {
         viewer.compose();
         viewer.canvas().submit_and_wait();
-        write_png(flags.screenshot, viewer.canvas().read_back());
+        write_screenshot(flags.screenshot, viewer.canvas().read_back());
         fmt::print("{}\n", flags.screenshot.string());
     }
     if (!flags.frames.empty()) {
@@ -53,6 +74,7 @@ int view(ViewFlags flags) {
     options.accuracy = chosen_accuracy(flags.accuracy);
     options.effects = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
+    refuse_other_pictures(flags.screenshot);
     std::string note;
     options.views = find_views(flags, note);
     if (!note.empty()) fmt::print(stderr, "warning: {}\n", printable(note));

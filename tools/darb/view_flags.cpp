@@ -57,6 +57,9 @@ void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) 
     if (flags.camera >= 0) viewer.choose_camera(flags.camera);
     if (flags.show == "error" && s.photos.current < 0)
         throw Error("--show error", "needs a photo", "Add --cameras DATASET --camera N.");
+    const bool nothing_chosen = s.photos.current < 0 && !flags.screenshot.empty();
+    if (flags.compare && (s.photos.views.empty() || nothing_chosen))
+        throw Error("--compare", "needs a photo", "Add --cameras DATASET --camera N.");
     s.photos.compare = flags.compare;
 }
 
@@ -70,7 +73,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     c.add_option("--size", flags.size, "WIDTHxHEIGHT of window, screenshot and frames, px")
         ->capture_default_str();
     c.add_option("--screenshot", flags.screenshot,
-                 "write the window's content to this PNG, without a window");
+                 "write the window's content to this .png or .jpg, without a window");
     c.add_option("--path", flags.path, "a camera path that the viewer saved");
     c.add_option("--export", flags.frames,
                  "write the path's frames (and a video, with ffmpeg) to this folder, no window")
