@@ -22,6 +22,7 @@ struct Tally {
     bool own_alpha = false;  // some photo has an alpha channel of its own
     bool masked = false;     // some photo has a mask, or a gap after it was straightened
     std::size_t resized = 0, unturned = 0, undistorted = 0, too_wide = 0, downscaled = 0;
+    std::size_t narrower = 0;  // photos, than the width that is asked for
     std::string resize_example;
     std::size_t unfit = 0;  // photos that cannot be used, where only cameras are wanted
     std::string unfit_example;
@@ -82,6 +83,7 @@ void set_intrinsics(View& view, const UndistortedFrame& frame, int resolution, T
     const Camera& full = frame.camera;
     const PhotoSize size = size_at_resolution(full.width, full.height, resolution);
     if (size.width != full.width || size.height != full.height) ++tally.downscaled;
+    if (resolution > std::max(full.width, 8)) ++tally.narrower;
     const double sx = static_cast<double>(size.width) / full.width;
     const double sy = static_cast<double>(size.height) / full.height;
     Camera& camera = view.camera;
@@ -131,6 +133,9 @@ void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& datas
         dataset.notes.push_back(
             fmt::format("Scaled down at load: {} wider than {} px; -r 1 keeps the size.",
                         counted(tally.downscaled, "photo"), kDefaultWidth));
+    if (tally.narrower > 0)
+        dataset.notes.push_back(fmt::format("-r {} is wider than {}: kept at their own size.",
+                                            options.resolution, counted(tally.narrower, "photo")));
 }
 
 }  // namespace

@@ -133,6 +133,12 @@ TEST(RealScenes, folder_scaled_by_divisor_and_width) {
     EXPECT_EQ(hundred.views[0].camera.height, 75);
     EXPECT_DOUBLE_EQ(hundred.views[0].camera.fx * 2,
                      load_dataset(test_data() / "monstree_200_tiny").views[0].camera.fx);
+    options.resolution = 20'000;  // wider than the photos: they stay, and it is said
+    const Dataset wide = load_dataset(test_data() / "monstree_200_tiny", options);
+    EXPECT_EQ(wide.views[0].camera.width, 200);
+    EXPECT_TRUE(std::any_of(wide.notes.begin(), wide.notes.end(), [](const std::string& note) {
+        return note.starts_with("-r 20000 is wider than");
+    }));
 }
 
 }  // namespace
