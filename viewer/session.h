@@ -61,7 +61,7 @@ struct MeasuredChoice {
 };
 
 /// Shares of 0 to 1; below 0 where nothing of the kind goes on.
-struct Progress {
+struct WorkProgress {
     double load = -1, exporting = -1, measuring = -1;
     std::string load_stage;
 };
@@ -98,7 +98,7 @@ struct Session {
     std::string error;                      // shown until dismissed
     std::string note;                       // shown in the status line
     std::string device_name;
-    Progress progress;
+    WorkProgress progress;
     std::vector<MeasuredChoice> measured;
     int sh_degree = 0;  // highest of the scene or the run
     bool panels = true;

@@ -12,7 +12,7 @@ namespace {
 constexpr float kWidth = 330;  // px at scale 1
 
 void progress_window(Session& s, float width, float height) {
-    const Progress& p = s.progress;
+    const WorkProgress& p = s.progress;
     if (p.load < 0 && p.exporting < 0 && p.measuring < 0) return;
     ImGui::SetNextWindowPos(ImVec2(width / 2, height - 20), 0, ImVec2(0.5f, 1));
     ImGui::Begin("progress", nullptr,
