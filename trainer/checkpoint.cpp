@@ -110,7 +110,8 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
 }
 
 std::uint64_t floats_per_splat(const TrainerState& s) {
-    const std::uint64_t parameters = 14 + static_cast<std::uint64_t>(s.model.rest_count());
+    std::uint64_t parameters = 0;
+    for (int a = 0; a < kAttributeCount; ++a) parameters += s.model.floats(a);
     return parameters * (s.averaged > 0 ? 4 : 3) + 2;
 }
 

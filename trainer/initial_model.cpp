@@ -13,7 +13,6 @@ namespace darb {
 
 namespace {
 
-constexpr double kShC0 = 0.28209479177387814;
 // float32 resolves 1/4,000,000 of a scene's width there: an update late in a run is 1/600,000 of
 // it.
 constexpr double kFarOff = 4;
@@ -129,7 +128,7 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
             model.position[at] = static_cast<float>(points.position[at] - model.origin[a]);
             model.log_scale[at] =
                 static_cast<float>(0.5 * std::log(distance2[i]) + std::log(initial_scale));
-            model.sh_dc[at] = static_cast<float>((points.colour[at] / 255.0 - 0.5) / kShC0);
+            model.sh_dc[at] = static_cast<float>((points.colour[at] / 255.0 - 0.5) / SH_C0);
         }
     }
     return model;

@@ -21,12 +21,12 @@ Optimizer::Optimizer(const TrainOptions& options, const Schedule& schedule, doub
 AdamStep Optimizer::rates(int iteration) const {
     const Schedule::Rates now = schedule_.rates(iteration);
     AdamStep step;
-    step.position = static_cast<float>(now.position * extent_);
-    step.scale = now.scale;
-    step.rotation = now.rotation;
-    step.opacity = now.opacity;
-    step.sh_dc = now.sh_dc;
-    step.sh_rest = now.sh_rest;
+    step.rate[kPosition] = static_cast<float>(now.position * extent_);
+    step.rate[kLogScale] = now.scale;
+    step.rate[kRotation] = now.rotation;
+    step.rate[kOpacity] = now.opacity;
+    step.rate[kShDc] = now.sh_dc;
+    step.rate[kShRest] = now.sh_rest;
     step.rest_every = schedule_.rest_every;
     return step;
 }
@@ -48,10 +48,8 @@ AdamStep Optimizer::step(int iteration) const {
 AdamStep Optimizer::trial_step(int iteration, float share) const {
     AdamStep step = rates(iteration);
     step.rest_every = 1;
-    step.sh_rest = kTrialRestRate * step.sh_dc;
-    for (float* rate :
-         {&step.position, &step.scale, &step.rotation, &step.opacity, &step.sh_dc, &step.sh_rest})
-        *rate *= share;
+    step.rate[kShRest] = kTrialRestRate * step.rate[kShDc];
+    for (float& rate : step.rate) rate *= share;
     return with_regularisers(adam_step(step, iteration), iteration);
 }
 

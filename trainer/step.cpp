@@ -35,7 +35,7 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, const TrainingPhot
       splats_(&splats),
       buffers_(device, forward_options(options)),
       forward_(device, forward_options(options)),
-      backward_(device, forward_options(options), BackwardResult::update),
+      backward_(device, forward_options(options)),
       loss_(device, photos.largest_width(), photos.largest_height(), loss),
       lambda_dssim_(options.lambda_dssim),
       d_image_(device, "d_image", photos.largest_photo() * 12),

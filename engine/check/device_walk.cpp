@@ -33,10 +33,11 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
     ForwardOptions options = forward_options(model, settings);
     options.effects.lens = camera.lens.active;
     const int degree = std::min(settings.sh_degree, model.sh_degree);
-    GpuSplats splats(device, model, true);
+    const GpuSplats splats(device, model, false);
     FrameBuffers buffers(device, options);
     Forward forward(device, options);
-    Backward backward(device, options, BackwardResult::store_gradient);
+    Backward backward(device, options);
+    GradientBuffers gradients(device, splats);
     FrameView view{camera_data(camera, model.origin), nullptr, 0, degree, settings.background};
     const Buffer cameras = upload_cameras(device, {view.camera});
     view.cameras = &cameras;
@@ -53,7 +54,7 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
         commands.begin();
         forward.record(commands, splats, view, frame);
         if (!d_image.data.empty())
-            backward.record(commands, view, frame, splats, d_planes, AdamStep{});
+            backward.record_gradients(commands, view, frame, splats, d_planes, gradients, false);
         commands.submit_and_wait();
         walk.status = frame.read_status();
         if (!buffers.make_room(walk.status)) break;
@@ -63,13 +64,8 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
     if (splats.count() > 0)
         walk.pair_count = frame.splats.intersection_count.download<std::uint32_t>(splats.count());
     if (d_image.data.empty()) return walk;
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const size_t n = size_t{splats.count()} * splats.stride(a);
-        const auto moments =
-            n > 0 ? splats.moments(a).download<float>(n * 2) : std::vector<float>{};
-        for (size_t i = 0; i < n; ++i) walk.d[a].push_back(moments[2 * i]);
-    }
-    const auto sums = backward.gradient_sum().download<float>(size_t{splats.count()} * 2);
+    for (int a = 0; a < kAttributeCount; ++a) walk.d[a] = gradients.download(a);
+    const auto sums = gradients.views().download<float>(size_t{splats.count()} * 2);
     for (size_t i = 0; i < splats.count(); ++i) walk.mean_gradient_ndc.push_back(sums[2 * i]);
     return walk;
 }

@@ -14,33 +14,31 @@ Image<double> linear_weights(const Camera& camera) {
     return w;
 }
 
-// [N][C-1][3] to [N][3][C-1].
+// In the order of the file's columns: harmonics channel by channel.
 template <class T>
-std::vector<T> channel_major(const std::vector<T>& rest, size_t per_splat) {
-    std::vector<T> out(rest.size());
-    const size_t coefficients = per_splat / 3;
-    for (size_t i = 0; i < rest.size(); ++i) {
-        const size_t splat = i / per_splat, at = i % per_splat;
-        out[splat * per_splat + at % 3 * coefficients + at / 3] = rest[i];
-    }
+std::vector<T> as_in_files(const std::vector<T>& values, int attribute, int sh_degree) {
+    const size_t floats = attribute_floats(attribute, sh_degree);
+    std::vector<T> out(values.size());
+    for (size_t i = 0; i < values.size(); ++i)
+        out[i / floats * floats + file_column(attribute, sh_degree, i % floats)] = values[i];
     return out;
 }
 
 template <class T>
 void write(const std::filesystem::path& folder, const SplatModel& model, const Camera& camera,
            const std::vector<T>& image, const std::array<std::vector<T>, kAttributeCount>& d) {
-    const size_t n = model.size(), rest = static_cast<size_t>(model.rest_count());
-    const auto put = [&](const char* name, const std::vector<size_t>& shape,
+    const auto put = [&](const std::string& name, const std::vector<size_t>& shape,
                          const std::vector<T>& values) {
-        write_npy(folder / (std::string(name) + ".npy"), shape, std::span<const T>(values));
+        write_npy(folder / (name + ".npy"), shape, std::span<const T>(values));
     };
     put("image", {size_t(camera.height), size_t(camera.width), 3}, image);
-    put("d_xyz", {n, 3}, d[kPosition]);
-    put("d_f_dc", {n, 3}, d[kShDc]);
-    put("d_f_rest", {n, rest}, rest > 0 ? channel_major(d[kShRest], rest) : std::vector<T>{});
-    put("d_opacity", {n}, d[kOpacity]);
-    put("d_scale", {n, 3}, d[kLogScale]);
-    put("d_rot", {n, 4}, d[kRotation]);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const size_t floats = model.floats(a);
+        std::vector<size_t> shape{model.size()};
+        if (floats != 1) shape.push_back(floats);
+        put(std::string("d_") + kSplatAttributes[static_cast<size_t>(a)].file_name, shape,
+            as_in_files(d[static_cast<size_t>(a)], a, model.sh_degree));
+    }
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ struct Stage {
             // The centre of the camera has no scale of its own.
             const double world = scale / c.fx * std::max(std::abs(depth), 0.01);
             m.log_scale[3 * i + a] = static_cast<float>(std::log(world)) + std::log(stretch[a]);
-            m.sh_dc[3 * i + a] = (colour[static_cast<int>(a)] - 0.5f) / 0.28209479f;
+            m.sh_dc[3 * i + a] = (colour[static_cast<int>(a)] - 0.5f) / static_cast<float>(SH_C0);
         }
     }
 };

@@ -32,8 +32,8 @@ WalkTruth walk(const SplatModel& model, const Camera& camera, const Image<double
     Image<T> d(d_image.width, d_image.height, d_image.channels);
     d.data.assign(d_image.data.begin(), d_image.data.end());
     const auto g = reference::backward(splats, local, raster, result, d);
-    truth.d = {widened(g.splats.position), widened(g.splats.log_scale), widened(g.splats.rotation),
-               widened(g.splats.opacity),  widened(g.splats.sh_dc),     widened(g.splats.sh_rest)};
+    for (int a = 0; a < kAttributeCount; ++a)
+        truth.d[static_cast<size_t>(a)] = widened(attribute_values(g.splats, a));
     truth.mean_gradient_ndc = widened(g.mean_gradient_ndc);
     return truth;
 }

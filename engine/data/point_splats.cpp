@@ -12,7 +12,7 @@ namespace darb {
 namespace {
 
 constexpr double kMinDistance2 = 1e-7;
-constexpr double kOpacity = 0.95;
+constexpr double kPointOpacity = 0.95;
 constexpr double kSizeShare = 1.0 / 3;  // of the distance to the neighbours
 constexpr double kLargestOfMedian = 4;
 
@@ -67,7 +67,7 @@ SplatModel points_as_splats(const PointCloud& points) {
                 static_cast<float>(dc_of_colour(points.colour[3 * i + k] / 255.0));
         }
         model.rotation[4 * i] = 1;
-        model.opacity[i] = static_cast<float>(std::log(kOpacity / (1 - kOpacity)));
+        model.opacity[i] = static_cast<float>(std::log(kPointOpacity / (1 - kPointOpacity)));
     }
     return model;
 }

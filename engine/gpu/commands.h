@@ -53,6 +53,12 @@ class Commands {
         dispatch_bytes(pipeline, std::as_bytes(std::span(&args, 1)),
                        std::span(buffers.begin(), buffers.size()), groups_x, groups_y, groups_z);
     }
+    template <class Args>
+    void dispatch(const Pipeline& pipeline, const Args& args, std::span<const BufferRange> buffers,
+                  std::uint32_t groups_x, std::uint32_t groups_y = 1, std::uint32_t groups_z = 1) {
+        dispatch_bytes(pipeline, std::as_bytes(std::span(&args, 1)), buffers, groups_x, groups_y,
+                       groups_z);
+    }
     /// The same with VkDispatchIndirectCommand read from indirect at offset (bytes).
     template <class Args>
     void dispatch_indirect(const Pipeline& pipeline, const Args& args,

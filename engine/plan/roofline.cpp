@@ -7,6 +7,7 @@
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
+#include "engine/scene/splat_attributes.h"
 #include "shaders/shared/limits.h"
 #include "shaders/shared/measure_args.h"
 #include "shaders/shared/render_args.h"
@@ -65,7 +66,7 @@ DeviceRates measure_rates(Device& device) {
 
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     const double rest = c.rest_floats;
-    const double floats = 14 + rest;  // parameters of a splat
+    const double others = splat_floats(0), floats = others + rest;  // of a splat
     const double samples = c.evaluated > 0 ? c.evaluated : c.pairs * kPixelsOfTile * kTouchedShare;
     if (pass == "project")
         return PassWork{c.splats * 8 + c.visible * (4 * floats + kProjectedBytes),
@@ -87,8 +88,9 @@ std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
         const double steps = 1 / c.rest_every;
         const double sums =
             c.rest_every > 1 ? (c.visible * (1 - steps) + c.splats * steps) * 8 * rest : 0;
-        return PassWork{c.splats * (24 * (14 + rest * steps) + 16) + sums + c.pairs * kSumsBytes,
-                        c.visible * (kProjectBackwardFma + 3 * kShFma * rest)};
+        return PassWork{
+            c.splats * (24 * (others + rest * steps) + 16) + sums + c.pairs * kSumsBytes,
+            c.visible * (kProjectBackwardFma + 3 * kShFma * rest)};
     }
     return std::nullopt;
 }

@@ -1,36 +1,24 @@
 #include "engine/raster/backward.h"
 
-#include <algorithm>
-#include <cmath>
+#include <fmt/format.h>
 
-#include "engine/core/check.h"
+#include <algorithm>
+
+#include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 
 namespace darb {
 
-AdamStep adam_step(const AdamStep& rates, int t) {
-    const auto correction1 = [](int steps) { return 1.0 - std::pow(0.9, steps); };
-    const auto correction2 = [](int steps) { return std::sqrt(1.0 - std::pow(0.999, steps)); };
-    const auto scaled = [&](float rate) { return static_cast<float>(rate / correction1(t)); };
-    AdamStep step = rates;
-    step.position = scaled(rates.position);
-    step.scale = scaled(rates.scale);
-    step.rotation = scaled(rates.rotation);
-    step.opacity = scaled(rates.opacity);
-    step.sh_dc = scaled(rates.sh_dc);
-    step.sh_rest = scaled(rates.sh_rest);
-    step.inverse_sqrt_correction2 = static_cast<float>(1.0 / correction2(t));
-    if (rates.rest_every > 1) {
-        step.rest = t % rates.rest_every == 0 ? REST_APPLY : REST_GATHER;
-        const int steps = std::max(t / rates.rest_every, 1);
-        step.sh_rest = static_cast<float>(rates.sh_rest / correction1(steps) * correction2(steps) /
-                                          correction2(t));
-    }
-    return step;
+namespace {
+void check_stored(const ForwardOptions& options) {
+    if (!options.store_for_backward)
+        throw Error("backward pass", "the frame keeps nothing to walk back from",
+                    "Make both with store_for_backward.");
 }
+}  // namespace
 
-Backward::Backward(Device& device, const ForwardOptions& options, BackwardResult result)
-    : device_(&device), options_(options), result_(result), blend_(device, options) {}
+Backward::Backward(Device& device, const ForwardOptions& options)
+    : device_(&device), options_(options), blend_(device, options) {}
 
 BufferList<Backward> Backward::splat_buffers(std::uint64_t splats) {
     return {{&Backward::gradient_sum_, "gradient sum", splats * 8}};
@@ -42,8 +30,8 @@ FrameBytes Backward::device_bytes(const FrameSize& size) {
     return bytes;
 }
 
-Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int rest) {
-    const std::array<int, 3> key{sh_degree, sh_stored, rest};
+Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, int rest) {
+    const std::array<int, 4> key{sh_degree, sh_stored, update, rest};
     const auto found = project_.find(key);
     if (found != project_.end()) return found->second;
     SpecConstants constants = kernel_constants(options_);
@@ -52,7 +40,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int rest) {
     constants["SH_STORED"] = sh_stored;
     add_constants(options_.effects, constants);
     constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(blend_.window_pairs());
-    constants["UPDATE"] = result_ == BackwardResult::update ? 1 : 0;
+    constants["UPDATE"] = update;
     constants["REST"] = rest;
     return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;
 }
@@ -77,63 +65,83 @@ void Backward::record_shares(Commands& commands, const FrameView& view, const Fr
     blend_.record(commands, black, frame, image);
 }
 
+void Backward::record_project(Commands& commands, const FrameView& view, const Frame& frame,
+                              const GpuSplats& splats, Pipeline& pipeline,
+                              const gpu::ProjectBackwardArgs& args, const ProjectBuffers& beside) {
+    const SplatRange range{args.first_splat, args.splat_end - args.first_splat};
+    std::vector<BufferRange> buffers{*view.cameras};
+    splats.bind_parameters(range, buffers);
+    buffers.insert(buffers.end(), beside.state.begin(), beside.state.end());
+    buffers.insert(buffers.end(),
+                   {frame.splats.intersection_count, frame.splats.first_intersection});
+    for (std::uint32_t w = 0; w < PARTIAL_WINDOWS; ++w) buffers.push_back(blend_.partials(w));
+    buffers.insert(buffers.end(), {blend_.rest(), beside.sums, frame.counters.status,
+                                   splats.smoothing(), beside.rest_sum});
+    const Groups g = groups_for(range.count);
+    commands.dispatch(pipeline, args, buffers, g.x, g.y);
+}
+
 void Backward::record(Commands& commands, const FrameView& view, const Frame& frame,
                       GpuSplats& splats, const Buffer& d_image, const AdamStep& step) {
-    DARB_CHECK(splats.has_moments() && options_.store_for_backward, "set up for training");
-    DARB_CHECK(step.rest == REST_EACH || splats.has_rest_sum(), "nothing to gather in");
+    check_stored(options_);
+    check_trainable(splats, step);
+    if (step.beta1 != 0.9 || step.beta2 != 0.999)
+        throw Error("backward pass", fmt::format("betas {} and {}", step.beta1, step.beta2),
+                    "Take AdamUpdate for others than 0.9 and 0.999.");
     commands.pass("blend backward");
     blend_.record(commands, view, frame, d_image);
 
     if (splats.count() == 0) return;
     commands.pass("project backward");
     const auto n = static_cast<float>(splats.count());
+    gpu::ProjectBackwardArgs args{};
+    args.camera_index = view.index;
+    args.low_pass = static_cast<float>(LOW_PASS_DEFAULT);
+    std::copy(step.rate.begin(), step.rate.end(), args.rate);
+    args.inverse_sqrt_correction2 = step.inverse_sqrt_correction2;
+    args.opacity_weight = step.opacity_weight / n;
+    args.scale_weight = step.scale_weight / (3.0f * n);
+    args.regularise_unseen = step.regularise_unseen ? 1u : 0u;
+    args.largest_log_scale = step.largest_log_scale;
+    args.clearance = step.clearance;
+    args.rest_share = 1.0f / static_cast<float>(step.rest_every);
+    const int rest = view.sh_degree > 0 ? step.rest : REST_EACH;  // nothing to step at degree 0
+    Pipeline& pipeline = project_pipeline(view.sh_degree, splats.sh_degree(), UPDATE_ADAM, rest);
     for (const SplatRange& range : splats.ranges()) {
-        const gpu::ProjectBackwardArgs args{range.first,
-                                            range.first + range.count,
-                                            view.index,
-                                            static_cast<float>(LOW_PASS_DEFAULT),
-                                            step.position,
-                                            step.scale,
-                                            step.rotation,
-                                            step.opacity,
-                                            step.sh_dc,
-                                            step.sh_rest,
-                                            step.inverse_sqrt_correction2,
-                                            step.opacity_weight / n,
-                                            step.scale_weight / (3.0f * n),
-                                            step.regularise_unseen ? 1u : 0u,
-                                            step.largest_log_scale,
-                                            step.clearance,
-                                            1.0f / static_cast<float>(step.rest_every)};
-        const Groups g = groups_for(range.count);
-        const int rest = view.sh_degree > 0 ? step.rest : REST_EACH;  // nothing to step at degree 0
-        commands.dispatch(project_pipeline(view.sh_degree, splats.sh_degree(), rest), args,
-                          {*view.cameras,
-                           splats.parameters(kPosition),
-                           splats.parameters(kLogScale),
-                           splats.parameters(kRotation),
-                           splats.parameters(kOpacity),
-                           splats.parameters(kShDc),
-                           splats.rows(splats.parameters(kShRest), range),
-                           splats.moments(kPosition),
-                           splats.moments(kLogScale),
-                           splats.moments(kRotation),
-                           splats.moments(kOpacity),
-                           splats.moments(kShDc),
-                           splats.rows(splats.moments(kShRest), range),
-                           frame.splats.intersection_count,
-                           frame.splats.first_intersection,
-                           blend_.partials(0),
-                           blend_.partials(1),
-                           blend_.partials(2),
-                           blend_.partials(3),
-                           blend_.partials(4),
-                           blend_.rest(),
-                           gradient_sum_,
-                           frame.counters.status,
-                           splats.smoothing(),
-                           splats.rows(splats.rest_sum(), range)},
-                          g.x, g.y);
+        args.first_splat = range.first;
+        args.splat_end = range.first + range.count;
+        ProjectBuffers beside{{}, gradient_sum_, splats.rest_sum(range)};
+        splats.bind_moments(range, beside.state);
+        record_project(commands, view, frame, splats, pipeline, args, beside);
+    }
+}
+
+void Backward::record_gradients(Commands& commands, const FrameView& view, const Frame& frame,
+                                const GpuSplats& splats, const Buffer& d_image, GradientBuffers& to,
+                                bool add) {
+    check_stored(options_);
+    if (to.count() != splats.count())
+        throw Error("backward pass",
+                    fmt::format("{} splats, gradients of {}", splats.count(), to.count()),
+                    "Make the gradients' buffers anew where splats come or go.");
+    commands.pass("blend backward");
+    blend_.record(commands, view, frame, d_image);
+
+    if (splats.count() == 0) return;
+    commands.pass("project backward");
+    gpu::ProjectBackwardArgs args{};
+    args.camera_index = view.index;
+    args.low_pass = static_cast<float>(LOW_PASS_DEFAULT);
+    Pipeline& pipeline = project_pipeline(view.sh_degree, splats.sh_degree(),
+                                          add ? UPDATE_ADD : UPDATE_STORE, REST_EACH);
+    for (const SplatRange& range : splats.ranges()) {
+        args.first_splat = range.first;
+        args.splat_end = range.first + range.count;
+        // In place of a sum of harmonics, which is not touched.
+        const BufferRange rest = bound_rows(to.of(kShRest), kShRest, range, to.stride(kShRest));
+        ProjectBuffers beside{{}, to.views(), rest};
+        to.bind(range, beside.state);
+        record_project(commands, view, frame, splats, pipeline, args, beside);
     }
 }
 

@@ -139,13 +139,13 @@ void Forward::record_projection(Commands& commands, const GpuSplats& splats, con
         const gpu::ProjectArgs args{range.first, range.first + range.count, view.index,
                                     static_cast<float>(LOW_PASS_DEFAULT)};
         const Groups g = groups_for(range.count);
-        commands.dispatch(
-            project_pipeline(view.sh_degree, splats.sh_degree()), args,
-            {*view.cameras, splats.parameters(kPosition), splats.parameters(kLogScale),
-             splats.parameters(kRotation), splats.parameters(kOpacity), splats.parameters(kShDc),
-             splats.rows(splats.parameters(kShRest), range), out.shape, out.light, out.bound,
-             out.cover, out.intersection_count, out.visible, status, splats.smoothing()},
-            g.x, g.y);
+        std::vector<BufferRange> buffers{*view.cameras};
+        splats.bind_parameters(range, buffers);
+        buffers.insert(buffers.end(),
+                       {out.shape, out.light, out.bound, out.cover, out.intersection_count,
+                        out.visible, status, splats.smoothing()});
+        commands.dispatch(project_pipeline(view.sh_degree, splats.sh_degree()), args, buffers, g.x,
+                          g.y);
     }
 }
 

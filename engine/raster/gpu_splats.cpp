@@ -3,42 +3,14 @@
 #include <algorithm>
 #include <string>
 
-#include "engine/core/check.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb {
 
-namespace {
-constexpr const char* kNames[kAttributeCount] = {"position", "log_scale", "rotation",
-                                                 "opacity",  "sh_dc",     "sh_rest"};
-}
-
-const char* attribute_name(int attribute) {
-    return kNames[attribute];
-}
-
-std::vector<float>& attribute_values(SplatModel& model, int attribute) {
-    switch (attribute) {
-        case kPosition:
-            return model.position;
-        case kLogScale:
-            return model.log_scale;
-        case kRotation:
-            return model.rotation;
-        case kOpacity:
-            return model.opacity;
-        case kShDc:
-            return model.sh_dc;
-        default:
-            return model.sh_rest;
-    }
-}
-
-const std::vector<float>& attribute_values(const SplatModel& model, int attribute) {
-    return attribute_values(const_cast<SplatModel&>(model), attribute);
-}
-
 std::array<std::uint32_t, kAttributeCount> GpuSplats::strides(int sh_degree) {
-    return {3, 3, 4, 1, 3, static_cast<std::uint32_t>((sh_degree + 1) * (sh_degree + 1) - 1) * 3};
+    std::array<std::uint32_t, kAttributeCount> floats{};
+    for (int a = 0; a < kAttributeCount; ++a) floats[a] = attribute_floats(a, sh_degree);
+    return floats;
 }
 
 std::uint64_t GpuSplats::parameter_bytes(std::uint64_t count, int sh_degree) {
@@ -58,16 +30,15 @@ GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments,
     header_.antialias = model.antialias;
     header_.origin = model.origin;
     smoothing_ = Buffer(device, "smoothing", 4);
-    strides_ = strides(model.sh_degree);
+    check_splat_shapes(model);
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& values = attribute_values(model, a);
-        DARB_CHECK(values.size() == size_t{count_} * strides_[a], "{}: {} values, {} splats of {}",
-                   kNames[a], values.size(), count_, strides_[a]);
+        strides_[a] = model.floats(a);
         const std::uint64_t bytes = values.size() * sizeof(float);
-        parameters_[a] = Buffer(device, kNames[a], bytes);
+        parameters_[a] = Buffer(device, attribute_name(a), bytes);
         if (bytes > 0) parameters_[a].upload(values);
         if (!with_moments) continue;
-        moments_[a] = Buffer(device, std::string("moments of ") + kNames[a], 2 * bytes);
+        moments_[a] = Buffer(device, std::string("moments of ") + attribute_name(a), 2 * bytes);
         if (bytes > 0) moments_[a].upload(std::vector<float>(2 * values.size(), 0.0f));
     }
     if (!with_moments) return;
@@ -89,11 +60,25 @@ std::vector<SplatRange> GpuSplats::ranges() const {
     return splat_ranges(count_, strides_[kShRest] * (has_moments() ? 2 : 1), binding_bytes_);
 }
 
-BufferRange GpuSplats::rows(const Buffer& of_rest, const SplatRange& range) const {
-    const std::uint32_t stride = strides_[kShRest];
-    if (stride == 0 || (&of_rest == &rest_sum_ && !has_rest_sum_)) return of_rest;
-    const std::uint64_t floats = &of_rest == &moments_[kShRest] ? stride * 2 : stride;
-    return {of_rest, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
+BufferRange bound_rows(const Buffer& buffer, int attribute, const SplatRange& range,
+                       std::uint64_t floats) {
+    if (!kSplatAttributes[static_cast<size_t>(attribute)].per_coefficient || floats == 0)
+        return buffer;
+    return {buffer, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
+}
+
+void GpuSplats::bind_parameters(const SplatRange& range, std::vector<BufferRange>& to) const {
+    for (int a = 0; a < kAttributeCount; ++a)
+        to.push_back(bound_rows(parameters_[a], a, range, strides_[a]));
+}
+
+void GpuSplats::bind_moments(const SplatRange& range, std::vector<BufferRange>& to) const {
+    for (int a = 0; a < kAttributeCount; ++a)
+        to.push_back(bound_rows(moments_[a], a, range, strides_[a] * 2));
+}
+
+BufferRange GpuSplats::rest_sum(const SplatRange& range) const {
+    return bound_rows(rest_sum_, kShRest, range, has_rest_sum_ ? strides_[kShRest] : 0);
 }
 
 // Rotations are the widest of what is bound whole, beside four words a splat of a frame; the

@@ -12,7 +12,10 @@
 
 namespace darb {
 
-enum Attribute { kPosition, kLogScale, kRotation, kOpacity, kShDc, kShRest, kAttributeCount };
+/// What a pass over a range of splats binds of an attribute's buffer of so many floats a splat:
+/// the range's rows of harmonics, the others whole, as what a frame holds of a splat is wider.
+BufferRange bound_rows(const Buffer& buffer, int attribute, const SplatRange& range,
+                       std::uint64_t floats);
 
 class GpuSplats {
   public:
@@ -33,7 +36,8 @@ class GpuSplats {
     const glm::dvec3& origin() const { return header_.origin; }
     bool has_moments() const { return static_cast<bool>(moments_[0]); }
 
-    /// Floats per splat of an attribute (0 for kShRest at degree 0).
+    /// Floats per splat of an attribute (0 for kShRest at degree 0, and of an optional attribute
+    /// that the model has not).
     std::uint32_t stride(int attribute) const { return strides_[attribute]; }
     Buffer& parameters(int attribute) { return parameters_[attribute]; }
     const Buffer& parameters(int attribute) const { return parameters_[attribute]; }
@@ -55,12 +59,17 @@ class GpuSplats {
     /// What passes over splats work off one dispatch at a time, as the harmonics and their moments
     /// are bound by range where one binding of the device does not hold them all.
     std::vector<SplatRange> ranges() const;
-    /// The rows of a range in one of the buffers of the harmonics.
-    BufferRange rows(const Buffer& of_rest, const SplatRange& range) const;
+    /// Appends a buffer an attribute, in the order of ATTRIBUTE_*, as the passes over a range bind
+    /// them: the rows of the range of what is too wide to be bound whole.
+    void bind_parameters(const SplatRange& range, std::vector<BufferRange>& to) const;
+    void bind_moments(const SplatRange& range, std::vector<BufferRange>& to) const;
+    /// rest_sum() likewise.
+    BufferRange rest_sum(const SplatRange& range) const;
 
-    /// Device memory of the parameters of so many splats; their moments take twice as much.
+    /// Device memory of the parameters of so many splats, optional ones among them; their moments
+    /// take twice as much.
     static std::uint64_t parameter_bytes(std::uint64_t count, int sh_degree);
-    /// Floats per splat of the attributes.
+    /// Floats per splat of the attributes, optional ones as where they are there.
     static std::array<std::uint32_t, kAttributeCount> strides(int sh_degree);
 
     /// The most splats that this device's bindings and its largest buffer allow.
@@ -77,10 +86,5 @@ class GpuSplats {
     Buffer rest_sum_;
     Buffer smoothing_;
 };
-
-/// The host array of an attribute.
-std::vector<float>& attribute_values(SplatModel& model, int attribute);
-const std::vector<float>& attribute_values(const SplatModel& model, int attribute);
-const char* attribute_name(int attribute);
 
 }  // namespace darb

@@ -149,10 +149,10 @@ RayBounds ray_bounds(const Camera& camera) {
     const glm::dvec2 principal(camera.cx, camera.cy);
     if (camera.lens.active) {
         const glm::dvec2 margin =
-            kJacobianMargin * 0.5 * (camera.lens.ray_max - camera.lens.ray_min);
+            JACOBIAN_MARGIN * 0.5 * (camera.lens.ray_max - camera.lens.ray_min);
         return {camera.lens.ray_min - margin, camera.lens.ray_max + margin};
     }
-    const glm::dvec2 margin = kJacobianMargin * 0.5 * size / focal;
+    const glm::dvec2 margin = JACOBIAN_MARGIN * 0.5 * size / focal;
     return {-principal / focal - margin, (size - principal) / focal + margin};
 }
 

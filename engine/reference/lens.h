@@ -21,7 +21,7 @@ template <class T>
 Vec2<T> lens_jacobian_backward(const LensTerms& lens, const Vec2<T>& ray,
                                const Mat2<T>& d_jacobian);
 
-/// The rays between which the projection's Jacobian is taken: the frame and kJacobianMargin.
+/// The rays between which the projection's Jacobian is taken: the frame and JACOBIAN_MARGIN.
 struct RayBounds {
     glm::dvec2 low{0.0}, high{0.0};
 };

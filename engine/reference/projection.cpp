@@ -216,12 +216,8 @@ std::string_view cull_name(Cull cull) {
 
 template <class T>
 void SplatGradients<T>::resize_like(const Splats<T>& splats) {
-    position.resize(splats.position.size());
-    log_scale.resize(splats.log_scale.size());
-    rotation.resize(splats.rotation.size());
-    opacity.resize(splats.opacity.size());
-    sh_dc.resize(splats.sh_dc.size());
-    sh_rest.resize(splats.sh_rest.size());
+    for (int a = 0; a < kAttributeCount; ++a)
+        attribute_values(*this, a).resize(attribute_values(splats, a).size());
 }
 
 template <class T>

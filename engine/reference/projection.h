@@ -47,9 +47,7 @@ struct ProjectedGradient {
 
 /// dL/d(parameter), same shapes as Splats.
 template <class T>
-struct SplatGradients {
-    std::vector<T> position, log_scale, rotation, opacity, sh_dc, sh_rest;
-
+struct SplatGradients : SplatArrays<T> {
     void resize_like(const Splats<T>& splats);
 };
 

@@ -24,10 +24,12 @@ void for_each_splat(size_t count, int threads, const Body& body) {
 template <class T>
 void check_shapes(const Splats<T>& splats, const Camera& camera) {
     const size_t n = splats.size();
-    DARB_CHECK(splats.position.size() == n * 3 && splats.log_scale.size() == n * 3 &&
-                   splats.rotation.size() == n * 4 && splats.sh_dc.size() == n * 3 &&
-                   splats.sh_rest.size() == n * splats.rest_count(),
-               "N = {}", n);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const size_t held = attribute_values(splats, a).size();
+        DARB_CHECK(held == n * attribute_floats(a, splats.sh_degree) ||
+                       (held == 0 && kSplatAttributes[static_cast<size_t>(a)].optional),
+                   "{}: {} values, N = {}", attribute_name(a), held, n);
+    }
     DARB_CHECK(camera.width > 0 && camera.height > 0, "{}x{}", camera.width, camera.height);
 }
 

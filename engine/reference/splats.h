@@ -24,43 +24,30 @@ using Mat3 = glm::mat<3, 3, T>;
 
 /// SplatModel in the scalar T (double or float): see engine/scene/splat_model.h for units.
 template <class T>
-struct Splats {
+struct Splats : SplatArrays<T> {
     int sh_degree = 0;
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
     bool antialias = false;    // opacity times sqrt(det S / det(S + low_pass I))
-    std::vector<T> position;   // [N][3] world
-    std::vector<T> log_scale;  // [N][3]
-    std::vector<T> rotation;   // [N][4] w x y z
-    std::vector<T> opacity;    // [N] logit
-    std::vector<T> sh_dc;      // [N][3]
-    std::vector<T> sh_rest;    // [N][C-1][3]
     std::vector<T> smoothing;  // [N] deviation of the 3D filter, world units; empty: none
 
-    size_t size() const { return opacity.size(); }
-    int rest_count() const { return ((sh_degree + 1) * (sh_degree + 1) - 1) * 3; }
+    size_t size() const { return this->opacity.size(); }
+    int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }
 };
 
 template <class T>
 Splats<T> make_splats(const SplatModel& model) {
-    const auto copy = [](const std::vector<float>& from) {
-        return std::vector<T>(from.begin(), from.end());
-    };
-    return {model.sh_degree,
-            model.kernel,
-            model.footprint,
-            model.antialias,
-            copy(model.position),
-            copy(model.log_scale),
-            copy(model.rotation),
-            copy(model.opacity),
-            copy(model.sh_dc),
-            copy(model.sh_rest),
-            {}};
+    Splats<T> splats;
+    splats.sh_degree = model.sh_degree;
+    splats.kernel = model.kernel;
+    splats.footprint = model.footprint;
+    splats.antialias = model.antialias;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float>& from = attribute_values(model, a);
+        attribute_values(splats, a).assign(from.begin(), from.end());
+    }
+    return splats;
 }
-
-/// The Jacobian is taken at x/z clamped to the image plus this share of W / (2 fx) on each side.
-constexpr double kJacobianMargin = 0.3;
 
 struct RenderSettings {
     double near_z = NEAR_DEFAULT;        // world units along camera z; splats need z > near_z

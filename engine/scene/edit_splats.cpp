@@ -7,7 +7,6 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "engine/core/error.h"
-#include "engine/scene/infinite_values.h"
 #include "engine/scene/sh_rotation.h"
 #include "shaders/shared/limits.h"
 
@@ -47,12 +46,11 @@ void gather_rows(const std::vector<float>& from, const std::vector<std::uint32_t
 }
 
 void gather(const SplatModel& from, const std::vector<std::uint32_t>& splats, SplatModel& to) {
-    gather_rows(from.position, splats, 3, to.position);
-    gather_rows(from.log_scale, splats, 3, to.log_scale);
-    gather_rows(from.rotation, splats, 4, to.rotation);
-    gather_rows(from.opacity, splats, 1, to.opacity);
-    gather_rows(from.sh_dc, splats, 3, to.sh_dc);
-    gather_rows(from.sh_rest, splats, static_cast<std::size_t>(from.rest_count()), to.sh_rest);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::size_t floats = from.floats(a);
+        if (&from != &to) attribute_values(to, a).resize(splats.size() * floats);
+        gather_rows(attribute_values(from, a), splats, floats, attribute_values(to, a));
+    }
 }
 
 bool row_is_finite(const std::vector<float>& values, std::size_t row, std::size_t width) {
@@ -133,7 +131,6 @@ SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>
     out.footprint = model.footprint;
     out.antialias = model.antialias;
     out.origin = model.origin;
-    out.resize(splats.size());
     gather(model, splats, out);
     return out;
 }
@@ -157,14 +154,14 @@ bool has_only_finite(const SplatModel& model) {
 }
 
 std::size_t drop_non_finite(SplatModel& model) {
-    for (float& logit : model.opacity) logit = limit_infinite_logit(logit);
-    for (float& scale : model.log_scale) scale = limit_infinite_log_scale(scale);
-    const auto rest = static_cast<std::size_t>(model.rest_count());
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (const auto limit = kSplatAttributes[static_cast<std::size_t>(a)].from_file)
+            for (float& value : attribute_values(model, a)) value = limit(value);
     return keep_splats(
         [&](std::size_t i) {
-            return row_is_finite(model.position, i, 3) && row_is_finite(model.log_scale, i, 3) &&
-                   row_is_finite(model.rotation, i, 4) && row_is_finite(model.opacity, i, 1) &&
-                   row_is_finite(model.sh_dc, i, 3) && row_is_finite(model.sh_rest, i, rest);
+            for (int a = 0; a < kAttributeCount; ++a)
+                if (!row_is_finite(attribute_values(model, a), i, model.floats(a))) return false;
+            return true;
         },
         model);
 }

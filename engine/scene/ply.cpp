@@ -10,7 +10,6 @@
 #include "engine/core/files.h"
 #include "engine/scene/compressed_ply.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/infinite_values.h"
 #include "engine/scene/ply_comments.h"
 #include "engine/scene/ply_dialects.h"
 #include "engine/scene/ply_table.h"
@@ -20,49 +19,42 @@ namespace darb {
 
 namespace {
 
-bool all_finite(const double* values, const PlyColumns& columns) {
-    // float32 range is what the model stores.
-    const auto value = [&](int column) { return static_cast<float>(values[column]); };
-    const auto good = [&](int column) { return std::isfinite(value(column)); };
-    bool finite = std::isfinite(limit_infinite_logit(value(columns.opacity)));
-    for (int i = 0; i < 3; ++i)
-        finite = finite && good(columns.position[i]) && good(columns.dc[i]) &&
-                 std::isfinite(limit_infinite_log_scale(value(columns.scale[i])));
-    for (const int column : columns.rotation) finite = finite && good(column);
-    for (const int column : columns.rest) finite = finite && good(column);
-    return finite;
+// float32 is what the model stores.
+float stored(const double* values, const PlyColumns& columns, std::size_t a, std::size_t c) {
+    const auto value = static_cast<float>(values[columns.of[a][c]]);
+    const auto limit = kSplatAttributes[a].from_file;
+    return limit ? limit(value) : value;
 }
 
+bool all_finite(const double* values, const PlyColumns& columns) {
+    for (std::size_t a = 0; a < kAttributeCount; ++a)
+        for (std::size_t c = 0; c < columns.of[a].size(); ++c)
+            if (!std::isfinite(stored(values, columns, a, c))) return false;
+    return true;
+}
+
+// Positions are set later, all at once.
 void store_splat(const double* values, const PlyColumns& columns, std::size_t at,
                  SplatModel& model) {
-    for (std::size_t i = 0; i < 3; ++i) {
-        model.sh_dc[at * 3 + i] = static_cast<float>(values[columns.dc[i]]);
-        model.log_scale[at * 3 + i] =
-            limit_infinite_log_scale(static_cast<float>(values[columns.scale[i]]));
-    }
-    for (std::size_t i = 0; i < 4; ++i)
-        model.rotation[at * 4 + i] = static_cast<float>(values[columns.rotation[i]]);
-    model.opacity[at] = limit_infinite_logit(static_cast<float>(values[columns.opacity]));
-    const std::size_t rest = columns.rest.size(), per_channel = rest / 3;
-    for (std::size_t i = 0; i < rest; ++i) {
-        const std::size_t channel = i / per_channel, coefficient = i % per_channel;
-        model.sh_rest[at * rest + coefficient * 3 + channel] =
-            static_cast<float>(values[columns.rest[i]]);
+    for (std::size_t a = 0; a < kAttributeCount; ++a) {
+        if (a == kPosition) continue;
+        const std::size_t floats = columns.of[a].size();
+        float* to = attribute_values(model, static_cast<int>(a)).data() + at * floats;
+        for (std::size_t c = 0; c < floats; ++c) to[c] = stored(values, columns, a, c);
     }
 }
 
 std::string make_header(const SplatModel& model, bool double_positions) {
     std::string text = fmt::format("ply\nformat binary_little_endian 1.0\n{}element vertex {}\n",
                                    ply_comments(model), model.size());
-    for (const char* name : {"x", "y", "z"})
-        text += fmt::format("property {} {}\n", double_positions ? "double" : "float", name);
-    for (const char* name : {"nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
-        text += fmt::format("property float {}\n", name);
-    for (int i = 0; i < model.rest_count(); ++i)
-        text += fmt::format("property float f_rest_{}\n", i);
-    for (const char* name :
-         {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
-        text += fmt::format("property float {}\n", name);
+    for (const int a : attributes_in_file_order()) {
+        const bool wide = double_positions && a == kPosition;
+        for (std::size_t c = 0; c < model.floats(a); ++c)
+            text += fmt::format("property {} {}\n", wide ? "double" : "float", ply_column(a, c));
+        if (a != kPosition) continue;
+        for (const char* name : {"nx", "ny", "nz"})
+            text += fmt::format("property float {}\n", name);
+    }
     return text + "end_header\n";
 }
 
@@ -70,6 +62,34 @@ template <class T>
 std::byte* put(std::byte* to, const T* values, std::size_t count) {
     if (count > 0) std::memcpy(to, values, count * sizeof(T));  // values may be null without any
     return to + count * sizeof(T);
+}
+
+std::byte* put_position(std::byte* to, const SplatModel& model, std::size_t splat, bool doubles) {
+    for (std::size_t i = 0; i < 3; ++i) {
+        const float local = model.position[splat * 3 + i];
+        const double origin = model.origin[static_cast<int>(i)], value = origin + double{local};
+        // Adding a zero origin would turn -0 into 0.
+        const float narrow = origin == 0.0 ? local : static_cast<float>(value);
+        to = doubles ? put(to, &value, 1) : put(to, &narrow, 1);
+    }
+    constexpr float kNoNormal[3] = {0, 0, 0};
+    return put(to, kNoNormal, 3);
+}
+
+std::byte* put_row(std::byte* to, const SplatModel& model, int attribute, std::size_t splat) {
+    const std::size_t floats = model.floats(attribute);
+    const float* from = attribute_values(model, attribute).data() + splat * floats;
+    if (!kSplatAttributes[static_cast<std::size_t>(attribute)].per_coefficient)
+        return put(to, from, floats);
+    for (std::size_t c = 0; c < floats; ++c)
+        put(to + file_column(attribute, model.sh_degree, c) * sizeof(float), from + c, 1);
+    return to + floats * sizeof(float);
+}
+
+std::size_t floats_in_all(const SplatModel& model) {
+    std::size_t sum = 0;
+    for (int a = 0; a < kAttributeCount; ++a) sum += model.floats(a);
+    return sum;
 }
 
 }  // namespace
@@ -90,9 +110,11 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
 
     SplatModel model;
     PlyFacts said;
-    model.sh_degree = static_cast<int>(std::lround(std::sqrt(columns.rest.size() / 3 + 1))) - 1;
+    model.sh_degree =
+        static_cast<int>(std::lround(std::sqrt(columns.of[kShRest].size() / 3 + 1))) - 1;
     read_ply_comments(header, where, model, said.notes);
-    model.resize(vertex->count);
+    for (std::size_t a = 0; a < kAttributeCount; ++a)
+        attribute_values(model, static_cast<int>(a)).resize(vertex->count * columns.of[a].size());
     std::vector<double> positions, translated;
     positions.reserve(vertex->count * 3);
     std::size_t kept = 0;
@@ -101,7 +123,7 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
         const double* values = translate_row(columns, read, translated);
         for (const int column : columns.normal) has_normals |= values[column] != 0;
         if (!all_finite(values, columns)) return;
-        for (const int column : columns.position) positions.push_back(values[column]);
+        for (const int column : columns.of[kPosition]) positions.push_back(values[column]);
         store_splat(values, columns, kept++, model);
     };
     const std::size_t end = read_ply_rows(file, header, *vertex, where, row, progress);
@@ -134,31 +156,12 @@ std::vector<std::byte> encode_ply(const SplatModel& model) {
     check_splat_shapes(model);
     const bool doubles = needs_double_positions(model);
     const std::string header = make_header(model, doubles);
-    const std::size_t rest = static_cast<std::size_t>(model.rest_count()), per_channel = rest / 3;
-    const std::size_t row = 3 * (doubles ? 8 : 4) + (3 + 3 + rest + 8) * 4;
+    const std::size_t row = 3 * (doubles ? 8 : 4) + 3 * 4 + (floats_in_all(model) - 3) * 4;
     std::vector<std::byte> file(header.size() + model.size() * row);
     std::byte* to = put(file.data(), header.data(), header.size());
-    std::vector<float> rest_row(rest);
-    constexpr float kNoNormal[3] = {0, 0, 0};
-    for (std::size_t n = 0; n < model.size(); ++n) {
-        for (std::size_t i = 0; i < 3; ++i) {
-            const double value =
-                model.origin[static_cast<int>(i)] + double{model.position[n * 3 + i]};
-            // Adding a zero origin would turn -0 into 0.
-            const float narrow = model.origin[static_cast<int>(i)] == 0.0
-                                     ? model.position[n * 3 + i]
-                                     : static_cast<float>(value);
-            to = doubles ? put(to, &value, 1) : put(to, &narrow, 1);
-        }
-        to = put(to, kNoNormal, 3);
-        to = put(to, &model.sh_dc[n * 3], 3);
-        for (std::size_t i = 0; i < rest; ++i)
-            rest_row[i] = model.sh_rest[n * rest + (i % per_channel) * 3 + i / per_channel];
-        to = put(to, rest_row.data(), rest);
-        to = put(to, &model.opacity[n], 1);
-        to = put(to, &model.log_scale[n * 3], 3);
-        to = put(to, &model.rotation[n * 4], 4);
-    }
+    for (std::size_t n = 0; n < model.size(); ++n)
+        for (const int a : attributes_in_file_order())
+            to = a == kPosition ? put_position(to, model, n, doubles) : put_row(to, model, a, n);
     return file;
 }
 

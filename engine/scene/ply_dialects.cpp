@@ -42,14 +42,15 @@ bool has_colour_bytes(const PlyElement& vertex) {
 }
 
 void find_harmonics(const PlyElement& vertex, const std::string& where, PlyColumns& columns) {
-    for (int i = 0; vertex.find(fmt::format("f_rest_{}", i)) >= 0; ++i)
-        columns.rest.push_back(need(vertex, fmt::format("f_rest_{}", i), where));
-    const std::size_t count = columns.rest.size();
+    std::vector<int> rest;  // in the file's order, channel by channel
+    for (std::size_t i = 0; vertex.find(ply_column(kShRest, i)) >= 0; ++i)
+        rest.push_back(need(vertex, ply_column(kShRest, i), where));
+    const std::size_t count = rest.size();
     if (count == kRestOfDegree4) {  // the last band of each channel is left out
         std::vector<int> kept;
         for (std::size_t i = 0; i < count; ++i)
-            if (i % (kRestOfDegree4 / 3) < kRestOfDegree3 / 3) kept.push_back(columns.rest[i]);
-        columns.rest = std::move(kept);
+            if (i % (kRestOfDegree4 / 3) < kRestOfDegree3 / 3) kept.push_back(rest[i]);
+        rest = std::move(kept);
         columns.notes.emplace_back("harmonics of degree 4 were left out");
     } else if (count != 0 && count != 9 && count != 24 && count != kRestOfDegree3) {
         throw Error(
@@ -57,15 +58,15 @@ void find_harmonics(const PlyElement& vertex, const std::string& where, PlyColum
             fmt::format("has {} f_rest properties; SH degree 0 to 4 has 0, 9, 24, 45, 72", count),
             "Export the scene again with whole bands.");
     }
+    for (std::size_t i = 0; i < rest.size(); ++i)
+        columns.of[kShRest].push_back(rest[i % 3 * (rest.size() / 3) + i / 3]);
 }
 
 /// Names; harmonics have a note of their own.
 std::vector<std::string> unread_properties(const PlyElement& vertex, const PlyColumns& columns) {
     std::vector<int> read = columns.normal;
-    read.insert(read.end(), {columns.opacity, columns.filter});
-    for (const auto& of : {columns.position, columns.dc, columns.scale})
-        read.insert(read.end(), of.begin(), of.end());
-    read.insert(read.end(), columns.rotation.begin(), columns.rotation.end());
+    read.push_back(columns.filter);
+    for (const auto& of : columns.of) read.insert(read.end(), of.begin(), of.end());
     std::vector<std::string> names;
     for (std::size_t i = 0; i < vertex.properties.size(); ++i)
         if (const std::string& name = vertex.properties[i].name;
@@ -83,12 +84,12 @@ double log_of_blurred(double log_scale, double filter) {
 /// As Mip-Splatting draws: s'^2 = s^2 + f^2, opacity' = opacity * product of s / s'.
 void apply_filter(const PlyColumns& columns, double* row) {
     double shrink = 0;  // -ln of the product
-    for (const int column : columns.scale) {
+    for (const int column : columns.of[kLogScale]) {
         const double log_scale = limit_infinite_log_scale(static_cast<float>(row[column]));
         row[column] = log_of_blurred(log_scale, row[columns.filter]);
         shrink += row[column] - log_scale;
     }
-    double& logit = row[columns.opacity];
+    double& logit = row[columns.of[kOpacity][0]];
     logit = -shrink - std::log(std::exp(-logit) - std::expm1(-shrink));
 }
 
@@ -99,22 +100,25 @@ PlyColumns find_ply_columns(const PlyElement& vertex, const std::string& where) 
     columns.count = vertex.properties.size();
     columns.dc_is_byte = has_colour_bytes(vertex);
     const char* const colours[] = {"red", "green", "blue"};
-    for (int i = 0; i < 3; ++i) {
-        columns.position[i] = need(vertex, std::string(1, "xyz"[i]), where);
-        columns.dc[i] =
-            need(vertex, columns.dc_is_byte ? colours[i] : fmt::format("f_dc_{}", i), where);
-        if (const int normal = find_value(vertex, fmt::format("n{}", "xyz"[i])); normal >= 0)
-            columns.normal.push_back(normal);
+    const int missing = static_cast<int>(columns.count);  // translate_row puts it there
+    const bool flat = vertex.find(ply_column(kLogScale, 2)) < 0;
+    for (const int a : attributes_in_file_order()) {
+        if (a == kShRest) continue;
+        std::vector<int>& of = columns.of[static_cast<std::size_t>(a)];
+        const SplatAttribute& row = kSplatAttributes[static_cast<std::size_t>(a)];
+        if (row.optional && find_value(vertex, ply_column(a, 0)) < 0) continue;
+        for (std::size_t c = 0; c < row.floats; ++c) {
+            const bool byte = a == kShDc && columns.dc_is_byte;
+            of.push_back(a == kLogScale && c == 2 && flat
+                             ? missing
+                             : need(vertex, byte ? colours[c] : ply_column(a, c), where));
+        }
     }
-    for (int i = 0; i < 4; ++i) columns.rotation[i] = need(vertex, fmt::format("rot_{}", i), where);
-    columns.opacity = need(vertex, "opacity", where);
-    for (int i = 0; i < 2; ++i) columns.scale[i] = need(vertex, fmt::format("scale_{}", i), where);
-    if (vertex.find("scale_2") < 0) {
-        columns.scale[2] = static_cast<int>(columns.count);
+    if (flat)
         columns.notes.emplace_back("has no scale_2, as scenes of 2DGS: splats have no thickness");
-    } else {
-        columns.scale[2] = need(vertex, "scale_2", where);
-    }
+    for (const char* name : {"nx", "ny", "nz"})
+        if (const int normal = find_value(vertex, name); normal >= 0)
+            columns.normal.push_back(normal);
     columns.filter = find_value(vertex, "filter_3D");
     if (columns.filter >= 0)
         columns.notes.emplace_back("filter_3D (Mip-Splatting) is now part of scales and opacities");
@@ -137,13 +141,13 @@ std::vector<std::string> ply_notes(const PlyColumns& columns, bool has_normals) 
 
 const double* translate_row(const PlyColumns& columns, const double* values,
                             std::vector<double>& row) {
-    const bool as_3dgs = columns.scale[2] < static_cast<int>(columns.count);
+    const bool as_3dgs = columns.of[kLogScale][2] < static_cast<int>(columns.count);
     if (as_3dgs && !columns.dc_is_byte && columns.filter < 0) return values;
     row.assign(values, values + columns.count);
     row.push_back(-LOG_SCALE_LIMIT);  // of the axis that the file may lack
     double* at = row.data();
     if (columns.dc_is_byte)
-        for (const int column : columns.dc) at[column] = dc_of_colour(at[column] / 255);
+        for (const int column : columns.of[kShDc]) at[column] = dc_of_colour(at[column] / 255);
     if (columns.filter >= 0) apply_filter(columns, at);
     return at;
 }

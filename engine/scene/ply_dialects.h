@@ -11,16 +11,15 @@
 #include <vector>
 
 #include "engine/scene/ply_table.h"
+#include "engine/scene/splat_attributes.h"
 
 namespace darb {
 
 /// Columns of a row as translate_row leaves it.
 struct PlyColumns {
     std::size_t count = 0;  // of the file's rows
-    std::array<int, 3> position{}, dc{}, scale{};
-    std::array<int, 4> rotation{};
-    int opacity = 0;
-    std::vector<int> rest;    // in file order: channel-major; degree 3 at most
+    /// Of each attribute, in the order of the model's floats; empty where there is none.
+    std::array<std::vector<int>, kAttributeCount> of;
     std::vector<int> normal;  // those of nx ny nz that are there
     bool dc_is_byte = false;
     int filter = -1;                  // filter_3D, world; -1: none

@@ -3,13 +3,15 @@
 
 #include <array>
 
+#include "shaders/shared/attribute_list.h"
+
 namespace darb {
 
 constexpr int kMaxShDegree = 3;
 constexpr int kMaxShCoefficients = 16;  // (3 + 1)^2
 
 // Normalisation of the real harmonics; the signs are 3DGS's (Condon-Shortley phase kept).
-constexpr double kShBand0 = 0.28209479177387814;      // sqrt(1 / pi) / 2
+constexpr double kShBand0 = SH_C0;                    // sqrt(1 / pi) / 2
 constexpr double kShBand1 = 0.4886025119029199;       // sqrt(3 / pi) / 2
 constexpr double kShBand2Xy = 1.0925484305920792;     // sqrt(15 / pi) / 2
 constexpr double kShBand2Zz = 0.31539156525252005;    // sqrt(5 / pi) / 4

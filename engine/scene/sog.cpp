@@ -23,7 +23,7 @@ using nlohmann::json;
 constexpr std::size_t kPaletteRow = 64;         // entries a row of shN_centroids
 constexpr std::size_t kMostPalette = 65536;     // entries
 constexpr std::size_t kSparePixels = 1u << 20;  // of the pictures, beyond four times the splats
-constexpr std::uint64_t kSplatBytes = 4 * (14 + 45);
+constexpr std::uint64_t kSplatBytes = 4 * splat_floats(kMaxShDegree);
 
 using Codebook = std::array<float, 256>;
 

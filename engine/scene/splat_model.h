@@ -8,32 +8,29 @@
 #include <vector>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/scene/splat_attributes.h"
 
 namespace darb {
 
-struct SplatModel {
+struct SplatModel : SplatArrays<float> {
     int sh_degree = 0;             // 0..3
     int kernel = KERNEL_GAUSSIAN;  // shaders/shared/kernel_list.h
     Footprint footprint = Footprint::psi;
     bool antialias = false;  // SplatRenderMode: mip
     glm::dvec3 origin{0.0};  // added to every position on save; positions are relative to it
 
-    std::vector<float> position;   // [N][3] world
-    std::vector<float> log_scale;  // [N][3] natural log of the standard deviation, world
-    std::vector<float> rotation;   // [N][4] quaternion w x y z, any norm above 1e-6
-    std::vector<float> opacity;    // [N] logit
-    std::vector<float> sh_dc;      // [N][3]; colour = 0.5 + 0.28209479 * dc
-    std::vector<float> sh_rest;    // [N][C-1][3]: coefficient-major, rgb innermost
-
     size_t size() const { return opacity.size(); }
-    int rest_count() const { return ((sh_degree + 1) * (sh_degree + 1) - 1) * 3; }
+    int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }
+    /// Floats of a splat; 0 of an optional attribute that is not there.
+    std::uint32_t floats(int attribute) const {
+        const bool held = !kSplatAttributes[static_cast<size_t>(attribute)].optional ||
+                          !attribute_values(*this, attribute).empty();
+        return held ? attribute_floats(attribute, sh_degree) : 0;
+    }
+    /// All arrays but those of optional attributes that are not there.
     void resize(size_t count) {
-        position.resize(count * 3);
-        log_scale.resize(count * 3);
-        rotation.resize(count * 4);
-        opacity.resize(count);
-        sh_dc.resize(count * 3);
-        sh_rest.resize(count * rest_count());
+        for (int a = 0; a < kAttributeCount; ++a)
+            attribute_values(*this, a).resize(count * floats(a));
     }
 };
 

@@ -1,16 +1,23 @@
 #include "engine/scene/splat_shapes.h"
 
-#include "engine/core/check.h"
+#include <fmt/format.h>
+
+#include "engine/core/error.h"
 
 namespace darb {
 
 void check_splat_shapes(const SplatModel& model) {
-    const std::size_t n = model.size();
-    DARB_CHECK(model.sh_degree >= 0 && model.sh_degree <= 3, "degree {}", model.sh_degree);
-    DARB_CHECK(model.position.size() == n * 3 && model.log_scale.size() == n * 3 &&
-                   model.rotation.size() == n * 4 && model.sh_dc.size() == n * 3 &&
-                   model.sh_rest.size() == n * static_cast<std::size_t>(model.rest_count()),
-               "N = {}, rest {}", n, model.sh_rest.size());
+    if (model.sh_degree < 0 || model.sh_degree > 3)
+        throw Error("splat model", fmt::format("has harmonics of degree {}", model.sh_degree),
+                    "Degrees are 0 to 3.");
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (const std::size_t held = attribute_values(model, a).size(),
+            wanted = model.size() * model.floats(a);
+            held != wanted)
+            throw Error("splat model",
+                        fmt::format("{} holds {} values, {} splats need {}", attribute_name(a),
+                                    held, model.size(), wanted),
+                        "Each array holds the values of all splats, as splat_attributes.h says.");
 }
 
 }  // namespace darb

@@ -5,7 +5,7 @@
 
 namespace darb {
 
-/// DARB_CHECK of the degree and of every array's length.
+/// Throws Error where the degree or the length of an array is wrong.
 void check_splat_shapes(const SplatModel& model);
 
 }  // namespace darb

@@ -1,5 +1,6 @@
 // Sums a splat's partials over its tiles, takes them back through the projection to its parameters and does
-// the Adam step there (UPDATE = 1), or stores the gradients in the moments' place (UPDATE = 0).
+// the Adam step there (UPDATE_ADAM), or leaves the gradients in buffers, in place of what they hold (UPDATE_STORE)
+// or added to it (UPDATE_ADD): adam_update.comp makes the step of these.
 // With REST_GATHER the harmonics above the first band of a splat in view add to rest_sum instead.
 // Place: last pass of an iteration. Source: docs/math.md, Gradients and Optimizer.
 // Work: one thread a splat, all N of them: Adam is dense, an unseen splat's moments decay and move it.
@@ -9,6 +10,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shared/attribute_list.h"
 #include "shared/limits.h"
 #include "shared/optim_args.h"
 #include "shared/render_args.h"
@@ -17,35 +19,46 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
 layout(constant_id = 1) const int SH_DEGREE = 0;
 layout(constant_id = 2) const int SH_STORED = 0;
-layout(constant_id = 3) const int UPDATE = 1;
+layout(constant_id = 3) const int UPDATE = UPDATE_ADAM;
 layout(constant_id = 4) const int REST = REST_EACH;
 
+#define STATE_BINDING (1 + ATTRIBUTES)
+#define FRAME_BINDING (1 + 2 * ATTRIBUTES)
 layout(push_constant, scalar) uniform Push { ProjectBackwardArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
-layout(set = 0, binding = 1, scalar) buffer Position { float position[]; };
-layout(set = 0, binding = 2, scalar) buffer LogScale { float log_scale[]; };
-layout(set = 0, binding = 3, scalar) buffer Rotation { vec4 rotation[]; };
-layout(set = 0, binding = 4, scalar) buffer Opacity { float opacity_logit[]; };
-layout(set = 0, binding = 5, scalar) buffer ShDc { float sh_dc[]; };
-layout(set = 0, binding = 6, scalar) buffer ShRest { float sh_rest[]; };  // from first_splat on, as m_rest
-layout(set = 0, binding = 7, scalar) buffer MPosition { vec2 m_position[]; };
-layout(set = 0, binding = 8, scalar) buffer MScale { vec2 m_scale[]; };
-layout(set = 0, binding = 9, scalar) buffer MRotation { vec2 m_rotation[]; };
-layout(set = 0, binding = 10, scalar) buffer MOpacity { vec2 m_opacity[]; };
-layout(set = 0, binding = 11, scalar) buffer MShDc { vec2 m_dc[]; };
-layout(set = 0, binding = 12, scalar) buffer MShRest { vec2 m_rest[]; };
-layout(set = 0, binding = 13, scalar) readonly buffer PairCount { uint pair_count[]; };
-layout(set = 0, binding = 14, scalar) readonly buffer PairBegin { uint pair_begin[]; };
-layout(set = 0, binding = 20, scalar) readonly buffer PartialRest { float partial_rest[]; };
-layout(set = 0, binding = 21, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // sum of norms, frames
-layout(set = 0, binding = 22, scalar) buffer Status { FrameStatus status; };
-layout(set = 0, binding = 23, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
-layout(set = 0, binding = 24, scalar) buffer RestSum { float rest_sum[]; };  // as sh_rest, but with REST_EACH
+layout(set = 0, binding = 1 + ATTRIBUTE_POSITION, scalar) buffer Position { float position[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_LOG_SCALE, scalar) buffer LogScale { float log_scale[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_ROTATION, scalar) buffer Rotation { vec4 rotation[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer OpacityLogit { float opacity_logit[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) buffer ShDc { float sh_dc[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) buffer ShRest { float sh_rest[]; };  // from first_splat on, as m_sh_rest and d_sh_rest
+
+// Moments with UPDATE_ADAM, else gradients.
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer MPosition { vec2 m_position[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_LOG_SCALE, scalar) buffer MLogScale { vec2 m_log_scale[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer MRotation { vec2 m_rotation[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer MOpacityLogit { vec2 m_opacity_logit[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer MShDc { vec2 m_sh_dc[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer MShRest { vec2 m_sh_rest[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer DPosition { float d_position[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_LOG_SCALE, scalar) buffer DLogScale { float d_log_scale[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer DRotation { float d_rotation[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer DOpacityLogit { float d_opacity_logit[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer DShDc { float d_sh_dc[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer DShRest { float d_sh_rest[]; };
+
+layout(set = 0, binding = FRAME_BINDING, scalar) readonly buffer PairCount { uint pair_count[]; };
+layout(set = 0, binding = FRAME_BINDING + 1, scalar) readonly buffer PairBegin { uint pair_begin[]; };
+layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer PartialRest { float partial_rest[]; };
+layout(set = 0, binding = FRAME_BINDING + 8, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // norms, views
+layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus status; };
+layout(set = 0, binding = FRAME_BINDING + 10, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world
+layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { float rest_sum[]; };  // as sh_rest, but with REST_EACH
 
 const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
 const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 
-#define PARTIALS_BINDING 15
+#define PARTIALS_BINDING (FRAME_BINDING + 2)
 #include "effects/constants.glsl"
 #include "kernels/kernel.glsl"
 #include "lib/covariance.glsl"
@@ -55,9 +68,8 @@ const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 #include "lib/partials.glsl"
 #include "lib/sh.glsl"
 #include "optim/adam.glsl"
+#include "optim/fading.glsl"
 #include "backward/project_gradient.glsl"
-
-const float FADING = 1.0;  // of a logit, in a frame: what Adam adds in 20 at most, so what many photos hold up stays
 
 Partial sum_partials(uint i) {
     Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
@@ -83,22 +95,31 @@ bool finite(SplatGradient g) {
     return below(max(ellipsoid, light), GRADIENT_LIMIT);
 }
 
+// What becomes of a float's gradient.
+#define UPDATE_FLOAT(value, moment, stored, gradient, rate)                   \
+    if (UPDATE == UPDATE_ADAM) {                                              \
+        vec2 m = moment;                                                      \
+        value = adam_step(value, m, gradient, rate);                          \
+        moment = m;                                                           \
+    } else {                                                                  \
+        stored = UPDATE == UPDATE_ADD ? stored + (gradient) : (gradient);     \
+    }
+
 void update_rest(uint i, SplatGradient g) {
     float basis[SH_REST_MAX];
     sh_basis(g.direction, basis);
+    const uint row = (i - args.first_splat) * SH_STRIDE;
     for (int k = 0; k < SH_USED; ++k) {
         for (uint c = 0u; c < 3u; ++c) {
-            const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u + c;
+            const uint at = row + uint(k) * 3u + c;
             float gradient = basis[k] * g.colour[c];
-            if (REST != REST_EACH) {
+            if (UPDATE == UPDATE_ADAM && REST != REST_EACH) {
                 gradient = rest_sum[at] + gradient * args.rest_share;
                 rest_sum[at] = REST == REST_GATHER ? gradient : 0.0;
             }
-            if (REST != REST_GATHER) {
-                vec2 m = m_rest[at];
-                sh_rest[at] = adam_step(sh_rest[at], m, gradient, args.rate_rest);
-                m_rest[at] = m;
-            }
+            if (REST != REST_GATHER)
+                UPDATE_FLOAT(sh_rest[at], m_sh_rest[at], d_sh_rest[at], gradient,
+                             args.rate[ATTRIBUTE_SH_REST])
         }
     }
 }
@@ -106,62 +127,73 @@ void update_rest(uint i, SplatGradient g) {
 void update_splat(uint i, SplatGradient g) {
     for (uint c = 0u; c < 3u; ++c) {
         const uint at = 3u * i + c;
-        vec2 m = m_position[at];
-        position[at] = adam_step(position[at], m, g.position[c], args.rate_position);
-        m_position[at] = m;
-        m = m_scale[at];
+        UPDATE_FLOAT(position[at], m_position[at], d_position[at], g.position[c],
+                     args.rate[ATTRIBUTE_POSITION])
         const float before = log_scale[at], largest = max(before, args.largest_log_scale);
-        const float after = adam_step(before, m, g.log_scale[c], args.rate_scale);
-        log_scale[at] = after > largest ? largest : after;  // not min: what is no number stays none
-        m_scale[at] = m;
-        m = m_dc[at];
-        sh_dc[at] = adam_step(sh_dc[at], m, SH_C0 * g.colour[c], args.rate_dc);
-        m_dc[at] = m;
+        UPDATE_FLOAT(log_scale[at], m_log_scale[at], d_log_scale[at], g.log_scale[c],
+                     args.rate[ATTRIBUTE_LOG_SCALE])
+        if (UPDATE == UPDATE_ADAM && log_scale[at] > largest) log_scale[at] = largest;
+        UPDATE_FLOAT(sh_dc[at], m_sh_dc[at], d_sh_dc[at], SH_C0 * g.colour[c],
+                     args.rate[ATTRIBUTE_SH_DC])
     }
-    vec4 q = rotation[i];
     for (uint c = 0u; c < 4u; ++c) {
-        vec2 m = m_rotation[4u * i + c];
-        q[c] = adam_step(q[c], m, g.rotation[c], args.rate_rotation);
-        m_rotation[4u * i + c] = m;
+        const uint at = 4u * i + c;
+        UPDATE_FLOAT(rotation[i][c], m_rotation[at], d_rotation[at], g.rotation[c],
+                     args.rate[ATTRIBUTE_ROTATION])
     }
-    rotation[i] = q;
-    vec2 m = m_opacity[i];
-    float logit = adam_step(opacity_logit[i], m, g.opacity_logit, args.rate_opacity);
-    const vec3 at = vec3(position[3u * i], position[3u * i + 1u], position[3u * i + 2u]);
-    const float away = length(from_centre(cameras[args.camera_index], at));
-    if (UPDATE == 1 && away < args.clearance) logit -= FADING;
-    opacity_logit[i] = logit;
-    m_opacity[i] = m;
+    UPDATE_FLOAT(opacity_logit[i], m_opacity_logit[i], d_opacity_logit[i], g.opacity_logit,
+                 args.rate[ATTRIBUTE_OPACITY_LOGIT])
+    if (UPDATE == UPDATE_ADAM && stands_near(cameras[args.camera_index], i, args.clearance))
+        opacity_logit[i] -= FADING;
     if (SH_DEGREE > 0 && (REST != REST_GATHER || pair_count[i] > 0u)) update_rest(i, g);
+    if (UPDATE == UPDATE_STORE) {  // the bands beyond the degree in use
+        const uint row = (i - args.first_splat) * SH_STRIDE;
+        for (uint c = uint(SH_USED) * 3u; c < SH_STRIDE; ++c) d_sh_rest[row + c] = 0.0;
+    }
 }
 
-void main() {
-    const uint i = args.first_splat + linear_id();
-    if (i >= args.splat_end || status.overflow != 0u) return;
+SplatGradient no_gradient() {
     SplatGradient g;
     g.position = g.log_scale = g.colour = g.direction = vec3(0.0);
     g.rotation = vec4(0.0);
     g.opacity_logit = 0.0;
     g.mean = vec2(0.0);
+    return g;
+}
+
+void regularise(uint i, inout SplatGradient g) {
+    const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
+    g.opacity_logit += args.opacity_weight * o * (1.0 - o);
+    for (uint c = 0u; c < 3u; ++c) {
+        const float raw = log_scale[3u * i + c];
+        if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c] += args.scale_weight * exp(raw);
+    }
+}
+
+void main() {
+    const uint i = args.first_splat + linear_id();
+    if (i >= args.splat_end || status.overflow != 0u) return;
+    SplatGradient g = no_gradient();
+    vec2 shown = vec2(0.0);  // norm of the gradient of the mean, NDC; 1
     if (pair_count[i] > 0u) {
         const CameraData camera = cameras[args.camera_index];
         g = project_gradient(camera, i, sum_partials(i));
+        shown = vec2(length(g.mean * 0.5 * vec2(camera.width, camera.height)), 1.0);
         if (!finite(g)) {
             atomicAdd(status.bad_gradients, 1u);
-            return;
+            if (UPDATE == UPDATE_ADAM) return;
+            g = no_gradient();
+            shown = vec2(0.0, VIEWS_BAD);
         }
-        const vec2 ndc = g.mean * 0.5 * vec2(camera.width, camera.height);
-        gradient_sum[i] += vec2(length(ndc), 1.0);
+    } else if (UPDATE == UPDATE_ADD) {
+        return;
     }
-    // The regularisers. Adam makes a step of full length of any gradient that comes alone: at all frames that do not
-    // show a splat they would take, in a large set, what a few of its photos never get to hold up.
-    if (UPDATE == 1 && (pair_count[i] > 0u || args.regularise_unseen == 1u)) {
-        const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
-        g.opacity_logit += args.opacity_weight * o * (1.0 - o);
-        for (uint c = 0u; c < 3u; ++c) {
-            const float raw = log_scale[3u * i + c];
-            if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c] += args.scale_weight * exp(raw);
-        }
-    }
+    if (UPDATE == UPDATE_STORE)
+        gradient_sum[i] = shown;
+    else if (pair_count[i] > 0u)
+        gradient_sum[i] += shown;
+    // Adam makes a step of full length of any gradient that comes alone: at all frames that do not show a splat the
+    // regularisers would take, in a large set, what a few of its photos never get to hold up.
+    if (UPDATE == UPDATE_ADAM && (pair_count[i] > 0u || args.regularise_unseen == 1u)) regularise(i, g);
     update_splat(i, g);
 }

@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shared/attribute_list.h"
 #include "shared/limits.h"
 #include "shared/render_args.h"
 
@@ -23,24 +24,25 @@ layout(constant_id = 2) const int SH_STORED = 0;   // degree of the buffer's lay
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
 
+#define FRAME_BINDING (1 + ATTRIBUTES)
 layout(push_constant, scalar) uniform Push { ProjectArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer Position { vec3 position[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer LogScale { vec3 log_scale[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer Rotation { vec4 rotation[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer Opacity { float opacity_logit[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer ShDc { vec3 sh_dc[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer ShRest { float sh_rest[]; };  // from first_splat on
-layout(set = 0, binding = 7, scalar) writeonly buffer SplatShape { vec4 splat_shape[]; };  // mean, l11, l21
-layout(set = 0, binding = 7, scalar) writeonly buffer SplatShapeHalf { uvec4 splat_shape_half[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer SplatLight { vec4 splat_light[]; };  // rgb, opacity
-layout(set = 0, binding = 8, scalar) writeonly buffer SplatLightHalf { uvec2 splat_light_half[]; };
-layout(set = 0, binding = 9, scalar) writeonly buffer SplatBound { vec4 splat_bound[]; };  // l22, reach, depth, slope
-layout(set = 0, binding = 10, scalar) writeonly buffer Cover { uvec4 cover[]; };
-layout(set = 0, binding = 11, scalar) writeonly buffer PairCount { uint pair_count[]; };
-layout(set = 0, binding = 12, scalar) writeonly buffer Visible { uint visible[]; };
-layout(set = 0, binding = 13, scalar) buffer Status { FrameStatus status; };
-layout(set = 0, binding = 14, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
+layout(set = 0, binding = 1 + ATTRIBUTE_POSITION, scalar) readonly buffer Position { vec3 position[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_LOG_SCALE, scalar) readonly buffer LogScale { vec3 log_scale[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_ROTATION, scalar) readonly buffer Rotation { vec4 rotation[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_OPACITY_LOGIT, scalar) readonly buffer Opacity { float opacity_logit[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) readonly buffer ShDc { vec3 sh_dc[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) readonly buffer ShRest { float sh_rest[]; };  // from first_splat on
+layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape { vec4 splat_shape[]; };  // mean, l11, l21
+layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShapeHalf { uvec4 splat_shape_half[]; };
+layout(set = 0, binding = FRAME_BINDING + 1, scalar) writeonly buffer SplatLight { vec4 splat_light[]; };  // rgb, opacity
+layout(set = 0, binding = FRAME_BINDING + 1, scalar) writeonly buffer SplatLightHalf { uvec2 splat_light_half[]; };
+layout(set = 0, binding = FRAME_BINDING + 2, scalar) writeonly buffer SplatBound { vec4 splat_bound[]; };  // l22, reach, depth, slope
+layout(set = 0, binding = FRAME_BINDING + 3, scalar) writeonly buffer Cover { uvec4 cover[]; };
+layout(set = 0, binding = FRAME_BINDING + 4, scalar) writeonly buffer PairCount { uint pair_count[]; };
+layout(set = 0, binding = FRAME_BINDING + 5, scalar) writeonly buffer Visible { uint visible[]; };
+layout(set = 0, binding = FRAME_BINDING + 6, scalar) buffer Status { FrameStatus status; };
+layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
 
 // Not clamped: max may drop NaN.
 vec3 splat_colour(uint i, vec3 direction) {

@@ -1,7 +1,8 @@
 // Real spherical harmonics of degree 0-3 with the constants, order and signs of 3DGS.
 // SH_DEGREE is a specialization constant of the including shader.
 
-const float SH_C0 = 0.28209479177387814;
+#include "shared/attribute_list.h"
+
 const float SH_C1 = 0.4886025119029199;
 const float SH_C2[5] = float[](1.0925484305920792, -1.0925484305920792, 0.31539156525252005,
                                -1.0925484305920792, 0.5462742152960396);

@@ -12,7 +12,6 @@
 
 layout(local_size_x = EXPOSURE_TERMS) in;
 
-const int UPDATE = 1;
 layout(push_constant, scalar) uniform Push { ExposureUpdateArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Partials { float partials[]; };
 layout(set = 0, binding = 1, scalar) buffer Maps { float maps[]; };        // [views][12]

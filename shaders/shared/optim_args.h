@@ -3,6 +3,7 @@
 #ifndef DARB_OPTIM_ARGS_H
 #define DARB_OPTIM_ARGS_H
 
+#include "attribute_list.h"
 #include "types.h"
 
 #ifdef __cplusplus
@@ -14,16 +15,51 @@ struct ProjectBackwardArgs {
     uint splat_end;    // one past its last
     uint camera_index;
     float low_pass;  // px^2
-    // Adam (UPDATE = 1): each rate is lr / (1 - beta1^t); the second moment's correction is common.
-    float rate_position, rate_scale, rate_rotation, rate_opacity, rate_dc, rate_rest;
+    // What follows is read with UPDATE_ADAM. Each rate is lr / (1 - beta1^t), of ATTRIBUTE_*; the
+    // second moment's correction is common.
+    float rate[ATTRIBUTES];
     float inverse_sqrt_correction2;  // 1 / sqrt(1 - beta2^t)
-    // Regularisers (UPDATE = 1): weights of the sum of opacities and of the sum of scales, over the
-    // splats that the frame shows, or with regularise_unseen = 1 over all.
+    // Regularisers: weights of the sum of opacities and of the sum of scales, over the splats that
+    // the frame shows, or with regularise_unseen = 1 over all.
     float opacity_weight, scale_weight;
     uint regularise_unseen;
-    float largest_log_scale;  // no scale grows beyond it (UPDATE = 1)
-    float clearance;          // world: splats nearer to the camera fade (UPDATE = 1)
+    float largest_log_scale;  // no scale grows beyond it
+    float clearance;          // world: splats nearer to the camera fade
     float rest_share;         // of an iteration's gradient in the mean that a step is made of
+};
+
+// What project_backward does with the gradients of a splat: the Adam step; into the buffers of
+// gradients; added to what they hold.
+#define UPDATE_ADAM 0
+#define UPDATE_STORE 1
+#define UPDATE_ADD 2
+
+// One attribute's step of adam_update, over the splats of a range.
+struct AdamUpdateArgs {
+    uint first_splat, splat_count;
+    uint floats_in_use;                  // of a splat; the others are left alone
+    float rate;                          // as above
+    float inverse_sqrt_correction2;      // as above
+    float beta1, share1, beta2, share2;  // share = 1 - beta
+    float gradient_scale;                // of what the buffers of gradients hold
+    float weight;                        // of the attribute's regulariser
+    uint regularise_unseen;
+    float largest;     // STEP_SCALE: no value grows beyond it
+    float rest_share;  // STEP_REST: as above
+};
+
+// What the views of a step show of a splat is (sum of norms, views); so much less of the latter
+// where a gradient was not finite, which the counts of views never make up for: no step is made.
+#define VIEWS_BAD -1e9
+
+struct AddArgs {  // to += from
+    uint count;   // floats
+};
+
+struct FadeNearArgs {
+    uint splat_count;
+    uint camera_index;
+    float clearance;  // world
 };
 
 // When the harmonics above the first band make a step: in this iteration, of its own gradient; not
@@ -68,6 +104,7 @@ struct ResetOpacityArgs {
 
 #ifdef __cplusplus
 static_assert(sizeof(ProjectBackwardArgs) == 68);
+static_assert(sizeof(AdamUpdateArgs) == 56);
 }  // namespace darb::gpu
 #endif
 #endif

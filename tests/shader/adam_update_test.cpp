@@ -10,12 +10,10 @@
 namespace darb::test {
 namespace {
 
-constexpr AdamStep kRates{2e-3f, 5e-3f, 1e-3f, 0.025f, 2.5e-3f, 1.25e-4f};
+constexpr AdamStep kRates{.rate = {2e-3f, 5e-3f, 1e-3f, 0.025f, 2.5e-3f, 1.25e-4f}};
 
 double rate_of(int attribute) {
-    const float rates[] = {kRates.position, kRates.scale, kRates.rotation,
-                           kRates.opacity,  kRates.sh_dc, kRates.sh_rest};
-    return rates[attribute];
+    return kRates.rate[static_cast<size_t>(attribute)];
 }
 
 struct Training {
@@ -27,10 +25,10 @@ struct Training {
           partials(Partials::random(count, seed + 1)) {}
 
     PassState gradient(const PassState& state) const {
-        return run_backward_pass(scene.model, scene.camera, 3, false, state, partials);
+        return run_backward_pass(scene.model, scene.camera, 3, UPDATE_STORE, state, partials);
     }
     PassState update(const PassState& state, int t, int degree = 3) const {
-        return run_backward_pass(scene.model, scene.camera, degree, true, state, partials,
+        return run_backward_pass(scene.model, scene.camera, degree, UPDATE_ADAM, state, partials,
                                  adam_step(kRates, t));
     }
 };
@@ -38,7 +36,7 @@ struct Training {
 /// Adam in double on the device's own gradient. Moves are compared in units of the learning rate.
 void expect_step_matches(const PassState& before, const PassState& gradient, const PassState& after,
                          int t) {
-    const auto g32 = stored_gradients(gradient);
+    const auto g32 = gradient.d;
     for (int a = 0; a < kAttributeCount; ++a) {
         std::vector<double> x(before.parameters[a].begin(), before.parameters[a].end());
         std::vector<double> first, second, move, got_move, got_first, got_second;
@@ -106,12 +104,12 @@ TEST(AdamUpdate, harmonics_step_every_fourth_time_of_the_mean_gradient) {
         training.partials = Partials::random(50, 200 + static_cast<std::uint64_t>(t));
         for (int a = 0; a < kAttributeCount; ++a)
             attribute_values(training.scene.model, a) = state.parameters[a];
-        const auto gradient = stored_gradients(training.gradient(state))[kShRest];
+        const auto gradient = training.gradient(state).d[kShRest];
         for (size_t i = 0; i < n; ++i) mean[i] += double(gradient[i]) / kEvery;
         AdamStep rates = kRates;
         rates.rest_every = kEvery;
         const PassState after =
-            run_backward_pass(training.scene.model, training.scene.camera, 3, true, state,
+            run_backward_pass(training.scene.model, training.scene.camera, 3, UPDATE_ADAM, state,
                               training.partials, adam_step(rates, t));
         const PassState same = training.update(state, t);
         for (int a = 0; a < kShRest; ++a) EXPECT_EQ(after.parameters[a], same.parameters[a]);
@@ -166,8 +164,8 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     step.opacity_weight = 0.3f;
     step.scale_weight = 0.7f;
     step.regularise_unseen = true;
-    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
-                                              state, training.partials, step);
+    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3,
+                                              UPDATE_ADAM, state, training.partials, step);
     for (size_t i = 0; i < 20; ++i) {
         const double o = 1 / (1 + std::exp(-double(state.parameters[kOpacity][i])));
         EXPECT_NEAR(after.moments[kOpacity][2 * i], 0.1 * 0.3 * o * (1 - o), 1e-6);
@@ -189,8 +187,8 @@ TEST(AdamUpdate, regularisers_leave_what_the_frame_does_not_show) {
     step.opacity_weight = 0.3f;
     step.scale_weight = 0.7f;
     const PassState plain = training.update(state, 1);
-    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
-                                              state, training.partials, step);
+    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3,
+                                              UPDATE_ADAM, state, training.partials, step);
     int seen = 0;
     for (size_t i = 0; i < 20; ++i) {
         const bool shown = training.partials.count[i] > 0;
@@ -214,8 +212,8 @@ TEST(AdamUpdate, regularisers_leave_scales_beyond_their_limit) {
     AdamStep step = adam_step(kRates, 1);
     step.scale_weight = 0.7f;
     step.regularise_unseen = true;
-    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3, true,
-                                              state, training.partials, step);
+    const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3,
+                                              UPDATE_ADAM, state, training.partials, step);
     EXPECT_EQ(after.parameters[kLogScale], state.parameters[kLogScale]);
 }
 
@@ -224,7 +222,7 @@ TEST(AdamUpdate, no_scale_grows_beyond_the_largest) {
     const PassState state = start_state(training.scene.model);
     AdamStep step = adam_step(kRates, 1);
     const auto updated = [&] {
-        return run_backward_pass(training.scene.model, training.scene.camera, 3, true, state,
+        return run_backward_pass(training.scene.model, training.scene.camera, 3, UPDATE_ADAM, state,
                                  training.partials, step);
     };
     const PassState free = updated();
@@ -249,8 +247,8 @@ TEST(AdamUpdate, splats_beside_the_camera_fade) {
     const PassState state = start_state(model);
     AdamStep step = adam_step(kRates, 1);
     const auto updated = [&] {
-        return run_backward_pass(model, training.scene.camera, 3, true, state, training.partials,
-                                 step);
+        return run_backward_pass(model, training.scene.camera, 3, UPDATE_ADAM, state,
+                                 training.partials, step);
     };
     const PassState free = updated();
     const auto from_camera = [&](size_t i) {  // after the step
@@ -268,8 +266,8 @@ TEST(AdamUpdate, splats_beside_the_camera_fade) {
                     free.parameters[kOpacity][i] - (from_camera(i) < step.clearance), 1e-5);
     faded.parameters[kOpacity] = free.parameters[kOpacity];
     EXPECT_EQ(faded, free) << "nothing else changes";
-    const PassState gradient =
-        run_backward_pass(model, training.scene.camera, 3, false, state, training.partials, step);
+    const PassState gradient = run_backward_pass(model, training.scene.camera, 3, UPDATE_STORE,
+                                                 state, training.partials, step);
     EXPECT_EQ(gradient.parameters, state.parameters) << "no update, no fading";
 }
 
@@ -284,9 +282,9 @@ TEST(AdamUpdate, an_overflowed_frame_changes_nothing) {
 TEST(AdamUpdate, gradient_sum_adds_up_over_frames) {
     Training training;
     PassState state = start_state(training.scene.model);
-    const PassState once = training.gradient(state);
+    const PassState once = training.update(state, 1);
     state.gradient_sum = once.gradient_sum;
-    const PassState twice = training.gradient(state);
+    const PassState twice = training.update(state, 1);
     int seen = 0;
     for (size_t i = 0; i < 50; ++i) {
         EXPECT_FLOAT_EQ(twice.gradient_sum[i].x, 2 * once.gradient_sum[i].x);

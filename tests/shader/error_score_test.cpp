@@ -44,7 +44,7 @@ Shares shares_on_device(const TestScene& scene, const std::vector<std::uint32_t>
     FrameBuffers buffers(d, options);
     Frame& frame = buffers.frame();
     Forward forward(d, options);
-    Backward backward(d, options, BackwardResult::update);
+    Backward backward(d, options);
     GpuSplats splats(d, scene.model, true);
     const auto n = splats.count();
     FrameView view{camera_data(scene.camera, scene.model.origin), nullptr, 0, scene.model.sh_degree,
@@ -131,7 +131,7 @@ TEST(ErrorScore, unseen_splats_have_no_share) {
     EXPECT_EQ(shares.got[4], glm::vec2(0));
 }
 
-/// Gradients of all parameters, in the place of the first moments.
+/// Gradients of all parameters.
 std::array<std::vector<float>, kAttributeCount> gradients(const TestScene& scene, bool scored) {
     Device& d = shared_device();
     ForwardOptions options = forward_options(scene.model, {});
@@ -139,8 +139,9 @@ std::array<std::vector<float>, kAttributeCount> gradients(const TestScene& scene
     FrameBuffers buffers(d, options);
     Frame& frame = buffers.frame();
     Forward forward(d, options);
-    Backward backward(d, options, BackwardResult::store_gradient);
-    GpuSplats splats(d, scene.model, true);
+    Backward backward(d, options);
+    const GpuSplats splats(d, scene.model, false);
+    GradientBuffers into(d, splats);
     const auto n = splats.count();
     const int width = scene.camera.width, height = scene.camera.height;
     FrameView view{camera_data(scene.camera, scene.model.origin), nullptr, 0, scene.model.sh_degree,
@@ -165,13 +166,11 @@ std::array<std::vector<float>, kAttributeCount> gradients(const TestScene& scene
     forward.record(commands, splats, view, frame);
     if (scored)
         score.record(commands, view, frame, backward, {frame.images.image, ground, scratch}, n);
-    backward.record(commands, view, frame, splats, d_image, {});
+    backward.record_gradients(commands, view, frame, splats, d_image, into, false);
     commands.submit_and_wait();
     EXPECT_EQ(frame.read_status().overflow, 0U);
     std::array<std::vector<float>, kAttributeCount> result;
-    for (int a = 0; a < kAttributeCount; ++a)
-        result[static_cast<size_t>(a)] =
-            splats.moments(a).download<float>(splats.moments(a).bytes() / 4);
+    for (int a = 0; a < kAttributeCount; ++a) result[static_cast<size_t>(a)] = into.download(a);
     return result;
 }
 

@@ -15,10 +15,10 @@ void expect_gradients_match(const SplatModel& model, const Camera& camera, int s
     const Partials partials = Partials::random(model.size(), 77);
     const DoubleGradients expected = gradients_in_double(model, camera, degree, partials);
     const PassState start = start_state(model);
-    const PassState after = run_backward_pass(model, camera, degree, false, start, partials);
+    const PassState after = run_backward_pass(model, camera, degree, UPDATE_STORE, start, partials);
     EXPECT_EQ(after.parameters, start.parameters);
     EXPECT_EQ(after.status.bad_gradients, 0U);
-    const auto got = stored_gradients(after);
+    const auto got = after.d;
     for (int a = 0; a < kAttributeCount; ++a) {
         const size_t stride = got[a].size() / model.size();
         if (stride == 0) continue;
@@ -126,8 +126,8 @@ TEST(ProjectBackward, parameters_beyond_their_limits_have_no_gradient) {
     }
     const Partials partials = Partials::random(8, 5);
     const PassState after =
-        run_backward_pass(s.model, s.camera, 3, false, start_state(s.model), partials);
-    const auto d = stored_gradients(after);
+        run_backward_pass(s.model, s.camera, 3, UPDATE_STORE, start_state(s.model), partials);
+    const auto d = after.d;
     for (size_t i = 0; i < 8; ++i) {
         EXPECT_EQ(d[kOpacity][i], 0) << "splat " << i;
         EXPECT_EQ(d[kLogScale][i * 3], 0) << "splat " << i;
@@ -140,8 +140,9 @@ TEST(ProjectBackward, colours_clamped_at_zero_have_no_gradient) {
     TestScene s = random_scene({.count = 3, .sh_degree = 1, .seed = 57});
     s.model.sh_rest.assign(s.model.sh_rest.size(), 0.0f);
     s.model.sh_dc = {-10, 1, 1, 1, -10, 1, 1, 1, -10};
-    const auto d = stored_gradients(run_backward_pass(
-        s.model, s.camera, 1, false, start_state(s.model), Partials::random(3, 6)));
+    const auto d = run_backward_pass(s.model, s.camera, 1, UPDATE_STORE, start_state(s.model),
+                                     Partials::random(3, 6))
+                       .d;
     for (size_t i = 0; i < 3; ++i)
         for (size_t c = 0; c < 3; ++c) {
             EXPECT_EQ(d[kShDc][i * 3 + c] == 0, i == c) << "splat " << i << " channel " << c;
@@ -157,8 +158,8 @@ TEST(ProjectBackward, a_splat_with_43000_pairs_sums_all_of_them) {
     partials.count = {43'000};
     partials.pairs.assign(43'000, {1, 0.5f, -0.25f, 1, 2, 1, 1, 1, 0.5f});
     const DoubleGradients expected = gradients_in_double(s.model, s.camera, 3, partials);
-    const auto got = stored_gradients(
-        run_backward_pass(s.model, s.camera, 3, false, start_state(s.model), partials));
+    const auto got =
+        run_backward_pass(s.model, s.camera, 3, UPDATE_STORE, start_state(s.model), partials).d;
     for (int a = 0; a < kAttributeCount; ++a)
         EXPECT_TRUE(compare_scaled(attribute_name(a), expected.d[a], got[a],
                                    tolerance("project_gradient_float32")));

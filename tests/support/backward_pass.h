@@ -46,12 +46,13 @@ struct Partials {
 struct PassState {
     std::array<std::vector<float>, kAttributeCount> parameters;
     std::array<std::vector<float>, kAttributeCount> moments;  // [N][stride][2]
+    std::array<std::vector<float>, kAttributeCount> d;        // what UPDATE_STORE and _ADD leave
     std::vector<float> rest_sum;                              // as the harmonics
     std::vector<glm::vec2> gradient_sum;
     gpu::FrameStatus status;
     bool operator==(const PassState& o) const {
-        return parameters == o.parameters && moments == o.moments && rest_sum == o.rest_sum &&
-               gradient_sum == o.gradient_sum &&
+        return parameters == o.parameters && moments == o.moments && d == o.d &&
+               rest_sum == o.rest_sum && gradient_sum == o.gradient_sum &&
                std::memcmp(&status, &o.status, sizeof status) == 0;
     }
 };
@@ -61,6 +62,7 @@ inline PassState start_state(const SplatModel& model) {
     for (int a = 0; a < kAttributeCount; ++a) {
         s.parameters[a] = attribute_values(model, a);
         s.moments[a].assign(s.parameters[a].size() * 2, 0.0f);
+        s.d[a].assign(s.parameters[a].size(), 0.0f);
     }
     s.rest_sum.assign(model.sh_rest.size(), 0.0f);
     s.gradient_sum.assign(model.size(), glm::vec2(0));
@@ -68,9 +70,25 @@ inline PassState start_state(const SplatModel& model) {
     return s;
 }
 
-/// One run of the pass. update: Adam, else gradients into the first moments.
+/// The arguments as Backward makes them; weights are not divided by the count.
+inline gpu::ProjectBackwardArgs backward_args(std::uint32_t splats, const AdamStep& step) {
+    gpu::ProjectBackwardArgs args{};
+    args.splat_end = splats;
+    args.low_pass = static_cast<float>(LOW_PASS_DEFAULT);
+    std::copy(step.rate.begin(), step.rate.end(), args.rate);
+    args.inverse_sqrt_correction2 = step.inverse_sqrt_correction2;
+    args.opacity_weight = step.opacity_weight;
+    args.scale_weight = step.scale_weight;
+    args.regularise_unseen = step.regularise_unseen ? 1u : 0u;
+    args.largest_log_scale = step.largest_log_scale;
+    args.clearance = step.clearance;
+    args.rest_share = 1.0f / static_cast<float>(step.rest_every);
+    return args;
+}
+
+/// One run of the pass; update: UPDATE_*. Without Adam gradient_sum holds what the view shows.
 inline PassState run_backward_pass(const SplatModel& model, const Camera& camera, int sh_degree,
-                                   bool update, const PassState& before, const Partials& partials,
+                                   int update, const PassState& before, const Partials& partials,
                                    const AdamStep& step = {}, const ProjectionEffects& effects = {},
                                    const std::vector<float>& filters = {0.0f}) {
     Device& device = shared_device();
@@ -79,7 +97,7 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = model.sh_degree;
-    constants["UPDATE"] = update ? 1 : 0;
+    constants["UPDATE"] = update;
     constants["REST"] = step.rest;
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);
@@ -90,51 +108,33 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     }
     const auto& b = before;
     const GuardedBuffer cameras(device, "cameras", std::vector{camera_data(camera, model.origin)});
-    const GuardedBuffer p[] = {
-        {device, "position", b.parameters[0]}, {device, "log_scale", b.parameters[1]},
-        {device, "rotation", b.parameters[2]}, {device, "opacity", b.parameters[3]},
-        {device, "sh_dc", b.parameters[4]},    {device, "sh_rest", b.parameters[5]}};
-    const GuardedBuffer m[] = {
-        {device, "m position", b.moments[0]}, {device, "m log_scale", b.moments[1]},
-        {device, "m rotation", b.moments[2]}, {device, "m opacity", b.moments[3]},
-        {device, "m sh_dc", b.moments[4]},    {device, "m sh_rest", b.moments[5]}};
+    std::vector<GuardedBuffer> p, held;  // held: moments or gradients
+    for (int a = 0; a < kAttributeCount; ++a) {
+        p.emplace_back(device, attribute_name(a), b.parameters[a]);
+        held.emplace_back(device, "state", update == UPDATE_ADAM ? b.moments[a] : b.d[a]);
+    }
     const GuardedBuffer count(device, "pair count", partials.count),
         begin(device, "pair begin", partials.begin), sum(device, "partials", sums),
         rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
         status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters),
         rest_sum(device, "rest sum", b.rest_sum);
-    const gpu::ProjectBackwardArgs args{0,
-                                        n,
-                                        0,
-                                        static_cast<float>(LOW_PASS_DEFAULT),
-                                        step.position,
-                                        step.scale,
-                                        step.rotation,
-                                        step.opacity,
-                                        step.sh_dc,
-                                        step.sh_rest,
-                                        step.inverse_sqrt_correction2,
-                                        step.opacity_weight,
-                                        step.scale_weight,
-                                        step.regularise_unseen ? 1u : 0u,
-                                        step.largest_log_scale,
-                                        step.clearance,
-                                        1.0f / static_cast<float>(step.rest_every)};
+    std::vector<BufferRange> buffers{cameras};
+    for (const GuardedBuffer& buffer : p) buffers.emplace_back(buffer);
+    for (const GuardedBuffer& buffer : held) buffers.emplace_back(buffer);
+    for (const GuardedBuffer* buffer : {&count, &begin, &sum, &sum, &sum, &sum, &sum, &rests,
+                                        &gradient, &status, &smoothing, &rest_sum})
+        buffers.emplace_back(*buffer);
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);
-    commands.dispatch(pipeline, args,
-                      {cameras, p[0], p[1],  p[2],     p[3],   p[4],      p[5],    m[0], m[1],
-                       m[2],    m[3], m[4],  m[5],     count,  begin,     sum,     sum,  sum,
-                       sum,     sum,  rests, gradient, status, smoothing, rest_sum},
-                      g.x, g.y);
+    commands.dispatch(pipeline, backward_args(n, step), buffers, g.x, g.y);
     commands.submit_and_wait();
-    PassState after;
+    PassState after = before;
     for (int a = 0; a < kAttributeCount; ++a) {
         EXPECT_TRUE(p[a].intact());
-        EXPECT_TRUE(m[a].intact());
+        EXPECT_TRUE(held[a].intact());
         after.parameters[a] = p[a].read<float>();
-        after.moments[a] = m[a].read<float>();
+        (update == UPDATE_ADAM ? after.moments : after.d)[a] = held[a].read<float>();
     }
     EXPECT_TRUE(gradient.intact() && status.intact() && sum.intact() && rests.intact());
     EXPECT_TRUE(rest_sum.intact());
@@ -142,14 +142,6 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     after.gradient_sum = gradient.read<glm::vec2>();
     after.status = status.read<gpu::FrameStatus>()[0];
     return after;
-}
-
-/// What the first moments hold after a run without update.
-inline std::array<std::vector<float>, kAttributeCount> stored_gradients(const PassState& state) {
-    std::array<std::vector<float>, kAttributeCount> d;
-    for (int a = 0; a < kAttributeCount; ++a)
-        for (size_t i = 0; i < state.moments[a].size(); i += 2) d[a].push_back(state.moments[a][i]);
-    return d;
 }
 
 struct DoubleGradients {
@@ -184,7 +176,8 @@ inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera
         result.mean_ndc.push_back(
             std::hypot(g.d_mean_px.x * camera.width / 2, g.d_mean_px.y * camera.height / 2));
     }
-    result.d = {out.position, out.log_scale, out.rotation, out.opacity, out.sh_dc, out.sh_rest};
+    for (int a = 0; a < kAttributeCount; ++a)
+        result.d[static_cast<size_t>(a)] = attribute_values(out, a);
     return result;
 }
 

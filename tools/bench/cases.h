@@ -36,6 +36,8 @@ struct BenchCase {
 std::vector<BenchCase> render_cases();
 /// Training steps; --full names other cases.
 std::vector<BenchCase> train_cases(bool full);
+/// Steps of training with Adam within the backward pass and in a pass of its own.
+std::vector<BenchCase> step_cases();
 /// Radix sort and scan.
 std::vector<BenchCase> sort_cases();
 /// The choices of the passes that have several (engine/plan/tuning_names.h), a row each.

@@ -8,12 +8,6 @@
 
 namespace darb {
 
-namespace {
-
-constexpr double kShC0 = 0.28209479177387814;
-
-}  // namespace
-
 SplatModel random_scene(std::size_t splats, int sh_degree) {
     SplatModel model;
     model.sh_degree = sh_degree;
@@ -32,7 +26,7 @@ SplatModel random_scene(std::size_t splats, int sh_degree) {
             const double coordinate = p[static_cast<int>(a)];
             model.position[3 * i + a] = static_cast<float>(coordinate);
             model.log_scale[3 * i + a] = normal(std::log(0.01), 0.4);
-            model.sh_dc[3 * i + a] = static_cast<float>(0.5 * coordinate / kShC0);
+            model.sh_dc[3 * i + a] = static_cast<float>(0.5 * coordinate / SH_C0);
         }
         for (std::size_t a = 0; a < 4; ++a) model.rotation[4 * i + a] = normal(0, 1);
         model.opacity[i] = normal(0, 1.5);

@@ -141,8 +141,8 @@ std::vector<BenchCase> start_cases() {
 
 std::vector<BenchCase> bench_cases(bool full) {
     std::vector<BenchCase> all;
-    for (const auto& some :
-         {render_cases(), train_cases(full), sort_cases(), tuning_cases(), start_cases()})
+    for (const auto& some : {render_cases(), train_cases(full), step_cases(), sort_cases(),
+                             tuning_cases(), start_cases()})
         all.insert(all.end(), some.begin(), some.end());
     return all;
 }

@@ -115,7 +115,8 @@ void DensityControl::move(GpuSplats& splats, const Buffer& sources, std::uint32_
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::uint32_t stride = splats.stride(a);
         if (stride == 0) continue;
-        gather(sources, count, stride, false, splats.parameters(a));
+        const bool copied = kSplatAttributes[static_cast<std::size_t>(a)].copied_to_new;
+        gather(sources, count, stride, !copied, splats.parameters(a));
         if (splats.has_moments()) gather(sources, count, stride * 2, true, splats.moments(a));
         if (a == kShRest && splats.has_rest_sum())
             gather(sources, count, stride, true, splats.rest_sum());

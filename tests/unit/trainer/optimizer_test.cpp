@@ -16,8 +16,8 @@ TEST(Optimizer, positions_and_regularisers_are_in_units_of_the_scene) {
     const TrainOptions options;
     const AdamStep one = optimizer_of(options, 1).step(50),
                    ten = optimizer_of(options, 10).step(50);
-    EXPECT_FLOAT_EQ(ten.position, 10 * one.position);
-    EXPECT_FLOAT_EQ(ten.scale, one.scale) << "of a logarithm";
+    EXPECT_FLOAT_EQ(ten.rate[kPosition], 10 * one.rate[kPosition]);
+    EXPECT_FLOAT_EQ(ten.rate[kLogScale], one.rate[kLogScale]) << "of a logarithm";
     EXPECT_FLOAT_EQ(10 * ten.scale_weight, one.scale_weight);
     EXPECT_EQ(ten.opacity_weight, one.opacity_weight);
 }
@@ -35,10 +35,10 @@ TEST(Optimizer, a_trial_has_a_share_of_all_rates_and_steps_of_all_bands) {
     const Optimizer optimizer = optimizer_of(options);
     const AdamStep usual = optimizer.step(160), trial = optimizer.trial_step(160, 0.5f);
     EXPECT_EQ(trial.rest_every, 1);
-    EXPECT_FLOAT_EQ(trial.position, 0.5f * usual.position);
-    EXPECT_FLOAT_EQ(trial.opacity, 0.5f * usual.opacity);
-    EXPECT_FLOAT_EQ(trial.sh_dc, 0.5f * usual.sh_dc);
-    EXPECT_FLOAT_EQ(trial.sh_rest, 0.2f * trial.sh_dc);
+    EXPECT_FLOAT_EQ(trial.rate[kPosition], 0.5f * usual.rate[kPosition]);
+    EXPECT_FLOAT_EQ(trial.rate[kOpacity], 0.5f * usual.rate[kOpacity]);
+    EXPECT_FLOAT_EQ(trial.rate[kShDc], 0.5f * usual.rate[kShDc]);
+    EXPECT_FLOAT_EQ(trial.rate[kShRest], 0.2f * trial.rate[kShDc]);
     EXPECT_EQ(trial.opacity_weight, usual.opacity_weight);
     EXPECT_EQ(trial.regularise_unseen, usual.regularise_unseen);
 }

@@ -1,0 +1,109 @@
+#include "engine/raster/adam_update.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "engine/core/error.h"
+#include "engine/primitives/groups.h"
+
+namespace darb {
+
+namespace {
+
+float weight_of(const AdamStep& step, int rule, std::uint32_t splats) {
+    const auto n = static_cast<float>(splats);
+    if (rule == STEP_OPACITY) return step.opacity_weight / n;
+    return rule == STEP_SCALE ? step.scale_weight / (3.0f * n) : 0.0f;
+}
+
+BufferRange rows(const Buffer& buffer, const SplatRange& range, std::uint64_t floats) {
+    return {buffer, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
+}
+
+}  // namespace
+
+AdamUpdate::AdamUpdate(Device& device)
+    : device_(&device),
+      fade_(device, "fade_near", {{"THREADS", SPLAT_GROUP}}),
+      add_views_(device, "add_views", {{"THREADS", SPLAT_GROUP}}) {}
+
+const Pipeline& AdamUpdate::pipeline(int attribute, std::uint32_t floats, int rest) {
+    const std::array<int, 3> key{attribute, static_cast<int>(floats), rest};
+    const auto found = pipelines_.find(key);
+    if (found != pipelines_.end()) return found->second;
+    const SpecConstants constants{
+        {"THREADS", SPLAT_GROUP},
+        {"FLOATS", static_cast<std::int32_t>(floats)},
+        {"STEP", kSplatAttributes[static_cast<std::size_t>(attribute)].step},
+        {"REST", rest}};
+    return pipelines_.emplace(key, Pipeline(*device_, "adam_update", constants)).first->second;
+}
+
+void AdamUpdate::record(Commands& commands, GpuSplats& splats, const GradientBuffers& gradients,
+                        const Buffer& status, int sh_degree, const AdamStep& step, float scale) {
+    check_step(step);
+    check_trainable(splats, step);
+    if (!std::isfinite(scale))
+        throw Error("step of the optimiser", fmt::format("the gradients' scale is {}", scale),
+                    "Give a finite number.");
+    if (gradients.count() != splats.count())
+        throw Error("step of the optimiser",
+                    fmt::format("{} splats, gradients of {}", splats.count(), gradients.count()),
+                    "Make the gradients' buffers anew where splats come or go.");
+    commands.pass("adam");
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::uint32_t floats = splats.stride(a);
+        gpu::AdamUpdateArgs args{};
+        const int rule = kSplatAttributes[static_cast<std::size_t>(a)].step;
+        args.floats_in_use = rule == STEP_REST ? attribute_floats(a, sh_degree) : floats;
+        if (args.floats_in_use == 0) continue;
+        args.rate = step.rate[static_cast<std::size_t>(a)];
+        args.inverse_sqrt_correction2 = step.inverse_sqrt_correction2;
+        args.beta1 = static_cast<float>(step.beta1);
+        args.share1 = static_cast<float>(1.0 - step.beta1);
+        args.beta2 = static_cast<float>(step.beta2);
+        args.share2 = static_cast<float>(1.0 - step.beta2);
+        args.gradient_scale = scale;
+        args.weight = weight_of(step, rule, splats.count());
+        args.regularise_unseen = step.regularise_unseen ? 1u : 0u;
+        args.largest = step.largest_log_scale;
+        args.rest_share = 1.0f / static_cast<float>(step.rest_every);
+        const int rest = rule == STEP_REST ? step.rest : REST_EACH;
+        for (const SplatRange& range : splats.ranges()) {
+            args.first_splat = range.first;
+            args.splat_count = range.count;
+            const BufferRange gradient = rows(gradients.of(a), range, floats);
+            const Groups g = groups_for(std::uint64_t{range.count} * floats);
+            commands.dispatch(
+                pipeline(a, floats, rest), args,
+                {rows(splats.parameters(a), range, floats),
+                 rows(splats.moments(a), range, 2ull * floats), gradient, gradients.views(),
+                 rest == REST_EACH ? gradient : splats.rest_sum(range), status},
+                g.x, g.y);
+        }
+    }
+}
+
+void AdamUpdate::record_fading(Commands& commands, GpuSplats& splats,
+                               const GradientBuffers& gradients, const Buffer& status,
+                               const FrameView& view, float clearance) {
+    if (!(clearance > 0) || splats.count() == 0) return;
+    const Groups g = groups_for(splats.count());
+    commands.pass("adam");
+    commands.dispatch(fade_, gpu::FadeNearArgs{splats.count(), view.index, clearance},
+                      {*view.cameras, splats.parameters(kPosition), splats.parameters(kOpacity),
+                       gradients.views(), status},
+                      g.x, g.y);
+}
+
+void AdamUpdate::record_sums(Commands& commands, const GradientBuffers& gradients,
+                             const Buffer& status, const Buffer& gradient_sum) {
+    if (gradients.count() == 0) return;
+    const Groups g = groups_for(gradients.count());
+    commands.pass("adam");
+    commands.dispatch(add_views_, gpu::SplatArgs{gradients.count()},
+                      {gradients.views(), gradient_sum, status}, g.x, g.y);
+}
+
+}  // namespace darb

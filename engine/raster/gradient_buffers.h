@@ -1,0 +1,58 @@
+// GradientBuffers: dL/d(every attribute) of N splats in device memory, of one view or added over
+// several, and what the views showed of each splat. Backward fills them, callers may, too;
+// AdamUpdate makes a step of them. Sums of floats depend on their order: whoever adds several
+// chooses it, so that a result repeats.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "engine/gpu/commands.h"
+#include "engine/gpu/pipeline.h"
+#include "engine/raster/gpu_splats.h"
+
+namespace darb {
+
+class GradientBuffers {
+  public:
+    GradientBuffers() = default;
+    /// For splats of this count and these attributes; all zero, of no view.
+    GradientBuffers(Device& device, const GpuSplats& splats);
+
+    std::uint32_t count() const { return count_; }
+    /// Floats per splat, as GpuSplats has them.
+    std::uint32_t stride(int attribute) const { return strides_[attribute]; }
+    /// [N][stride]; zero beyond the degree of harmonics in use.
+    Buffer& of(int attribute) { return gradients_[attribute]; }
+    const Buffer& of(int attribute) const { return gradients_[attribute]; }
+    /// [N][2]: sum over the views of |dL/dmean| in NDC units, and how many showed the splat;
+    /// negative where a gradient of one was not finite: no step is made of it.
+    Buffer& views() { return views_; }
+    const Buffer& views() const { return views_; }
+
+    /// As GpuSplats::bind_parameters.
+    void bind(const SplatRange& range, std::vector<BufferRange>& to) const;
+
+    /// All to zero.
+    void record_clear(Commands& commands) const;
+    /// These += other, of the same splats. Throws Error where they are not.
+    void record_add(Commands& commands, const GradientBuffers& other);
+
+    /// A caller's own: values in the layout of SplatModel. Throws Error where the count is another
+    /// or a value is not finite. The queue must be idle.
+    void upload(int attribute, const std::vector<float>& values);
+    std::vector<float> download(int attribute) const;
+
+    /// Device memory of so many splats.
+    static std::uint64_t device_bytes(std::uint64_t count, int sh_degree);
+
+  private:
+    Device* device_ = nullptr;
+    std::uint32_t count_ = 0;
+    std::array<std::uint32_t, kAttributeCount> strides_{};
+    std::array<Buffer, kAttributeCount> gradients_;
+    Buffer views_;
+    Pipeline add_;
+};
+
+}  // namespace darb

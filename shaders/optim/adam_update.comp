@@ -1,0 +1,70 @@
+// The Adam step of one attribute, of gradients that stand in buffers: of several views, or the caller's own.
+// The same step as project_backward.comp makes of one view, with its regularisers and limits.
+// Place: once an attribute and range, after the gradients of all views. Source: Kingma and Ba 2015.
+// Work: one thread a float. Shared memory: none. Does nothing when a frame overflowed its pair buffers.
+// A splat with a gradient that was not finite is left as it is; a float whose own is not is counted and left.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shared/attribute_list.h"
+#include "shared/limits.h"
+#include "shared/optim_args.h"
+#include "shared/render_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 64;
+layout(constant_id = 1) const uint FLOATS = 1;  // of a splat
+layout(constant_id = 2) const int STEP = STEP_PLAIN;
+layout(constant_id = 3) const int REST = REST_EACH;
+
+layout(push_constant, scalar) uniform Push { AdamUpdateArgs args; };
+layout(set = 0, binding = 0, scalar) buffer Value { float value[]; };  // of the range, as the next two and rest_sum
+layout(set = 0, binding = 1, scalar) buffer Moment { vec2 moment[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Gradient { float gradient[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Views { vec2 views[]; };  // [N] sum of norms, views
+layout(set = 0, binding = 4, scalar) buffer RestSum { float rest_sum[]; };
+layout(set = 0, binding = 5, scalar) buffer Status { FrameStatus status; };
+
+#define ADAM_BETA1 args.beta1
+#define ADAM_BETA2 args.beta2
+#define ADAM_SHARE1 args.share1
+#define ADAM_SHARE2 args.share2
+#include "lib/finite.glsl"
+#include "lib/linear_id.glsl"
+#include "optim/adam.glsl"
+
+float regulariser(float x) {
+    if (STEP == STEP_SCALE) return abs(x) <= LOG_SCALE_LIMIT ? args.weight * exp(x) : 0.0;
+    const float o = 1.0 / (1.0 + exp(-x));
+    return args.weight * o * (1.0 - o);
+}
+
+void main() {
+    const uint at = linear_id(), splat = at / FLOATS;
+    if (splat >= args.splat_count || at % FLOATS >= args.floats_in_use || status.overflow != 0u) return;
+    const float shown = views[args.first_splat + splat].y;
+    if (shown < 0.0) return;
+    float g = gradient[at] * args.gradient_scale;
+    if (!magnitude_below(g, GRADIENT_LIMIT)) {
+        atomicAdd(status.bad_gradients, 1u);
+        return;
+    }
+    if ((STEP == STEP_SCALE || STEP == STEP_OPACITY) && (shown > 0.0 || args.regularise_unseen == 1u))
+        g += regulariser(value[at]);
+    if (STEP == STEP_REST && REST != REST_EACH) {
+        if (REST == REST_GATHER && shown == 0.0) return;
+        g = rest_sum[at] + g * args.rest_share;
+        rest_sum[at] = REST == REST_GATHER ? g : 0.0;
+        if (REST == REST_GATHER) return;
+    }
+    const float before = value[at];
+    vec2 m = moment[at];
+    float after = adam_step(before, m, g, args.rate);
+    if (STEP == STEP_SCALE) {
+        const float largest = max(before, args.largest);
+        after = after > largest ? largest : after;  // not min: what is no number stays none
+    }
+    value[at] = after;
+    moment[at] = m;
+}

@@ -1,0 +1,23 @@
+// The attributes of a splat by number: the order of their buffers, moments, gradients and rates, in
+// bindings and in checkpoints. What each is stands in engine/scene/splat_attributes.h.
+#ifndef DARB_ATTRIBUTE_LIST_H
+#define DARB_ATTRIBUTE_LIST_H
+
+#define ATTRIBUTE_POSITION 0
+#define ATTRIBUTE_LOG_SCALE 1
+#define ATTRIBUTE_ROTATION 2
+#define ATTRIBUTE_OPACITY_LOGIT 3
+#define ATTRIBUTE_SH_DC 4
+#define ATTRIBUTE_SH_REST 5
+#define ATTRIBUTES 6
+
+// What a step of the optimizer does beside Adam.
+#define STEP_PLAIN 0
+#define STEP_SCALE 1    // the regulariser of scales, and none grows beyond the largest
+#define STEP_OPACITY 2  // the regulariser of opacities
+#define STEP_REST 3     // a step in every so many iterations, of the mean gradient of these
+
+// The zeroth spherical harmonic, sqrt(1 / pi) / 2: colour = 0.5 + SH_C0 * sh_dc + higher bands.
+#define SH_C0 0.28209479177387814
+
+#endif
