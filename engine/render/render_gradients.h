@@ -1,0 +1,68 @@
+// Pictures of splats and what a caller's loss of them says of every parameter, in calls that a
+// training loop of one's own is made of. Gradients are exact derivatives of the picture that is
+// drawn; engine/reference has the same in double.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/gpu/device.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/splat_model.h"
+#include "shaders/shared/limits.h"
+#include "shaders/shared/render_args.h"
+
+namespace darb {
+
+struct ViewGradients {
+    ImageF image;          // [H][W][3] RGB, not clamped
+    SplatArrays<float> d;  // dL/d(attribute), as the model's arrays: of the logarithm of scales, of
+                           // the logit of opacities, of quaternions as they are, not normalised
+    /// [N] |dL/d(mean)| in units of half the picture's sides, what density control goes by.
+    std::vector<float> mean_gradient_ndc;
+    std::vector<std::uint8_t> shown;  // [N] 1 where a tile of the picture lists the splat
+    gpu::FrameStatus status{};        // bad_gradients: splats whose gradients left float32; 0 in d
+};
+
+struct GradientOptions {
+    int sh_degree = -1;                                   // harmonics in use; -1: all of the model
+    float near_plane = static_cast<float>(NEAR_DEFAULT);  // world units along z
+};
+
+/// One model on a device for many views. Kernel, footprint and anti-aliasing are the model's.
+class GradientRenderer {
+  public:
+    /// Uploads the model. Throws Error where its arrays do not fit together, or the device.
+    GradientRenderer(Device& device, const SplatModel& model, const GradientOptions& options = {});
+    ~GradientRenderer();
+    GradientRenderer(GradientRenderer&&) noexcept;
+    GradientRenderer& operator=(GradientRenderer&&) noexcept;
+
+    /// Other values for the same splats, after a step of the caller's. Throws Error where count,
+    /// degree or origin are others.
+    void update(const SplatModel& model);
+
+    /// RGB, not clamped. Throws Error for a camera without pixels or with what is no number.
+    ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f));
+    /// Of the picture that render() last made, once for each; d_image [H][W][3] is dL/d(image).
+    /// Throws Error for another size, for values that are not finite, and where no picture was
+    /// made.
+    ViewGradients backward(const ImageF& d_image);
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+/// dL/d(image) [H][W][3] from the picture [H][W][3].
+using ImageGradient = std::function<ImageF(const ImageF& image)>;
+
+/// The same in one call, for one view. Throws Error as the class does.
+ViewGradients render_with_gradients(Device& device, const SplatModel& model, const Camera& camera,
+                                    const glm::vec3& background, const ImageGradient& d_image,
+                                    const GradientOptions& options = {});
+
+}  // namespace darb
