@@ -107,7 +107,8 @@ def is_whole(path):
         elif path.endswith(".html"):
             return data.rstrip().endswith(b"</html>")
         else:
-            return path.endswith((".darb", ".mp4"))  # a resumed run reads the former
+            # A resumed run reads the first; the last lists the frames so far.
+            return path.endswith((".darb", ".mp4", "/darb_export.txt"))
     except ValueError:
         return False
     return True
