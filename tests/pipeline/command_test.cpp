@@ -100,6 +100,13 @@ TEST(Command, missing_files_are_named) {
                     {"train " + long_name + " -o " + none + "_out", "File name too long"}});
 }
 
+TEST(Command, a_command_without_its_data_set_is_named) {
+    const fs::path run = scratch() / "no_data_set";
+    write_file_atomic(run / "command.json", R"(["train","-o","out"])");
+    expect_refused({{"train --resume -o " + run.string(),
+                     (run / "command.json").string() + ": names no data set"}});
+}
+
 TEST(Command, features_that_are_not_there_say_so) {
     const std::string train =
         fmt::format("train {} -o {} ", kScene, (scratch() / "unused").string());

@@ -71,6 +71,7 @@ void recall_arguments(const std::vector<std::string>& typed, TrainFlags& flags, 
     } catch (const CLI::ParseError& e) {
         throw Error(path.string(), e.what(), kRemedy);
     }
+    if (recalled.dataset.empty()) throw Error(path.string(), "names no data set", kRemedy);
     recalled.resume = true;
     recalled.run.output = flags.run.output;
     if (!flags.device.empty()) recalled.device = flags.device;
