@@ -75,7 +75,7 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
             if (progress) progress(kReadShare + kDecodeShare * share, "decoding");
         };
         decoding(0);
-        scene.is_points = is_point_cloud(bytes);
+        scene.is_points = is_point_cloud(bytes, file.string());
         scene.model =
             scene.is_points
                 ? points_as_splats(parse_point_cloud_ply(bytes, file.string(), facts.dropped))

@@ -120,8 +120,8 @@ bool is_sog_folder(const fs::path& path) {
     return fs::is_regular_file(path / "meta.json", none);
 }
 
-bool is_point_cloud(Bytes bytes) {
-    return starts_with(bytes, "ply") && is_point_cloud(parse_ply_header(bytes, "PLY"));
+bool is_point_cloud(Bytes bytes, const std::string& where) {
+    return starts_with(bytes, "ply") && is_point_cloud(parse_ply_header(bytes, where));
 }
 
 bool is_point_cloud(const PlyHeader& header) {

@@ -42,7 +42,7 @@ SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& whe
 /// A folder with meta.json.
 bool is_sog_folder(const std::filesystem::path& path);
 /// PLY whose vertices have positions and no opacity: opens as points (engine/data/point_splats.h).
-bool is_point_cloud(std::span<const std::byte> bytes);
+bool is_point_cloud(std::span<const std::byte> bytes, const std::string& where = "PLY");
 bool is_point_cloud(const PlyHeader& header);
 
 /// What a name asks for when writing: .compressed.ply, .ply, .splat, .spz; nothing for others.

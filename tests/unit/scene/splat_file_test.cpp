@@ -61,6 +61,8 @@ TEST(SplatFile, a_point_cloud_is_named_as_one) {
     EXPECT_TRUE(is_point_cloud(bytes));
     EXPECT_NE(error_of([&] { parse_splats(bytes, "test"); }).find("is a point cloud"),
               std::string::npos);
+    EXPECT_EQ(error_of([&] { is_point_cloud(std::span(bytes).first(60), "a.ply"); }).find("a.ply"),
+              0u);
     EXPECT_FALSE(is_point_cloud(encode_ply(sample_model(0, 1))));
     EXPECT_FALSE(is_point_cloud(encode_splats(SplatFormat::compressed_ply, sample_model(0, 1))));
 }
