@@ -163,6 +163,16 @@ TEST(CompareCommand, DataSetThatCannotBeLoaded_isAFailureInTheReport) {
     EXPECT_NE(read_text_file(out / "compare.html").find("every kernel"), std::string::npos);
 }
 
+TEST(CompareCommand, RunThatCannotBeRead_isSaidWhereProgressIsNot) {
+    const fs::path out = scratch() / "compare_unread";
+    write_file_atomic(out / "scene/gaussian/seed0/metrics.json", "[]");
+    const Outcome one = darb("compare " + kScene +
+                             " --kernels gaussian --iterations 4 -r 8 --blending-views 0 -q -o " +
+                             out.string());
+    EXPECT_EQ(one.code, 2);
+    EXPECT_NE(one.err.find("metrics.json"), std::string::npos) << one.err;
+}
+
 TEST(PsiCommand, TableJsonAndPage_agree) {
     const fs::path json = scratch() / "psi.json", page = scratch() / "psi.html";
     const Outcome psi = darb("psi --kernel raised_cosine,sinc --samples 4 --cells 32 --json " +

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
@@ -104,7 +105,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
     } catch (const std::exception& e) {
         run.failure = e.what();
         count_exception(e, run);
-        note(fmt::format("failed: {}", e.what()));
+        fmt::print(stderr, "failed: {}\n", printable(e.what(), true));  // -q hides progress alone
     }
     if (run.failure.empty())
         measure(run);
