@@ -100,6 +100,13 @@ TEST(Command, missing_files_are_named) {
                     {"train " + long_name + " -o " + none + "_out", "File name too long"}});
 }
 
+TEST(Command, a_refused_option_does_not_steer_the_terminal) {
+    const Outcome bad = darb("info a --no$(printf '\\033')[2J");
+    EXPECT_EQ(bad.code, 2);
+    EXPECT_EQ(bad.err.find('\x1b'), std::string::npos);
+    EXPECT_NE(bad.err.find("--no\\x1b[2J"), std::string::npos) << bad.err;
+}
+
 TEST(Command, a_command_without_its_data_set_is_named) {
     const fs::path run = scratch() / "no_data_set";
     write_file_atomic(run / "command.json", R"(["train","-o","out"])");

@@ -9,6 +9,7 @@
 #include <exception>
 #include <filesystem>
 #include <limits>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -96,7 +97,11 @@ int run(int argc, char** argv) {
     try {
         app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     } catch (const CLI::ParseError& e) {
-        return app.exit(e) == 0 ? 0 : 2;
+        std::ostringstream out, err;  // the arguments that it repeats may steer a terminal
+        const int code = app.exit(e, out, err);
+        fmt::print("{}", out.str());
+        fmt::print(stderr, "{}", darb::printable(err.str(), true));
+        return code == 0 ? 0 : 2;
     }
     return action();
 }
