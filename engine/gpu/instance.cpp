@@ -129,8 +129,10 @@ Instance::Instance(bool validation, const std::vector<std::string>& extensions)
         info.ppEnabledLayerNames = &kValidationLayer;
     }
     check_vulkan(vkCreateInstance(&info, nullptr, &instance_), "Vulkan instance");
-    if (!debug) return;
+    if (debug) load_debug(validation);
+}
 
+void Instance::load_debug(bool validation) {
     const auto load = [&](const char* name) { return vkGetInstanceProcAddr(instance_, name); };
     debug_.set_name =
         reinterpret_cast<PFN_vkSetDebugUtilsObjectNameEXT>(load("vkSetDebugUtilsObjectNameEXT"));

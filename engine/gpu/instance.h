@@ -34,6 +34,8 @@ class Instance {
     std::vector<VkPhysicalDevice> physical_devices() const;
 
   private:
+    void load_debug(bool validation);  // and begin to listen to the layers
+
     VkInstance instance_ = VK_NULL_HANDLE;
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
     DebugUtils debug_;

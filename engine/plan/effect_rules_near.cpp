@@ -44,17 +44,23 @@ Ball ball_of(const SplatModel& model, std::size_t i) {
     return ball;
 }
 
+// x or y of a camera: focal length and centre in px, the clamp's limits of the ratio, the size.
+struct Axis {
+    double focal, centre, low, high;
+    int pixels;
+};
+
 // One axis: whether [-extent, extent] around the projected centre meets the picture. The row of the
 // Jacobian is f/z (1, 0, -ratio), its length bounds what the covariance becomes. The clamped ratio
 // is the larger one where the picture lies far off the axis, so that it counts too.
-bool meets(double focal, double centre, double z, double ratio, double low, double high, int pixels,
-           const Ball& ball) {
-    const double along = ball.deviation * focal / z;
-    const double steepest = std::max(std::abs(ratio), std::abs(std::clamp(ratio, low, high)));
+bool meets(const Axis& axis, double z, double ratio, const Ball& ball) {
+    const double along = ball.deviation * axis.focal / z;
+    const double steepest =
+        std::max(std::abs(ratio), std::abs(std::clamp(ratio, axis.low, axis.high)));
     const double variance = along * along * (1 + steepest * steepest) + LOW_PASS_DEFAULT;
     const double extent = kSlack * std::sqrt(ball.reach2 * variance) + kSlack_px;
-    const double at = focal * ratio + centre;
-    return at + extent >= 0 && at - extent <= pixels + TILE_SIZE;
+    const double at = axis.focal * ratio + axis.centre;
+    return at + extent >= 0 && at - extent <= axis.pixels + TILE_SIZE;
 }
 
 bool needs_care(const Camera& camera, const gpu::CameraData& data, const Ball& ball, double near) {
@@ -71,8 +77,8 @@ bool needs_care(const Camera& camera, const gpu::CameraData& data, const Ball& b
         return false;
     if (camera.lens.active) return true;  // its Jacobian has no such bound
     const glm::vec2 low = data.ratio_min, high = data.ratio_max;
-    return meets(camera.fx, camera.cx, p.z, x, low.x, high.x, camera.width, ball) &&
-           meets(camera.fy, camera.cy, p.z, y, low.y, high.y, camera.height, ball);
+    return meets({camera.fx, camera.cx, low.x, high.x, camera.width}, p.z, x, ball) &&
+           meets({camera.fy, camera.cy, low.y, high.y, camera.height}, p.z, y, ball);
 }
 
 }  // namespace

@@ -186,8 +186,8 @@ void blend_tile(const TileLists& lists, size_t tile, const std::vector<Projected
 template <class T>
 Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                             const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
-                            const RenderSettings& settings, const Image<T>& d_colour,
-                            const Image<T>& d_alpha, ProjectedGradient<T>* pairs) {
+                            const RenderSettings& settings, const ImageGradient<T>& d_image,
+                            ProjectedGradient<T>* pairs) {
     const std::vector<ProjectedSplat<T>> list = gather(lists, tile, splats);
     const Vec3<T> background = background_of<T>(settings);
     std::vector<Blended<T>> blended;
@@ -198,12 +198,13 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                                               [&](size_t k, const Sample<T>& sample, T before) {
                                                   blended.push_back({k, sample, before});
                                               });
-        const Vec3<T> d_pixel(d_colour.at(x, y, 0), d_colour.at(x, y, 1), d_colour.at(x, y, 2));
+        const Image<T>&d_rgb = d_image.colour, &d_alpha = d_image.alpha;
+        const Vec3<T> d_pixel(d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2));
         const T d_out = d_alpha.data.empty() ? T(0) : d_alpha.at(x, y, 0);
         d_background += d_pixel * transmittance;
         pixel_backward<T>(list, blended, d_pixel, d_out, background, kernel, pairs);
     };
-    for_each_pixel(lists, tile, d_colour.width, d_colour.height, pixel);
+    for_each_pixel(lists, tile, d_image.colour.width, d_image.colour.height, pixel);
     return d_background;
 }
 
@@ -212,7 +213,7 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                              const KernelTable&, const RenderSettings&, BlendImages<T>&);     \
     template Vec3<T> blend_tile_backward(                                                     \
         const TileLists&, size_t, const std::vector<ProjectedSplat<T>>&, const KernelTable&,  \
-        const RenderSettings&, const Image<T>&, const Image<T>&, ProjectedGradient<T>*);
+        const RenderSettings&, const ImageGradient<T>&, ProjectedGradient<T>*);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 

@@ -21,13 +21,19 @@ template <class T>
 void blend_tile(const TileLists& lists, size_t tile, const std::vector<ProjectedSplat<T>>& splats,
                 const KernelTable& kernel, const RenderSettings& settings, BlendImages<T>& images);
 
-/// d_colour [H][W][3] is dL/d(image); d_alpha [H][W][1] or empty is dL/d(1 - T).
+/// dL/d(image), [H][W][3], and dL/d(1 - T), [H][W][1] or empty.
+template <class T>
+struct ImageGradient {
+    const Image<T>& colour;
+    const Image<T>& alpha;
+};
+
 /// Writes one gradient per entry of the tile's list into pairs[0 .. length), and returns
 /// dL/d(background) of this tile's pixels.
 template <class T>
 Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                             const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
-                            const RenderSettings& settings, const Image<T>& d_colour,
-                            const Image<T>& d_alpha, ProjectedGradient<T>* pairs);
+                            const RenderSettings& settings, const ImageGradient<T>& d_image,
+                            ProjectedGradient<T>* pairs);
 
 }  // namespace darb::reference

@@ -220,6 +220,25 @@ void SplatGradients<T>::resize_like(const Splats<T>& splats) {
         attribute_values(*this, a).resize(attribute_values(splats, a).size());
 }
 
+/// Covariance, its Cholesky factor and the slope of the depth along it.
+template <class T>
+void set_shape(const Camera& camera, const RenderSettings& settings,
+               const RotationTerms<T>& rotation, const CovarianceTerms<T>& terms,
+               ProjectedSplat<T>& p) {
+    const T area = terms.shrink * terms.shrink;  // of a shrunk px^2
+    p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
+    p.cov_xy = glm::dot(terms.r1, terms.r2);
+    p.cov_yy = glm::dot(terms.r2, terms.r2) + T(settings.low_pass);
+    const T xy = p.cov_xy * area, yy = p.cov_yy * area;
+    p.l11 = terms.shrink * std::sqrt(yy / terms.det);
+    p.l21 = -terms.shrink * xy / (std::sqrt(yy) * std::sqrt(terms.det));
+    p.l22 = 1 / std::sqrt(p.cov_yy);
+    const Vec3<T> r3 =
+        terms.root * (Vec3<T>(0, 0, 1) * view_rotation<T>(camera) * rotation.matrix) * terms.scale;
+    const T c1 = glm::dot(r3, terms.r1), c2 = glm::dot(r3, terms.r2);
+    p.depth_slope = {p.l11 * c1 + p.l21 * c2, p.l22 * c2};
+}
+
 template <class T>
 ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
                           const RenderSettings& settings, const KernelTable& kernel) {
@@ -265,17 +284,7 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
                      T(camera.fy) * at.value.y + T(camera.cy)};
     }
     p.depth = mean.z;
-    p.cov_xx = glm::dot(terms.r1, terms.r1) + T(settings.low_pass);
-    p.cov_xy = glm::dot(terms.r1, terms.r2);
-    p.cov_yy = glm::dot(terms.r2, terms.r2) + T(settings.low_pass);
-    const T xy = p.cov_xy * area, yy = p.cov_yy * area;
-    p.l11 = terms.shrink * std::sqrt(yy / terms.det);
-    p.l21 = -terms.shrink * xy / (std::sqrt(yy) * std::sqrt(terms.det));
-    p.l22 = 1 / std::sqrt(p.cov_yy);
-    const Vec3<T> r3 =
-        terms.root * (Vec3<T>(0, 0, 1) * view_rotation<T>(camera) * rotation.matrix) * terms.scale;
-    const T c1 = glm::dot(r3, terms.r1), c2 = glm::dot(r3, terms.r2);
-    p.depth_slope = {p.l11 * c1 + p.l21 * c2, p.l22 * c2};
+    set_shape(camera, settings, rotation, terms, p);
     p.reach = T(kernel.reach(static_cast<double>(p.opacity), settings.alpha_cutoff));
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     p.colour = colour_of(splats, index, active_degree(splats, settings), view.direction);
@@ -291,8 +300,8 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
 template <class T>
 void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
                       const RenderSettings& settings, const KernelTable& kernel,
-                      const ProjectedSplat<T>& splat, const ProjectedGradient<T>& gradient,
-                      SplatGradients<T>& out) {
+                      const ProjectedPair<T>& projected, SplatGradients<T>& out) {
+    const auto& [splat, gradient] = projected;
     if (splat.cull != Cull::none) {
         return;
     }
@@ -343,8 +352,8 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     template ProjectedSplat<T> project(const Splats<T>&, size_t, const Camera&,                    \
                                        const RenderSettings&, const KernelTable&);                 \
     template void project_backward(const Splats<T>&, size_t, const Camera&, const RenderSettings&, \
-                                   const KernelTable&, const ProjectedSplat<T>&,                   \
-                                   const ProjectedGradient<T>&, SplatGradients<T>&);
+                                   const KernelTable&, const ProjectedPair<T>&,                    \
+                                   SplatGradients<T>&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 

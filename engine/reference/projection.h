@@ -57,12 +57,18 @@ template <class T>
 ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
                           const RenderSettings& settings, const KernelTable& kernel);
 
-/// Writes the gradients of splat `index` into `out` (sized like the splats); `splat` is what
-/// project returned. Does nothing for culled splats.
+/// What project returned for a splat, and the gradient of that.
+template <class T>
+struct ProjectedPair {
+    const ProjectedSplat<T>& splat;
+    const ProjectedGradient<T>& gradient;
+};
+
+/// Writes the gradients of splat `index` into `out` (sized like the splats). Does nothing for
+/// culled splats.
 template <class T>
 void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
                       const RenderSettings& settings, const KernelTable& kernel,
-                      const ProjectedSplat<T>& splat, const ProjectedGradient<T>& gradient,
-                      SplatGradients<T>& out);
+                      const ProjectedPair<T>& projected, SplatGradients<T>& out);
 
 }  // namespace darb::reference

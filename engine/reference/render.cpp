@@ -89,7 +89,7 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     std::vector<Vec3<T>> d_background(tiles.tile_count());
     parallel_for(tiles.tile_count(), settings.threads, [&](size_t tile) {
         d_background[tile] =
-            blend_tile_backward(tiles, tile, result.projected, kernel, settings, d_image, d_alpha,
+            blend_tile_backward(tiles, tile, result.projected, kernel, settings, {d_image, d_alpha},
                                 pairs.data() + tiles.begin[tile]);
     });
 
@@ -107,8 +107,8 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     for_each_splat(splats.size(), settings.threads, [&](size_t i) {
         const Vec2<T> d = gradients.projected[i].d_mean_px;
         gradients.mean_gradient_ndc[i] = std::hypot(d.x * half_width, d.y * half_height);
-        project_backward(splats, i, camera, settings, kernel, result.projected[i],
-                         gradients.projected[i], gradients.splats);
+        project_backward(splats, i, camera, settings, kernel,
+                         {result.projected[i], gradients.projected[i]}, gradients.splats);
     });
     return gradients;
 }

@@ -70,7 +70,7 @@ Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed
     r.truth.resize(r.lists.pair_count());
     for (size_t t = 0; t < r.lists.tile_count(); ++t)
         reference::blend_tile_backward(r.lists, t, scene.splats, scene.table(), scene.settings(),
-                                       d_colour, {}, r.truth.data() + r.lists.begin[t]);
+                                       {d_colour, {}}, r.truth.data() + r.lists.begin[t]);
     r.out = blend_on_device(scene, r.lists, true, planes);
     r.got = gradients_of(scene, r.lists, r.out);
     expect_gradients_match(r, allowed);

@@ -172,7 +172,7 @@ inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera
             2 * s.l22 * sum[8],
             sum[4],
             {sum[5], sum[6], sum[7]}};
-        reference::project_backward(splats, i, camera, settings, kernel, s, g, out);
+        reference::project_backward(splats, i, camera, settings, kernel, {s, g}, out);
         result.mean_ndc.push_back(
             std::hypot(g.d_mean_px.x * camera.width / 2, g.d_mean_px.y * camera.height / 2));
     }

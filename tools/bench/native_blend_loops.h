@@ -60,6 +60,28 @@ inline void offset_of(int v, float dx0, float dy0, const glm::vec4& shape, float
     o.y = l22 * o.dy;
 }
 
+/// What a block's pixels have come to, [V] each.
+struct BlockLight {
+    const F *red, *green, *blue, *transmittance;  // negative where a pixel has ended
+    const I* last;
+};
+
+inline void write_block(const BlendFrame& f, const Block& at, const BlockLight& light,
+                        BlendedImage& out) {
+    const std::size_t plane = std::size_t{f.width} * f.height;
+    for (int p = 0; p < kBlockPixels; ++p) {
+        const std::uint32_t x = at.x + p % kBlockSide, y = at.y + p / kBlockSide;
+        if (x >= f.width || y >= f.height) continue;
+        const std::size_t o = std::size_t{y} * f.width + x;
+        const float t = std::abs(light.transmittance[p / W][p % W]);
+        out.image[o] = light.red[p / W][p % W] + t * f.background.r;
+        out.image[plane + o] = light.green[p / W][p % W] + t * f.background.g;
+        out.image[2 * plane + o] = light.blue[p / W][p % W] + t * f.background.b;
+        out.final_transmittance[o] = t;
+        out.last_pair[o] = static_cast<std::uint32_t>(light.last[p / W][p % W]);
+    }
+}
+
 template <bool kCount>
 inline void forward_block(const BlendFrame& f, std::uint32_t tile, std::uint32_t block, Hits& hits,
                           BlendedImage& out, BlendCounts& counts) {
@@ -118,18 +140,7 @@ inline void forward_block(const BlendFrame& f, std::uint32_t tile, std::uint32_t
         for (int l = 0; l < W; ++l) counts.contributing += static_cast<std::uint32_t>(counted[l]);
         return;
     }
-    const std::size_t plane = std::size_t{f.width} * f.height;
-    for (int p = 0; p < kBlockPixels; ++p) {
-        const std::uint32_t x = at.x + p % kBlockSide, y = at.y + p / kBlockSide;
-        if (x >= f.width || y >= f.height) continue;
-        const std::size_t o = std::size_t{y} * f.width + x;
-        const float t = std::abs(transmittance[p / W][p % W]);
-        out.image[o] = red[p / W][p % W] + t * f.background.r;
-        out.image[plane + o] = green[p / W][p % W] + t * f.background.g;
-        out.image[2 * plane + o] = blue[p / W][p % W] + t * f.background.b;
-        out.final_transmittance[o] = t;
-        out.last_pair[o] = static_cast<std::uint32_t>(last[p / W][p % W]);
-    }
+    write_block(f, at, {red, green, blue, transmittance, last}, out);
 }
 
 /// sums[i] += the sum of the lanes of v[i], i < 8.

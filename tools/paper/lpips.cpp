@@ -76,9 +76,15 @@ Plane max_pool(const Plane& in, int side) {
     return out;
 }
 
-/// Patches of the output rows [first, last): column[(c k + v) k + u][pixel].
-void unfold(const Plane& in, int side, int stride, int padding, int width, int first, int last,
+/// Of the output, [first, last).
+struct OutputRows {
+    int width, first, last;
+};
+
+/// Patches of these rows: column[(c k + v) k + u][pixel].
+void unfold(const Plane& in, int side, int stride, int padding, const OutputRows& rows,
             float* column) {
+    const auto [width, first, last] = rows;
     for (std::size_t c = 0; c < in.channels; ++c) {
         const float* plane = &in.data[c * in.width * in.height];
         for (int v = 0; v < side; ++v)
@@ -117,7 +123,7 @@ Plane convolve_relu(const Plane& in, const Tensor& weight, const std::vector<flo
         const int first = static_cast<int>(b) * rows, last = std::min(first + rows, out.height);
         const Eigen::Index count = Eigen::Index(last - first) * out.width;
         Matrix column(Eigen::Index(taps), count);
-        unfold(in, side, stride, padding, out.width, first, last, column.data());
+        unfold(in, side, stride, padding, {out.width, first, last}, column.data());
         const Matrix product = ((filter * column).colwise() + offset).cwiseMax(0.0f);
         for (std::size_t c = 0; c < out.channels; ++c)
             std::copy_n(product.data() + Eigen::Index(c) * count, count,

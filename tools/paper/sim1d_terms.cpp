@@ -130,9 +130,15 @@ struct Sums {
     double weight = 0, position = 0, width = 0, shape = 0;
 };
 
-Sums dot_products(const float* x, const float* residual, const float* w, const float* slope_z,
-                  const float* by_shape, const Primitive1d& p, std::size_t first,
+/// Rows of one primitive, [sample]; by_shape may be null.
+struct SampleRows {
+    const float *x, *residual, *w, *slope_z, *by_shape;
+};
+
+Sums dot_products(const SampleRows& rows, const Primitive1d& p, std::size_t first,
                   std::size_t last) {
+    const float *x = rows.x, *residual = rows.residual, *w = rows.w;
+    const float *slope_z = rows.slope_z, *by_shape = rows.by_shape;  // simd wants variables
     const float inverse = 1 / p.width, position = p.position;
     float a = 0, b = 0, c = 0, d = 0;
 #pragma omp simd reduction(+ : a, b, c)
@@ -251,9 +257,9 @@ double Terms1d::loss(std::span<const Primitive1d> primitives, std::vector<double
         const Primitive1d& p = primitives[i];
         const Reach reach = reach_of(p);
         const std::size_t row = i * x_.size();
-        const Sums sums =
-            dot_products(x_.data(), residual_.data(), &w_[row], &slope_z_[row],
-                         by_shape_.empty() ? nullptr : &by_shape_[row], p, reach.first, reach.last);
+        const Sums sums = dot_products({x_.data(), residual_.data(), &w_[row], &slope_z_[row],
+                                        by_shape_.empty() ? nullptr : &by_shape_[row]},
+                                       p, reach.first, reach.last);
         gradient[i * 4] = scale * p.weight * sums.position * -2 / p.width;
         gradient[i * 4 + 1] = scale * p.weight * sums.width * -2;
         gradient[i * 4 + 2] = scale * sums.weight;

@@ -46,7 +46,7 @@ size_t expect_gradients(const std::string& name, Splats<double> splats, const Ca
         const auto now = project(splats, i, camera, {}, kernel);
         if (now.cull != Cull::none) continue;
         ++seen;
-        project_backward(splats, i, camera, {}, kernel, now, w.d, out);
+        project_backward(splats, i, camera, {}, kernel, {now, w.d}, out);
         const auto check = [&](std::vector<double>& values, const std::vector<double>& d,
                                size_t stride) {
             for (size_t k = i * stride; k < (i + 1) * stride; ++k) {

@@ -149,7 +149,8 @@ void expect_position_gradient(const OneSplat& one, const Camera& camera) {
     d.d_l22 = -3;
     SplatGradients<double> out;
     out.resize_like(splats);
-    project_backward(splats, 0, camera, {}, kernel, project(splats, 0, camera, {}, kernel), d, out);
+    project_backward(splats, 0, camera, {}, kernel, {project(splats, 0, camera, {}, kernel), d},
+                     out);
     for (int c = 0; c < 3; ++c) {
         const double kept = splats.position[c];
         splats.position[c] = kept + 1e-6;
