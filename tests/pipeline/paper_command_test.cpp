@@ -166,9 +166,9 @@ TEST(CompareCommand, DataSetThatCannotBeLoaded_isAFailureInTheReport) {
 TEST(CompareCommand, RunThatCannotBeRead_isSaidWhereProgressIsNot) {
     const fs::path out = scratch() / "compare_unread";
     write_file_atomic(out / "scene/gaussian/seed0/metrics.json", "[]");
-    const Outcome one = darb("compare " + kScene +
-                             " --kernels gaussian --iterations 4 -r 8 --blending-views 0 -q -o " +
-                             out.string());
+    const Outcome one =
+        darb("compare " + kScene +
+             " --kernels gaussian --iterations 4 -r 8 --blending-views 0 -q -o " + out.string());
     EXPECT_EQ(one.code, 2);
     EXPECT_NE(one.err.find("metrics.json"), std::string::npos) << one.err;
 }
