@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "engine/check/check.h"
+#include "engine/check/run_checks.h"
 #include "engine/core/rng.h"
 #include "engine/gpu/commands.h"
 #include "engine/kernels/kernel_coefficients.h"

@@ -1,5 +1,5 @@
 // The whole walk of a random scene, image and every gradient, against the reference.
-#include "engine/check/check.h"
+#include "engine/check/run_checks.h"
 #include "engine/check/walk_truth.h"
 #include "engine/kernels/kernel_profile.h"
 #include "engine/reference/random_scene.h"

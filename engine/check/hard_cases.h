@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/check/check_report.h"
 #include "engine/check/device_walk.h"
-#include "engine/check/report.h"
 #include "engine/reference/random_scene.h"
 
 namespace darb::check {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/gpu/buffer.h"
-#include "engine/primitives/groups.h"
+#include "engine/raster/splat_ranges.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {

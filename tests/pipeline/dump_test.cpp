@@ -5,8 +5,8 @@
 
 #include <cstring>
 
+#include "engine/check/check_report.h"
 #include "engine/check/dump.h"
-#include "engine/check/report.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
 #include "engine/reference/render.h"

@@ -9,7 +9,7 @@
 #include "tests/support/chromium.h"
 #include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
-#include "tools/cost/report.h"
+#include "tools/cost/cost_report.h"
 #include "tools/cost/train_cost.h"
 #include "trainer/initial_model.h"
 #include "trainer/trainer.h"

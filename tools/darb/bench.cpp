@@ -9,8 +9,8 @@
 #include <regex>
 
 #include "engine/core/error.h"
+#include "tools/bench/bench_report.h"
 #include "tools/bench/cases.h"
-#include "tools/bench/report.h"
 #include "tools/bench/scenes.h"
 #include "tools/darb/bench_growth.h"
 #include "tools/darb/commands.h"

@@ -6,8 +6,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "engine/check/check.h"
 #include "engine/check/dump.h"
+#include "engine/check/run_checks.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/text.h"

@@ -7,7 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "tools/cost/report.h"
+#include "tools/cost/cost_report.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"

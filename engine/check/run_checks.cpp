@@ -1,4 +1,4 @@
-#include "engine/check/check.h"
+#include "engine/check/run_checks.h"
 
 #include <chrono>
 

@@ -1,4 +1,4 @@
-#include "engine/check/report.h"
+#include "engine/check/check_report.h"
 
 #include <fmt/format.h>
 

@@ -6,7 +6,7 @@
 #include "engine/report/html.h"
 #include "engine/report/page.h"
 #include "engine/report/svg_plot.h"
-#include "tools/cost/report.h"
+#include "tools/cost/cost_report.h"
 
 namespace darb {
 

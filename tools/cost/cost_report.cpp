@@ -1,4 +1,4 @@
-#include "tools/cost/report.h"
+#include "tools/cost/cost_report.h"
 
 #include <fmt/format.h>
 

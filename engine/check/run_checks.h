@@ -2,7 +2,7 @@
 // whole walk forward and back, and the hard cases.
 #pragma once
 
-#include "engine/check/report.h"
+#include "engine/check/check_report.h"
 #include "engine/gpu/device.h"
 #include "engine/kernels/kernel_family.h"
 
