@@ -4,6 +4,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/kernels/relocation.h"
+#include "engine/primitives/groups.h"
 #include "engine/reference/mcmc.h"
 #include "engine/reference/render.h"
 #include "shaders/shared/strategy_args.h"
