@@ -86,6 +86,9 @@ def violations(root, file, arrows, libraries, used):
 
 
 def main():
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__.strip())
+        return 0
     root = sys.argv[1] if len(sys.argv) > 1 else "."
     arrows, libraries = read_arrows(os.path.join(root, "ARCHITECTURE.md"))
     files = list(source_files(root, arrows))

@@ -2,6 +2,7 @@
 # Include arrows, guards of the hard cases, file length and layout of every source file; prints each violation.
 #   tools/check_style.sh [--fix] [ROOT]      --fix: let clang-format rewrite the files
 set -uo pipefail
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
 fix=0
 [[ ${1:-} == --fix ]] && { fix=1; shift; }

@@ -2,6 +2,7 @@
 # Sets up, builds, trains the shipped scene and ends with the paths of a picture and a report.
 #   tools/demo.sh [options of darb train]
 set -euo pipefail
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 
 tools/setup.sh --no-tests

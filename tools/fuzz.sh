@@ -5,6 +5,7 @@
 # Seeds: small whole files of every format and version (tests/fuzz/make_seeds.cpp). What is learned stays in
 # build-asan/corpus, findings in build-asan/crashes.
 set -euo pipefail
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 
 readers="ply compressed_ply dot_splat spz sog splat_file photo colmap transforms checkpoint"

@@ -318,6 +318,9 @@ def run(names):
 
 
 def main():
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__.strip())
+        return 0
     if len(sys.argv) > 1 and sys.argv[1] == "check":
         return check()
     if len(sys.argv) > 1 and sys.argv[1] == "docs":

@@ -6,6 +6,7 @@
 # kitchen bonsai truck train drjohnson playroom. Missing ones are named and left out. Runs again go on. The schedule is
 # that of 3DGS, as the paper's, unless --train-options names another --schedule.
 set -euo pipefail
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
 if [[ $# -lt 2 ]]; then
     sed -n '2,8s/^# \{0,1\}//p' "$0" >&2

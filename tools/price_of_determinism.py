@@ -73,6 +73,9 @@ def train(darb, folder):
 
 
 def main():
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__.strip())
+        return 0
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     commands = {"deterministic": os.path.join(ROOT, "build/darb"), "atomics": build_atomics()}
     times = {name: [] for name in commands}

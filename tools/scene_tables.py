@@ -93,6 +93,9 @@ def replaced(page, name, tables):
 
 
 def main():
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__.strip())
+        return 0
     figures = {}
     if os.path.exists(FIGURES):
         with open(FIGURES, encoding="utf-8") as file:

@@ -4,6 +4,7 @@
 # fifth of the run holds at most 2 % more than the fifth before it.
 #   tools/soak.sh [ITERATIONS]
 set -euo pipefail
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 
 darb=${DARB:-build/darb} # the command under test

@@ -8,6 +8,7 @@ the roofline, and, where there is one of `darb bench --growth`, time against spl
 import json
 import os
 import re
+import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 RESULTS = os.path.join(ROOT, "assets/results")
@@ -54,6 +55,9 @@ def write_between(page, name, text):
 
 
 def main():
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__.strip())
+        return 0
     with open(PAGE, encoding="utf-8") as file:
         page = file.read()
     for name, path, table in (("cases", "bench_lavapipe.json", cases_table), ("growth", "growth_lavapipe.json", growth_table)):

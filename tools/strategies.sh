@@ -8,6 +8,7 @@
 # OUT/SET/STRATEGY/seedN: finished ones are kept, one that was interrupted goes on. Times are those of training alone;
 # run it on a quiet machine. Beside the table all evaluations go to OUT/strategies.json. DARB= names another command.
 set -euo pipefail
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 
 usage() { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 fail() { echo "strategies.sh: $*" >&2; exit 2; }

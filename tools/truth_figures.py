@@ -166,6 +166,9 @@ def tables():
 
 
 def main():
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__.strip())
+        return 0
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     figures = load()

@@ -2,6 +2,7 @@
 # tools/view_times.sh OUT.json SCENE...: frame times of darb view at 1280x720 in a window, for each
 # scene; on a virtual display where there is none. On a machine that does nothing else.
 set -eu
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 if [ $# -lt 2 ]; then
     echo "usage: tools/view_times.sh OUT.json SCENE..." >&2
     exit 2
