@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include "engine/core/say.h"
 
 namespace darb {
 
@@ -42,8 +42,7 @@ void Progress::update(const IterationResult& r, const Device& device) {
     const double since = std::chrono::duration<double>(now - last_print_).count();
     if (since < (terminal_ ? kTerminalSeconds : kPlainSeconds) && r.iteration < last_) return;
     last_print_ = now;
-    fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"), text(r, device));
-    std::fflush(stderr);
+    say_text(fmt::format(fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"), text(r, device)));
 }
 
 std::string Progress::text(const IterationResult& r, const Device& device) const {
@@ -64,7 +63,7 @@ std::string Progress::text(const IterationResult& r, const Device& device) const
 
 void Progress::note(const std::string& line) {
     if (quiet_) return;
-    fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K\n" : "{}\n"), line);
+    say_text(fmt::format(fmt::runtime(terminal_ ? "\r{}\033[K\n" : "{}\n"), printable(line)));
 }
 
 void Progress::new_pace(int iteration) {
@@ -77,7 +76,7 @@ void Progress::leave_out(double seconds) {
 }
 
 void Progress::finish() {
-    if (!quiet_ && terminal_ && any_) fmt::print(stderr, "\n");
+    if (!quiet_ && terminal_ && any_) say_text("\n");
 }
 
 }  // namespace darb

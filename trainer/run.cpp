@@ -18,6 +18,8 @@
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
 #include "trainer/progress.h"
+#include "trainer/run_events.h"
+#include "trainer/run_folder.h"
 #include "trainer/run_log.h"
 
 namespace darb {
@@ -75,7 +77,7 @@ class Run {
           tuning_(result_tuning(device)),
           checkpoint_(checkpoint_of(device, run.resume_from)),
           trainer_(device, dataset, photos_, initial_model(dataset, options), options),
-          log_(run.output, !run.resume_from.empty()),
+          log_(run.output),
           progress_(1, options.iterations, run.quiet) {}
 
     RunSummary execute(const std::atomic<bool>* stop);
@@ -91,8 +93,12 @@ class Run {
     void save_model(int iteration);
     void show_step();
     void save_checkpoint(const std::filesystem::path& path);
+    void begin();
     void train(const std::atomic<bool>* stop);
+    void after_step();
+    void save_what_is_there(bool failed);
     bool is_finished() const;
+    RunSummary finished();
     std::string other_way() const;
     void report_troubles();
     void report_resolution();
@@ -127,28 +133,11 @@ class Run {
     std::uint32_t told_by_memory_ = 0, told_by_pairs_ = 0;  // the splats at which growth stopped
     bool told_no_mean_ = false;
     int told_divisor_ = 1;
+    bool whole_ = false;  // between two iterations, when the splats can be saved
     double seconds_ = 0;
     bool running_ = false;
     Clock::time_point started_;
 };
-
-// What an earlier run in the folder would pass on as this one's: to --resume, and to what looks for
-// the folder's scene. Replaces what was set aside before.
-void set_aside(const std::filesystem::path& output) {
-    namespace fs = std::filesystem;
-    std::error_code none;  // there is no such file
-    for (const char* name : {"checkpoint.darb", "metrics.json", "exposure.json", "report.html"})
-        fs::rename(output / name, output / (std::string("earlier.") + name), none);
-    std::vector<fs::path> scenes;
-    for (const fs::directory_entry& entry : fs::directory_iterator(output / "point_cloud", none))
-        scenes.push_back(entry.path());
-    const fs::path earlier = output / "earlier.point_cloud";
-    if (!scenes.empty()) fs::create_directories(earlier, none);
-    for (const fs::path& scene : scenes) {
-        fs::remove_all(earlier / scene.filename(), none);
-        fs::rename(scene, earlier / scene.filename(), none);
-    }
-}
 
 // Whether the run that wrote a checkpoint is the one that the folder holds.
 bool is_own(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
@@ -167,7 +156,7 @@ void Run::resume() {
     seconds_ = checkpoint.seconds;
     const bool own = is_own(run_.resume_from, run_.output);
     if (!own) set_aside(run_.output);
-    log_.cut_after(own ? checkpoint.state.iteration : -1);
+    own ? log_.go_on(checkpoint.state.iteration) : log_.begin();
     progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
     progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
                                checkpoint.state.iteration));
@@ -247,44 +236,50 @@ void Run::show_step() {
 bool Run::is_finished() const {
     const std::filesystem::path path = run_.output / "metrics.json";
     if (trainer_.iteration() < options_.iterations || !std::filesystem::exists(path)) return false;
-    const auto metrics = nlohmann::json::parse(read_text_file(path), nullptr, false);
-    return metrics.is_object() && !metrics.value("interrupted", true) &&
-           metrics.value("iteration", 0) == options_.iterations;
+    const RunEnd end = read_run_end(path);
+    return !end.interrupted && end.iteration == options_.iterations;
 }
 
-RunSummary Run::execute(const std::atomic<bool>* stop) {
-    const std::filesystem::path latest = run_.output / "checkpoint.darb";
-    trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
-    if (!run_.resume_from.empty())
-        resume();  // before anything of an earlier run is written over: it may be refused
-    else
+// Nothing is left to do but a report that could not be written then.
+RunSummary Run::finished() {
+    progress_.note("the run is finished: nothing is left to do");
+    if (run_.report && !std::filesystem::exists(run_.output / "report.html"))
+        summary_.report = log_.report_again();
+    summary_.iteration = trainer_.iteration();
+    summary_.seconds = seconds_;
+    return summary_;
+}
+
+void Run::begin() {
+    remove_leftovers(run_.output);
+    if (!run_.resume_from.empty()) {
+        resume();  // before anything of an earlier run is moved: it may be refused
+    } else {
         set_aside(run_.output);
+        log_.begin();
+    }
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
     if (!run_.command.empty()) write_file_atomic(run_.output / "command.json", run_.command);
-    if (!run_.resume_from.empty() && is_finished()) {
-        progress_.note("the run is finished: nothing is left to do");
-        summary_.iteration = trainer_.iteration();
-        summary_.seconds = seconds_;
-        return summary_;
-    }
+}
+
+RunSummary Run::execute(const std::atomic<bool>* stop) {
+    trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
+    begin();
+    if (!run_.resume_from.empty() && is_finished()) return finished();
     // Of where the run was interrupted; it goes on, and its scene is the latest until it has ended.
     std::error_code none;
     std::filesystem::remove(run_.output / "metrics.json", none);
     log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
-
     try {
         train(stop);
-    } catch (const Error& e) {
+    } catch (const std::exception& e) {
         log_.failure(trainer_.iteration(), e.what());
+        save_what_is_there(true);
         throw;
     }
     summary_.interrupted = trainer_.iteration() < options_.iterations;
-    if (summary_.interrupted) {
-        save_checkpoint(latest);
-        save_model(trainer_.iteration());
-        stopwatch(false);
-    }
+    if (summary_.interrupted) save_what_is_there(false);
     report_troubles();
     progress_.finish();
     summary_.iteration = trainer_.iteration();
@@ -292,6 +287,27 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     summary_.passes = log_.passes(trainer_);
     summary_.report = log_.finish(summary_, trainer_, device_, run_.report);
     return summary_;
+}
+
+// failed: by something else than the device, as a full disk, which may have room for one of the
+// two; what cannot be saved is left out, for the run ends with the first failure.
+void Run::save_what_is_there(bool failed) {
+    if (!whole_ || trainer_.iteration() >= options_.iterations) return;
+    std::string saved;
+    const auto save = [&](const char* what, const auto& write) {
+        try {
+            write();
+            saved += fmt::format("{}{}", saved.empty() ? "" : " and ", what);
+        } catch (const std::exception&) {
+            if (!failed) throw;
+        }
+    };
+    save("the checkpoint", [&] { save_checkpoint(run_.output / "checkpoint.darb"); });
+    save("the scene", [&] { save_model(trainer_.iteration()); });
+    stopwatch(false);
+    if (!saved.empty())
+        progress_.note(fmt::format("iteration {}: saved {} in {}", trainer_.iteration(), saved,
+                                   run_.output.string()));
 }
 
 // Of the backward blend, where that holds more pairs.
@@ -313,23 +329,32 @@ void Run::train(const std::atomic<bool>* stop) {
         save_model(end);
         save_checkpoint(latest);
     }
+    whole_ = true;
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
+        whole_ = false;
         trainer_.step();
-        report_resolution();
-        report_memory();
-        report_probes();
-        const int i = trainer_.iteration();
-        const bool last = i == options_.iterations;
-        if (last || contains(run_.test_iterations, i)) evaluate(i);
-        if (last || contains(run_.save_iterations, i)) save_model(i);
-        if (contains(run_.checkpoint_iterations, i))
-            save_checkpoint(run_.output / fmt::format("chkpnt{}.darb", i));
-        if (last || (run_.checkpoint_interval > 0 && i % run_.checkpoint_interval == 0))
-            save_checkpoint(latest);
+        whole_ = true;
+        after_step();
         if (run_.on_step) show_step();
     }
+    whole_ = false;
     trainer_.drain();
+    whole_ = true;
     stopwatch(false);
+}
+
+void Run::after_step() {
+    report_resolution();
+    report_memory();
+    report_probes();
+    const int i = trainer_.iteration();
+    const bool last = i == options_.iterations;
+    if (last || contains(run_.test_iterations, i)) evaluate(i);
+    if (last || contains(run_.save_iterations, i)) save_model(i);
+    if (contains(run_.checkpoint_iterations, i))
+        save_checkpoint(run_.output / fmt::format("chkpnt{}.darb", i));
+    if (last || (run_.checkpoint_interval > 0 && i % run_.checkpoint_interval == 0))
+        save_checkpoint(run_.output / "checkpoint.darb");
 }
 
 void Run::report_resolution() {
@@ -390,6 +415,7 @@ RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptio
                         const RunOptions& run, const std::atomic<bool>* stop) {
     for (const View& view : dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
+    check_run_folder(run.output, dataset);
     return Run(device, dataset, options, run).execute(stop);
 }
 

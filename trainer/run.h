@@ -3,7 +3,7 @@
 //   point_cloud/iteration_N/point_cloud.ply  cameras.json  cfg_args
 //   run.jsonl (a line an event)  metrics.json  report.html  held_out/ITERATION/*.png
 //   checkpoint.darb
-// What an earlier run left there and this one would be taken for is kept as earlier.*.
+// What an earlier run left there is kept in earlier.1, earlier.2, ...
 #pragma once
 
 #include <atomic>
@@ -71,7 +71,8 @@ struct RunSummary {
 
 /// Trains until options.iterations or until *stop; saves, evaluates and logs as RunOptions says.
 /// Progress goes to stderr: a bar on a terminal, plain lines elsewhere. Throws Error; the last
-/// checkpoint is then intact.
+/// checkpoint is then intact, and where the device is not what failed, checkpoint and scene are
+/// saved once more as far as they can be. The caller holds the RunLock of the folder.
 RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
                         const RunOptions& run, const std::atomic<bool>* stop = nullptr);
 

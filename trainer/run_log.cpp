@@ -6,13 +6,15 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <sstream>
+#include <set>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/text.h"
+#include "engine/data/image_io.h"
 #include "engine/plan/tuning_names.h"
 #include "trainer/checkpoint.h"
+#include "trainer/run_events.h"
 #include "trainer/schedule.h"
 #include "trainer/strategy.h"
 
@@ -76,33 +78,28 @@ std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
             : "False");
 }
 
-RunLog::RunLog(const std::filesystem::path& folder, bool append)
-    : folder_(folder), file_(nullptr, &std::fclose) {
-    const auto path = folder / "run.jsonl";
-    if (append && std::filesystem::exists(path)) {
-        std::istringstream lines(read_text_file(path));
-        for (std::string line; std::getline(lines, line);) {
-            Json event = Json::parse(line, nullptr, false);
-            if (event.is_object()) events_.push_back(std::move(event));
-        }
-    }
-    std::error_code ignored;
-    std::filesystem::create_directories(folder, ignored);
-    file_.reset(std::fopen(path.c_str(), append ? "ab" : "wb"));
+void RunLog::open() {
+    const auto path = folder_ / "run.jsonl";
+    file_.reset(std::fopen(path.c_str(), "abe"));
     if (!file_)
         throw Error(path.string(), std::string("cannot be written: ") + std::strerror(errno),
                     "Choose another output folder with -o.");
 }
 
-void RunLog::cut_after(int iteration) {
+void RunLog::begin() {
+    std::error_code ignored;
+    std::filesystem::create_directories(folder_, ignored);
+    write_file_atomic(folder_ / "run.jsonl", std::string_view());
+    open();
+}
+
+void RunLog::go_on(int iteration) {
+    events_ = read_events(folder_ / "run.jsonl");
     std::erase_if(events_, [&](const Json& e) { return e.value("iteration", 0) > iteration; });
     std::string text;
     for (const Json& e : events_) text += text_of(e) + "\n";
-    const auto path = folder_ / "run.jsonl";
-    write_file_atomic(path, text);
-    file_.reset(std::fopen(path.c_str(), "ab"));
-    if (!file_)
-        throw Error(path.string(), std::strerror(errno), "Choose another output folder with -o.");
+    write_file_atomic(folder_ / "run.jsonl", text);
+    open();
 }
 
 void RunLog::write(const Json& event) {
@@ -179,7 +176,10 @@ void RunLog::mean_left_out(int iteration) {
 }
 
 void RunLog::failure(int iteration, const std::string& what) {
-    write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
+    try {
+        write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
+    } catch (const Error&) {  // a full disk, which may be the failure itself
+    }
 }
 
 void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, double seconds,
@@ -262,7 +262,8 @@ ReportData RunLog::report_data(const RunSummary& summary) const {
             "measured at the start: {:.1f} GB/s of copies, {:.1f} billion multiply-adds a second.",
             1e-9 * rates_.bytes_per_s, 1e-9 * rates_.fma_per_s));
     data.settings.emplace_back("strategy", start_.value("strategy", "adc"));
-    for (const auto& [name, value] : start_["settings"].items())
+    const Json settings = start_.value("settings", Json::object());
+    for (const auto& [name, value] : settings.items())
         if (name != "effects" && name != "strategy")
             data.settings.emplace_back(name, setting_text(value));
     for (const Json& effect : start_.value("effects", Json::array()))
@@ -270,7 +271,8 @@ ReportData RunLog::report_data(const RunSummary& summary) const {
             "effect " + effect.value("effect", ""),
             (effect.value("on", false) ? "on: " : "off: ") + effect.value("reason", ""));
     data.pictures = summary.pictures;
-    for (const Json& note : start_["notes"]) data.notes.push_back(note.get<std::string>());
+    for (const Json& note : start_.value("notes", Json::array()))
+        data.notes.push_back(note.get<std::string>());
     return data;
 }
 
@@ -353,6 +355,47 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"evaluations", evaluations}};
     write_file_atomic(folder_ / "metrics.json", text_of(metrics, 2) + "\n");
     if (!with_report) return {};
+    const auto report = folder_ / "report.html";
+    write_report(report, report_data(summary));
+    return report;
+}
+
+namespace {
+
+std::vector<ReportPass> passes_of(const Json& metrics) {
+    std::vector<ReportPass> passes;
+    for (const Json& p : metrics.value("passes_ms", Json::array())) {
+        passes.push_back({p.value("name", ""), number(p, "ms"), std::nullopt});
+        if (p.contains("roofline")) passes.back().roofline = number(p, "roofline");
+    }
+    return passes;
+}
+
+// Those of the last evaluation that are still there, under the names that they were written with.
+std::vector<ReportPicture> pictures_of(const Json& evaluation, const std::filesystem::path& root) {
+    std::vector<ReportPicture> pictures;
+    std::set<std::string> used;
+    const auto folder = root / std::to_string(evaluation.value("iteration", 0));
+    for (const Json& view : evaluation.value("views", Json::array())) {
+        const std::string name = view.value("name", "");
+        const auto file = folder / picture_name(name, used);
+        if (std::filesystem::exists(file))
+            pictures.push_back({name, file, number(view, "psnr_db"), number(view, "ssim")});
+    }
+    return pictures;
+}
+
+}  // namespace
+
+std::filesystem::path RunLog::report_again() {
+    const Json metrics = read_metrics(folder_ / "metrics.json");
+    start_ = metrics.value("start", Json::object());
+    rates_.bytes_per_s = number(start_, "copy_bytes_per_s");
+    rates_.fma_per_s = number(start_, "fma_per_s");
+    RunSummary summary;
+    summary.passes = passes_of(metrics);
+    if (const Json list = metrics.value("evaluations", Json::array()); !list.empty())
+        summary.pictures = pictures_of(list.back(), folder_ / "held_out");
     const auto report = folder_ / "report.html";
     write_report(report, report_data(summary));
     return report;

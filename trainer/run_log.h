@@ -25,12 +25,14 @@ void add_events(const std::vector<nlohmann::json>& events, ReportData& data);
 
 class RunLog {
   public:
-    /// append: keep the lines of an earlier part of the run. Throws Error where the folder cannot
-    /// be written.
-    RunLog(const std::filesystem::path& folder, bool append);
+    /// Touches nothing before begin() or go_on().
+    explicit RunLog(const std::filesystem::path& folder) : folder_(folder) {}
 
-    /// Forgets events after an iteration, -1: all; a resumed run writes them again.
-    void cut_after(int iteration);
+    /// An empty run.jsonl. Throws Error where the folder cannot be written.
+    void begin();
+    /// The run.jsonl of an earlier part of the run, without what came after an iteration, which a
+    /// resumed run writes again. Throws Error as read_events does, and where it cannot be written.
+    void go_on(int iteration);
 
     /// rates: of the device, for the roofline.
     void start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
@@ -47,7 +49,7 @@ class RunLog {
     void growth_stopped(int iteration, const char* limit, std::uint32_t splats);
     /// There was no room for the mean that the run was to end with.
     void mean_left_out(int iteration);
-    /// What ended the run before its time.
+    /// What ended the run before its time; nothing where the log cannot be written.
     void failure(int iteration, const std::string& what);
     void evaluation(const Evaluation& evaluation);
     /// The passes of the run so far, in their order.
@@ -55,16 +57,20 @@ class RunLog {
     /// metrics.json and, with_report, report.html; returns the path of the report, if any.
     std::filesystem::path finish(const RunSummary& summary, const Trainer& trainer,
                                  const Device& device, bool with_report);
+    /// report.html of a run that has ended, from run.jsonl, metrics.json and held_out/; returns its
+    /// path.
+    std::filesystem::path report_again();
 
     static constexpr int kLogInterval = 50;  // iterations a line, values averaged over them
 
   private:
+    void open();
     void write(const nlohmann::json& event);
     ReportData report_data(const RunSummary& summary) const;
 
     std::filesystem::path folder_;
     std::vector<nlohmann::json> events_;
-    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+    std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_{nullptr, &std::fclose};
     double loss_sum_ = 0, psnr_sum_ = 0;
     int summed_ = 0;
     FrameCounts counts_;  // sums over counted_ iterations

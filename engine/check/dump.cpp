@@ -43,6 +43,14 @@ void write(const std::filesystem::path& folder, const SplatModel& model, const C
 
 }  // namespace
 
+std::vector<std::filesystem::path> dump_files(const std::filesystem::path& folder) {
+    std::vector<std::filesystem::path> files;
+    for (const char* name :
+         {"image", "d_xyz", "d_f_dc", "d_f_rest", "d_opacity", "d_scale", "d_rot"})
+        files.push_back(folder / (std::string(name) + ".npy"));
+    return files;
+}
+
 void dump_from_device(Device& device, const SplatModel& model, const Camera& camera,
                       const std::filesystem::path& folder) {
     const DeviceWalk walk = walk_on_device(device, model, camera, linear_weights(camera), {});

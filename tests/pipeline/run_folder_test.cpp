@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -39,12 +40,37 @@ TEST_F(RunFolder, a_shorter_run_after_a_longer_one_is_the_scene) {
     const Outcome info = darb("info " + folder_.string());
     EXPECT_NE(info.out.find("iteration_2"), std::string::npos) << info.out;
     EXPECT_NE(info.out.find("sinc"), std::string::npos) << info.out;
-    const fs::path earlier = folder_ / "earlier.point_cloud" / "iteration_3";
+    const fs::path earlier = folder_ / "earlier.1" / "point_cloud" / "iteration_3";
     ASSERT_TRUE(fs::exists(earlier / "point_cloud.ply")) << "kept";
     fs::rename(earlier, folder_ / "point_cloud" / "iteration_3");
     EXPECT_NE(darb("info " + folder_.string()).out.find("iteration_2"), std::string::npos);
     fs::remove(folder_ / "metrics.json");  // as of another program: the last one
     EXPECT_NE(darb("info " + folder_.string()).out.find("iteration_3"), std::string::npos);
+}
+
+// Three starts afresh: each earlier run is there as it was, with what the user put beside it.
+TEST_F(RunFolder, nothing_of_earlier_runs_is_lost) {
+    std::vector<std::map<fs::path, std::vector<std::byte>>> runs;
+    for (const char* options : {"--kernel gaussian --eval",
+                                "--kernel sinc --checkpoint-iterations 1", "--kernel cosine"}) {
+        ASSERT_EQ(train(std::string("--iterations 2 -q ") + options).code, 0);
+        runs.emplace_back();
+        for (const auto& entry : fs::recursive_directory_iterator(folder_))
+            if (const fs::path name = entry.path().lexically_relative(folder_);
+                entry.is_regular_file() && !name.string().starts_with("earlier."))
+                runs.back()[name] = read_file(entry.path());
+        write_file_atomic(folder_ / "notes.txt", "mine");
+    }
+    for (size_t run = 0; run < 2; ++run)
+        for (const auto& [name, bytes] : runs[run]) {
+            if (name == "notes.txt") continue;
+            EXPECT_EQ(read_file(folder_ / fmt::format("earlier.{}", run + 1) / name), bytes)
+                << name;
+        }
+    EXPECT_EQ(read_text_file(folder_ / "notes.txt"), "mine");
+    for (const auto& [name, bytes] : runs[2]) EXPECT_EQ(read_file(folder_ / name), bytes) << name;
+    // An earlier run is a folder like any other.
+    EXPECT_NE(darb("info " + (folder_ / "earlier.2").string()).out.find("sinc"), std::string::npos);
 }
 
 TEST_F(RunFolder, a_run_that_is_resumed_and_killed_shows_its_latest_scene) {
@@ -81,11 +107,11 @@ TEST_F(RunFolder, a_checkpoint_of_another_folder_begins_a_log_of_its_own) {
     const json metrics = json::parse(read_text_file(other / "metrics.json"));
     ASSERT_EQ(metrics["evaluations"].size(), 1U) << metrics["evaluations"];
     EXPECT_EQ(metrics["evaluations"][0]["iteration"], 3);
-    EXPECT_TRUE(fs::exists(other / "earlier.metrics.json"));
+    EXPECT_TRUE(fs::exists(other / "earlier.1" / "metrics.json"));
     EXPECT_FALSE(fs::exists(other / "report.html")) << "this run writes none";
-    EXPECT_TRUE(fs::exists(other / "earlier.report.html"));
+    EXPECT_TRUE(fs::exists(other / "earlier.1" / "report.html"));
     EXPECT_FALSE(fs::exists(other / "exposure.json")) << "this run trains none";
-    EXPECT_TRUE(fs::exists(other / "earlier.exposure.json"));
+    EXPECT_TRUE(fs::exists(other / "earlier.1" / "exposure.json"));
     EXPECT_FALSE(fs::exists(other / "point_cloud" / "iteration_2"));
 
     fs::remove_all(other);  // and from the end of a run

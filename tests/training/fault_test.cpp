@@ -179,7 +179,7 @@ TEST_F(FaultyRun, a_fresh_run_is_not_mistaken_for_an_earlier_one) {
     const Bytes before = read_file(checkpoint());
     const Fault fault("lost:30");
     EXPECT_EQ(darb(training(run_) + " --kernel sinc").code, 2);
-    EXPECT_EQ(read_file(run_ / "earlier.checkpoint.darb"), before);
+    EXPECT_EQ(read_file(run_ / "earlier.1" / "checkpoint.darb"), before);
     EXPECT_TRUE(!fs::exists(checkpoint()) || read_file(checkpoint()) != before);
 }
 

@@ -133,7 +133,7 @@ TEST_F(KilledRun, interrupted_run_saves_and_resumes_by_its_folder_alone) {
         while (command.running() && !fs::exists(stopped / "checkpoint.darb")) ::usleep(200);
         ASSERT_TRUE(command.running()) << "the run ended before it was interrupted";
         command.interrupt();
-        EXPECT_EQ(command.wait(), 0) << read_text_file(log());
+        EXPECT_EQ(command.wait(), 128 + SIGINT) << read_text_file(log());
     }
     EXPECT_FALSE(fs::exists(model(stopped)));
     ASSERT_EQ(Command({"train", "--resume", "-q", "-o", stopped.string()}, log()).wait(), 0)
@@ -141,7 +141,7 @@ TEST_F(KilledRun, interrupted_run_saves_and_resumes_by_its_folder_alone) {
     EXPECT_EQ(read_file(model(stopped)), read_file(model(whole)));
 }
 
-// A comparison ends with 0 and reports what the run came to.
+// A comparison ends with the code of the signal and reports what the run came to.
 TEST_F(KilledRun, interrupted_comparison_keeps_the_evaluations_that_were_made) {
     const fs::path run = folder_ / "scene/gaussian/seed0";
     Command command(
@@ -151,7 +151,7 @@ TEST_F(KilledRun, interrupted_comparison_keeps_the_evaluations_that_were_made) {
     while (command.running() && !fs::exists(run / "point_cloud/iteration_10")) ::usleep(200);
     ASSERT_TRUE(command.running()) << read_text_file(log());
     command.interrupt();
-    EXPECT_EQ(command.wait(), 0) << read_text_file(log());
+    EXPECT_EQ(command.wait(), 128 + SIGINT) << read_text_file(log());
     const auto report = nlohmann::json::parse(read_text_file(folder_ / "compare.json"));
     const auto& set = report["datasets"][0];
     EXPECT_GT(set["medians"][0]["psnr_db"]["median"].get<double>(), 5);

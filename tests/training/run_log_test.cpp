@@ -37,8 +37,10 @@ TEST(RunLog, names_that_are_no_utf_8_and_numbers_that_are_not_finite_are_written
     evaluation.views = {{"f\xfcr.jpg", std::nan(""), std::nan("")}};
     evaluation.psnr_db = std::nan("");
     evaluation.ssim = 0.5;
-    RunLog(folder, false).evaluation(evaluation);
-    RunLog(folder, true).cut_after(7);
+    RunLog first(folder), again(folder);
+    first.begin();
+    first.evaluation(evaluation);
+    again.go_on(7);
     ReportData data;
     add_events({nlohmann::json::parse(read_text_file(folder / "run.jsonl"))}, data);
     std::filesystem::remove_all(folder);

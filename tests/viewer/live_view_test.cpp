@@ -40,5 +40,24 @@ TEST_F(LiveViewTest, Run_pauses_steps_and_goes_on_when_the_window_is_closed_slow
         << log("train.log");
 }
 
+TEST_F(LiveViewTest, Run_goes_on_when_the_display_is_gone_slow) {
+    const std::filesystem::path out = folder_ / "run";
+    program_.emplace(
+        Words{DARB_COMMAND, "train", DARB_SOURCE_DIR "/assets/scene", "-o", out.string(),
+              "--iterations", "200", "-r", "8", "--effects", "none", "--view"},
+        folder_ / "train.log");
+    ASSERT_TRUE(changes_from(ImageU8(kDisplayWidth, kDisplayHeight, 3), 100)) << log("train.log");
+    xdo({"mousemove", "600", "400", "key", "space"});  // a pause, which ends with the display
+    settled();
+    display_->terminate();
+    display_->wait();
+    EXPECT_TRUE(eventually([&] { return !program_->running(); })) << log("train.log");
+    EXPECT_EQ(program_->wait(), 0) << log("train.log");
+    EXPECT_TRUE(std::filesystem::exists(out / "point_cloud" / "iteration_200" / "point_cloud.ply"))
+        << log("train.log");
+    EXPECT_NE(log("train.log").find("the display is gone; the run goes on"), std::string::npos)
+        << log("train.log");
+}
+
 }  // namespace
 }  // namespace darb::test

@@ -9,6 +9,7 @@
 #include <regex>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "tools/bench/bench_report.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
@@ -18,6 +19,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 
 namespace darb {
@@ -55,8 +57,8 @@ std::vector<BenchCase> possible_cases(std::vector<BenchCase> cases, const BenchO
     std::erase_if(cases, [&](const BenchCase& one) {
         if (one.file.empty()) return false;
         if (options.data && std::filesystem::exists(*options.data / one.file, error)) return false;
-        fmt::print(stderr, "{} is left out: no {}; name its folder with --data or DARB_TEST_DATA\n",
-                   one.name, ((options.data ? *options.data : "DATA") / one.file).string());
+        say("{} is left out: no {}; name its folder with --data or DARB_TEST_DATA\n", one.name,
+            ((options.data ? *options.data : "DATA") / one.file).string());
         return true;
     });
     return cases;
@@ -76,16 +78,11 @@ void run_cases(Device& device, const DeviceRates& rates, const std::vector<Bench
 }
 
 int bench(BenchFlags flags) {
-    if (flags.growth.on && !flags.filter.empty())
-        throw Error("darb bench --growth " + flags.filter, "--growth measures no cases",
-                    "Leave one of them out.");
-    if (!flags.growth.on && !flags.growth.html.empty())
-        throw Error("darb bench --html", "the page is that of --growth", "Add --growth.");
+    check_growth(flags.growth, flags.filter);
     std::vector<BenchCase> cases = chosen_cases(flags);
-    if (flags.list) {
-        for (const BenchCase& one : cases) fmt::print("{}\n", one.name);
-        return 0;
-    }
+    for (const BenchCase& one : cases)
+        if (flags.list) fmt::print("{}\n", one.name);
+    if (flags.list) return 0;
     BenchOptions& options = flags.options;
     options.data = bench_data_folder(flags.data);
     options.device = flags.device;
@@ -98,9 +95,13 @@ int bench(BenchFlags flags) {
         apply_plan(plan, dataset.views);
     };
     options.progress = [&](const std::string& line) {
-        if (!flags.quiet) fmt::print(stderr, "{}\n", line);
+        if (!flags.quiet) say("{}\n", line);
     };
     if (!flags.growth.on) cases = possible_cases(std::move(cases), options);
+    Paths read;
+    for (const BenchCase& one : cases)
+        if (options.data) read = together({read, files_of(*options.data / one.file)});
+    refuse_to_overwrite_inputs({flags.json, flags.growth.html}, read);
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tools/darb/cost_flags.h"
 
@@ -14,6 +15,14 @@ void add_growth_flags(CLI::App& command, GrowthFlags& flags) {
         ->capture_default_str()
         ->check(CLI::Range(1'000u, 100'000'000u));
     command.add_option("--html", flags.html, "write the plots of --growth to this page");
+}
+
+void check_growth(const GrowthFlags& flags, const std::string& filter) {
+    if (flags.on && !filter.empty())
+        throw Error("darb bench --growth " + filter, "--growth measures no cases",
+                    "Leave one of them out.");
+    if (!flags.on && !flags.html.empty())
+        throw Error("darb bench --html", "the page is that of --growth", "Add --growth.");
 }
 
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,

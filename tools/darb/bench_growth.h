@@ -21,6 +21,9 @@ struct GrowthFlags {
 void add_growth_flags(CLI::App& command, GrowthFlags& flags);
 
 /// Measures, prints the table and writes the files that are named.
+/// Throws Error where the flags contradict each other. filter: of the cases.
+void check_growth(const GrowthFlags& flags, const std::string& filter);
+
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
                   const std::filesystem::path& json,
                   const std::function<void(const std::string&)>& progress);

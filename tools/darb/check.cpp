@@ -14,6 +14,7 @@
 #include "tools/darb/commands.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
 
@@ -96,6 +97,7 @@ int dump_view(const CheckFlags& flags) {
         throw Error(flags.cameras.string(), fmt::format("there is no view {}", flags.view),
                     fmt::format("--view takes 0 to {}.", views.size() - 1));
     const View& view = views[static_cast<size_t>(flags.view)];
+    refuse_to_overwrite_inputs(check::dump_files(flags.dump), files_of(flags.scene));
     std::string from = "the reference in double";
     if (flags.reference) {
         check::dump_from_reference(model, view.camera, flags.dump);

@@ -3,17 +3,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/gpu/device.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/outputs.h"
+#include "tools/darb/stop_signals.h"
 #include "tools/darb/train_run.h"
+#include "trainer/run_folder.h"
 
 namespace darb {
 
@@ -41,6 +47,9 @@ void check_flags(CompareFlags& flags) {
         flags.forwarded.push_back("--max-splats=" + std::to_string(flags.max_splats));
     if (flags.html.empty()) flags.html = flags.output / "compare.html";
     if (flags.json.empty()) flags.json = flags.output / "compare.json";
+    for (const std::string& dataset : flags.datasets)
+        refuse_to_overwrite_inputs({flags.json, flags.html},
+                                   together({files_of(dataset_path(dataset)), flags.lpips}));
 }
 
 std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
@@ -48,7 +57,7 @@ std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
     for (const auto& file : flags.lpips)
         if (!std::filesystem::exists(file)) {
             note = "LPIPS was left out: " + file.string() + " does not exist.";
-            fmt::print(stderr, "warning: {}\n", note);
+            say("warning: {}\n", note);
             return std::nullopt;
         }
     if (flags.lpips.empty()) return std::nullopt;
@@ -87,6 +96,8 @@ int compare(CompareFlags flags) {
         const Device device(options);
         comparison.device = device.info().name + ", " + device.info().driver;
     }
+    const RunLock lock(flags.output);
+    go_on_without_readers();
     const std::atomic<bool>& stop = stop_on_signals();
     int exit_code = 0;
     for (const std::string& dataset : flags.datasets) {
@@ -101,10 +112,14 @@ int compare(CompareFlags flags) {
                               "\n");
         write_file_atomic(flags.html, comparison_html(comparison));
     }
-    fmt::print("{}{}\nreport   {}\n", comparison_table(comparison), comparison.lpips_note,
-               flags.html.string());
-    if (stop) fmt::print("interrupted; the same command goes on\n");
-    return exit_code;
+    const std::string shown = fmt::format(
+        "{}{}\nreport   {}\n{}", comparison_table(comparison), comparison.lpips_note,
+        flags.html.string(),
+        stop ? fmt::format("interrupted by {}; the same command goes on\n", stop_name()) : "");
+    if (!write_or_let_go(printable(shown, true)))
+        throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
+                    "The runs are complete: " + flags.html.string() + " shows them.");
+    return stop ? stop_exit_code() : exit_code;
 }
 
 }  // namespace

@@ -5,16 +5,19 @@
 #include <set>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_run.h"
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_measure.h"
 #include "trainer/checkpoint.h"
+#include "trainer/run_folder.h"
 
 namespace darb {
 
@@ -26,7 +29,8 @@ class Comparer {
     Comparer(const CompareFlags& flags, const std::string& name, int kernel, const Lpips* lpips)
         : flags_(flags), name_(name), lpips_(lpips) {
         TrainFlags first = train_flags_of(flags, name, kernel, 0);
-        dataset_ = load_training_data(first);
+        std::optional<RunLock> lock;  // while COLMAP writes
+        dataset_ = load_training_data(first, lock);
         if (!flags.quiet) print_notes(dataset_.notes);
         if (held_out().empty())
             throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
@@ -34,6 +38,7 @@ class Comparer {
         photos_ = load_photos(dataset_.views);
     }
 
+    const std::vector<View>& views() const { return dataset_.views; }
     ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
 
   private:
@@ -45,9 +50,7 @@ class Comparer {
     }
     void train(TrainFlags& f, const std::atomic<bool>& stop);
     void measure(ComparedRun& run);
-    void note(const std::string& line) const {
-        if (!flags_.quiet) fmt::print(stderr, "{}\n", line);
-    }
+    void note(const std::string& line) const { say_text(flags_.quiet ? "" : line + "\n"); }
 
     const CompareFlags& flags_;
     std::string name_;
@@ -72,6 +75,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     if (state == RunState::finished) return note(title + ": is there");
     if (state == RunState::partial) f.run.resume_from = f.run.output / "checkpoint.darb";
     note(title);
+    const RunLock lock(f.run.output);
     DeviceOptions options = command_device(flags_.device);
     Device device(options);  // of its own, so that the peak of memory is this run's
     settle_tuning(device);
@@ -130,10 +134,11 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
         failed.kernel = "every kernel";
         failed.failure = e.what();
         failed.exit_code = 2;
-        fmt::print(stderr, "failed: {}\n", e.what());
+        say("failed: {}\n", e.what());
         result.runs.push_back(std::move(failed));
         return result;
     }
+    refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
     for (int seed = 0; seed < flags.seeds; ++seed)
         for (const int kernel : kernels) {
             if (stop) return result;

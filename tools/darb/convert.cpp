@@ -6,12 +6,14 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/scene/gaussian_scene.h"
 #include "tools/cost/views.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/compare_scenes.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/scene_edits.h"
 #include "tools/darb/scene_file.h"
 
@@ -56,7 +58,8 @@ void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
 }
 
 int convert(const ConvertFlags& flags) {
-    for (const auto& input : {flags.input, flags.cameras}) keep_input(input, flags.output);
+    refuse_to_overwrite_inputs({flags.output},
+                               together({files_of(flags.input), files_of(flags.cameras)}));
     const std::optional<SplatFormat> format = format_to_write(flags.output);
     if (!format)
         throw Error(flags.output.string(), "names no format that can be written",
@@ -75,7 +78,7 @@ int convert(const ConvertFlags& flags) {
         model = gaussians;
     }
     for (const std::string& loss : losses_of(*format, model, flags.output.string()))
-        fmt::print(stderr, "warning: {}: {}\n", flags.output.string(), loss);
+        darb::say("warning: {}: {}\n", flags.output.string(), loss);
     drop_unwritable(*format, model);
     const std::vector<std::byte> file = encode_splats(*format, model, flags.output.string());
     write_file_atomic(flags.output, file);

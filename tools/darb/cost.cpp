@@ -7,12 +7,14 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "tools/cost/cost_report.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/pixel_size.h"
 #include "tools/darb/scene_file.h"
 
@@ -43,6 +45,7 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
     options.hold_out = true;
     const Dataset dataset = load_dataset(flags.dataset, options);
     if (!flags.quiet) print_notes(dataset.notes);
+    refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(dataset.views));
     return dataset_views(dataset, most);
 }
 
@@ -50,8 +53,8 @@ int cost(const CostFlags& flags) {
     if (!flags.train.empty()) return train_cost(flags);
     if (flags.scene.empty())
         throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
-    for (const std::string& input : {flags.scene, flags.dataset})
-        for (const auto& output : {flags.json, flags.html}) keep_input(input, output);
+    refuse_to_overwrite_inputs({flags.json, flags.html},
+                               together({files_of(flags.scene), files_of(flags.dataset)}));
     const Extent extent = extent_of(flags);
     const SplatModel model = load_scene(flags.scene);
     if (model.size() == 0)
@@ -64,7 +67,7 @@ int cost(const CostFlags& flags) {
     const CostResult result =
         measure_cost(device, model, views, glm::vec3(flags.white_background ? 1.0f : 0.0f),
                      extent.plan, [&](const std::string& line) {
-                         if (!flags.quiet) fmt::print(stderr, "{}\n", line);
+                         if (!flags.quiet) say("{}\n", line);
                      });
     fmt::print("{}: {} splats, {}; {} views of {}\n\n{}", flags.scene, model.size(), result.device,
                views.cameras.size(), flags.dataset.empty() ? "an orbit" : flags.dataset,

@@ -4,10 +4,12 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "tools/cost/train_cost.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/train_run.h"
 
 namespace darb {
@@ -40,15 +42,17 @@ int train_cost(const CostFlags& flags) {
     if (flags.seeds > 0) plan.seeds = flags.seeds;
     Dataset dataset = load_dataset(run.dataset, run.data);
     if (!flags.quiet) print_notes(dataset.notes);
+    refuse_to_overwrite_inputs({flags.json, flags.html},
+                               together({files_of(flags.train), files_of(dataset.views)}));
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
     plan_effects(dataset, run);
     plan_strategy(dataset, run);
-    if (!flags.quiet) fmt::print(stderr, "effects: {}\n", run.run.effects);
+    if (!flags.quiet) say("effects: {}\n", run.run.effects);
     const TrainCostResult result =
         measure_train_cost(device, dataset, run.train, plan, [&](const std::string& line) {
-            if (!flags.quiet) fmt::print(stderr, "{}\n", line);
+            if (!flags.quiet) say("{}\n", line);
         });
     fmt::print("{}: iterations {}, seeds {}, {}\n\n{}", flags.train, result.iterations,
                result.seeds, result.device, train_cost_table(result));

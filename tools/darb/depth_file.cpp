@@ -10,6 +10,7 @@
 
 #include "engine/check/npy.h"
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 
 namespace darb {
 
@@ -38,11 +39,15 @@ void check_depth(const DepthFlags& flags, const Accuracy& accuracy, const Effect
                     "Add --render-scale 1.");
 }
 
-void DepthFiles::write(const std::filesystem::path& frame, const ImageF& depth) {
-    const bool npy = flags_.format == "npy";
+std::filesystem::path depth_file(const DepthFlags& flags, const std::filesystem::path& frame) {
     std::filesystem::path file = frame;
-    file.replace_filename(frame.stem().string() + (npy ? "_depth.npy" : "_depth.png"));
-    if (!npy) {
+    return file.replace_filename(frame.stem().string() +
+                                 (flags.format == "npy" ? "_depth.npy" : "_depth.png"));
+}
+
+void DepthFiles::write(const std::filesystem::path& frame, const ImageF& depth) {
+    const std::filesystem::path file = depth_file(flags_, frame);
+    if (flags_.format != "npy") {
         const DepthRange range = write_depth_png(file, depth, flags_.unit);
         range_.clipped += range.clipped;
         range_.farthest = std::max(range_.farthest, range.farthest);
@@ -57,11 +62,9 @@ void DepthFiles::write(const std::filesystem::path& frame, const ImageF& depth) 
 
 void DepthFiles::print_clipped() const {
     if (range_.clipped == 0) return;
-    fmt::print(stderr,
-               "warning: {} pixels of the depth PNGs lie beyond {:g} world units, their last step, "
-               "up to {:g}: --depth-unit {:g} holds all, as does --depth npy\n",
-               range_.clipped, kDepthSteps * flags_.unit, range_.farthest,
-               unit_for(range_.farthest));
+    say("warning: {} pixels of the depth PNGs lie beyond {:g} world units, their last step, "
+        "up to {:g}: --depth-unit {:g} holds all, as does --depth npy\n",
+        range_.clipped, kDepthSteps * flags_.unit, range_.farthest, unit_for(range_.farthest));
 }
 
 }  // namespace darb

@@ -19,6 +19,9 @@ struct DepthFlags {
 /// the effects leave them out.
 void check_depth(const DepthFlags& flags, const Accuracy& accuracy, const EffectChoice& effects);
 
+/// FRAME_depth.png or FRAME_depth.npy.
+std::filesystem::path depth_file(const DepthFlags& flags, const std::filesystem::path& frame);
+
 class DepthFiles {
   public:
     explicit DepthFiles(const DepthFlags& flags) : flags_(flags) {}

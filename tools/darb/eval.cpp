@@ -17,6 +17,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/evaluation.h"
@@ -68,13 +69,15 @@ void print_table(const Evaluation& evaluation) {
 }
 
 int eval(EvalFlags flags) {
-    for (const auto& input : {flags.scene, flags.dataset}) keep_input(input, flags.json);
+    refuse_to_overwrite_inputs({flags.json},
+                               together({files_of(flags.scene), files_of(flags.dataset)}));
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::measuring, flags.data);
     SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
     print_notes(dataset.notes);
+    refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
     std::vector<View> views = views_of(dataset, flags);
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);

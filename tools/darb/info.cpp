@@ -5,9 +5,11 @@
 #include <memory>
 
 #include "engine/core/files.h"
+#include "engine/data/camera_list.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/dataset_info.h"
 #include "tools/darb/info_text.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/scene_info.h"
 
@@ -28,8 +30,10 @@ bool is_dataset(const std::filesystem::path& path) {
 }
 
 int info(const InfoFlags& flags) {
-    keep_input(flags.path, flags.json);
+    refuse_to_overwrite_inputs({flags.json}, files_of(flags.path));
     const bool dataset = is_dataset(flags.path);
+    if (dataset && std::filesystem::is_regular_file(flags.json))
+        refuse_to_overwrite_inputs({flags.json}, files_of(load_cameras(flags.path, flags.data)));
     const nlohmann::json facts =
         dataset ? dataset_info(flags.path, flags.data) : scene_info(find_scene(flags.path));
     // Names may hold any bytes.

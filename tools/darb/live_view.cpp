@@ -7,9 +7,11 @@
 #include <cstdio>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "tools/darb/live_curves.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
+#include "viewer/display_loss.h"
 #include "viewer/window.h"
 
 namespace darb {
@@ -25,15 +27,17 @@ constexpr double kPausedNap_s = 0.1;
 }  // namespace
 
 struct LiveSystem::System {
+    std::atomic<bool> lost{false};  // the display; before what it outlives
     WindowSystem windows;
 };
 
 struct LiveView::State {
     State(Device& device, ViewerOptions options, const Dataset& dataset,
-          const std::atomic<bool>& stop_)
+          const std::atomic<bool>& stop_, const std::atomic<bool>& lost_)
         : window(std::make_unique<ViewerWindow>(device, std::move(options), 1280, 720)),
           bounds(bounds_of(dataset)),
-          stop(stop_) {
+          stop(stop_),
+          lost(lost_) {
         window->set_title("training - darb");
         if (!dataset.views.empty()) window->viewer().choose_camera(0);
     }
@@ -43,6 +47,7 @@ struct LiveView::State {
     std::unique_ptr<ViewerWindow> window;  // null once closed
     Bounds bounds;
     const std::atomic<bool>& stop;
+    const std::atomic<bool>& lost;  // the display
     Clock::time_point next_picture{};
     LiveCurves curves;
 };
@@ -52,8 +57,13 @@ LiveView::~LiveView() = default;
 
 // The run matters more than its window.
 void LiveView::warn(const std::exception& error) {
-    fmt::print(stderr, "warning: the window is closed: {}\n", error.what());
+    say("warning: the window is closed: {}\n",
+        state_->lost ? "the display is gone; the run goes on" : error.what());
     state_->window.reset();
+}
+
+void LiveView::check_display() const {
+    if (state_->lost) throw Error("window", "the display is gone");
 }
 
 double LiveView::show(const LiveStep& step) {
@@ -80,11 +90,13 @@ double LiveView::pump(const LiveStep& step) {
                       std::chrono::duration<double>(std::max(kShortest_s, cost_s / kShare)));
     }
     bool open = s.window->pump(0);
+    check_display();
     training.steps_to_go = std::max(0, training.steps_to_go - 1);
     const auto paused = Clock::now();
     double paused_s = 0;
     while (open && training.paused && training.steps_to_go == 0 && !s.stop) {
         open = s.window->pump(kPausedNap_s);
+        check_display();
         paused_s = std::chrono::duration<double>(Clock::now() - paused).count();
     }
     if (!open) s.window.reset();
@@ -97,8 +109,7 @@ void LiveView::finish(const std::filesystem::path& model) {
     try {
         s.window->viewer().end_live();
         if (!model.empty()) s.window->viewer().open(model);
-        while (!s.stop && s.window->pump(kPausedNap_s)) {
-        }
+        while (!s.stop && s.window->pump(kPausedNap_s)) check_display();
         s.window.reset();
     } catch (const std::exception& e) {
         warn(e);
@@ -113,6 +124,7 @@ LiveSystem::LiveSystem(bool on, DeviceOptions& options) {
         throw Error(e.where, e.reason, "Start it inside a desktop session, or leave out --view.");
     }
     system_->windows.require(options);
+    survive_display_loss(system_->lost);
 }
 
 LiveSystem::~LiveSystem() = default;
@@ -124,7 +136,8 @@ std::unique_ptr<LiveView> LiveSystem::open(Device& device, const Dataset& datase
     options.views = dataset.views;
     options.resolve = find_scene;
     options.find_cameras = cameras_beside;
-    auto state = std::make_unique<LiveView::State>(device, std::move(options), dataset, stop);
+    auto state =
+        std::make_unique<LiveView::State>(device, std::move(options), dataset, stop, system_->lost);
     if (white) state->session().display.background = glm::vec3(1.0f);
     return std::make_unique<LiveView>(std::move(state));
 }

@@ -29,6 +29,7 @@ class LiveView {
   private:
     double pump(const LiveStep& step);
     void warn(const std::exception& error);
+    void check_display() const;  // throws Error once it is gone
     std::unique_ptr<State> state_;
 };
 

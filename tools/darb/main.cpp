@@ -1,21 +1,28 @@
 // darb: train, render and measure splat scenes. Exit codes: 0 done, 1 internal error, 2 bad usage
-// or input.
+// or input, or what the system refuses (a full disk); 128 and its number: a signal ended a run that
+// was saved.
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <limits>
+#include <new>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/stop_signals.h"
 
 namespace {
 
@@ -106,21 +113,39 @@ int run(int argc, char** argv) {
     return action();
 }
 
+// Of what is printed, where the file behind stdout fails; else of a thread that did not start.
+int report(const std::system_error& e) {
+    const bool output = std::ferror(stdout) != 0;
+    darb::say("error: {}: {}\n  {}\n", output ? "standard output" : "darb", e.code().message(),
+              output ? "Free space, or send the output elsewhere."
+                     : "The limits of this system are reached: close other programs.");
+    return 2;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+    darb::keep_standard_descriptors();
+    darb::fail_at_the_file_limit();
     try {
-        return run(argc, argv);
+        const int code = run(argc, argv);
+        if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+        throw std::system_error(errno, std::generic_category());
     } catch (const darb::Error& e) {
-        fmt::print(stderr, "error: {}\n", darb::printable(e.what(), true));
+        darb::say("error: {}\n", e.what());
         return 2;
     } catch (const std::filesystem::filesystem_error& e) {
-        fmt::print(stderr, "error: {}: {}\n  Check the path and its permissions.\n",
-                   e.path1().empty() ? "a path" : darb::printable(e.path1().string()),
-                   e.code().message());
+        darb::say("error: {}: {}\n  Check the path and its permissions.\n",
+                  e.path1().empty() ? "a path" : e.path1().string(), e.code().message());
+        return 2;
+    } catch (const std::system_error& e) {
+        return report(e);
+    } catch (const std::bad_alloc&) {
+        darb::say(
+            "error: darb: no memory is left\n  Close other programs, or give it less to do.\n");
         return 2;
     } catch (const std::exception& e) {
-        fmt::print(stderr, "internal error: {}\n", darb::printable(e.what(), true));
+        darb::say("internal error: {}\n", e.what());
         return 1;
     }
 }

@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"
 
 namespace darb {
 
 void print_notes(const std::vector<std::string>& notes) {
-    for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", printable(note));
+    for (const std::string& note : notes) say("note: {}\n", note);
 }
 
 std::vector<View> open_cameras(const std::filesystem::path& path, const DatasetOptions& options) {

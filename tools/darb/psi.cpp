@@ -9,6 +9,7 @@
 #include "engine/core/files.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/outputs.h"
 #include "tools/paper/psi_report.h"
 
 namespace darb {
@@ -22,6 +23,7 @@ struct PsiFlags {
 };
 
 int psi(const PsiFlags& flags) {
+    refuse_to_overwrite_inputs({flags.json, flags.html}, {});
     std::vector<PsiResult> results;
     std::vector<const DerivedKernel*> kernels;
     for (const int k : kernels_from_list("--kernel", flags.kernels)) {

@@ -18,6 +18,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/evaluation.h"
@@ -68,10 +69,11 @@ int render(RenderFlags flags) {
         for (View& view : views) scale_camera(view.camera, flags.data.resolution);
     std::vector<std::filesystem::path> files;
     std::set<std::string> used;
-    for (const View& view : views) {
-        files.push_back(flags.output / picture_name(view.name, used));
-        keep_input(view.photo, files.back());
-    }
+    for (const View& view : views) files.push_back(flags.output / picture_name(view.name, used));
+    Paths outputs = files;
+    for (const auto& file : files) outputs.push_back(depth_file(flags.depth, file));
+    refuse_to_overwrite_inputs(
+        outputs, together({files_of(flags.scene), files_of(flags.cameras), files_of(views)}));
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);

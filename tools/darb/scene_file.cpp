@@ -9,6 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 
 namespace darb {
@@ -18,10 +19,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kPrefix = "iteration_";
-// What a folder is read by.
-constexpr const char* kDescriptions[] = {
-    "meta.json",       "metrics.json",          "cameras.json",
-    "transforms.json", "transforms_train.json", "transforms_test.json"};
 
 // -1 where the folder is not named iteration_N.
 long iteration_of(const fs::path& folder) {
@@ -44,7 +41,8 @@ long last_iteration(const fs::path& output) {
     return at != metrics.end() && at->is_number_integer() ? at->get<long>() : -1;
 }
 
-// The scene where the run of an output folder ended; empty where there is none.
+}  // namespace
+
 fs::path scene_of_run(const fs::path& output) {
     fs::path found;
     long latest = -1;
@@ -60,8 +58,6 @@ fs::path scene_of_run(const fs::path& output) {
     }
     return found;
 }
-
-}  // namespace
 
 fs::path find_scene(const fs::path& path) {
     if (!fs::is_directory(path) || is_sog_folder(path)) return path;
@@ -79,30 +75,15 @@ bool is_scene(const fs::path& path) {
     return fs::exists(path / "point_cloud") || fs::exists(path / "meta.json");
 }
 
-void keep_input(const fs::path& input, const fs::path& output) {
-    if (input.empty() || output.empty()) return;
-    const auto is_output = [&](const fs::path& file) {
-        std::error_code none;  // one of the two is not there
-        return fs::equivalent(file, output, none);
-    };
-    bool read = is_output(input) || is_output(scene_of_run(input));
-    for (const char* name : kDescriptions) read = read || is_output(input / name);
-    const fs::path sog = input.filename() == "meta.json" ? input.parent_path() : input;
-    if (has_extension(output, ".webp") && is_sog_folder(sog))
-        read = read || is_output(sog / output.filename());
-    if (read) throw Error(output.string(), "is what is read", "Name another file to write.");
-}
-
 SplatModel load_scene(const fs::path& path, SplatFile* facts) {
     const fs::path file = find_scene(path);
     SplatFile unused;
     SplatFile& said = facts ? *facts : unused;
     SplatModel model = load_splats(file, &said);
     if (said.dropped > 0)
-        fmt::print(stderr, "warning: {}: {} splats with NaN or infinity were dropped\n",
-                   printable(file.string()), said.dropped);
-    for (const std::string& note : said.notes)
-        fmt::print(stderr, "warning: {}: {}\n", printable(file.string()), printable(note));
+        say("warning: {}: {} splats with NaN or infinity were dropped\n", file.string(),
+            said.dropped);
+    for (const std::string& note : said.notes) say("warning: {}: {}\n", file.string(), note);
     return model;
 }
 

@@ -15,9 +15,8 @@ bool is_scene(const std::filesystem::path& path);
 /// SOG scene either.
 std::filesystem::path find_scene(const std::filesystem::path& path);
 
-/// Throws Error where writing `output` would replace a file that `input` names: a scene, a run, a
-/// SOG folder, a data set, a list of cameras, a photo. Either may be empty.
-void keep_input(const std::filesystem::path& input, const std::filesystem::path& output);
+/// Where the run of an output folder ended; empty where there is none.
+std::filesystem::path scene_of_run(const std::filesystem::path& output);
 
 /// load_splats of find_scene(path), with a warning on stderr for what was dropped or left out.
 SplatModel load_scene(const std::filesystem::path& path, SplatFile* facts = nullptr);

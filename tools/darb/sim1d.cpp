@@ -8,8 +8,10 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/outputs.h"
 #include "tools/paper/study1d.h"
 
 namespace darb {
@@ -52,12 +54,13 @@ std::vector<int> kernels_1d_from_list(const std::string& list) {
 }
 
 int sim1d(Sim1dFlags flags) {
+    refuse_to_overwrite_inputs({flags.json, flags.html}, {});
     flags.study.kernels = kernels_1d_from_list(flags.kernels);
     flags.study.signals = signals_from_list(flags.signals);
     const bool shown = !flags.quiet && ::isatty(STDERR_FILENO) == 1;
     const Study1dResult result = study_1d(flags.study, [&](std::size_t done, std::size_t all) {
         if (shown && (done % 20 == 0 || done == all))
-            fmt::print(stderr, "\r{} of {} runs{}", done, all, done == all ? "\n" : "");
+            say_text(fmt::format("\r{} of {} runs{}", done, all, done == all ? "\n" : ""));
     });
     fmt::print("{}", study_1d_table(result));
     if (!flags.json.empty()) write_file_atomic(flags.json, study_1d_json(result).dump() + "\n");

@@ -4,56 +4,68 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
+#include <cstring>
 #include <memory>
+#include <optional>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
+#include "tools/darb/stop_signals.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
 #include "tools/darb/train_recall.h"
 #include "tools/darb/train_run.h"
 #include "tools/darb/tune_flags.h"
+#include "trainer/run_folder.h"
 
 namespace darb {
 
 namespace {
 
 // The dearest first; what takes less than a hundredth of an iteration is not printed.
-void print_passes(std::vector<ReportPass> passes) {
+std::string passes_text(std::vector<ReportPass> passes) {
+    std::string text;
     std::sort(passes.begin(), passes.end(),
               [](const ReportPass& a, const ReportPass& b) { return a.ms > b.ms; });
     double all_ms = 0;
     for (const ReportPass& pass : passes) all_ms += pass.ms;
-    if (all_ms > 0) fmt::print("{:.2f} ms an iteration on the device:\n", all_ms);
+    if (all_ms > 0) text = fmt::format("{:.2f} ms an iteration on the device:\n", all_ms);
     for (const ReportPass& pass : passes)
         if (pass.ms > 0.01 * all_ms)
-            fmt::print("  {:<18} {:8.3f} ms{}\n", pass.name, pass.ms,
-                       pass.roofline
-                           ? fmt::format("  {:4.1f} % of the roofline", 100 * *pass.roofline)
-                           : "");
+            text += fmt::format(
+                "  {:<18} {:8.3f} ms{}\n", pass.name, pass.ms,
+                pass.roofline ? fmt::format("  {:4.1f} % of the roofline", 100 * *pass.roofline)
+                              : "");
+    return text;
 }
 
-void print_summary(const RunSummary& summary, const TrainFlags& flags) {
-    fmt::print("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
+std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
+    std::string text =
+        fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
     if (!summary.evaluations.empty()) {
         const Evaluation& e = summary.evaluations.back();
-        fmt::print("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
-                   e.splats);
+        text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
+                            e.splats);
     }
-    print_passes(summary.passes);
-    if (!summary.model.empty()) fmt::print("scene    {}\n", summary.model.string());
+    text += passes_text(summary.passes);
+    if (!summary.model.empty()) text += fmt::format("scene    {}\n", summary.model.string());
     if (!summary.pictures.empty())
-        fmt::print("picture  {}\n", summary.pictures.front().file.string());
-    if (!summary.report.empty()) fmt::print("report   {}\n", summary.report.string());
+        text += fmt::format("picture  {}\n", summary.pictures.front().file.string());
+    if (!summary.report.empty()) text += fmt::format("report   {}\n", summary.report.string());
     if (summary.interrupted)
-        fmt::print("interrupted; go on with: darb train --resume -o '{}'\n",
-                   flags.run.output.string());
+        text += fmt::format("interrupted{}{}; go on with: darb train --resume -o '{}'\n",
+                            stop_exit_code() == 0 ? "" : " by ", stop_name(),
+                            flags.run.output.string());
+    return printable(text, true);
 }
 
 int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
+    go_on_without_readers();
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
     if (recalled) recall_arguments(arguments, flags, tune);
     finish_train_flags(flags);
@@ -64,7 +76,10 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
     settle_tuning(device, tune);
-    Dataset dataset = load_training_data(flags);
+    std::optional<RunLock> lock;
+    Dataset dataset = load_training_data(flags, lock);
+    check_run_folder(flags.run.output, dataset);
+    if (!lock) lock.emplace(flags.run.output);
     plan_effects(dataset, flags);
     plan_strategy(dataset, flags);
     if (!recalled) flags.run.command = command_text(std::move(arguments), flags.dataset);
@@ -74,9 +89,11 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
         live.open(device, dataset, stop, flags.train.white_background);
     if (view) flags.run.on_step = [&](const LiveStep& step) { return view->show(step); };
     const RunSummary summary = run_training(device, dataset, flags.train, flags.run, &stop);
-    print_summary(summary, flags);
+    if (!write_or_let_go(summary_text(summary, flags)))
+        throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
+                    "The run is complete: its folder holds everything.");
     if (view) view->finish(summary.model);
-    return 0;
+    return summary.interrupted ? stop_exit_code() : 0;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
@@ -35,9 +36,9 @@ void check_output(const fs::path& photos, const fs::path& output) {
 // Steps as lines of their own, and on a terminal what COLMAP says, in place.
 void show(std::string_view line) {
     const bool step = line.starts_with('['), terminal = ::isatty(STDERR_FILENO) == 1;
-    const std::string text = printable(step ? line : line.substr(0, kShownColumns));
-    if (step) fmt::print(stderr, "{}{}\n", terminal ? "\r\033[K" : "", text);
-    if (!step && terminal) fmt::print(stderr, "\r{}\033[K", text);
+    if (step) say_text(fmt::format("{}{}\n", terminal ? "\r\033[K" : "", printable(line)));
+    if (!step && terminal)
+        say_text(fmt::format("\r{}\033[K", printable(line.substr(0, kShownColumns))));
 }
 
 // Undistorting leaves the masks behind; darb straightens them with the photos where it loads both.
@@ -51,8 +52,10 @@ std::string masks_note(const ColmapRun& run, const fs::path& project) {
         images == "images" ? "" : ", with --images " + images);
 }
 
-Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags) {
+Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
+                            std::optional<RunLock>& lock) {
     check_output(photos, flags.run.output);
+    lock.emplace(flags.run.output);
     ColmapRun run;
     run.photos = fs::absolute(photos / "").lexically_normal().parent_path();
     const fs::path project = run.photos.parent_path();
@@ -71,7 +74,7 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags) {
     if (!is_colmap_model(dense / "sparse")) {  // written last
         if (is_installed("colmap")) write_file_atomic(list_file, made_from);
         run_colmap(run, flags.run.quiet ? nullptr : show);
-        if (!flags.run.quiet && ::isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\033[K");
+        if (!flags.run.quiet && ::isatty(STDERR_FILENO) == 1) say_text("\r\033[K");
     }
     DatasetOptions options = flags.data;
     options.images_folder = "images";
@@ -86,10 +89,10 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags) {
 
 }  // namespace
 
-Dataset load_training_data(const TrainFlags& flags) {
+Dataset load_training_data(const TrainFlags& flags, std::optional<RunLock>& lock) {
     const fs::path photos = photos_without_cameras(flags.dataset, flags.data.images_folder);
     Dataset dataset = photos.empty() ? load_dataset(flags.dataset, flags.data)
-                                     : load_through_colmap(photos, flags);
+                                     : load_through_colmap(photos, flags, lock);
     if (flags.data.hold_out) return dataset;
     size_t own_test = 0;
     for (View& view : dataset.views) own_test += std::exchange(view.is_test, false) ? 1 : 0;

@@ -1,8 +1,11 @@
 // What `darb train` trains on: a data set, or photos whose cameras COLMAP finds first.
 #pragma once
 
+#include <optional>
+
 #include "engine/data/dataset.h"
 #include "tools/darb/train_flags.h"
+#include "trainer/run_folder.h"
 
 namespace darb {
 
@@ -10,7 +13,7 @@ namespace darb {
 /// and JPEG files (itself, or its --images folder) without sparse, sparse/0 or transforms*.json
 /// goes through the installed COLMAP into OUT/colmap first; what is there from an earlier run over
 /// the same photos is used again. Throws Error as load_dataset and run_colmap do, and where OUT
-/// lies among the photos.
-Dataset load_training_data(const TrainFlags& flags);
+/// lies among the photos. lock: that of OUT, taken before COLMAP writes there.
+Dataset load_training_data(const TrainFlags& flags, std::optional<RunLock>& lock);
 
 }  // namespace darb

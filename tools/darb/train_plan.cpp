@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "engine/core/say.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "trainer/forecast.h"
@@ -83,10 +84,10 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
     if (too_large && most > 0)
         advice += fmt::format(" --cap-max {} stays within the memory.", most);
     if (too_large)
-        fmt::print(stderr, "warning: more than the {} of this device allow.{}\n",
-                   format_bytes(static_cast<double>(device.info().heap_bytes)), advice);
+        say("warning: more than the {} of this device allow.{}\n",
+            format_bytes(static_cast<double>(device.info().heap_bytes)), advice);
     else if (!advice.empty())
-        fmt::print(stderr, "hint:{}\n", advice);
+        say("hint:{}\n", advice);
 }
 
 void print_forecast(const Device& device, const Dataset& dataset, const TrainFlags& flags) {
@@ -95,7 +96,7 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
     scratch.set_tuning(device.tuning());
     const Forecast f =
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
-    fmt::print(stderr, "forecast: {}; {}\n", time_text(f, flags.train), memory_text(device, f));
+    say("forecast: {}; {}\n", time_text(f, flags.train), memory_text(device, f));
     print_advice(device, dataset, f);
 }
 
@@ -104,10 +105,9 @@ void print_growth(const TrainOptions& options) {
     for (int i = 1; i < options.iterations; ++i)
         if (schedule.refines_after(i)) return;
     if (schedule.rounds.end > 0)
-        fmt::print(stderr,
-                   "growth: none, it would end after {} iterations and begin after {}: a longer "
-                   "run or --densify-from-iter changes that\n",
-                   schedule.rounds.end, schedule.rounds.begin);
+        say("growth: none, it would end after {} iterations and begin after {}: a longer "
+            "run or --densify-from-iter changes that\n",
+            schedule.rounds.end, schedule.rounds.begin);
 }
 
 }  // namespace
@@ -116,13 +116,12 @@ void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags)
     if (flags.run.quiet) return;
     size_t held_out = 0;
     for (const View& v : dataset.views) held_out += v.is_test ? 1 : 0;
-    fmt::print(stderr, "{}: {}, {} photos to train on, {} held out, {} points\n",
-               dataset.root.string(), dataset.source, dataset.views.size() - held_out, held_out,
-               dataset.points.size());
+    say("{}: {}, {} photos to train on, {} held out, {} points\n", dataset.root.string(),
+        dataset.source, dataset.views.size() - held_out, held_out, dataset.points.size());
     print_notes(dataset.notes);
-    fmt::print(stderr, "device: {} ({})\n", device.info().name, device.info().driver);
-    fmt::print(stderr, "effects: {}\n", flags.run.effects);
-    if (!flags.strategy_note.empty()) fmt::print(stderr, "{}\n", flags.strategy_note);
+    say("device: {} ({})\n", device.info().name, device.info().driver);
+    say("effects: {}\n", flags.run.effects);
+    if (!flags.strategy_note.empty()) say("{}\n", flags.strategy_note);
     print_growth(flags.train);
     // A resumed run knows better: its progress shows the time left.
     if (flags.run.resume_from.empty() && held_out < dataset.views.size())

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <csignal>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "tools/darb/effect_flags.h"
@@ -13,12 +11,6 @@
 namespace darb {
 
 namespace {
-
-std::atomic<bool> g_stop{false};  // a signal handler can reach nothing else
-
-void on_interrupt(int) {
-    if (g_stop.exchange(true)) std::_Exit(130);  // the second Ctrl-C does not wait
-}
 
 EffectChoice training_choice(const TrainFlags& flags) {
     EffectChoice choice = parse_effects(flags.effects);
@@ -52,12 +44,6 @@ void plan_strategy(const Dataset& dataset, TrainFlags& flags) {
                           : fmt::format(", what {} is forecast to end with; --budget sets another "
                                         "count",
                                         strategy_name(Strategy{})));
-}
-
-std::atomic<bool>& stop_on_signals() {
-    std::signal(SIGINT, on_interrupt);
-    std::signal(SIGTERM, on_interrupt);
-    return g_stop;
 }
 
 }  // namespace darb

@@ -1,7 +1,5 @@
-// What the commands that train share: the effects of a run, and Ctrl-C.
+// What the commands that train share: the effects of a run and its strategy.
 #pragma once
-
-#include <atomic>
 
 #include "engine/data/dataset.h"
 #include "tools/darb/train_flags.h"
@@ -15,8 +13,5 @@ void plan_effects(Dataset& dataset, TrainFlags& flags);
 
 /// Sets the count that mcmc and budget grow to where none was given; after plan_effects.
 void plan_strategy(const Dataset& dataset, TrainFlags& flags);
-
-/// Set by SIGINT and SIGTERM from now on; a second signal ends the process at once.
-std::atomic<bool>& stop_on_signals();
 
 }  // namespace darb

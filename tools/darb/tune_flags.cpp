@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "engine/core/say.h"
 #include "engine/plan/tuner.h"
 
 namespace darb {
@@ -19,7 +20,7 @@ void add_tune_flags(CLI::App& command, TuneFlags& flags) {
 void settle_tuning(Device& device, const TuneFlags& flags) {
     const char* environment = std::getenv("DARB_TUNE");
     tune(device, {flags.choice, environment != nullptr ? environment : "", flags.retune,
-                  [](const std::string& line) { fmt::print(stderr, "{}\n", line); }});
+                  [](const std::string& line) { say("{}\n", line); }});
 }
 
 std::string tuning_of_listed(const DeviceInfo& info) {

@@ -7,11 +7,13 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
 #include "tools/darb/commands.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
 #include "tools/darb/view_times.h"
@@ -66,6 +68,16 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     return 0;
 }
 
+// Frames have names of their own, frame_00000.png and so on, which photos may have, too.
+void refuse_frames_among_photos(const std::filesystem::path& frames,
+                                const std::vector<View>& views) {
+    std::error_code none;
+    for (const auto& file : files_of(views))
+        if (!file.empty() && std::filesystem::equivalent(frames, file.parent_path(), none))
+            throw Error(frames.string(), "holds photos that are read: " + file.string(),
+                        "Name another folder with --export.");
+}
+
 int view(ViewFlags flags) {
     const PixelSize size = parse_size(flags.size);
     ViewerOptions options;
@@ -75,9 +87,14 @@ int view(ViewFlags flags) {
     options.effects = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
     refuse_other_pictures(flags.screenshot);
+    refuse_to_overwrite_inputs(
+        {flags.screenshot, flags.times},
+        together({files_of(flags.scene), files_of(flags.cameras), files_of(flags.path)}));
     std::string note;
     options.views = find_views(flags, note);
-    if (!note.empty()) fmt::print(stderr, "warning: {}\n", printable(note));
+    refuse_to_overwrite_inputs({flags.screenshot, flags.times}, files_of(options.views));
+    refuse_frames_among_photos(flags.frames, options.views);
+    if (!note.empty()) say("warning: {}\n", note);
     options.resolve = find_scene;
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())

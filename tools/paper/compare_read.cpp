@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <sstream>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/report/html.h"
 #include "tools/paper/compare.h"
+#include "trainer/run_events.h"
 
 namespace darb {
 
@@ -20,13 +20,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr const char* kOtherFolder = "Name another folder with -o, or remove this one.";
-
-Json read_json(const fs::path& path) {
-    Json json = Json::parse(read_text_file(path), nullptr, false);
-    if (!json.is_object())
-        throw Error(path.string(), "is no JSON object", "Remove the folder to train again.");
-    return json;
-}
 
 std::string differences(const Json& there, const Json& wanted) {
     std::string text;
@@ -40,14 +33,14 @@ std::string differences(const Json& there, const Json& wanted) {
 
 // JSON has NaN and infinity as null.
 double number(const Json& record, const char* key) {
-    const Json& value = record.at(key);
-    return value.is_number() ? value.get<double>() : std::nan("");
+    const auto at = record.find(key);
+    return at != record.end() && at->is_number() ? at->get<double>() : std::nan("");
 }
 
 ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
     ComparedAt at;
     at.iteration = e.at("iteration");
-    at.seconds = e.at("seconds");
+    at.seconds = number(e, "seconds");
     at.psnr_db = number(e, "psnr_db");
     at.ssim = number(e, "ssim");
     at.splats = e.at("splats");
@@ -65,20 +58,11 @@ ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
     return at;
 }
 
-std::vector<Json> events_of(const fs::path& log) {
-    std::vector<Json> events;
-    std::istringstream lines(read_text_file(log));
-    for (std::string line; std::getline(lines, line);)
-        if (Json e = Json::parse(line, nullptr, false); e.is_object())
-            events.push_back(std::move(e));
-    return events;
-}
-
 std::vector<CurvePoint> curve_of(const std::vector<Json>& events) {
     std::vector<CurvePoint> curve;
     for (const Json& e : events)
         if (e.value("event", "") == "iteration")
-            curve.push_back({e.value("iteration", 0), e.value("seconds", 0.0), number(e, "loss"),
+            curve.push_back({e.value("iteration", 0), number(e, "seconds"), number(e, "loss"),
                              e.value("splats", 0.0)});
     return curve;
 }
@@ -94,7 +78,7 @@ RunState run_state(const fs::path& folder, const std::string& settings, const st
                    int iterations, std::size_t held_out) {
     const fs::path metrics_path = folder / "metrics.json";
     if (fs::exists(metrics_path)) {
-        const Json metrics = read_json(metrics_path);
+        const Json metrics = read_metrics(metrics_path);
         const Json start = metrics.value("start", Json::object());
         const Json there = start.value("settings", Json::object());
         if (const std::string other = differences(there, Json::parse(settings)); !other.empty())
@@ -114,7 +98,7 @@ RunState run_state(const fs::path& folder, const std::string& settings, const st
 
 void read_run(ComparedRun& run, const std::vector<int>& iterations) {
     const fs::path path = run.folder / "metrics.json";
-    const Json metrics = read_json(path);
+    const Json metrics = read_metrics(path);
     try {
         for (const Json& e : metrics.at("evaluations")) take_evaluation(e, iterations, run);
         run.peak_mb = 1e-6 * metrics.at("peak_device_bytes").get<double>();
@@ -122,7 +106,7 @@ void read_run(ComparedRun& run, const std::vector<int>& iterations) {
         throw Error(path.string(), std::string("lacks what it should have: ") + e.what(),
                     "Remove the folder to train again.");
     }
-    run.curve = curve_of(events_of(run.folder / "run.jsonl"));
+    run.curve = curve_of(read_events(run.folder / "run.jsonl"));
     for (const int iteration : iterations)
         if (std::none_of(run.at.begin(), run.at.end(),
                          [&](const ComparedAt& at) { return at.iteration == iteration; }))
@@ -132,11 +116,13 @@ void read_run(ComparedRun& run, const std::vector<int>& iterations) {
                 format_number(iteration), run.folder.string());
 }
 
-void read_unfinished_run(ComparedRun& run, const std::vector<int>& iterations,
-                         const std::string& settings, const std::string& cameras) {
+namespace {
+
+void read_what_was_logged(ComparedRun& run, const std::vector<int>& iterations,
+                          const std::string& settings, const std::string& cameras) {
     const fs::path log = run.folder / "run.jsonl", list = run.folder / "cameras.json";
     if (!fs::exists(log) || !fs::exists(list) || read_text_file(list) != cameras) return;
-    const std::vector<Json> events = events_of(log);
+    const std::vector<Json> events = read_events(log);
     const auto start = std::find_if(events.rbegin(), events.rend(),
                                     [](const Json& e) { return e.value("event", "") == "start"; });
     if (start == events.rend() ||
@@ -146,6 +132,17 @@ void read_unfinished_run(ComparedRun& run, const std::vector<int>& iterations,
     for (const Json& e : events)
         if (e.value("event", "") == "evaluation") take_evaluation(e, iterations, run);
     run.curve = curve_of(events);
+}
+
+}  // namespace
+
+void read_unfinished_run(ComparedRun& run, const std::vector<int>& iterations,
+                         const std::string& settings, const std::string& cameras) {
+    try {
+        read_what_was_logged(run, iterations, settings, cameras);
+    } catch (const std::exception& e) {  // the run has failed for a reason of its own
+        run.notes += fmt::format("Its log cannot be read: {} ", e.what());
+    }
 }
 
 HeldOutPicture read_held_out(const fs::path& picture) {

@@ -1,0 +1,36 @@
+#include "engine/core/say.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+namespace darb {
+
+void say_text(std::string_view text) noexcept {
+    if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size() || std::fflush(stderr) != 0)
+        std::clearerr(stderr);
+}
+
+bool write_or_let_go(std::string_view text) {
+    errno = 0;
+    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0)
+        return true;
+    if (errno != EPIPE && errno != EBADF && errno != EIO) return false;
+    const int nothing = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nothing < 0) return false;
+    ::dup2(nothing, STDOUT_FILENO);
+    ::close(nothing);
+    std::clearerr(stdout);
+    return std::fflush(stdout) == 0;
+}
+
+void keep_standard_descriptors() {
+    for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+        if (::fcntl(fd, F_GETFD) != -1 || errno != EBADF) continue;
+        // The lowest free number, which is this one. To be read alone: writing to it fails.
+        ::open("/dev/null", fd == STDERR_FILENO ? O_WRONLY : O_RDONLY);
+    }
+}
+
+}  // namespace darb

@@ -1,0 +1,28 @@
+// The one rule for every file that a command writes: never one that it reads.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+using Paths = std::vector<std::filesystem::path>;
+
+/// What a scene, the output folder of a run, a data set or a list of cameras is read from, itself
+/// among them; the photos are those of files_of(views). Names need not be there; an empty path has
+/// none.
+Paths files_of(const std::filesystem::path& input);
+/// Photos and masks.
+Paths files_of(const std::vector<View>& views);
+
+/// Throws Error where one of the outputs is one of the inputs, by the file that they come to, links
+/// or not, or where two outputs are one file. Empty paths and "-" do not count. Pipes and devices
+/// may be named twice.
+void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs);
+
+/// All of them in one list.
+Paths together(std::initializer_list<Paths> lists);
+
+}  // namespace darb
