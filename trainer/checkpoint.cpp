@@ -2,14 +2,19 @@
 
 #include <zlib.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <utility>
 
+#include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/raster/gpu_splats.h"
+#include "trainer/exposure.h"
 #include "trainer/schedule.h"
 #include "trainer/strategy.h"
 
@@ -76,14 +81,28 @@ Json header_of(const Checkpoint& c) {
                 {"most_pairs", n.most_pairs}};
 }
 
+// The library converts 1e30 and "true" without a word.
+template <class Whole>
+Whole whole_of(const Json& h, const char* key, const std::string& where) {
+    const Json& value = h.at(key);
+    const bool fits =
+        value.is_number_unsigned()
+            ? std::in_range<Whole>(value.get<std::uint64_t>())
+            : value.is_number_integer() && std::in_range<Whole>(value.get<std::int64_t>());
+    if (!fits)
+        throw Error(where, fmt::format("the header's '{}' is {}", key, value.dump()),
+                    "Start from another checkpoint, or without --resume.");
+    return value.get<Whole>();
+}
+
 void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     SplatModel& m = c.state.model;
-    c.state.iteration = h.at("iteration").get<int>();
-    c.state.next_probe = h.at("next_probe").get<int>();
-    m.sh_degree = h.at("sh_degree").get<int>();
+    c.state.iteration = whole_of<int>(h, "iteration", where);
+    c.state.next_probe = whole_of<int>(h, "next_probe", where);
+    m.sh_degree = whole_of<int>(h, "sh_degree", where);
     const auto kernel = kernel_from_name(h.at("kernel").get<std::string>());
     const auto footprint = footprint_from_name(h.at("footprint").get<std::string>());
-    const auto splats = h.at("splats").get<std::uint64_t>();
+    const auto splats = whole_of<std::uint64_t>(h, "splats", where);
     if (!kernel || !footprint || m.sh_degree < 0 || m.sh_degree > 3 || splats > kMaxSplats ||
         c.state.iteration < 0 || (*footprint == Footprint::exact && !has_exact_footprint(*kernel)))
         throw Error(where, "the header's values make no sense",
@@ -91,7 +110,8 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     m.kernel = *kernel;
     m.footprint = *footprint;
     m.antialias = h.at("antialias").get<bool>();
-    c.state.averaged = h.value("averaged", 0u);  // absent in earlier files
+    if (h.contains("averaged"))  // absent in earlier files
+        c.state.averaged = whole_of<std::uint32_t>(h, "averaged", where);
     for (int a = 0; a < 3; ++a) m.origin[a] = h.at("origin").at(a).get<double>();
     c.seconds = h.at("seconds").get<double>();
     c.settings = h.at("settings").get<std::string>();
@@ -128,7 +148,9 @@ void size_arrays(Checkpoint& c, std::uint64_t splats) {
 
 }  // namespace
 
-void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+namespace {
+
+std::vector<std::byte> checkpoint_bytes(const Checkpoint& checkpoint) {
     std::vector<std::byte> payload;
     for_each_array(checkpoint.state, [&](const std::vector<float>& values) {
         const auto bytes = std::as_bytes(std::span(values));
@@ -146,7 +168,13 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
         std::memcpy(file.data() + kHeadBytes + header.size(), payload.data(), payload.size());
     const std::uint32_t crc = checksum(std::span(file).subspan(kSizeAt));
     std::memcpy(file.data() + kCrcAt, &crc, 4);
-    write_file_atomic(path, file);
+    return file;
+}
+
+}  // namespace
+
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+    while_doing(path.string(), [&] { write_file_atomic(path, checkpoint_bytes(checkpoint)); });
 }
 
 Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& where) {
@@ -169,9 +197,9 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     try {
         const Json header = Json::parse(text, text + header_bytes);
         read_header(header, c, where);
-        splats = header.at("splats").get<std::uint64_t>();
-        smoothing = header.at("smoothing").get<std::uint64_t>();
-        exposure = header.at("exposure").get<std::uint64_t>();
+        splats = whole_of<std::uint64_t>(header, "splats", where);
+        smoothing = whole_of<std::uint64_t>(header, "smoothing", where);
+        exposure = whole_of<std::uint64_t>(header, "exposure", where);
         shares = header.value("error_shares", std::uint64_t{0});  // absent in earlier files
         rest = header.value("rest_sum", std::uint64_t{0});
         const auto rest_floats = static_cast<std::uint64_t>(c.state.model.rest_count());
@@ -205,7 +233,8 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {
-    return parse_checkpoint(read_file(path), path.string());
+    return while_doing(path.string(),
+                       [&] { return parse_checkpoint(read_file(path), path.string()); });
 }
 
 std::string settings_text(const TrainOptions& o) {
@@ -297,11 +326,63 @@ std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU
     return fmt::format("{:016x}", hash);
 }
 
+namespace {
+
+constexpr const char* kOtherCheckpoint = "Start from another checkpoint, or without --resume.";
+
+bool is_finite(const SplatModel& m, size_t splat) {
+    const auto all = [splat](const std::vector<float>& values, size_t each) {
+        return std::all_of(values.begin() + std::ptrdiff_t(splat * each),
+                           values.begin() + std::ptrdiff_t(splat * each + each),
+                           [](float value) { return std::isfinite(value); });
+    };
+    return all(m.position, 3) && all(m.log_scale, 3) && all(m.rotation, 4) && all(m.opacity, 1);
+}
+
+// What the settings say and the state does not follow, which no run writes.
+std::string contradiction(const TrainerState& s, const TrainOptions& o, size_t photos) {
+    const SplatModel& m = s.model;
+    if (m.kernel != o.kernel || m.footprint != o.footprint)
+        return fmt::format(
+            "holds splats of the kernel {} with the footprint {}, the run trains {} "
+            "with {}",
+            kernel_name(m.kernel), footprint_name(m.footprint), kernel_name(o.kernel),
+            footprint_name(o.footprint));
+    if (s.iteration > o.iterations)
+        return fmt::format("is of iteration {}, beyond the end of the run at {}", s.iteration,
+                           o.iterations);
+    if (m.sh_degree > o.sh_degree)
+        return fmt::format("holds colours of degree {}, the run goes up to {}", m.sh_degree,
+                           o.sh_degree);
+    if (m.antialias != o.antialias || (!s.smoothing.empty() && !o.antialias) ||
+        (!s.exposure.empty() &&
+         (!o.exposure || s.exposure.size() != Exposure::state_size(photos))) ||
+        (!s.rest_sum.empty() && Schedule(o).rest_every <= 1))
+        return "holds what the run's effects and strategy have no use for";
+    if (std::int64_t{s.averaged} > s.iteration)
+        return fmt::format("holds a mean of {} iterations after {}", s.averaged, s.iteration);
+    size_t finite = 0;
+    for (size_t i = 0; i < m.size(); ++i) finite += is_finite(m, i) ? 1 : 0;
+    if (m.size() > 0 && finite == 0)
+        return fmt::format("holds {} splats, none of them with finite numbers", m.size());
+    return "";
+}
+
+Json settings_of(const Checkpoint& checkpoint, const std::string& where) {
+    Json settings = Json::parse(checkpoint.settings, nullptr, false);
+    if (!settings.is_object())
+        throw Error(where, "its settings are no JSON object", kOtherCheckpoint);
+    if (const auto at = settings.find("strategy"); at != settings.end() && !at->is_string())
+        throw Error(where, "its settings: 'strategy' is no text: " + at->dump(), kOtherCheckpoint);
+    return settings;
+}
+
+}  // namespace
+
 void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
                      const TrainOptions& options, const Dataset& dataset,
                      const std::string& fingerprint) {
-    Json before = Json::parse(checkpoint.settings, nullptr, false);
-    if (!before.is_object()) before = Json::object();
+    const Json before = settings_of(checkpoint, path.string());
     const Json now = Json::parse(settings_text(options));
     const std::string strategy = before.value("strategy", std::string(strategy_name(Strategy{})));
     if (strategy != strategy_name(options.strategy))
@@ -327,6 +408,10 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
         throw Error(path.string(),
                     "the data set " + dataset.root.string() + " is not the one it was trained on",
                     "Restore the photos and cameras of that run, or start without --resume.");
+    const auto photos = static_cast<size_t>(
+        std::ranges::count_if(dataset.views, [](const View& v) { return !v.is_test; }));
+    if (const std::string what = contradiction(checkpoint.state, options, photos); !what.empty())
+        throw Error(path.string(), what, kOtherCheckpoint);
 }
 
 }  // namespace darb

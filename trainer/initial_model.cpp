@@ -52,7 +52,10 @@ Region region_in_view(const Dataset& dataset) {
     return {0.5 * (low + high), glm::max(0.5 * (high - low), glm::dvec3(scene_extent(dataset)))};
 }
 
-std::uint64_t random_count(const Dataset& dataset, const TrainOptions& options) {
+}  // namespace
+
+std::uint64_t start_points(const Dataset& dataset, const TrainOptions& options) {
+    if (dataset.points.size() > 0) return dataset.points.size();
     std::uint64_t pixels = 0;
     for (const View& v : dataset.views)
         if (!v.is_test) pixels += std::uint64_t(v.camera.width) * v.camera.height;
@@ -60,8 +63,10 @@ std::uint64_t random_count(const Dataset& dataset, const TrainOptions& options) 
                                  : std::clamp<std::uint64_t>(pixels / 32, 1'000, 100'000);
 }
 
+namespace {
+
 PointCloud random_points(const Dataset& dataset, const TrainOptions& options) {
-    const std::uint64_t wanted = random_count(dataset, options);
+    const std::uint64_t wanted = start_points(dataset, options);
     const Region region = region_in_view(dataset);
     Pcg32 random(options.seed, 1);
     PointCloud cloud;
@@ -93,10 +98,8 @@ PointCloud drawn_from(const PointCloud& cloud, std::uint32_t count, std::uint64_
 }  // namespace
 
 std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options) {
-    const std::uint64_t points =
-        dataset.points.size() > 0 ? dataset.points.size() : random_count(dataset, options);
-    return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(points, options.max_splats.value_or(kAnyNumberOfSplats)));
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(
+        start_points(dataset, options), options.max_splats.value_or(kAnyNumberOfSplats)));
 }
 
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {

@@ -16,6 +16,8 @@ namespace darb {
 /// coordinates are large. Of more points than options.max_splats a drawn part.
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options);
 /// Its number of splats.
+/// The points that they come from: the data set's, or as many as are drawn where it has none.
+std::uint64_t start_points(const Dataset& dataset, const TrainOptions& options);
 std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options);
 
 }  // namespace darb

@@ -7,9 +7,11 @@
 #include <optional>
 #include <utility>
 
+#include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
+#include "engine/data/run_events.h"
 #include "engine/plan/tuning_names.h"
 #include "engine/raster/frame_limit.h"
 #include "engine/scene/edit_splats.h"
@@ -18,9 +20,9 @@
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
 #include "trainer/progress.h"
-#include "trainer/run_events.h"
 #include "trainer/run_folder.h"
 #include "trainer/run_log.h"
+#include "trainer/start_memory.h"
 
 namespace darb {
 
@@ -76,7 +78,11 @@ class Run {
           rates_(rates_of(device)),
           tuning_(result_tuning(device)),
           checkpoint_(checkpoint_of(device, run.resume_from)),
-          trainer_(device, dataset, photos_, initial_model(dataset, options), options),
+          trainer_(while_doing("the splats of the start",
+                               [&] {
+                                   return Trainer(device, dataset, photos_,
+                                                  initial_model(dataset, options), options);
+                               })),
           log_(run.output),
           progress_(1, options.iterations, run.quiet) {}
 
@@ -211,7 +217,7 @@ void Run::save_model(int iteration) {
                                    lost, summary_.model.string()));
     if (model.size() == 0)
         progress_.note("warning: no splat is left: " + summary_.model.string() + " is empty");
-    write_ply(summary_.model, model);
+    while_doing(summary_.model.string(), [&] { write_ply(summary_.model, model); });
     if (const auto maps = trainer_.exposures(); !maps.empty())
         write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
     stopwatch(true);
@@ -332,9 +338,11 @@ void Run::train(const std::atomic<bool>* stop) {
     whole_ = true;
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         whole_ = false;
-        trainer_.step();
+        while_doing(fmt::format("iteration {}", trainer_.iteration() + 1),
+                    [&] { trainer_.step(); });
         whole_ = true;
-        after_step();
+        while_doing(fmt::format("what follows iteration {}", trainer_.iteration()),
+                    [&] { after_step(); });
         if (run_.on_step) show_step();
     }
     whole_ = false;
@@ -416,6 +424,7 @@ RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptio
     for (const View& view : dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
     check_run_folder(run.output, dataset);
+    if (run.resume_from.empty()) check_start_memory(device, dataset, options);
     return Run(device, dataset, options, run).execute(stop);
 }
 

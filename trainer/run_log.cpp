@@ -12,9 +12,10 @@
 #include "engine/core/files.h"
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
+#include "engine/data/run_events.h"
 #include "engine/plan/tuning_names.h"
 #include "trainer/checkpoint.h"
-#include "trainer/run_events.h"
+#include "trainer/portable_path.h"
 #include "trainer/schedule.h"
 #include "trainer/strategy.h"
 
@@ -68,10 +69,9 @@ std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
     return fmt::format(
         "Namespace(sh_degree={}, source_path={}, model_path={}, images={}, "
         "resolution={}, white_background={}, data_device='cpu', eval={})",
-        options.sh_degree, python_string(std::filesystem::absolute(dataset.root).string()),
-        python_string(std::filesystem::absolute(output).string()),
-        python_string(dataset.options.images_folder), dataset.options.resolution,
-        options.white_background ? "True" : "False",
+        options.sh_degree, python_string(seen_from(output, dataset.root).string()),
+        python_string("."), python_string(dataset.options.images_folder),
+        dataset.options.resolution, options.white_background ? "True" : "False",
         std::any_of(dataset.views.begin(), dataset.views.end(),
                     [](const View& v) { return v.is_test; })
             ? "True"
@@ -102,6 +102,10 @@ void RunLog::go_on(int iteration) {
     open();
 }
 
+std::string RunLog::shared_text(const std::string& text) const {
+    return without_folders(without_folders(text, root_), folder_);
+}
+
 void RunLog::write(const Json& event) {
     const std::string line = text_of(event) + "\n";
     if (std::fwrite(line.data(), 1, line.size(), file_.get()) != line.size() ||
@@ -115,6 +119,9 @@ void RunLog::write(const Json& event) {
 void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
                    const TrainOptions& options, std::uint32_t splats,
                    const std::string& effects_json) {
+    root_ = dataset.root;
+    std::vector<std::string> notes;
+    for (const std::string& note : dataset.notes) notes.push_back(shared_text(note));
     rates_ = rates;
     counts_.rest_every = Schedule(options).rest_every;
     const auto held_out = std::ranges::count_if(dataset.views, &View::is_test);
@@ -123,9 +130,9 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
               {"device", device.info().name},
               {"driver", device.info().driver},
               {"tuning", names_text(tuning_names(device.tuning()))},
-              {"dataset", dataset.root.string()},
+              {"dataset", shared_name(folder_, dataset.root)},
               {"source", dataset.source},
-              {"notes", dataset.notes},
+              {"notes", notes},
               {"train_views", dataset.views.size() - held_out},
               {"held_out_views", held_out},
               {"splats", splats},
@@ -177,7 +184,7 @@ void RunLog::mean_left_out(int iteration) {
 
 void RunLog::failure(int iteration, const std::string& what) {
     try {
-        write({{"event", "failure"}, {"iteration", iteration}, {"what", what}});
+        write({{"event", "failure"}, {"iteration", iteration}, {"what", shared_text(what)}});
     } catch (const Error&) {  // a full disk, which may be the failure itself
     }
 }
@@ -252,7 +259,7 @@ void add_events(const std::vector<Json>& events, ReportData& data) {
 
 ReportData RunLog::report_data(const RunSummary& summary) const {
     ReportData data;
-    data.title = start_.value("dataset", "");
+    data.title = std::filesystem::path(start_.value("dataset", "")).filename().string();
     data.device = start_.value("device", "") + ", " + start_.value("driver", "");
     data.passes = summary.passes;
     add_events(events_, data);

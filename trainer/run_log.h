@@ -15,7 +15,8 @@
 namespace darb {
 
 /// cfg_args as 3DGS writes it: one Python Namespace, which the ecosystem's viewers parse and 3DGS
-/// evaluates; names are quoted so that nothing in them runs.
+/// evaluates; names are quoted so that nothing in them runs. Paths are as
+/// seen from the output folder.
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
                      const std::filesystem::path& output);
 
@@ -66,9 +67,10 @@ class RunLog {
   private:
     void open();
     void write(const nlohmann::json& event);
+    std::string shared_text(const std::string& text) const;  // without the folders of this machine
     ReportData report_data(const RunSummary& summary) const;
 
-    std::filesystem::path folder_;
+    std::filesystem::path folder_, root_;  // of the run and of its data set
     std::vector<nlohmann::json> events_;
     std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_{nullptr, &std::fclose};
     double loss_sum_ = 0, psnr_sum_ = 0;

@@ -1,12 +1,13 @@
 #include "engine/data/metrics.h"
+#include "engine/core/on_threads.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
-#include <thread>
 #include <vector>
 
 #include "engine/core/error.h"
@@ -128,16 +129,15 @@ double ssim(const ImageF& image, const ImageF& truth, int threads) {
     check_same_size(image, truth);
     const int parts = std::clamp(threads, 1, image.height);
     std::vector<double> sums(static_cast<std::size_t>(parts), 0.0);
-    {
-        std::vector<std::jthread> workers;
-        for (int part = 0; part < parts; ++part)
-            workers.emplace_back([&, part] {
-                const int begin = static_cast<int>(std::int64_t{image.height} * part / parts);
-                const int end = static_cast<int>(std::int64_t{image.height} * (part + 1) / parts);
-                for (int c = 0; c < used_channels(image); ++c)
-                    sums[static_cast<std::size_t>(part)] += ssim_rows(image, truth, c, begin, end);
-            });
-    }
+    std::atomic<int> next{0};
+    on_threads(static_cast<std::size_t>(parts), [&] {
+        for (int part; (part = next++) < parts;) {
+            const int begin = static_cast<int>(std::int64_t{image.height} * part / parts);
+            const int end = static_cast<int>(std::int64_t{image.height} * (part + 1) / parts);
+            for (int c = 0; c < used_channels(image); ++c)
+                sums[static_cast<std::size_t>(part)] += ssim_rows(image, truth, c, begin, end);
+        }
+    });
     double total = 0;
     for (const double sum : sums) total += sum;
     return total / (static_cast<double>(image.width) * image.height * used_channels(image));

@@ -13,6 +13,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/memory.h"
+#include "engine/core/on_threads.h"
 #include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
 #include "engine/data/resample.h"
@@ -154,10 +155,7 @@ std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads,
     };
     const std::size_t wanted = threads > 0 ? static_cast<std::size_t>(threads)
                                            : std::max(1u, std::thread::hardware_concurrency());
-    {
-        std::vector<std::jthread> workers(std::min(wanted, views.size()));
-        for (std::jthread& worker : workers) worker = std::jthread(work);
-    }
+    on_threads(std::min(wanted, views.size()), work);
     for (const std::exception_ptr& error : errors)
         if (error) std::rethrow_exception(error);
     return photos;

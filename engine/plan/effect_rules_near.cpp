@@ -5,10 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <thread>
 #include <vector>
 
+#include "engine/core/on_threads.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/plan/effect_rules.h"
 #include "engine/raster/frame_view.h"
@@ -99,20 +101,20 @@ EffectRow near_rule(const SplatModel& model, const std::vector<View>& views, flo
     for (const View& view : views) data.push_back(camera_data(view.camera, model.origin));
     const std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
     std::vector<std::size_t> found(threads, 0);
-    const auto look = [&](std::size_t t) {
-        for (std::size_t i = t; i < model.size(); i += threads) {
-            const Ball ball = ball_of(model, i);
-            if (!(ball.reach2 > 0)) continue;
-            bool needs = false;
-            for (std::size_t v = 0; v < views.size() && !needs; ++v)
-                needs = needs_care(views[v].camera, data[v], ball, near_plane);
-            found[t] += needs ? 1 : 0;
-        }
+    std::atomic<std::size_t> next{0};
+    const auto look = [&] {
+        std::size_t t = next++;
+        for (; t < threads; t = next++)
+            for (std::size_t i = t; i < model.size(); i += threads) {
+                const Ball ball = ball_of(model, i);
+                if (!(ball.reach2 > 0)) continue;
+                bool needs = false;
+                for (std::size_t v = 0; v < views.size() && !needs; ++v)
+                    needs = needs_care(views[v].camera, data[v], ball, near_plane);
+                found[t] += needs ? 1 : 0;
+            }
     };
-    std::vector<std::thread> workers;
-    for (std::size_t t = 1; t < threads; ++t) workers.emplace_back(look, t);
-    look(0);
-    for (std::thread& worker : workers) worker.join();
+    on_threads(threads, look);
     std::size_t count = 0;
     for (const std::size_t n : found) count += n;
     row.measured = static_cast<double>(count);

@@ -5,7 +5,8 @@
 #include <atomic>
 #include <cstddef>
 #include <thread>
-#include <vector>
+
+#include "engine/core/on_threads.h"
 
 namespace darb::reference {
 
@@ -22,11 +23,7 @@ void parallel_for(size_t count, int threads, const Body& body) {
             body(i);
         }
     };
-    std::vector<std::jthread> pool;
-    for (size_t t = 1; t < workers; ++t) {
-        pool.emplace_back(work);
-    }
-    work();
+    on_threads(workers, work);
 }
 
 }  // namespace darb::reference

@@ -21,7 +21,7 @@ TEST(CfgArgs, names_what_the_photos_were_loaded_with) {
     TrainOptions options;
     options.sh_degree = 2;
     EXPECT_EQ(cfg_args(dataset, options, "/out"),
-              "Namespace(sh_degree=2, source_path='/photos', model_path='/out', "
+              "Namespace(sh_degree=2, source_path='../photos', model_path='.', "
               "images='images_4', resolution=2, white_background=False, data_device='cpu', "
               "eval=True)");
     dataset.root = "/a', x=__import__('os').system('id'), b='";

@@ -6,7 +6,6 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "engine/core/text.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
@@ -109,7 +108,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
     } catch (const std::exception& e) {
         run.failure = e.what();
         count_exception(e, run);
-        fmt::print(stderr, "failed: {}\n", printable(e.what(), true));  // -q hides progress alone
+        say("failed: {}\n", e.what());  // -q hides progress alone
     }
     if (run.failure.empty())
         measure(run);

@@ -6,12 +6,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <limits>
 #include <new>
 #include <sstream>
 #include <string>
@@ -20,8 +17,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "engine/core/text.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/stop_signals.h"
 
 namespace {
@@ -38,29 +35,6 @@ std::vector<std::string> with_dashes(int argc, char** argv) {
     return arguments;
 }
 
-// Whether all of it is a number that float32 holds as infinity.
-bool beyond_float(const std::string& value) {
-    char* end = nullptr;
-    const double number = std::strtod(value.c_str(), &end);
-    return end != value.c_str() && *end == '\0' &&
-           std::abs(number) > std::numeric_limits<float>::max();
-}
-
-// The parser takes these for numbers, and lets them through every limit.
-void refuse_no_numbers(const std::vector<std::string>& arguments) {
-    for (const std::string& argument : arguments) {
-        const bool option = argument.starts_with("--");
-        const size_t equals = option ? argument.find('=') : std::string::npos;
-        if (option && equals == std::string::npos) continue;
-        std::string value =
-            darb::lower(equals == std::string::npos ? argument : argument.substr(equals + 1));
-        if (value.starts_with('-') || value.starts_with('+')) value.erase(0, 1);
-        if (value == "nan" || value == "inf" || value == "infinity" || beyond_float(value))
-            throw darb::Error(argument, "is no number that anything here can take",
-                              "Give a finite number; a file of that name as ./" + value + ".");
-    }
-}
-
 // A value that begins with a minus reads like an option: "--effects -sh" becomes "--effects=-sh".
 void join_effects(std::vector<std::string>& arguments) {
     for (size_t i = 0; i + 1 < arguments.size(); ++i) {
@@ -75,7 +49,7 @@ void join_effects(std::vector<std::string>& arguments) {
 int run(int argc, char** argv) {
     std::vector<std::string> arguments = with_dashes(argc, argv);
     join_effects(arguments);
-    refuse_no_numbers(arguments);
+    darb::refuse_no_numbers(arguments);
     CLI::App app(
         "Train, render and measure 3D splat scenes with a choice of kernel, on any Vulkan device.",
         "darb");
@@ -141,8 +115,8 @@ int main(int argc, char** argv) {
     } catch (const std::system_error& e) {
         return report(e);
     } catch (const std::bad_alloc&) {
-        darb::say(
-            "error: darb: no memory is left\n  Close other programs, or give it less to do.\n");
+        darb::say("error: darb {}: no memory is left\n  Close other programs, or give it less.\n",
+                  argc > 1 ? argv[1] : "");
         return 2;
     } catch (const std::exception& e) {
         darb::say("internal error: {}\n", e.what());

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
@@ -79,7 +80,7 @@ SplatModel load_scene(const fs::path& path, SplatFile* facts) {
     const fs::path file = find_scene(path);
     SplatFile unused;
     SplatFile& said = facts ? *facts : unused;
-    SplatModel model = load_splats(file, &said);
+    SplatModel model = while_doing(file.string(), [&] { return load_splats(file, &said); });
     if (said.dropped > 0)
         say("warning: {}: {} splats with NaN or infinity were dropped\n", file.string(),
             said.dropped);

@@ -22,6 +22,7 @@
 #include "tools/darb/train_run.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/run_folder.h"
+#include "trainer/start_memory.h"
 
 namespace darb {
 
@@ -82,7 +83,9 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     if (!lock) lock.emplace(flags.run.output);
     plan_effects(dataset, flags);
     plan_strategy(dataset, flags);
-    if (!recalled) flags.run.command = command_text(std::move(arguments), flags.dataset);
+    if (!recalled) flags.run.command = command_text(std::move(arguments), flags);
+    if (flags.run.resume_from.empty())  // before the forecast, which makes them
+        check_start_memory(device, dataset, flags.train);
     print_plan(device, dataset, flags);
     std::atomic<bool>& stop = stop_on_signals();
     const std::unique_ptr<LiveView> view =

@@ -9,6 +9,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "tools/darb/numbers.h"
+#include "trainer/portable_path.h"
 
 namespace darb {
 
@@ -46,13 +48,60 @@ std::vector<std::string> saved_arguments(const std::filesystem::path& path) {
 
 }  // namespace
 
-std::string command_text(std::vector<std::string> arguments, const std::string& dataset) {
-    const std::string absolute = std::filesystem::absolute(dataset).string();
-    for (std::string& word : arguments) {
-        if (word == dataset) word = absolute;
-        if (word.starts_with('-') && word.ends_with("=" + dataset))
-            word.replace(word.size() - dataset.size(), dataset.size(), absolute);
+namespace {
+
+bool is_one_of(std::string_view name, std::initializer_list<std::string_view> names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// What an option with a path gets in its place; paths are relative to the output folder.
+std::string shared_value(std::string_view option, const std::string& value,
+                         const std::filesystem::path& output) {
+    if (is_one_of(option, {"-o", "-m", "--output", "--model-path"})) return ".";
+    return seen_from(output, value).string();
+}
+
+bool takes_path(std::string_view option) {
+    return is_one_of(option, {"-o", "-m", "--output", "--model-path", "-s", "--source-path",
+                              "--start-checkpoint"});
+}
+
+// The word that is the data set, where no option names it: the first one behind "train", or one
+// that no option is before.
+size_t place_of_dataset(const std::vector<std::string>& arguments, const std::string& dataset) {
+    if (arguments.size() > 1 && arguments[1] == dataset) return 1;
+    size_t first = arguments.size();
+    for (size_t i = arguments.size(); i-- > 1;)
+        if (arguments[i] == dataset) {
+            first = i;
+            if (!arguments[i - 1].starts_with('-')) return i;
+        }
+    return first;
+}
+
+}  // namespace
+
+std::string command_text(std::vector<std::string> arguments, const TrainFlags& flags) {
+    const std::filesystem::path& output = flags.run.output;
+    bool named = false;  // the data set, by an option
+    for (size_t i = 0; i < arguments.size(); ++i) {
+        std::string& word = arguments[i];
+        const size_t equals = word.find('=');
+        const std::string name = word.substr(0, equals), attached = word.substr(0, 2);
+        named = named || is_one_of(name, {"-s", "--source-path"});
+        if (takes_path(name) && equals != std::string::npos) {
+            word = name + "=" + shared_value(name, word.substr(equals + 1), output);
+        } else if (takes_path(name) && i + 1 < arguments.size()) {
+            arguments[i + 1] = shared_value(name, arguments[i + 1], output);
+            ++i;
+        } else if (takes_path(attached) && word.size() > 2) {
+            named = named || attached == "-s";
+            word = attached + shared_value(attached, word.substr(2), output);
+        }
     }
+    if (!named)
+        if (const size_t at = place_of_dataset(arguments, flags.dataset); at < arguments.size())
+            arguments[at] = seen_from(output, flags.dataset).string();
     return nlohmann::json(arguments).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -60,6 +109,7 @@ void recall_arguments(const std::vector<std::string>& typed, TrainFlags& flags, 
     check_typed(typed);
     const std::filesystem::path path = flags.run.output / "command.json";
     const std::vector<std::string> arguments = saved_arguments(path);
+    refuse_no_numbers(arguments);
     TrainFlags recalled;
     TuneFlags recalled_tune;
     CLI::App app;
@@ -72,6 +122,11 @@ void recall_arguments(const std::vector<std::string>& typed, TrainFlags& flags, 
         throw Error(path.string(), e.what(), kRemedy);
     }
     if (recalled.dataset.empty()) throw Error(path.string(), "names no data set", kRemedy);
+    const auto there = [&](const std::filesystem::path& seen) {
+        return seen.empty() ? seen : std::filesystem::weakly_canonical(flags.run.output / seen);
+    };
+    recalled.dataset = there(recalled.dataset).string();
+    recalled.start_checkpoint = there(recalled.start_checkpoint);
     recalled.resume = true;
     recalled.run.output = flags.run.output;
     if (!flags.device.empty()) recalled.device = flags.device;

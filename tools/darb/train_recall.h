@@ -10,9 +10,10 @@
 
 namespace darb {
 
-/// The text of command.json. arguments: as typed; the data set becomes an absolute path, so that
-/// the run can be resumed from any folder.
-std::string command_text(std::vector<std::string> arguments, const std::string& dataset);
+/// The text of command.json. arguments: as typed; data set, checkpoint and output become paths as
+/// seen from the output folder, so that the run can be resumed from any folder, and moved with its
+/// data.
+std::string command_text(std::vector<std::string> arguments, const TrainFlags& flags);
 
 /// flags and tune as that file has them; of what was typed now, the device, -q, --view and --tune
 /// count. Throws Error for any other option, and for a file that is no list of arguments.

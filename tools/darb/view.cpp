@@ -86,10 +86,10 @@ int view(ViewFlags flags) {
     options.accuracy = chosen_accuracy(flags.accuracy);
     options.effects = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
-    refuse_other_pictures(flags.screenshot);
     refuse_to_overwrite_inputs(
         {flags.screenshot, flags.times},
         together({files_of(flags.scene), files_of(flags.cameras), files_of(flags.path)}));
+    refuse_other_pictures(flags.screenshot);
     std::string note;
     options.views = find_views(flags, note);
     refuse_to_overwrite_inputs({flags.screenshot, flags.times}, files_of(options.views));

@@ -1,7 +1,9 @@
 #include "tools/make_scene/write_scene.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/colmap_write.h"
 #include "engine/data/image_io.h"
@@ -38,10 +40,22 @@ std::string transforms_json(const std::vector<View>& views, bool test) {
     return file.dump(1) + "\n";
 }
 
+// A folder of photos that this program did not make stays as it is.
+void refuse_other_photos(const std::filesystem::path& images, const std::vector<View>& views) {
+    std::error_code none;  // there is no such folder
+    for (const auto& entry : std::filesystem::directory_iterator(images, none))
+        if (std::none_of(views.begin(), views.end(), [&](const View& view) {
+                return view.name == entry.path().filename().string();
+            }))
+            throw Error(entry.path().string(), "is none of the photos that are made here",
+                        "Name an empty folder.");
+}
+
 }  // namespace
 
 void write_scene(const std::filesystem::path& folder, const std::vector<View>& views,
                  const Capture& capture) {
+    refuse_other_photos(folder / "images", views);
     std::string held_out;
     for (std::size_t i = 0; i < views.size(); ++i) {
         write_png(folder / "images" / views[i].name, capture.photos[i]);

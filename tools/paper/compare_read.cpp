@@ -8,9 +8,9 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "engine/data/run_events.h"
 #include "engine/report/html.h"
 #include "tools/paper/compare.h"
-#include "trainer/run_events.h"
 
 namespace darb {
 

@@ -1,4 +1,4 @@
-#include "trainer/run_events.h"
+#include "engine/data/run_events.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,174 @@
+// What a run leaves in its folder for later: paths that move with it, files that are not as a run
+// writes them, a report that failed, a start that has no room. For the command.
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "engine/core/error.h"
+#include "tests/support/run_command.h"
+#include "trainer/checkpoint.h"
+
+namespace darb::test {
+namespace {
+
+using nlohmann::json;
+using Bytes = std::vector<std::byte>;
+
+class RunFiles : public testing::Test {
+  protected:
+    void SetUp() override {
+        fs::create_directories(data());
+        const fs::path scene = fs::path(DARB_SOURCE_DIR) / "assets" / "scene";
+        fs::copy(scene / "images", data() / "images");
+        fs::copy(scene / "sparse", data() / "sparse", fs::copy_options::recursive);
+    }
+    void TearDown() override { fs::remove_all(folder_); }
+
+    fs::path data() const { return folder_ / "photos"; }
+    fs::path run() const { return folder_ / "out" / "run"; }
+    static constexpr const char* kOptions = " -r 8 -q --iterations 4 --eval";
+    Outcome train(const std::string& options = "") const {
+        return darb(fmt::format("train '{}' -o '{}' {} {}", data().string(), run().string(),
+                                kOptions, options));
+    }
+    Outcome resume() const { return darb("train --resume -q -o " + run().string()); }
+    void edit(const char* name, const std::function<void(json&)>& change) const {
+        json content = json::parse(read_text_file(run() / name));
+        change(content);
+        std::ofstream(run() / name) << content.dump();
+    }
+    void expect_input_error(const Outcome& o, const std::vector<std::string>& parts) const {
+        EXPECT_EQ(o.code, 2) << o.err;
+        for (const std::string& part : parts)
+            EXPECT_NE(o.err.find(part), std::string::npos) << "no '" << part << "' in: " << o.err;
+        EXPECT_EQ(o.err.find("json.exception"), std::string::npos) << o.err;
+        EXPECT_NE(o.err.find("\n  "), std::string::npos) << "no remedy: " << o.err;
+    }
+    // What was trained 2 iterations long and then interrupted.
+    void leave_unfinished() const {
+        ASSERT_EQ(train("--checkpoint-iterations 2").code, 0);
+        fs::rename(run() / "chkpnt2.darb", run() / "checkpoint.darb");
+        edit("metrics.json", [](json& m) {
+            m["iteration"] = 2;
+            m["interrupted"] = true;
+        });
+    }
+
+    const fs::path folder_ = scratch() / "run_files";
+};
+
+TEST_F(RunFiles, name_no_folder_of_the_machine_and_move_with_the_data) {
+    leave_unfinished();
+    for (const auto& entry : fs::recursive_directory_iterator(run())) {
+        const std::string name = entry.path().extension().string();
+        if (!entry.is_regular_file() || name == ".ply" || name == ".png" || name == ".darb")
+            continue;
+        EXPECT_EQ(read_text_file(entry.path()).find(folder_.string()), std::string::npos)
+            << entry.path();
+    }
+    const fs::path moved = scratch() / "moved";
+    fs::remove_all(moved);
+    fs::rename(folder_, moved);
+    const Outcome o = darb("train --resume -q -o " + (moved / "out" / "run").string());
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_TRUE(fs::exists(moved / "out/run/point_cloud/iteration_4/point_cloud.ply"));
+    fs::remove_all(moved);
+}
+
+TEST_F(RunFiles, a_report_that_failed_is_written_by_resume) {
+    ASSERT_EQ(train().code, 0);
+    const std::string report = read_text_file(run() / "report.html");
+    const std::string metrics = read_text_file(run() / "metrics.json");
+    fs::remove(run() / "report.html");
+    const Outcome o = resume();
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(read_text_file(run() / "report.html"), report);
+    EXPECT_EQ(read_text_file(run() / "metrics.json"), metrics);
+}
+
+TEST_F(RunFiles, values_of_another_type_are_errors_of_input) {
+    leave_unfinished();
+    const std::string log = read_text_file(run() / "run.jsonl");
+    const auto with_line = [&](const std::string& line) {
+        std::ofstream(run() / "run.jsonl") << log << line << "\n" << log;
+        const Outcome o = resume();
+        std::ofstream(run() / "run.jsonl") << log;
+        return o;
+    };
+    const int line = int(std::count(log.begin(), log.end(), '\n')) + 1;
+    const std::string where = fmt::format("run.jsonl, line {}", line);
+    expect_input_error(with_line(R"({"event": 7})"), {where, "'event' is no text: 7"});
+    expect_input_error(with_line(R"({"event": "iteration", "iteration": "9"})"),
+                       {where, "'iteration'"});
+    expect_input_error(with_line(R"({"event": "evaluation", "iteration": 1, "views": [3]})"),
+                       {where, "no JSON object"});
+    expect_input_error(with_line("[1]"), {where});
+    expect_input_error(with_line("{\"event"), {where});
+    const std::string command = read_text_file(run() / "command.json");
+    for (const char* text : {"{}", "[1]", "[\"train\", null]", "nonsense",
+                             "[\"train\", \".\", \"--lambda-dssim\", \"nan\"]"}) {
+        std::ofstream(run() / "command.json") << text;
+        expect_input_error(resume(), {});
+    }
+    std::ofstream(run() / "command.json") << command;
+    ASSERT_EQ(resume().code, 0) << "as it was";
+    edit("metrics.json", [](json& m) { m["interrupted"] = "no"; });
+    expect_input_error(resume(), {"metrics.json", "'interrupted' is neither true nor false"});
+    edit("metrics.json", [](json& m) {
+        m["interrupted"] = false;
+        m["iteration"] = 1e300;
+    });
+    expect_input_error(resume(), {"metrics.json", "'iteration' is no whole number"});
+}
+
+TEST_F(RunFiles, a_line_that_a_kill_cut_off_does_not_count) {
+    leave_unfinished();
+    std::ofstream(run() / "run.jsonl", std::ios::app) << "{\"event\": \"itera";
+    const Outcome o = resume();
+    EXPECT_EQ(o.code, 0) << o.err;
+}
+
+// Whole by its checksum, and of no run that these options make.
+TEST_F(RunFiles, a_checkpoint_that_contradicts_its_settings_is_refused) {
+    leave_unfinished();
+    const fs::path path = run() / "checkpoint.darb";
+    const Checkpoint good = read_checkpoint(path);
+    const auto refused = [&](const std::string& reason,
+                             const std::function<void(Checkpoint&)>& change) {
+        Checkpoint bad = good;
+        change(bad);
+        write_checkpoint(path, bad);
+        expect_input_error(resume(), {"checkpoint.darb", reason});
+    };
+    refused("the kernel sinc", [](Checkpoint& c) { c.state.model.kernel = KERNEL_SINC; });
+    refused("beyond the end", [](Checkpoint& c) { c.state.iteration = 5; });
+    refused("no use for", [](Checkpoint& c) { c.state.exposure.assign(36, 0.0f); });
+    refused("none of them with finite numbers", [](Checkpoint& c) {
+        for (float& value : c.state.model.position) value = std::nanf("");
+    });
+    refused("no JSON object", [](Checkpoint& c) { c.settings = "[]"; });
+    refused("'strategy' is no text", [](Checkpoint& c) {
+        json settings = json::parse(c.settings);
+        settings["strategy"] = 3;
+        c.settings = settings.dump();
+    });
+    write_checkpoint(path, good);
+    EXPECT_EQ(resume().code, 0);
+}
+
+TEST_F(RunFiles, a_start_without_room_is_refused_with_the_number_that_fits) {
+    fs::remove_all(data() / "sparse" / "0");
+    fs::copy(fs::path(DARB_SOURCE_DIR) / "assets" / "scene" / "transforms_train.json",
+             data() / "transforms_train.json");
+    const std::string train =
+        fmt::format("train '{}' -o '{}' -r 8 -q --iterations 1 --no-report --random-points ",
+                    data().string(), run().string());
+    const Outcome o = darb(train + "4000000000");
+    expect_input_error(o, {"--random-points 4000000000", "of device memory", " fits."});
+    EXPECT_FALSE(fs::exists(run() / "checkpoint.darb"));
+    EXPECT_EQ(darb(train + "2000").code, 0);
+}
+
+}  // namespace
+}  // namespace darb::test
