@@ -18,9 +18,9 @@ constexpr int kDegree = 3;
 
 // One step of training on a random scene and a photo of noise, in both ways: Adam within the
 // backward pass, or gradients in buffers and a pass of its own. Each has splats of its own.
-class StepFrame {
+class BenchStep {
   public:
-    StepFrame(Device& device, const SplatModel& model, const Camera& camera)
+    BenchStep(Device& device, const SplatModel& model, const Camera& camera)
         : buffers_(device, training_options()),
           forward_(device, training_options()),
           backward_(device, training_options()),
@@ -102,7 +102,7 @@ class StepFrame {
 // A sample is a step in each way, one after the other; the case's time is that of both.
 BenchResult measure(Device& device, int width, int height, const BenchOptions& options) {
     const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, width, height);
-    StepFrame frame(device, random_scene(kSplats, kDegree), camera);
+    BenchStep frame(device, random_scene(kSplats, kDegree), camera);
     BenchResult result;
     take_samples(
         options.sampling, 1,
