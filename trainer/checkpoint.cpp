@@ -12,9 +12,9 @@
 #include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/plan/effect_plan.h"
 #include "engine/raster/gpu_splats.h"
 #include "trainer/exposure.h"
+#include "trainer/option_table.h"
 #include "trainer/schedule.h"
 #include "trainer/strategy.h"
 
@@ -237,63 +237,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
                        [&] { return parse_checkpoint(read_file(path), path.string()); });
 }
 
-std::string settings_text(const TrainOptions& o) {
-    const Schedule s(o);
-    Json settings{{"iterations", o.iterations},
-                  {"seed", o.seed},
-                  {"kernel", kernel_name(o.kernel)},
-                  {"footprint", footprint_name(o.footprint)},
-                  {"accuracy", accuracy_text(o.accuracy)},
-                  {"sh_degree", o.sh_degree},
-                  {"sh_interval", s.degree_interval},
-                  {"effects",
-                   {{"probe_sh", o.probe_sh},
-                    {"antialias", o.antialias},
-                    {"exposure", o.exposure},
-                    {"alpha", o.alpha},
-                    {"exposure_lr", {o.exposure_lr_init, o.exposure_lr_final}}}},
-                  {"white_background", o.white_background},
-                  {"random_background", o.random_background},
-                  {"resolution_ramp", o.resolution_ramp},
-                  {"lambda_dssim", o.lambda_dssim},
-                  {"position_lr", {static_cast<float>(s.first.position), s.last_position_rate}},
-                  {"scale_lr", s.first.scale},
-                  {"rotation_lr", s.first.rotation},
-                  {"opacity_lr", s.first.opacity},
-                  {"sh_lr", {s.first.sh_dc, s.first.sh_rest}},
-                  {"sh_rest_every", s.rest_every},
-                  {"position_lr_falls", s.position_falls_for},
-                  {"final_lr_share", s.last_share},
-                  {"average_begin", s.average_begin},
-                  {"densify_from", s.rounds.begin},
-                  {"densify_until", s.rounds.end},
-                  {"densify_interval", s.rounds.interval},
-                  {"densify_grad_threshold", o.densify_grad_threshold},
-                  {"clone_split_extent", o.clone_split_extent},
-                  {"prune_opacity", s.prune_opacity},
-                  {"prune_extent", o.prune_extent},
-                  {"largest_scale", s.largest_scale},
-                  {"clearance", o.clearance},
-                  {"opacity_reset", {s.resets.interval, s.resets.to}},
-                  {"last_opacity_reset", s.resets.last},
-                  {"max_splats", o.max_splats.value_or(kAnyNumberOfSplats)},
-                  {"regularisers", {o.opacity_weight, o.scale_weight}},
-                  {"initial_opacity", s.initial_opacity},
-                  {"random_points", o.random_points.value_or(0)}};
-    for (const ProjectionSwitch& p : kProjectionSwitches)
-        if (p.effect != kNoEffect && p.effect != EFFECT_ANTIALIAS)
-            settings["effects"][effect_name(p.effect)] = o.projection.*p.on;
-    // What the defaults do not have stands only where it is.
-    if (o.strategy != Strategy{}) {
-        settings["strategy"] = strategy_name(o.strategy);
-        settings["initial_scale"] = s.initial_scale;
-    }
-    if (s.length_scale != 1) settings["length_scale"] = s.length_scale;
-    const StrategyRow& strategy = strategy_row(o.strategy);
-    if (strategy.has_setting("noise_lr")) settings["noise_lr"] = o.noise_lr;
-    if (strategy.has_setting("opacity_decay")) settings["opacity_decay"] = s.opacity_decay;
-    if (o.morton_order) settings["morton_order"] = true;
-    return settings.dump();
+std::string settings_text(const TrainOptions& options) {
+    return settings_json(options).dump();
 }
 
 std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU8>& photos) {

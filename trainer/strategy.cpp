@@ -49,22 +49,6 @@ std::string strategy_names() {
     return names;
 }
 
-void use_3dgs_schedule(TrainOptions& options) {
-    options.position_lr_init = 1.6e-4f;
-    options.position_lr_final = 1.6e-6f;
-    options.opacity_lr = 0.025f;
-    options.paced = options.sh_rest_hastens = false;
-    options.final_lr_share = options.average_from = 1;
-    options.prune_opacity = 0.005f;
-    options.prune_extent = 0.1f;
-    options.late_resets = true;
-    options.opacity_weight = options.scale_weight = 0;
-    options.random_background = options.resolution_ramp = false;
-    options.lengths_by_area = false;
-    options.largest_scale = 0;
-    options.clearance = 0;
-}
-
 std::uint32_t growth_target(const TrainOptions& options, const Schedule& schedule, int iteration,
                             std::uint32_t count, std::uint32_t limit) {
     return strategy_row(options.strategy).target(options, schedule, iteration, count, limit);

@@ -38,7 +38,7 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"train --no-such-option", "--no-such-option"},
                     {"train " + kScene, "no output folder"},
                     {"train" + out, "no data set"},
-                    {train + "--sh_degree 4", "--sh-degree"},
+                    {train + "--sh_degree 4", "--sh-degree 4: must be a whole number from 0 to 3"},
                     {train + "--kernel no_such", "no such kernel"},
                     {train + "--footprint no_such", "psi, exact"},
                     {train + "--effects no_such", "'no_such' is no effect"},

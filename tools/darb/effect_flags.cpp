@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <utility>
-
 #include "engine/core/error.h"
 
 namespace darb {
@@ -46,15 +44,6 @@ EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptio
                     "Leave --lens out, or keep the effect with +lens.");
     data.original_where_wide = false;
     return choice;
-}
-
-void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options) {
-    command.add_flag("--antialiasing", antialiasing, "as --effects +antialias");
-    for (auto [name, rate] : {std::pair{"--exposure-lr-init", &options.exposure_lr_init},
-                              {"--exposure-lr-final", &options.exposure_lr_final}})
-        command.add_option(name, *rate, "of the exposure of each photo, where that is trained")
-            ->capture_default_str()
-            ->check(CLI::PositiveNumber);
 }
 
 nlohmann::json plan_json(const EffectPlan& plan) {

@@ -21,9 +21,6 @@ void add_lens_flag(CLI::App& command, DatasetOptions& data);
 /// where they cannot be read, ask for an effect that the use cannot have, or contradict --lens.
 EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptions& data);
 
-/// Adds --antialiasing and the rates of exposure.
-void add_training_effect_flags(CLI::App& command, bool& antialiasing, TrainOptions& options);
-
 /// A row an effect: name, on, overridden, measured, reason.
 nlohmann::json plan_json(const EffectPlan& plan);
 

@@ -18,6 +18,7 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "tools/darb/commands.h"
+#include "tools/darb/help.h"
 #include "tools/darb/numbers.h"
 #include "tools/darb/stop_signals.h"
 
@@ -46,6 +47,19 @@ void join_effects(std::vector<std::string>& arguments) {
     }
 }
 
+// The headings of `darb --help`.
+void group_commands(CLI::App& app) {
+    for (CLI::App* one : app.get_subcommands({})) {
+        const std::string name = one->get_name();
+        const auto in = [&](std::initializer_list<const char*> names) {
+            return std::find(names.begin(), names.end(), name) != names.end();
+        };
+        one->group(in({"train", "eval", "render", "view", "convert"})          ? "Scenes"
+                   : in({"info", "plan", "devices", "cost", "bench", "check"}) ? "Insight"
+                                                                               : "Paper");
+    }
+}
+
 int run(int argc, char** argv) {
     std::vector<std::string> arguments = with_dashes(argc, argv);
     join_effects(arguments);
@@ -55,6 +69,9 @@ int run(int argc, char** argv) {
         "darb");
     app.set_version_flag("--version", std::string("darb ") + DARB_VERSION);
     app.require_subcommand(1);
+    app.formatter(darb::make_help_formatter());
+    app.set_help_flag("-h,--help", "this, without the options of few users");
+    app.set_help_all_flag("--help-all", "with every option");
     darb::Action action;
     darb::add_train(app, action, arguments);
     darb::add_eval(app, action);
@@ -62,27 +79,25 @@ int run(int argc, char** argv) {
 #ifdef DARB_HAS_VIEWER
     darb::add_view(app, action);
 #endif
+    darb::add_convert(app, action);
+    darb::add_info(app, action);
+    darb::add_plan(app, action);
+    darb::add_devices(app, action);
     darb::add_cost(app, action);
     darb::add_bench(app, action);
-    darb::add_plan(app, action);
-    darb::add_info(app, action);
-    darb::add_convert(app, action);
-    darb::add_devices(app, action);
+    darb::add_check(app, action);
     darb::add_compare(app, action);
     darb::add_psi(app, action);
     darb::add_sim1d(app, action);
-    darb::add_check(app, action);
+    group_commands(app);
     if (!arguments.empty() && !arguments[0].starts_with('-') &&
         app.get_subcommands([&](CLI::App* one) { return one->check_name(arguments[0]); }).empty())
-        throw darb::Error("darb " + arguments[0], "no such subcommand", "darb --help lists them.");
+        throw darb::unknown_command(app, arguments[0]);
     try {
         app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     } catch (const CLI::ParseError& e) {
-        std::ostringstream out, err;  // the arguments that it repeats may steer a terminal
-        const int code = app.exit(e, out, err);
-        fmt::print("{}", out.str());
-        fmt::print(stderr, "{}", darb::printable(err.str(), true));
-        return code == 0 ? 0 : 2;
+        if (e.get_exit_code() == 0) return app.exit(e);  // help and version
+        throw darb::usage_error(app, e);
     }
     return action();
 }

@@ -4,12 +4,11 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "engine/data/dataset.h"
 #include "tools/darb/accuracy_flags.h"
-#include "trainer/options.h"
+#include "tools/darb/option_flags.h"
 #include "trainer/run.h"
 
 namespace darb {
@@ -26,10 +25,8 @@ struct TrainFlags {
     std::filesystem::path start_checkpoint;
     std::string kernel = "gaussian", strategy = "adc";
     std::string schedule = "darb";  // or 3dgs
-    std::string resolution_ramp;    // on, off, or empty: as the schedule has it
     std::string strategy_note;      // what plan_strategy decided, for people
-    // Options that were given and the strategies that know them.
-    std::vector<std::pair<std::string, std::string>> of_strategies;
+    GivenOfStrategies of_strategies;
     int pulses = 1;
     AccuracyFlags accuracy;
     DatasetOptions data;
@@ -39,14 +36,6 @@ struct TrainFlags {
 
 /// Adds every option to the subcommand; values land in flags, which must outlive the parse.
 void add_train_flags(CLI::App& command, TrainFlags& flags);
-
-/// The part of it that concerns learning rates.
-void add_rate_flags(CLI::App& command, TrainFlags& flags);
-/// The part of it that concerns density control.
-void add_density_flags(CLI::App& command, TrainFlags& flags);
-/// --strategy and what goes with it to options: defaults of the strategy, then what was given.
-/// Throws Error for an option that the strategy does not know.
-void finish_strategy(TrainFlags& flags);
 
 /// As if `darb train` had got these words, `train` left out; options: more of them in one text,
 /// from the --train-options of `command`, which an Error names.

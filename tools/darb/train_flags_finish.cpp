@@ -4,6 +4,7 @@
 #include "engine/core/error.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/train_flags.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -40,6 +41,35 @@ std::string effects_beside(const std::string& schedule, std::string given) {
     return given.empty() ? schedule : schedule + "," + given;
 }
 
+// --strategy, and whether it knows what was given beside it.
+void finish_strategy(TrainFlags& f) {
+    const auto strategy = strategy_from_name(f.strategy);
+    if (!strategy)
+        throw Error("--strategy " + f.strategy, "no such strategy",
+                    fmt::format("Use {}.", strategy_names()));
+    if (f.schedule == "3dgs" && !strategy_row(*strategy).follows_3dgs)
+        throw Error("--schedule 3dgs", fmt::format("means nothing with --strategy {}", f.strategy),
+                    "Leave one of the two out.");
+    f.train.strategy = *strategy;
+    for (const auto& [name, strategies] : f.of_strategies)
+        if (strategies.find(f.strategy) == std::string::npos)
+            throw Error(name, fmt::format("means nothing with --strategy {}", f.strategy),
+                        fmt::format("Leave it out; it goes with --strategy {}.", strategies));
+}
+
+// Scripts give those of long runs to short ones, too.
+void note_iterations_beyond(const TrainFlags& f) {
+    const std::pair<const char*, const std::vector<int>&> lists[] = {
+        {"--test-iterations", f.run.test_iterations},
+        {"--save-iterations", f.run.save_iterations},
+        {"--checkpoint-iterations", f.run.checkpoint_iterations}};
+    for (const auto& [name, list] : lists)
+        for (const int iteration : list)
+            if (iteration > f.train.iterations && !f.run.quiet)
+                fmt::print(stderr, "note: {} {} is beyond the end at {}: it never comes\n", name,
+                           iteration, f.train.iterations);
+}
+
 }  // namespace
 
 void finish_train_flags(TrainFlags& f) {
@@ -62,6 +92,7 @@ void finish_train_flags(TrainFlags& f) {
     if (f.train.footprint == Footprint::exact && !has_exact_footprint(f.train.kernel))
         throw Error(fmt::format("--pulses {}", f.pulses), "goes with the footprint psi only",
                     "Leave --footprint out, or use one pulse.");
+    note_iterations_beyond(f);
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())
             list->assign(std::begin(kStandardEvaluations), std::end(kStandardEvaluations));

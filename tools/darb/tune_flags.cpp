@@ -6,15 +6,20 @@
 
 #include "engine/core/say.h"
 #include "engine/plan/tuner.h"
+#include "tools/darb/help.h"
 
 namespace darb {
 
 void add_tune_flags(CLI::App& command, TuneFlags& flags) {
-    command.add_option("--tune", flags.choice,
-                       "run passes in these ways, such as scatter=ballot,backward=buckets; an "
-                       "unknown name lists those of the device");
-    command.add_flag("--retune", flags.retune,
-                     "measure which ways are the fastest on this device, and keep the result");
+    command
+        .add_option("--tune", flags.choice,
+                    "run passes in these ways, such as scatter=ballot,backward=buckets; an "
+                    "unknown name lists those of the device")
+        ->group(help_group::kDevice);
+    command
+        .add_flag("--retune", flags.retune,
+                  "measure which ways are the fastest on this device, and keep the result")
+        ->group(help_group::kDevice);
 }
 
 void settle_tuning(Device& device, const TuneFlags& flags) {

@@ -1,0 +1,32 @@
+// How the commands show their help, and what they say to a command line that they do not take.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/core/error.h"
+
+namespace darb {
+
+/// Headings that --help leaves to --help-all; trainer/option_table.h has more of them.
+namespace help_group {
+inline constexpr const char *kInput = "Photos and output", *kSaving = "Saving and testing",
+                            *kAccuracy = "Accuracy", *kDevice = "Device and passes";
+}
+
+/// Options under their headings, wrapped to the terminal's width (COLUMNS, or what the terminal
+/// says, 80 elsewhere, at most 100). --help leaves out the headings of few users.
+std::shared_ptr<CLI::Formatter> make_help_formatter();
+
+/// The candidate nearest to a word that is none of them, or "" where none is near.
+std::string nearest_name(const std::string& word, const std::vector<std::string>& candidates);
+
+/// With the nearest command that there is.
+Error unknown_command(const CLI::App& app, const std::string& word);
+
+/// What the parser found, with the option, the reason and a remedy; of an unknown one the nearest.
+Error usage_error(const CLI::App& app, const CLI::ParseError& error);
+
+}  // namespace darb
