@@ -3,9 +3,11 @@
 // truth.
 #include "engine/scene/splat_attributes.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <regex>
 #include <set>
 #include <string>
@@ -38,7 +40,7 @@ TEST(SplatAttributes, every_row_has_an_array_and_names_of_its_own) {
     for (int a = 0; a < kAttributeCount; ++a) {
         arrays.insert(&attribute_values(model, a));
         names.insert(attribute_name(a));
-        names.insert(std::string("file ") + kSplatAttributes[static_cast<size_t>(a)].file_name);
+        names.insert(fmt::format("file {}", kSplatAttributes[static_cast<size_t>(a)].file_name));
     }
     EXPECT_EQ(arrays.size(), size_t{kAttributeCount});
     EXPECT_EQ(names.size(), 2 * size_t{kAttributeCount});
@@ -131,7 +133,8 @@ TEST(SplatAttributes, what_only_carries_them_names_none) {
                              "shaders/optim/adam_update.comp",
                              "shaders/optim/add_gradients.comp",
                              "shaders/densify/gather_attribute.comp"}) {
-        const std::vector<std::byte> bytes = read_file(std::string(DARB_SOURCE_DIR) + "/" + file);
+        const std::vector<std::byte> bytes =
+            read_file(std::filesystem::path(DARB_SOURCE_DIR) / file);
         const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
         std::smatch found;
         EXPECT_FALSE(std::regex_search(text, found, named)) << file << " says " << found.str();
