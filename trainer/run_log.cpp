@@ -268,7 +268,8 @@ ReportData RunLog::report_data(const RunSummary& summary) const {
             "Roofline: bytes and multiply-adds of a pass, estimated from counts, at the rates "
             "measured at the start: {:.1f} GB/s of copies, {:.1f} billion multiply-adds a second.",
             1e-9 * rates_.bytes_per_s, 1e-9 * rates_.fma_per_s));
-    data.settings.emplace_back("strategy", start_.value("strategy", "adc"));
+    data.settings.emplace_back("strategy",
+                               start_.value("strategy", std::string(strategy_name(Strategy{}))));
     const Json settings = start_.value("settings", Json::object());
     for (const auto& [name, value] : settings.items())
         if (name != "effects" && name != "strategy")
@@ -340,7 +341,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"seconds", summary.seconds},
         {"ms_per_iteration", summary.seconds * 1000.0 / std::max(summary.iteration, 1)},
         {"splats", trainer.splat_count()},
-        {"strategy", start_.value("strategy", "adc")},
+        {"strategy", start_.value("strategy", std::string(strategy_name(Strategy{})))},
         {"passes_ms", passes},
         {"peak_device_bytes", device.peak_bytes()},
         {"planned_device_bytes", trainer.planned_bytes()},
