@@ -105,8 +105,6 @@ class HelpFormatter : public CLI::Formatter {
   private:
     static std::string usage(const CLI::App& app, const std::string& name) {
         std::string line = "Usage: ";
-        if (app.get_parent() != nullptr && app.get_parent()->get_parent() == nullptr)
-            line += app.get_parent()->get_name() + " ";
         line += name.empty() ? app.get_name() : name;
         if (!app.get_subcommands({}).empty()) return line + " COMMAND [options]\n";
         for (const CLI::Option* option : app.get_options())
