@@ -1,5 +1,7 @@
 #include "engine/check/dump.h"
 
+#include <fmt/format.h>
+
 #include "engine/check/npy.h"
 #include "engine/check/walk_truth.h"
 
@@ -44,10 +46,9 @@ void write(const std::filesystem::path& folder, const SplatModel& model, const C
 }  // namespace
 
 std::vector<std::filesystem::path> dump_files(const std::filesystem::path& folder) {
-    std::vector<std::filesystem::path> files;
-    for (const char* name :
-         {"image", "d_xyz", "d_f_dc", "d_f_rest", "d_opacity", "d_scale", "d_rot"})
-        files.push_back(folder / (std::string(name) + ".npy"));
+    std::vector<std::filesystem::path> files{folder / "image.npy"};
+    for (const SplatAttribute& attribute : kSplatAttributes)
+        files.push_back(folder / fmt::format("d_{}.npy", attribute.file_name));
     return files;
 }
 

@@ -77,7 +77,7 @@ TEST_F(CompareFolder, OtherSettingsCamerasOrViews_areErrorsThatNameThem) {
 TEST_F(CompareFolder, Run_isReadWithCurveAndPictures) {
     write_metrics(kSettings, 10, false);
     write_file_atomic(folder_ / "run.jsonl",
-                      std::string_view("{\"event\":\"start\"}\nbroken\n{\"event\":\"iteration\","
+                      std::string_view("{\"event\":\"start\"}\n{\"event\":\"iteration\","
                                        "\"iteration\":5,\"seconds\":0.5,\"loss\":0.25,"
                                        "\"splats\":6}\n"));
     write_file_atomic(folder_ / "point_cloud/iteration_10/point_cloud.ply",
@@ -94,6 +94,21 @@ TEST_F(CompareFolder, Run_isReadWithCurveAndPictures) {
     ASSERT_EQ(run.curve.size(), 1u);
     EXPECT_EQ(run.curve[0].loss, 0.25);
     EXPECT_EQ(run.peak_mb, 3);
+}
+
+TEST_F(CompareFolder, BrokenLineOfTheLog_isAnErrorThatNamesIt) {
+    write_metrics(kSettings, 10, false);
+    write_file_atomic(folder_ / "run.jsonl",
+                      std::string_view("{\"event\":\"start\"}\nbroken\n{\"event\":\"end\"}\n"));
+    ComparedRun run;
+    run.folder = folder_;
+    try {
+        read_run(run, {10, 20});
+        FAIL() << "accepted";
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("run.jsonl, line 2"), std::string::npos)
+            << error.what();
+    }
 }
 
 TEST_F(CompareFolder, UnfinishedRun_isReadAsFarAsItCame) {
