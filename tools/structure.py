@@ -4,7 +4,7 @@
     structure.py [--json] [ROOT]
 
 Sizes are read with Universal Ctags (Debian: universal-ctags). The files of a change are those that name the last thing
-of its kind that was added, tests and documents left out: whoever adds the next one has to look at them.
+of its kind that was added, tests, documents and comments left out: whoever adds the next one has to look at them.
 A number with a target is marked where it misses it.
 """
 
@@ -21,13 +21,13 @@ LONGEST_FUNCTION, MOST_PARAMETERS, MOST_MEMBERS = 60, 7, 25  # lines, of a signa
 # kind of change: (example, pattern of what names it, most files that it should take)
 CHANGES = {
     "kernel": ("half-cosine squared", r"half_cosine_squared|HALF_COSINE_SQUARED", 2),
-    "effect": ("exposure", r"\bexposure|\bExposure|EFFECT_EXPOSURE", 6),
+    "effect": ("off-centre", r"\boff_centre\b|OFF_CENTRE", 6),
     "format": ("SPZ", r"\bspz|Spz|SPZ", 2),
     "strategy": ("mcmc", r"\bmcmc|\bMcmc", 2),
     "command": ("psi", r"\bpsi_command|add_psi|run_psi", 2),
     "sort": ("ballot", r"ballot", 3),
     "attribute": ("colour", r"\bsh_dc\b|kShDc|SH_DC", 8),
-    "option": ("clearance", r"\bclearance", 2),
+    "option": ("lambda_dssim", r"\blambda_dssim\b", 3),
     "second process": ("gradients before the step", r"GradientBuffers|gradient_buffers", 4),
 }
 
@@ -73,8 +73,12 @@ def over(values, limit):
     return sorted(((value, name) for name, value in values.items() if value > limit), reverse=True)
 
 
+def without_comments(text):
+    return re.sub(r"//[^\n]*", "", text)
+
+
 def changes(root, files):
-    texts = {name: (pathlib.Path(root) / name).read_text(errors="replace") for name in files}
+    texts = {name: without_comments((pathlib.Path(root) / name).read_text(errors="replace")) for name in files}
     return {kind: sorted(name for name, text in texts.items() if re.search(pattern, text))
             for kind, (_, pattern, _) in CHANGES.items()}
 
