@@ -26,7 +26,7 @@ TEST(CfgArgs, names_what_the_photos_were_loaded_with) {
               "eval=True)");
     dataset.root = "/a', x=__import__('os').system('id'), b='";
     EXPECT_NE(cfg_args(dataset, options, "/out")
-                  .find("source_path=\"/a', x=__import__('os').system('id'), b='\", model_path="),
+                  .find("source_path=\"../a', x=__import__('os').system('id'), b='\", model_path="),
               std::string::npos);
 }
 

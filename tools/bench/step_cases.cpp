@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <glm/glm.hpp>
+
 #include "engine/core/rng.h"
 #include "engine/raster/adam_update.h"
 #include "engine/raster/backward.h"
@@ -140,12 +142,11 @@ BenchResult measure(Device& device, int width, int height, const BenchOptions& o
 
 std::vector<BenchCase> step_cases() {
     std::vector<BenchCase> cases;
-    for (const auto& [width, height] : {std::pair(320, 240), std::pair(800, 600)})
-        cases.push_back(
-            {fmt::format("step/random_100k/{}x{}", width, height), "",
-             [width, height](Device& device, const DeviceRates&, const BenchOptions& options) {
-                 return measure(device, width, height, options);
-             }});
+    for (const glm::ivec2 size : {glm::ivec2(320, 240), glm::ivec2(800, 600)})
+        cases.push_back({fmt::format("step/random_100k/{}x{}", size.x, size.y), "",
+                         [size](Device& device, const DeviceRates&, const BenchOptions& options) {
+                             return measure(device, size.x, size.y, options);
+                         }});
     return cases;
 }
 

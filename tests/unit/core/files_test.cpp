@@ -112,10 +112,11 @@ TEST_F(Files, Read_of_pipes_devices_and_sockets_is_refused_without_waiting) {
                                                          {"link", "is a pipe"},
                                                          {"zero.jpg", "is a device"},
                                                          {"s", "is a socket"}};
-    for (const auto& [file, kind] : kinds) {
-        expect_contains(error_text([&] { read_file(folder / file); }), kind);
-        expect_contains(error_text([&] { read_file_head(folder / file, 10); }), kind);
-        expect_contains(error_text([&] { check_is_file(folder / file); }), kind);
+    for (const auto& [name_of_it, kind] : kinds) {
+        const fs::path file = folder / name_of_it;
+        expect_contains(error_text([&] { read_file(file); }), kind);
+        expect_contains(error_text([&] { read_file_head(file, 10); }), kind);
+        expect_contains(error_text([&] { check_is_file(file); }), kind);
     }
     check_is_file(folder / "missing");
     ::close(socket);
