@@ -78,6 +78,8 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"train " + kScene + " -o unused --lambda-dssim nan", "finite number"},
                     {"train " + kScene + " -o unused --opacity-reg=inf", "finite number"},
                     {"sim1d --signals ''", "--signals"},
+                    {"psi --json ''", "--json: has an empty value"},
+                    {"psi --json=", "--json: has an empty value"},
                     {"plan " + kScene + " --kernel sin", "no such kernel"},
                     {"plan " + ply + " --kernel sinc", "is for a data set, and this is a scene"},
                     {"convert " + ply + " " + ply, "is what is read"}});

@@ -63,6 +63,7 @@ void group_commands(CLI::App& app) {
 int run(int argc, char** argv) {
     std::vector<std::string> arguments = with_dashes(argc, argv);
     join_effects(arguments);
+    darb::refuse_empty_values(arguments);
     darb::refuse_no_numbers(arguments);
     CLI::App app(
         "Train, render and measure 3D splat scenes with a choice of kernel, on any Vulkan device.",

@@ -21,6 +21,16 @@ bool beyond_float(const std::string& value) {
 
 }  // namespace
 
+void refuse_empty_values(const std::vector<std::string>& arguments) {
+    for (size_t i = 0; i < arguments.size(); ++i) {
+        const std::string& argument = arguments[i];
+        const bool ends_empty = argument.starts_with("--") && argument.ends_with('=');
+        if (ends_empty || (argument.empty() && i > 0 && arguments[i - 1].starts_with('-')))
+            throw Error(ends_empty ? argument.substr(0, argument.size() - 1) : arguments[i - 1],
+                        "has an empty value", "Give a value, or leave the option out.");
+    }
+}
+
 void refuse_no_numbers(const std::vector<std::string>& arguments) {
     for (const std::string& argument : arguments) {
         const bool option = argument.starts_with("--");
