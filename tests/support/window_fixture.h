@@ -74,7 +74,9 @@ class Process {
         statm >> pages >> pages;
         return statm ? pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
     }
-    void terminate() { ::kill(pid_, SIGTERM); }
+    void terminate() {  // 0 would be this whole process group
+        if (pid_ > 0) ::kill(pid_, SIGTERM);
+    }
     int wait() {
         if (pid_ > 0) ::waitpid(pid_, &status_, 0);
         pid_ = 0;
