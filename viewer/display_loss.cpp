@@ -15,8 +15,14 @@ bool survive_display_loss(std::atomic<bool>& lost) {
         reinterpret_cast<GetDisplay>(::dlsym(RTLD_DEFAULT, "glfwGetX11Display"));
     if (x11 == nullptr || get_display == nullptr) return false;
     const auto set = reinterpret_cast<SetOnExit>(::dlsym(x11, "XSetIOErrorExitHandler"));
-    void* const display = set != nullptr ? get_display() : nullptr;
+    using OnError = int (*)(void* display);
+    using SetOnError = OnError (*)(OnError on_error);
+    const auto set_on_error = reinterpret_cast<SetOnError>(::dlsym(x11, "XSetIOErrorHandler"));
+    void* const display = set != nullptr && set_on_error != nullptr ? get_display() : nullptr;
     if (display == nullptr) return false;
+    // The first handler ends the process unless it is replaced, the second one if the first
+    // returns.
+    set_on_error([](void*) { return 0; });
     set(
         display, [](void*, void* user) { *static_cast<std::atomic<bool>*>(user) = true; }, &lost);
     return true;
