@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Keeps what `darb compare` found on data sets in assets/results/scenes_lavapipe.json and writes its tables into
-docs/paper.md.
+docs/experiments/kernels_on_photos.md.
 
     tools/scene_tables.py TITLE=COMPARE.json...     takes these comparisons, one table each; others stay
     tools/scene_tables.py                           only writes the page again
@@ -13,7 +13,7 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FIGURES = os.path.join(ROOT, "assets/results/scenes_lavapipe.json")
-PAGE = os.path.join(ROOT, "docs/paper.md")
+PAGE = os.path.join(ROOT, "docs/experiments/kernels_on_photos.md")
 KEPT = {"psnr_db": 3, "ssim": 4, "lpips": 4, "model_mb": 3, "splats": 0, "peak_mb": 1, "training_s": 1}
 BLENDING = {"blended_per_pixel": 1, "pairs_per_splat": 2, "blend_ms": 1, "ns_per_splat_pixel": 2, "frame_ms": 1}
 

@@ -3,9 +3,9 @@
 set -uo pipefail
 fake=$(mktemp -d)
 trap 'rm -rf "$fake"' EXIT
-mkdir -p "$fake/tools" "$fake/docs" "$fake/assets/results"
+mkdir -p "$fake/tools" "$fake/docs/experiments" "$fake/assets/results"
 cp "$(cd "$(dirname "$0")/../../tools" && pwd)/scene_tables.py" "$fake/tools"
-page=$fake/docs/paper.md figures=$fake/assets/results/scenes_lavapipe.json
+page=$fake/docs/experiments/kernels_on_photos.md figures=$fake/assets/results/scenes_lavapipe.json
 failed=0
 check() { # NAME PATTERN TEXT
     if grep -qE -- "$2" <<<"$3"; then echo "ok      $1"; else
