@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The tables of docs/accuracy.md and docs/effects.md: what accuracy costs on some scenes, and what effects each data set calls for.
+"""Tables of what accuracy costs on some scenes (docs/experiments/accuracy_cost.md) and of what effects each data set calls
+for (docs/effects.md).
 
     tools/show_costs.py --darb build/darb --scene NAME=SCENE[,DATASET] ... [--quick]
         runs `darb cost` on each scene; writes OUT/accuracy_cost.json
@@ -9,7 +10,7 @@
 
 --out OUT: default assets/results. --prefix "chrt -r 4": put before each measuring command. --note TEXT: about the
 machine, kept in the files. Results of scenes that are not named this time are kept. Every call, one without scenes
-too, rewrites the tables of docs/accuracy.md and docs/effects.md.
+too, rewrites the tables of both pages.
 """
 
 import argparse
@@ -90,6 +91,21 @@ def cost_cell(row):
     return f"**{text}**" if row["on_front"] else text
 
 
+def answer_table(answers):
+    """The sentences of `darb cost` on what is fastest under a condition, a row each."""
+    form = re.compile(r"Fastest (?:with|within|at) (.*): (.*), ([\d.]+) ms a frame, ([\d.]+) times as fast as balanced, "
+                      r"([\d.]+ dB) from the truth(?:, ([\d.]+ dB) against the photos)?\.")
+    rows = []
+    for answer in answers:
+        found = form.fullmatch(answer)
+        if not found:
+            sys.exit(f"accuracy_cost.json: no settings, times and errors in '{answer}'; `darb cost` says it otherwise now")
+        rows.append([cell or "" for cell in found.groups()])
+    return ["| fastest with | settings | ms | beside balanced | from the truth | photos |", "|---|---|---|---|---|---|",
+            *(f"| {what} | {settings} | {ms} | {ratio} times as fast | {truth} | {photos} |"
+              for what, settings, ms, ratio, truth, photos in rows)]
+
+
 def cost_tables(costs):
     """Settings alone and presets, a column a scene; then the answers and the front of each."""
     single = [s for s in SETTINGS_FIRST if any(s == r["name"] for scene in costs.values() for r in scene["rows"])]
@@ -109,7 +125,7 @@ def cost_tables(costs):
         for row in sorted((r for r in scene["rows"] if r["on_front"]), key=lambda r: r["ms"]["median"]):
             photos = f" {row['photos']['psnr_db']:.2f} dB |" if "photos" in row else ""
             lines.append(f"| {row['name']} | {row['ms']['median']:.1f} | {row['error']['psnr_db']:.1f} dB |{photos}")
-        lines += [""] + [f"- {answer}" for answer in scene["answers"]]
+        lines += ["", *answer_table(scene["answers"])]
     return "\n".join(lines)
 
 
@@ -135,7 +151,7 @@ def compared_table(plans):
 
 
 def write_docs(costs, plans):
-    for page, tables in (("docs/accuracy.md", {"costs": cost_tables(costs)}),
+    for page, tables in (("docs/experiments/accuracy_cost.md", {"costs": cost_tables(costs)}),
                          ("docs/effects.md", {"compared": compared_table(plans), "plans": plan_table(plans)})):
         path = os.path.join(ROOT, page)
         with open(path, encoding="utf-8") as file:
