@@ -2,7 +2,7 @@
 """The guards of the hard cases: which line of the sources holds each, and which test watches it.
 
     tools/guards.py check               strings and tests exist, docs/hard_cases.md says the same
-    tools/guards.py docs                rewrites the tables of docs/hard_cases.md, those of figures from
+    tools/guards.py docs                rewrites its table, and those of docs/experiments/float32.md from
                                         assets/results/truth_lavapipe.json (tools/truth_figures.py)
     tools/guards.py run [NAME...]       disables each guard in turn in a copy of the sources (build-guards)
                                         and fails unless the named test turns red; minutes
@@ -18,7 +18,7 @@ import sys
 import truth_figures
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-DOCS = "docs/hard_cases.md"
+CASES, FIGURES = "docs/hard_cases.md", "docs/experiments/float32.md"
 COPY = "build-guards"
 
 PROJECT = "shaders/forward/project.comp"
@@ -243,27 +243,30 @@ def check():
         full = re.fullmatch(r"(?:\w+/)?(\w+)\.(\w+)(?:/\w+)?", test)
         if full and not re.search(rf"TEST\w*\({full[1]},\s*{full[2]}\)", text):
             problems.append(f"guard {name}: {program} has no TEST({full[1]}, {full[2]})")
-    docs = read(DOCS)
-    for name, table in all_tables().items():
-        if between(docs, name) != table:
-            problems.append(f"{DOCS}: the table of {name} is out of date; run tools/guards.py docs")
+    for page, tables in all_tables().items():
+        for name, table in tables.items():
+            if between(read(page), name) != table:
+                problems.append(f"{page}: the table of {name} is out of date; run tools/guards.py docs")
+    errors = between(read(FIGURES), "errors")
     for name in re.findall(r'add\(\s*"(\w+)"', read("engine/check/hard_cases.cpp")):
-        if f"| {name}" not in between(docs, "errors"):
-            problems.append(f"{DOCS}: no errors of the case {name}; see tools/truth_figures.py")
+        if f"| {name}" not in errors:
+            problems.append(f"{FIGURES}: no errors of the case {name}; see tools/truth_figures.py")
     print("\n".join(problems) or f"guards: {len(GUARDS)}, all in place")
     return 1 if problems else 0
 
 
 def all_tables():
-    return {"cases": case_table(), **truth_figures.tables()}
+    """-> {page: {name of a table: text}}"""
+    return {CASES: {"cases": case_table()}, FIGURES: truth_figures.tables()}
 
 
 def write_docs():
-    docs = read(DOCS)
-    for name, table in all_tables().items():
-        docs = between(docs, name, new=table)
-    with open(os.path.join(ROOT, DOCS), "w", encoding="utf-8") as file:
-        file.write(docs)
+    for page, tables in all_tables().items():
+        docs = read(page)
+        for name, table in tables.items():
+            docs = between(docs, name, new=table)
+        with open(os.path.join(ROOT, page), "w", encoding="utf-8") as file:
+            file.write(docs)
     return 0
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Figures of how far the numbers can be trusted: collected from what the checks print, shown in docs/hard_cases.md.
+"""Figures of how far the numbers can be trusted: collected from what the checks print, shown in docs/experiments/float32.md.
 
     tools/truth_figures.py WHAT=FILE...     takes new figures into assets/results/truth_lavapipe.json and leaves the
                                             others as they are; `tools/guards.py docs` then shows them
@@ -156,7 +156,7 @@ def run_table(figures):
 
 
 def tables():
-    """-> {marker of docs/hard_cases.md: text}"""
+    """-> {marker of docs/experiments/float32.md: text}"""
     figures = load()
     found = {"runs": run_table(figures)}
     if "check" in figures:
@@ -180,7 +180,7 @@ def main():
             figures[what] = COLLECT[what](file.read())
     with open(os.path.join(ROOT, FIGURES), "w", encoding="utf-8") as file:
         file.write(json.dumps(figures, indent=1) + "\n")
-    print("tools/guards.py docs writes them into docs/hard_cases.md")
+    print("tools/guards.py docs writes them into docs/experiments/float32.md")
     return 0
 
 
