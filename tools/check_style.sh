@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Include arrows, guards of the hard cases, file length and layout of every source file; prints each violation.
+# Include arrows, guards of the hard cases, file length and layout of every source file, and the length of the sentences
+# of every page; prints each violation.
 #   tools/check_style.sh [--fix] [ROOT]      --fix: let clang-format rewrite the files
 set -uo pipefail
 case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
@@ -13,6 +14,7 @@ cpp_cap=500 command_cap=150 glsl_cap=250 # lines
 failed=0
 
 python3 "$here/check_includes.py" . || failed=1
+python3 "$here/prose.py" --check --root . || failed=1
 [[ ! -f tools/guards.py ]] || python3 tools/guards.py check || failed=1
 
 folders=()

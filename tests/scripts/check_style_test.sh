@@ -84,6 +84,30 @@ printf 'int  x ;\n' >"$root/engine/core/bad.cpp"
 cp "$tools/../.clang-format" "$root/"
 expect "layout" 1 'bad.cpp:1:.*clang-format'
 
+words() { for ((i = 0; i < $1; ++i)); do printf 'word '; done; } # no line break, no full stop
+
+fresh_tree
+mkdir "$root/docs"
+printf '# Page\n\nShort. %send.\n' "$(words 40)" >"$root/docs/bad.md"
+expect "sentence over its cap" 1 'docs/bad.md:3: a sentence of 41 words: word'
+
+fresh_tree
+mkdir "$root/docs"
+printf -- '%send.\n\n- %send\n- %send\n' "$(words 25)" "$(words 26)" "$(words 27)" >"$root/docs/bad.md"
+expect "sentences too long on average" 1 'docs/bad.md:1: 27.0 words a sentence on average, the limit is 25'
+
+fresh_tree
+mkdir "$root/docs"
+{
+    printf '# %s\n\nFewer. %sof 0.5, e.g. `%s` as it is. (So?) "Short."\n' "$(words 50)" "$(words 30)" "$(words 50)"
+    printf 'Short. [%send](https://a.b/c.d?e=f) is short, too.\n\n| a |\n|---|\n| %s |\n\n' "$(words 10)" "$(words 50)"
+    printf 'Short:\n\n    %s\n\n```\n%s\n```\n\n<!-- %s -->\n\n' "$(words 50)" "$(words 50)" "$(words 50)"
+    printf '1. %s\n   %s\n2. %s\n\n   %s\n\n       %s\n' \
+        "$(words 15)" "$(words 15)" "$(words 30)" "$(words 30)" "$(words 50)"
+    printf -- '- %s\n- %s\n  - %s\n\n![%s](a.jpg)\n' "$(words 22)" "$(words 22)" "$(words 22)" "$(words 50)"
+} >"$root/docs/good.md"
+expect "code, tables, headings, lists, abbreviations and decimals are no long sentence" 0 '^prose: 2 pages, 0 over'
+
 fresh_tree
 rm "$root/ARCHITECTURE.md" && printf 'no arrows\n' >"$root/ARCHITECTURE.md"
 expect "architecture without arrows" 1 'no block fenced'
