@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Tables of what accuracy costs on some scenes (docs/experiments/accuracy_cost.md) and of what effects each data set calls
-for (docs/effects.md).
+for (docs/experiments/effect_costs.md).
 
     tools/show_costs.py --darb build/darb --scene NAME=SCENE[,DATASET] ... [--quick]
         runs `darb cost` on each scene; writes OUT/accuracy_cost.json
@@ -152,7 +152,7 @@ def compared_table(plans):
 
 def write_docs(costs, plans):
     for page, tables in (("docs/experiments/accuracy_cost.md", {"costs": cost_tables(costs)}),
-                         ("docs/effects.md", {"compared": compared_table(plans), "plans": plan_table(plans)})):
+                         ("docs/experiments/effect_costs.md", {"compared": compared_table(plans), "plans": plan_table(plans)})):
         path = os.path.join(ROOT, page)
         with open(path, encoding="utf-8") as file:
             text = file.read()
