@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Length of the sentences of each page, in words: how many there are, the average, the longest.
+"""Length of the sentences of each page, in words: how many there are, the average, the longest. Links that lead nowhere.
 
     tools/prose.py [PAGE...] [--root DIR]    a line a page; default: every Markdown file of the top folder, docs and assets
-    tools/prose.py --check                   prints only what is over the limits; exit code 1 if anything is
+    tools/prose.py --check                   prints only what is over the limits, and links to files and headings that are
+                                             not there; exit code 1 if there is anything
     tools/prose.py --over N [PAGE...]        each sentence of more than N words, with its file and line
 
 The limits: 25 words on average, 40 in any sentence. Headings, tables, code blocks, pictures and comments are left out.
@@ -96,6 +97,28 @@ def measure(path):
         return [(line, sentence) for line, text in blocks(file.read()) for sentence in sentences(text)]
 
 
+def anchors(path):
+    """Names under which a page's headings are reached, as GitHub makes them."""
+    with open(path, encoding="utf-8") as file:
+        headings = re.findall(r"^#{1,6} +(.*?)\s*$", file.read(), re.M)
+    return {re.sub(r"[^\w\- ]", "", plain(h.replace("`", "")).lower()).replace(" ", "-") for h in headings}
+
+
+def dead_links(path):
+    """-> [(line number, target)] of links to a file or heading that is not there; addresses of the web are not tried"""
+    with open(path, encoding="utf-8") as file:
+        text = re.sub(r"^(```.*?^```|    .*?)$", lambda m: "\n" * m[0].count("\n"), file.read(), flags=re.M | re.S)
+    found = []
+    for link in re.finditer(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]*`", lambda m: " " * len(m[0]), text)):
+        if re.match(r"[a-z]+:", link[1]):
+            continue
+        name, _, anchor = link[1].partition("#")
+        target = os.path.join(os.path.dirname(path), name) if name else path
+        if not os.path.exists(target) or (anchor and target.endswith(".md") and anchor not in anchors(target)):
+            found.append((text.count("\n", 0, link.start()) + 1, link[1]))
+    return found
+
+
 def pages(root):
     found = [name for name in sorted(os.listdir(root)) if name.endswith(".md")]
     for top in ("docs", "assets"):
@@ -116,7 +139,7 @@ def main():
     width = max([len(name) for name in names] + [4])
     if not options.check and options.over is None:
         print(f"{'page':<{width}}  sentences  average  longest")
-    over = 0
+    over = dead = 0
     for name in names:
         path = name if options.pages and os.path.exists(name) else os.path.join(options.root, name)
         try:
@@ -134,11 +157,14 @@ def main():
                     print(f"{name}:{line}: a sentence of {len(words)} words: {' '.join(words[:8])} ...")
             if options.check and average > AVERAGE:
                 print(f"{name}:1: {average:.1f} words a sentence on average, the limit is {AVERAGE}")
+            for line, target in dead_links(path) if options.check else []:
+                print(f"{name}:{line}: a link to {target}, which is not there")
+                dead += 1
         else:
             print(f"{name:<{width}}  {len(lengths):9}  {average:7.1f}  {longest:7}{'  over' if bad else ''}")
     if options.check:
-        print(f"prose: {len(names)} pages, {over} over {AVERAGE} words on average or {LONGEST} in a sentence")
-    return 1 if over and options.over is None else 0
+        print(f"prose: {len(names)} pages, {over} over {AVERAGE} words on average or {LONGEST} in a sentence, {dead} dead links")
+    return 1 if (over and options.over is None) or dead else 0
 
 
 if __name__ == "__main__":

@@ -104,9 +104,20 @@ mkdir "$root/docs"
     printf 'Short:\n\n    %s\n\n```\n%s\n```\n\n<!-- %s -->\n\n' "$(words 50)" "$(words 50)" "$(words 50)"
     printf '1. %s\n   %s\n2. %s\n\n   %s\n\n       %s\n' \
         "$(words 15)" "$(words 15)" "$(words 30)" "$(words 30)" "$(words 50)"
-    printf -- '- %s\n- %s\n  - %s\n\n![%s](a.jpg)\n' "$(words 22)" "$(words 22)" "$(words 22)" "$(words 50)"
+    printf -- '- %s\n- %s\n  - %s\n\n![%s](https://a.b/a.jpg)\n' "$(words 22)" "$(words 22)" "$(words 22)" "$(words 50)"
 } >"$root/docs/good.md"
-expect "code, tables, headings, lists, abbreviations and decimals are no long sentence" 0 '^prose: 2 pages, 0 over'
+expect "code, tables, headings, lists, abbreviations and decimals are no long sentence" 0 '^prose: 2 pages, 0 over 25 '
+
+fresh_tree
+mkdir "$root/docs"
+printf '# A page: one\n\n[Good](b.md#a-page-one), [good](#a-page-one), `[no](link.md)`.\n\n    [no](link.md)\n' >"$root/docs/b.md"
+expect "links that lead somewhere" 0 '^prose: 2 pages, .*, 0 dead links'
+
+printf '\n[Bad](../docs/nowhere.md)\n' >>"$root/docs/b.md"
+expect "link to no file" 1 'docs/b.md:7: a link to ../docs/nowhere.md, which is not there'
+
+printf '# A\n\n[Bad](#b)\n' >"$root/docs/b.md"
+expect "link to no heading" 1 'docs/b.md:3: a link to #b, which is not there'
 
 fresh_tree
 rm "$root/ARCHITECTURE.md" && printf 'no arrows\n' >"$root/ARCHITECTURE.md"
