@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What it costs that training repeats bit by bit: gradients of a splat-tile pair have a slot of their own and are
+"""What it costs that training repeats bit by bit: gradients of a splat-tile intersection have a slot of their own and are
 summed in order. Builds, in a copy of the sources (build-atomics), the other way: float atomics into one sum a splat;
 trains both in turn on the shipped scene, and prints the milliseconds of the two passes that differ.
 
@@ -27,13 +27,13 @@ CHANGES = [
     ("shaders/lib/reduce.glsl", "partial_rest[slot] += rest;", "atomicAdd(partial_rest[slot], rest);"),
     ("shaders/backward/blend_backward.comp", "#extension GL_KHR_shader_subgroup_arithmetic : require",
      "#extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_shader_atomic_float : require"),
-    ("shaders/backward/blend_backward.comp", "slot = pair_order[number - 1u];", "slot = splat;"),
+    ("shaders/backward/blend_backward.comp", "slot = intersection_from_sorted[number - 1u];", "slot = splat;"),
     ("shaders/backward/project_backward.comp",
-     "const uint begin = pair_begin[i], end = begin + pair_count[i];", "const uint begin = i, end = i + 1u;"),
-    ("engine/raster/backward.cpp", "if (pairs > pair_capacity_ || pair_capacity_ == 0) {",
-     "if (splats > pair_capacity_ || (pair_capacity_ == 0 && pairs + 1 > 0)) {"),
-    ("engine/raster/backward.cpp", "pair_capacity_ = std::max(pairs, 1024u);",
-     "pair_capacity_ = std::max(splats, 1024u);"),
+     "const uint begin = first_intersection[i], end = begin + intersection_count[i];", "const uint begin = i, end = i + 1u;"),
+    ("engine/raster/backward.cpp", "if (intersections > intersection_capacity_ || intersection_capacity_ == 0) {",
+     "if (splats > intersection_capacity_ || (intersection_capacity_ == 0 && intersections + 1 > 0)) {"),
+    ("engine/raster/backward.cpp", "intersection_capacity_ = std::max(intersections, 1024u);",
+     "intersection_capacity_ = std::max(splats, 1024u);"),
 ]
 
 

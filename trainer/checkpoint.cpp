@@ -78,7 +78,7 @@ Json header_of(const Checkpoint& c) {
                 {"overflows", n.overflows},
                 {"longest_list", n.longest_list},
                 {"huge_splats", n.huge_splats},
-                {"most_pairs", n.most_pairs}};
+                {"most_pairs", n.most_intersections}};
 }
 
 // The library converts 1e30 and "true" without a word.
@@ -125,7 +125,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     n.overflows = h.value("overflows", std::uint64_t{0});  // absent in earlier files
     n.longest_list = h.value("longest_list", 0u);
     n.huge_splats = h.value("huge_splats", 0u);
-    n.most_pairs = h.value("most_pairs", 0u);
+    n.most_intersections = h.value("most_pairs", 0u);
     n.culled = h.at("culled").get<decltype(n.culled)>();
 }
 
@@ -281,7 +281,8 @@ bool is_finite(const SplatModel& m, size_t splat) {
                            values.begin() + std::ptrdiff_t(splat * each + each),
                            [](float value) { return std::isfinite(value); });
     };
-    return all(m.position, 3) && all(m.log_scale, 3) && all(m.rotation, 4) && all(m.opacity, 1);
+    return all(m.position, 3) && all(m.log_scale, 3) && all(m.rotation, 4) &&
+           all(m.opacity_logit, 1);
 }
 
 // What the settings say and the state does not follow, which no run writes.

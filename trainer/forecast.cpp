@@ -19,9 +19,9 @@ namespace {
 
 // The stand-in for a trained scene: most trained splats are more opaque than those at the start.
 constexpr float kTrainedLogit = 0;  // of an opacity of a half
-// Trainer's buffers grow to 1.5 times the pairs that did not fit.
-constexpr double kPairRoom = 1.5;
-constexpr std::uint32_t kMinPairsPerSplat = 4;
+// Trainer's buffers grow to 1.5 times the intersections that did not fit.
+constexpr double kIntersectionRoom = 1.5;
+constexpr std::uint32_t kMinIntersectionsPerSplat = 4;
 
 // The measurement: enough to average over, no more than a moment.
 constexpr int kViews = 4, kIterations = 10;
@@ -36,8 +36,8 @@ double seconds_since(Clock::time_point start) {
 }
 
 struct Measurement {
-    double ms = 0;            // an iteration
-    std::uint64_t pairs = 0;  // the most of any frame
+    double ms = 0;                    // an iteration
+    std::uint64_t intersections = 0;  // the most of any frame
 };
 
 // The first round of density control, in which random splats go that no photo holds up.
@@ -106,7 +106,7 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     trainer.restore(state);
     Measurement result;
     trainer.on_result = [&](const IterationResult& r) {
-        result.pairs = std::max<std::uint64_t>(result.pairs, r.pairs);
+        result.intersections = std::max<std::uint64_t>(result.intersections, r.intersections);
     };
     // Compiles, and grows the buffers.
     timed_steps(trainer, std::max(2, static_cast<int>(few.views.size())));
@@ -114,29 +114,29 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
     return result;
 }
 
-double pairs_per_splat(const Measurement& m, const SplatModel& model) {
-    return static_cast<double>(m.pairs) / std::max(static_cast<double>(model.size()), 1.0);
+double intersections_per_splat(const Measurement& m, const SplatModel& model) {
+    return static_cast<double>(m.intersections) / std::max(static_cast<double>(model.size()), 1.0);
 }
 
-// Room that the buffers will have for the pairs of a splat.
-double pair_room(double pairs) {
-    return std::max(double{kMinPairsPerSplat}, kPairRoom * pairs);
+// Room that the buffers will have for the intersections of a splat.
+double intersection_room(double intersections) {
+    return std::max(double{kMinIntersectionsPerSplat}, kIntersectionRoom * intersections);
 }
 
-// Splats and pairs at the end: of the splats that are wanted no more than a budget of memory leaves
-// room for, where Trainer's growth stops.
-void fit_size(const Device& device, const TrainOptions& options, std::uint32_t wanted, double pairs,
-              Forecast& f) {
-    const double room = pair_room(pairs);
+// Splats and intersections at the end: of the splats that are wanted no more than a budget of
+// memory leaves room for, where Trainer's growth stops.
+void fit_size(const Device& device, const TrainOptions& options, std::uint32_t wanted,
+              double intersections, Forecast& f) {
+    const double room = intersection_room(intersections);
     const auto demand_for = [&](std::uint64_t splats) {
         f.demand.splats = splats;
-        f.demand.pairs = static_cast<std::uint64_t>(room * static_cast<double>(splats));
+        f.demand.intersections = static_cast<std::uint64_t>(room * static_cast<double>(splats));
     };
     f.splats = wanted;
     demand_for(wanted);
     if (!options.max_memory_bytes) return;
     MemoryDemand grown = f.demand;
-    grown.pairs += grown.pairs / 2;
+    grown.intersections += grown.intersections / 2;
     const std::uint64_t within = std::max<std::uint64_t>(
         splats_within(device, grown, *options.max_memory_bytes), f.start_splats);
     f.splats = static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, within));
@@ -154,7 +154,7 @@ void measure_ramp(Device& device, const Dataset& few, const SplatModel& start,
         for (View& view : smaller.views) view.camera = divided(view.camera, step.divisor);
         const Measurement measured = measure_training(device, smaller, start, options);
         f.ramp_ms.push_back(measured.ms);
-        if (at_start > 0) f.start_pairs = pairs_per_splat(measured, start);
+        if (at_start > 0) f.start_intersections = intersections_per_splat(measured, start);
         const int before = std::clamp(at_start, 0, step.iterations);
         at_start -= before;
         const double saved = 1 - f.ramp_ms.back() / f.start_ms;
@@ -173,7 +173,7 @@ SplatModel surface_model(const Dataset& dataset, TrainOptions options, const Spl
     // Their distances are the cube root of the volume for each.
     const auto shrink = static_cast<float>(std::log(static_cast<double>(model.size())) / 6);
     for (float& scale : model.log_scale) scale -= shrink;
-    std::fill(model.opacity.begin(), model.opacity.end(), kTrainedLogit);
+    std::fill(model.opacity_logit.begin(), model.opacity_logit.end(), kTrainedLogit);
     return model;
 }
 
@@ -188,22 +188,23 @@ double share_of_the_end(const TrainOptions& options, const Forecast& f) {
            (double(f.splats) - f.start_splats);
 }
 
-// Times and pairs of the forecast, from the count at the start and one near that at the end.
+// Times and intersections of the forecast, from the count at the start and one near that at the
+// end.
 void measure_both(Device& device, const Dataset& dataset, const SplatModel& start,
                   const TrainOptions& options, Forecast& f) {
     const Dataset few = some_views(dataset);
     const Measurement at_start = measure_training(device, few, start, options);
     f.start_ms = f.end_ms = at_start.ms;
-    f.start_pairs = pairs_per_splat(at_start, start);
+    f.start_intersections = intersections_per_splat(at_start, start);
     const std::uint32_t wanted = f.splats;
-    fit_size(device, options, wanted, f.start_pairs, f);
+    fit_size(device, options, wanted, f.start_intersections, f);
     const std::uint32_t most = device.info().type == "cpu" ? kMostMeasuredCpu : kMostMeasuredGpu;
     const std::uint32_t count = std::min(f.splats, most);
     const SplatModel later = f.falls ? surface_model(dataset, options, start, count)
                                      : split_model(start, count, options.seed);
     if (f.falls || later.size() != start.size()) {
         const Measurement at_end = measure_training(device, few, later, options);
-        fit_size(device, options, wanted, pairs_per_splat(at_end, later), f);
+        fit_size(device, options, wanted, intersections_per_splat(at_end, later), f);
         const auto measured = static_cast<double>(later.size());
         const double ms = f.falls ? at_end.ms : std::max(at_end.ms, at_start.ms);
         const double per_splat = f.falls ? ms / std::max(1.0, measured)
@@ -255,9 +256,10 @@ void find_peak(const Device& device, const TrainOptions& options, const MemoryDe
     early.sh_degree =
         predict_degree(options, f.falls ? first_round(schedule) + 1 : ramp_end(schedule, f));
     early.splats = splats_with_smaller_photos(schedule, f);
-    const double room = f.falls ? pair_room(f.start_pairs)
-                                : double(f.demand.pairs) / std::max(1.0, double(f.demand.splats));
-    early.pairs = static_cast<std::uint64_t>(room * double(early.splats));
+    const double room =
+        f.falls ? intersection_room(f.start_intersections)
+                : double(f.demand.intersections) / std::max(1.0, double(f.demand.splats));
+    early.intersections = static_cast<std::uint64_t>(room * double(early.splats));
     if (options.max_memory_bytes)  // growth stops before it
         early.splats =
             std::min(early.splats,
@@ -317,7 +319,7 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
         for (size_t a = 0; a < 4; ++a) model.rotation[4 * i + a] = start.rotation[4 * from + a];
         for (size_t a = 0; a < rest; ++a)
             model.sh_rest[rest * i + a] = start.sh_rest[rest * from + a];
-        model.opacity[i] = kTrainedLogit;
+        model.opacity_logit[i] = kTrainedLogit;
     }
     return model;
 }

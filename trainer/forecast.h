@@ -21,9 +21,9 @@ struct Forecast {
     std::vector<double> ramp_ms;      // of each of ramp_steps(), at the count at the start, as far
                                       // as they were measured
     double seconds = 0;               // of the whole run; 0: not measured
-    double start_pairs = 0;           // a splat, of the photos that the start sees; 0: as seconds
-    // At the end. Exact is what the plan makes of it; splats, pairs and degree are as uncertain as
-    // the constants in the .cpp.
+    double start_intersections = 0;   // a splat, of the photos that the start sees; 0: as seconds
+    // At the end. Exact is what the plan makes of it; splats, intersections and degree are as
+    // uncertain as the constants in the .cpp.
     MemoryDemand demand;
     // Where the run needs most memory: at the end, in the last rounds of density control, while the
     // ramp's smaller photos are there, or at the start, where that has more splats.

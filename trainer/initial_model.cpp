@@ -125,7 +125,7 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     const double initial_scale = schedule.initial_scale * schedule.length_scale;
     for (size_t i = 0; i < model.size(); ++i) {
         model.rotation[4 * i] = 1.0f;
-        model.opacity[i] = logit;
+        model.opacity_logit[i] = logit;
         for (int a = 0; a < 3; ++a) {
             const size_t at = 3 * i + a;
             model.position[at] = static_cast<float>(points.position[at] - model.origin[a]);

@@ -10,8 +10,8 @@ namespace darb {
 
 namespace {
 constexpr std::uint32_t kNoLimit = 0xFFFFFFFFu;
-// Of the pairs that the device binds: beyond, splats do not grow in number.
-constexpr double kMostPairs = 0.7;
+// Of the intersections that the device binds: beyond, splats do not grow in number.
+constexpr double kMostIntersections = 0.7;
 }  // namespace
 
 MemoryBudget::MemoryBudget(Device& device, const Dataset& dataset, const TrainOptions& options,
@@ -24,7 +24,7 @@ MemoryDemand MemoryBudget::demand(const HeldMemory& held) const {
     MemoryDemand demand = photos_;
     demand.splats = held.splats;
     demand.room_splats = held.frame.splats;
-    demand.pairs = held.frame.intersections;
+    demand.intersections = held.frame.intersections;
     demand.list_segments = held.frame.list_segments;
     demand.cooperates = held.frame.cooperates;
     demand.sh_degree = held.sh_degree;
@@ -57,16 +57,17 @@ void MemoryBudget::record_round(const HeldMemory& held, std::uint32_t before) {
     planned_bytes_ = std::max(planned_bytes_, round_peak(*device_, round, before, held.splats));
 }
 
-// Of a frame with half more pairs than the fullest so far, in buffers that grew to half more than
-// those. From what a checkpoint holds, not from the size that the buffers came to have: a run that
-// is resumed, or shows other pictures meanwhile, has the same limit.
+// Of a frame with half more intersections than the fullest so far, in buffers that grew to half
+// more than those. From what a checkpoint holds, not from the size that the buffers came to have: a
+// run that is resumed, or shows other pictures meanwhile, has the same limit.
 MemoryDemand MemoryBudget::growth_demand(const HeldMemory& held,
                                          const TrainCounters& counters) const {
     MemoryDemand grown = demand(held);
-    std::uint64_t most = counters.most_pairs;
+    std::uint64_t most = counters.most_intersections;
     if (held.divisor > 1) {
         // Photos of the ramp's larger step are still to come, and frames in which a splat has more
-        // pairs: at the sizes that splats come to, about as many times more as sides are longer.
+        // intersections: at the sizes that splats come to, about as many times more as sides are
+        // longer.
         grown.small_pixels = std::max(grown.small_pixels, photos_.small_pixels);
         most *= static_cast<std::uint64_t>(held.divisor);
     }
@@ -74,8 +75,8 @@ MemoryDemand MemoryBudget::growth_demand(const HeldMemory& held,
         grown.sh_degree = grown.sh_degree == 0 ? std::min(1, options_.sh_degree)
                                                : predict_degree(options_, options_.iterations);
     grown.room_splats = 0;
-    grown.pairs = std::max(4 * grown.splats, most + most / 2);
-    grown.pairs += grown.pairs / 2;
+    grown.intersections = std::max(4 * grown.splats, most + most / 2);
+    grown.intersections += grown.intersections / 2;
     grown.list_segments = counters.longest_list > LIST_SEGMENT ? 2 : photos_.list_segments;
     grown.cooperates = photos_.cooperates || counters.huge_splats > 0;
     grown.densifies = true;
@@ -102,8 +103,9 @@ std::uint32_t MemoryBudget::splats_within_memory(const HeldMemory& held,
 
 std::uint32_t MemoryBudget::growth_limit(const HeldMemory& held, const TrainCounters& counters) {
     within_memory_ = splats_within_memory(held, counters);
-    const bool near = counters.most_pairs > kMostPairs * FrameBuffers::max_intersections(*device_);
-    if (near && stopped_by_pairs_ == 0) stopped_by_pairs_ = held.splats;
+    const bool near = counters.most_intersections >
+                      kMostIntersections * FrameBuffers::max_intersections(*device_);
+    if (near && stopped_by_intersections_ == 0) stopped_by_intersections_ = held.splats;
     limit_ = std::min({options_.max_splats.value_or(kNoLimit), within_memory_,
                        GpuSplats::max_count(*device_, options_.sh_degree, true),
                        near ? held.splats : kNoLimit});

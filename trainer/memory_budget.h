@@ -1,6 +1,6 @@
 // MemoryBudget: what a run takes of device memory while it goes: the plan for what it holds now,
-// the peak of all plans so far, and where a budget, or the pairs that the device binds, stop the
-// growth.
+// the peak of all plans so far, and where a budget, or the intersections that the device binds,
+// stop the growth.
 #pragma once
 
 #include <array>
@@ -43,14 +43,14 @@ class MemoryBudget {
     /// frame works with still has the size from before it.
     void record_round(const HeldMemory& held, std::uint32_t before);
 
-    /// The most splats that a round may come to, by what is asked for, memory and pairs.
+    /// The most splats that a round may come to, by what is asked for, memory and intersections.
     std::uint32_t growth_limit(const HeldMemory& held, const TrainCounters& counters);
     /// After the round that had this limit: whether memory stopped it.
     void end_round(std::uint32_t splats);
     /// The splats at which TrainOptions::max_memory_bytes stopped the growth; 0: it did not.
     std::uint32_t stopped_by_memory() const { return stopped_by_memory_; }
-    /// The same where frames came near the pairs that the device's bindings hold.
-    std::uint32_t stopped_by_pairs() const { return stopped_by_pairs_; }
+    /// The same where frames came near the intersections that the device's bindings hold.
+    std::uint32_t stopped_by_intersections() const { return stopped_by_intersections_; }
 
     bool has_room_for_degree(const HeldMemory& held, int degree) const;
 
@@ -66,7 +66,7 @@ class MemoryBudget {
     std::array<std::uint64_t, 6> recorded_{};
     std::uint64_t planned_bytes_ = 0;
     std::uint32_t limit_ = 0, within_memory_ = 0;  // of the round under way
-    std::uint32_t stopped_by_memory_ = 0, stopped_by_pairs_ = 0;
+    std::uint32_t stopped_by_memory_ = 0, stopped_by_intersections_ = 0;
 };
 
 }  // namespace darb

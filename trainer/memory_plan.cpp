@@ -19,7 +19,7 @@ namespace darb {
 namespace {
 
 constexpr std::uint64_t kFewest =
-    1024;  // splats and pairs that FrameBuffers and Backward make room for
+    1024;  // splats and intersections that FrameBuffers and Backward make room for
 
 FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     const auto room = [](std::uint64_t wanted, std::uint64_t most) {
@@ -27,7 +27,7 @@ FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     };
     FrameSize size;
     size.splats = room(std::max(demand.splats, demand.room_splats), 0xFFFFFFFFu);
-    size.intersections = room(demand.pairs, FrameBuffers::max_intersections(device));
+    size.intersections = room(demand.intersections, FrameBuffers::max_intersections(device));
     size.pixels = std::uint64_t(demand.width) * demand.height;
     size.tiles = image_tiles(demand.width, demand.height);
     size.list_segments = demand.list_segments;
@@ -85,7 +85,7 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     plan.moments = moment_bytes(demand.splats, demand.sh_degree, false) +
                    rest_sum_bytes(demand.splats, demand.sh_degree, demand.rest_sum);
     plan.frame = bytes.splats;
-    plan.pairs = bytes.intersections;
+    plan.intersections = bytes.intersections;
     plan.photos = demand.photo_pixels * 4;
     plan.images = bytes.images + image_bytes(device, demand);
     plan.effects = effect_bytes(demand) + strategy_bytes(demand);
@@ -115,11 +115,12 @@ MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand) {
 
 std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
                             std::uint64_t budget_bytes) {
-    const double pairs = double(demand.pairs) / std::max(double(demand.splats), 1.0);
+    const double intersections =
+        double(demand.intersections) / std::max(double(demand.splats), 1.0);
     const auto total = [&](std::uint64_t splats) {
         MemoryDemand d = demand;
         d.splats = splats;
-        d.pairs = static_cast<std::uint64_t>(pairs * static_cast<double>(splats));
+        d.intersections = static_cast<std::uint64_t>(intersections * static_cast<double>(splats));
         return plan_memory(device, d).total();
     };
     const std::uint64_t fixed_bytes = total(0), all_bytes = total(demand.splats);
@@ -151,8 +152,8 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
     }
     demand.exposure_photos = options.exposure ? training : 0;
     demand.smoothing_photos = options.antialias ? training : 0;
-    // With Crowds::always every frame is cut and shared from the first on.
-    if (options.crowds == Crowds::always) {
+    // With HugeSplatPath::always every frame is cut and shared from the first on.
+    if (options.huge_splat_path == HugeSplatPath::always) {
         demand.cooperates = true;
         demand.list_segments = 2;
     }

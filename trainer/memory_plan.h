@@ -1,6 +1,6 @@
-// MemoryPlan: how much device memory a training run takes. Exact where splats, pairs and degree are
-// given: it adds up the lists from which the parts of the trainer make their buffers. What a run
-// will come to is another matter, see forecast.h.
+// MemoryPlan: how much device memory a training run takes. Exact where splats, intersections and
+// degree are given: it adds up the lists from which the parts of the trainer make their buffers.
+// What a run will come to is another matter, see forecast.h.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +16,12 @@ namespace darb {
 
 /// What decides the size of a run.
 struct MemoryDemand {
-    std::uint64_t splats = 0;  // N
-    std::uint64_t pairs = 0;   // K that the buffers hold
-    int sh_degree = 3;         // of the buffers
-    bool rest_sum = false;     // harmonics make a step in some iterations only
-    bool densifies = true;     // density control runs at this N
-    bool averages = false;     // the run ends with a mean of the splats
+    std::uint64_t splats = 0;         // N
+    std::uint64_t intersections = 0;  // K that the buffers hold
+    int sh_degree = 3;                // of the buffers
+    bool rest_sum = false;            // harmonics make a step in some iterations only
+    bool densifies = true;            // density control runs at this N
+    bool averages = false;            // the run ends with a mean of the splats
     ForwardOptions frame;
     std::uint64_t room_splats = 0;       // N that the frame's buffers hold, where there were more
     std::uint32_t list_segments = 1;     // as FrameSize
@@ -41,18 +41,18 @@ struct MemoryDemand {
 /// Bytes of device memory, by what they are for.
 struct MemoryPlan {
     std::uint64_t parameters = 0, moments = 0;
-    std::uint64_t frame = 0;    // per splat, of the forward and backward passes
-    std::uint64_t pairs = 0;    // per splat-tile pair
-    std::uint64_t photos = 0;   // ground truth
-    std::uint64_t images = 0;   // picture, its gradient, what the passes share
-    std::uint64_t effects = 0;  // of per-photo exposure, of the 3D filter and of the strategy
+    std::uint64_t frame = 0;          // per splat, of the forward and backward passes
+    std::uint64_t intersections = 0;  // per splat-tile intersection
+    std::uint64_t photos = 0;         // ground truth
+    std::uint64_t images = 0;         // picture, its gradient, what the passes share
+    std::uint64_t effects = 0;        // of per-photo exposure, of the 3D filter and of the strategy
     // For a time, beyond the rest: while density control runs; after it, the mean of the last
     // iterations, and while host and device copy.
     std::uint64_t densify = 0, average = 0, staging = 0;
 
     /// What is there between iterations, before the mean is.
     std::uint64_t resident() const {
-        return parameters + moments + frame + pairs + photos + images + effects;
+        return parameters + moments + frame + intersections + photos + images + effects;
     }
     std::uint64_t total() const { return resident() + std::max(densify, average + staging); }
 };
@@ -66,13 +66,13 @@ MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand);
 std::uint64_t round_peak(const Device& device, const MemoryDemand& demand, std::uint32_t before,
                          std::uint32_t after);
 
-/// The most splats whose plan stays within budget_bytes, with pairs in the demand's proportion to
-/// splats; 0 where the photos alone exceed it.
+/// The most splats whose plan stays within budget_bytes, with intersections in the demand's
+/// proportion to splats; 0 where the photos alone exceed it.
 std::uint64_t splats_within(const Device& device, const MemoryDemand& demand,
                             std::uint64_t budget_bytes);
 
-/// What a data set, the run's effects and its strategy demand: all but splats, pairs and densifies.
-/// sh_degree: the highest that the run may reach. Of a resolution ramp: its larger step.
+/// What a data set, the run's effects and its strategy demand: all but splats, intersections and
+/// densifies. sh_degree: the highest that the run may reach. Of a resolution ramp: its larger step.
 void add_photos(const std::vector<View>& views, const TrainOptions& options, MemoryDemand& demand);
 
 }  // namespace darb

@@ -24,7 +24,7 @@ AdamStep Optimizer::rates(int iteration) const {
     step.rate[kPosition] = static_cast<float>(now.position * extent_);
     step.rate[kLogScale] = now.scale;
     step.rate[kRotation] = now.rotation;
-    step.rate[kOpacity] = now.opacity;
+    step.rate[kOpacityLogit] = now.opacity;
     step.rate[kShDc] = now.sh_dc;
     step.rate[kShRest] = now.sh_rest;
     step.rest_every = schedule_.rest_every;

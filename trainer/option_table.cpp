@@ -206,8 +206,8 @@ Json settings_json(const TrainOptions& options) {
     for (const OptionRow& row : option_rows()) {
         if (*row.setting == '\0' || (row.stands && !row.stands(options, schedule))) continue;
         Json& place = settings[Json::json_pointer(row.setting)];
-        if (row.settled) {
-            place = row.settled(options, schedule);
+        if (row.resolved) {
+            place = row.resolved(options, schedule);
             continue;
         }
         std::visit(

@@ -45,7 +45,7 @@ struct OptionRow {
     bool is_switch = false;       // a flag without a value; after "!" the flag for false
     bool is_size = false;         // bytes, with a unit, as 1.5GB
     /// What comes of it, for the settings; nullptr: the member.
-    nlohmann::json (*settled)(const TrainOptions&, const Schedule&) = nullptr;
+    nlohmann::json (*resolved)(const TrainOptions&, const Schedule&) = nullptr;
     /// Whether the settings have it; nullptr: always. Files from before an option lack it.
     bool (*stands)(const TrainOptions&, const Schedule&) = nullptr;
 };
@@ -65,7 +65,7 @@ std::string limits_text(const OptionRow& row);
 /// it takes: no number, one that is not finite or not whole where it must be, or out of limits.
 void set_option(const OptionRow& row, const std::string& text, TrainOptions& options);
 
-/// Every option that changes the result, settled, as one JSON object.
+/// Every option that changes the result, resolved, as one JSON object.
 nlohmann::json settings_json(const TrainOptions& options);
 
 }  // namespace darb

@@ -23,7 +23,8 @@ struct TrainOptions {
     Footprint footprint = Footprint::psi;
     Accuracy accuracy;  // footprint and SH degree aside: they are the two here
     int sh_degree = 3;
-    std::optional<int> sh_interval;  // iterations to the next degree; absent: 1,000 over the pace
+    std::optional<int>
+        sh_interval;  // iterations to the next degree; absent: 1,000 over Schedule::speedup
     // false: a degree is added at each interval. true: the first only where a probe on training
     // photos set aside gains, tried again after as many iterations as before. The others follow:
     // probes of a few iterations refuse them wrongly, and without these degrees the shipped scene
@@ -34,7 +35,7 @@ struct TrainOptions {
     float exposure_lr_init = 0.001f, exposure_lr_final = 0.0001f;
     ProjectionEffects projection;  // but for its antialias and smoothing, which are antialias
     bool alpha = true;             // false: every photo is opaque, its alpha is not read
-    Crowds crowds = Crowds::by_counters;
+    HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;
     bool white_background = false;  // what pictures are compared over; black otherwise
     bool random_background = true;  // train over another colour each iteration: no surface can
                                     // stay half transparent to borrow the background's colour
@@ -43,13 +44,13 @@ struct TrainOptions {
     // Learning rates of Adam; position is log-linear over the run and in units of the scene extent.
     // Absent: 1.6e-4 to 1.6e-6, higher by the root of 30,000 / iterations, without which short runs
     // end before positions settle (fox at 200 px, after 2,500 of 4,000: 27.95 dB with, 27.81
-    // without); 0.005 and 0.001 times the pace, 0.05 times its root.
+    // without); 0.005 and 0.001 times Schedule::speedup, 0.05 times its root.
     std::optional<float> position_lr_init, position_lr_final;
     std::optional<float> scale_lr, rotation_lr, opacity_lr;
     float sh_dc_lr = 2.5e-3f;
     // Whether the rate of the other bands, a twentieth of it, is multiplied by 30,000 / iterations,
     // at most 10: they come late in a run. ARCHITECTURE has what that brings.
-    bool sh_rest_hastens = true;
+    bool speed_up_sh_rest = true;
     // These bands make a step in every so many iterations, of their mean gradient, at the root of
     // as many times the rate: what Adam reads and writes for them is most of what it moves. Absent:
     // as the strategy has it.
@@ -65,11 +66,11 @@ struct TrainOptions {
     std::optional<double> final_lr_share;
 
     // Whether runs of fewer than 4,000 iterations learn shapes and opacities, grow, and come to
-    // their degrees of colour faster; see Schedule::pace.
-    bool paced = true;
+    // their degrees of colour faster; see Schedule::speedup.
+    bool speed_up_short_runs = true;
 
-    // Density control. Absent: rounds after 500 iterations and then every 100, over the pace, until
-    // the part of the run that the strategy has.
+    // Density control. Absent: rounds after 500 iterations and then every 100, over
+    // Schedule::speedup, until the part of the run that the strategy has.
     Strategy strategy{};  // the first of the table
     std::optional<int> densify_from, densify_until, densify_interval;
     float densify_grad_threshold = 2e-4f;  // NDC units

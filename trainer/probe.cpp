@@ -8,7 +8,7 @@ namespace darb {
 
 namespace {
 
-constexpr float kArmIterations = 150;    // over the root of the pace
+constexpr float kArmIterations = 150;    // over the root of Schedule::speedup
 constexpr std::size_t kFewestViews = 8;  // fewer photos leave none to set aside: the schedule holds
 constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 
@@ -40,7 +40,7 @@ double DegreeProbe::train_arm(const TrainerState& start, int degree, const Probe
     TrainerState state = start;
     set_degree(state, degree);
     fork.restore(state);
-    const auto iterations = std::lround(kArmIterations / std::sqrt(schedule_.pace));
+    const auto iterations = std::lround(kArmIterations / std::sqrt(schedule_.speedup));
     for (long i = 0; i < iterations; ++i) {
         const int iteration = start.iteration + 1 + static_cast<int>(i);
         const float share =

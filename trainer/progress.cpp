@@ -66,7 +66,7 @@ void Progress::note(const std::string& line) {
     say_text(fmt::format(fmt::runtime(terminal_ ? "\r{}\033[K\n" : "{}\n"), printable(line)));
 }
 
-void Progress::new_pace(int iteration) {
+void Progress::restart_rate(int iteration) {
     first_ = iteration;
     start_ = Clock::now();
 }

@@ -18,7 +18,7 @@ class Progress {
     /// A line of its own (evaluation, saved file), leaving the bar intact.
     void note(const std::string& line);
     /// From this iteration on they take another time: rate and time left count from here.
-    void new_pace(int iteration);
+    void restart_rate(int iteration);
     /// So many seconds were no training: a pause.
     void leave_out(double seconds);
     void finish();

@@ -136,7 +136,8 @@ class Run {
     RunSummary summary_;
     IterationResult latest_;
     size_t told_probes_ = 0;
-    std::uint32_t told_by_memory_ = 0, told_by_pairs_ = 0;  // the splats at which growth stopped
+    std::uint32_t told_by_memory_ = 0,
+                  told_by_intersections_ = 0;  // the splats at which growth stopped
     bool told_no_mean_ = false;
     int told_divisor_ = 1;
     bool whole_ = false;  // between two iterations, when the splats can be saved
@@ -316,7 +317,7 @@ void Run::save_what_is_there(bool failed) {
                                    run_.output.string()));
 }
 
-// Of the backward blend, where that holds more pairs.
+// Of the backward blend, where that holds more intersections.
 std::string Run::other_way() const {
     if (result_tuning(device_) == "backward=subgroup") return "";
     return fmt::format(
@@ -370,7 +371,7 @@ void Run::report_resolution() {
     if (divisor == told_divisor_) return;
     told_divisor_ = divisor;
     const int i = trainer_.iteration();
-    progress_.new_pace(i);
+    progress_.restart_rate(i);
     log_.resolution(i, divisor);
     progress_.note(divisor == 1
                        ? fmt::format("iteration {}: photos at their full size", i)
@@ -391,11 +392,11 @@ void Run::report_memory() {
         log_.growth_stopped(trainer_.iteration(), limit, told = splats);
     };
     tell(trainer_.stopped_by_memory(), told_by_memory_, "memory", "--max-memory");
-    tell(trainer_.stopped_by_pairs(), told_by_pairs_, "pairs",
-         fmt::format(
-             "frames come near the {} pairs of splats and tiles that this device can hold; a "
-             "smaller -r leaves room{}",
-             FrameBuffers::max_intersections(device_), other_way()));
+    tell(trainer_.stopped_by_intersections(), told_by_intersections_, "pairs",
+         fmt::format("frames come near the {} intersections of splats with tiles that this device "
+                     "can hold; a "
+                     "smaller -r leaves room{}",
+                     FrameBuffers::max_intersections(device_), other_way()));
 }
 
 void Run::report_probes() {

@@ -193,7 +193,7 @@ void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, 
                        const std::vector<PassTotal>& totals) {
     counts_.splats += r.splats;
     counts_.visible += r.visible;
-    counts_.pairs += r.pairs;
+    counts_.intersections += r.intersections;
     counts_.pixels += r.pixels;
     counts_.rest_floats += r.rest_floats;
     ++counted_;
@@ -214,7 +214,7 @@ void RunLog::iteration(const IterationResult& r, const TrainCounters& counters, 
            {"psnr_db", psnr_sum_ / summed_},
            {"splats", r.splats},
            {"visible", r.visible},
-           {"pairs", r.pairs},
+           {"pairs", r.intersections},
            {"bad_gradients", counters.bad_gradients},
            {"overflows", counters.overflows},
            {"redone_iterations", counters.redone_iterations},
@@ -287,7 +287,8 @@ ReportData RunLog::report_data(const RunSummary& summary) const {
 std::vector<ReportPass> RunLog::passes(const Trainer& trainer) const {
     std::vector<ReportPass> passes;
     FrameCounts mean = counts_;
-    for (double* sum : {&mean.splats, &mean.visible, &mean.pairs, &mean.pixels, &mean.rest_floats})
+    for (double* sum :
+         {&mean.splats, &mean.visible, &mean.intersections, &mean.pixels, &mean.rest_floats})
         *sum /= std::max(counted_, 1.0);
     for (const PassTotal& p : trainer.pass_totals()) {
         const double ms = p.ms / std::max<double>(1.0, double(trainer.timed_iterations()));
@@ -350,7 +351,7 @@ std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& t
         {"overflows", c.overflows},
         {"longest_list", c.longest_list},
         {"huge_splats", c.huge_splats},
-        {"most_pairs", c.most_pairs},
+        {"most_pairs", c.most_intersections},
         {"splats_stopped_by_memory", stopped_by(events_, "memory")},
         {"splats_stopped_by_pairs", stopped_by(events_, "pairs")},
         {"bad_gradients", c.bad_gradients},

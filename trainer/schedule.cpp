@@ -9,8 +9,8 @@ namespace darb {
 
 namespace {
 
-constexpr int kPacedBelow = 4'000;  // iterations
-constexpr float kMostPace = 5, kMostHaste = 10;
+constexpr int kShortRun = 4'000;  // iterations
+constexpr float kMostSpeedup = 5, kMostRateScale = 10;
 constexpr std::size_t kPhotosThatBear = 50;
 
 struct RampSize {
@@ -20,26 +20,26 @@ struct RampSize {
 constexpr RampSize kRampSizes[] = {{4, 0.1}, {2, 0.3}};
 constexpr int kSmallestSide = 100;  // px
 
-// A run that is shorter than kPacedBelow is that run in fast motion, at most kMostPace times.
-float pace_of(const TrainOptions& o) {
-    const float times = float(kPacedBelow) / static_cast<float>(std::max(o.iterations, 1));
-    return o.paced ? std::clamp(times, 1.0f, kMostPace) : 1.0f;
+// A run that is shorter than kShortRun is that run in fast motion, at most kMostSpeedup times.
+float speedup_of(const TrainOptions& o) {
+    const float times = float(kShortRun) / static_cast<float>(std::max(o.iterations, 1));
+    return o.speed_up_short_runs ? std::clamp(times, 1.0f, kMostSpeedup) : 1.0f;
 }
 
 // Of what would not settle in a run shorter than the 30,000 iterations of 3DGS.
-float haste_of(const TrainOptions& o) {
+float rate_scale_of(const TrainOptions& o) {
     return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(o.iterations, 1))));
 }
 
-int paced(std::optional<int> given, int usual, float pace) {
-    return given ? *given : static_cast<int>(std::lround(static_cast<float>(usual) / pace));
+int sped_up(std::optional<int> given, int usual, float speedup) {
+    return given ? *given : static_cast<int>(std::lround(static_cast<float>(usual) / speedup));
 }
 
 // Harmonics above the first band: of steps of the mean of so many iterations.
 float rest_rate(const TrainOptions& o, int every) {
     float times = std::sqrt(static_cast<float>(every));
-    const float haste = haste_of(o);
-    if (o.sh_rest_hastens) times *= std::min(haste * haste, kMostHaste);
+    const float rate_scale = rate_scale_of(o);
+    if (o.speed_up_sh_rest) times *= std::min(rate_scale * rate_scale, kMostRateScale);
     return o.sh_dc_lr * std::min(1.0f, times / 20);
 }
 
@@ -69,7 +69,7 @@ Schedule::Resets resets_of(const TrainOptions& o, float prune_opacity,
 Schedule::Schedule(const TrainOptions& o)
     : iterations(o.iterations),
       strategy(o.strategy),
-      pace(pace_of(o)),
+      speedup(speedup_of(o)),
       prune_extent_(o.prune_extent),
       exposure_lr_init_(o.exposure_lr_init),
       exposure_lr_final_(o.exposure_lr_final),
@@ -82,9 +82,9 @@ Schedule::Schedule(const TrainOptions& o)
     opacity_decay = o.opacity_decay.value_or(defaults.opacity_decay);
     rest_every = o.sh_rest_every.value_or(defaults.sh_rest_every);
 
-    degree_interval = paced(o.sh_interval, 1'000, pace);
-    rounds.begin = paced(o.densify_from, 500, pace);
-    rounds.interval = paced(o.densify_interval, 100, pace);
+    degree_interval = sped_up(o.sh_interval, 1'000, speedup);
+    rounds.begin = sped_up(o.densify_from, 500, speedup);
+    rounds.interval = sped_up(o.densify_interval, 100, speedup);
     degree_interval = std::max(degree_interval, 1);
     rounds.interval = std::max(rounds.interval, 1);
     rounds.end = rounds_end(o);
@@ -96,13 +96,14 @@ Schedule::Schedule(const TrainOptions& o)
     if (o.lengths_by_area) length_scale = std::max(1.0, equal_area_scale(o.kernel, o.footprint));
     largest_scale = o.largest_scale.value_or(length_scale > 1 ? 1.0f : 0.0f);
 
-    const float haste = haste_of(o), first_position = o.position_lr_init.value_or(1.6e-4f * haste);
+    const float rate_scale = rate_scale_of(o),
+                first_position = o.position_lr_init.value_or(1.6e-4f * rate_scale);
     first.position = first_position;
-    last_position_rate = o.position_lr_final.value_or(1.6e-6f * haste);
-    first.scale = o.scale_lr.value_or(0.005f * pace) * (length_scale > 1 ? 1.5f : 1.0f);
-    first.rotation = o.rotation_lr.value_or(0.001f * pace);
-    // The root of the pace: with the whole, fewer splats and less time, but 0.8 dB less.
-    first.opacity = o.opacity_lr.value_or(0.05f * std::sqrt(pace));
+    last_position_rate = o.position_lr_final.value_or(1.6e-6f * rate_scale);
+    first.scale = o.scale_lr.value_or(0.005f * speedup) * (length_scale > 1 ? 1.5f : 1.0f);
+    first.rotation = o.rotation_lr.value_or(0.001f * speedup);
+    // The root of the speedup: with the whole, fewer splats and less time, but 0.8 dB less.
+    first.opacity = o.opacity_lr.value_or(0.05f * std::sqrt(speedup));
     first.sh_dc = o.sh_dc_lr;
     first.sh_rest = rest_rate(o, rest_every);
     // A mean settles what large steps scatter.

@@ -65,9 +65,9 @@ class Schedule {
     // Where they are not given, the strategy's.
     float initial_opacity = 0, initial_scale = 0, prune_opacity = 0, opacity_decay = 0;
     int rest_every = 1;  // see TrainOptions::sh_rest_every
-    /// How many times faster a run below kPacedBelow iterations learns shapes and opacities, grows,
-    /// and comes to its degrees of colour: at most kMostPace times.
-    float pace = 1;
+    /// How many times faster a run below kShortRun iterations learns shapes and opacities, grows,
+    /// and comes to its degrees of colour: at most kMostSpeedup times.
+    float speedup = 1;
     int degree_interval = 0;
     /// Density control: rounds every `interval` iterations after `begin` and before `end`.
     struct Rounds {

@@ -62,8 +62,8 @@ SplatModel bake_smoothing(const SplatModel& model, const std::vector<float>& fil
             kept *= s / wide;
             baked.log_scale[3 * i + c] = static_cast<float>(std::log(wide));
         }
-        const double opacity = kept / (1 + std::exp(-double{model.opacity[i]}));
-        baked.opacity[i] = static_cast<float>(std::clamp(
+        const double opacity = kept / (1 + std::exp(-double{model.opacity_logit[i]}));
+        baked.opacity_logit[i] = static_cast<float>(std::clamp(
             std::log(opacity / (1 - opacity)), -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT));
     }
     return baked;

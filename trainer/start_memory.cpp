@@ -40,7 +40,7 @@ MemoryDemand demand_at_start(const Dataset& dataset, const TrainOptions& options
     MemoryDemand demand;
     add_photos(dataset.views, options, demand);
     demand.splats = splats;
-    demand.pairs = splats;  // at least, where a photo sees them
+    demand.intersections = splats;  // at least, where a photo sees them
     demand.densifies = false;
     if (options.probe_sh) demand.sh_degree = 0;
     return demand;

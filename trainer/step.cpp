@@ -15,7 +15,7 @@ ForwardOptions forward_options(const TrainOptions& options) {
     set_options(options.accuracy, f);
     f.effects = options.projection;
     f.effects.antialias = f.effects.smoothing = options.antialias;
-    f.crowds = options.crowds;
+    f.huge_splat_path = options.huge_splat_path;
     f.store_for_backward = true;
     return f;
 }

@@ -19,7 +19,7 @@ void RunTotals::count(const StepOutcome& outcome) {
     counters.bad_gradients += status.bad_gradients;
     counters.longest_list = std::max(counters.longest_list, status.longest_list);
     counters.huge_splats = std::max(counters.huge_splats, status.huge_splats);
-    counters.most_pairs = std::max(counters.most_pairs, status.pairs);
+    counters.most_intersections = std::max(counters.most_intersections, status.intersections);
 }
 
 void RunTotals::add_times(const StepOutcome& outcome) {

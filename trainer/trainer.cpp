@@ -124,7 +124,7 @@ void Trainer::finish(const StepOutcome& outcome) {
     totals_.add_times(outcome);
     if (!on_result) return;
     on_result({outcome.iteration, outcome.loss, psnr_of(outcome.mse), splats_.count(),
-               outcome.status.visible, outcome.status.pairs, outcome.pixels,
+               outcome.status.visible, outcome.status.intersections, outcome.pixels,
                static_cast<int>(splats_.stride(kShRest))});
 }
 

@@ -35,7 +35,7 @@ struct IterationResult {
     int iteration = 0;  // from 1
     double loss = 0;
     double psnr_db = 0;  // of the training view
-    std::uint32_t splats = 0, visible = 0, pairs = 0;
+    std::uint32_t splats = 0, visible = 0, intersections = 0;
     std::uint32_t pixels = 0;  // of the photo, at the size of now
     int rest_floats = 0;       // of a splat's harmonics, as buffers hold them
 };
@@ -89,7 +89,7 @@ class Trainer {
     const std::vector<Probe>& probes() const { return probe_.results(); }
     /// What stopped the growth, see MemoryBudget.
     std::uint32_t stopped_by_memory() const { return memory_.stopped_by_memory(); }
-    std::uint32_t stopped_by_pairs() const { return memory_.stopped_by_pairs(); }
+    std::uint32_t stopped_by_intersections() const { return memory_.stopped_by_intersections(); }
     /// What plan_memory() asks for what the trainer holds now.
     MemoryDemand memory_demand() const { return memory_.demand(held()); }
     /// The peak that the plans for all it held so far come to; Device::peak_bytes measures it.

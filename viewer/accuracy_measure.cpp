@@ -16,7 +16,7 @@ AccuracyMeasure::AccuracyMeasure(const Camera& camera, const DisplaySettings& di
     exact.footprint = own.footprint;
     exact.sh_degree = own.sh_degree;
     exact.effects = own.effects;
-    exact.crowds = own.crowds;
+    exact.huge_splat_path = own.huge_splat_path;
     pictures_ = {{exact, {}}, {now, {}}};
     const auto add = [&](int row) {
         const int count = static_cast<int>(row_choices(row, own.sh_degree).size());

@@ -23,7 +23,7 @@ std::vector<glm::dvec3> sample(const SplatModel& m, float least_logit) {
     std::vector<glm::dvec3> points;
     const size_t step = std::max<size_t>(1, m.size() / kLooked);
     for (size_t i = 0; i < m.size(); i += step)
-        if (m.opacity[i] >= least_logit)
+        if (m.opacity_logit[i] >= least_logit)
             points.emplace_back(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
     return points;
 }

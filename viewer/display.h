@@ -22,11 +22,11 @@ struct DisplaySettings {
     Accuracy accuracy;  // all but footprint and SH degree, which stand here
     int sh_degree = 3;  // highest in use
     ProjectionEffects effects;
-    Crowds crowds = Crowds::by_counters;
+    HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;
     glm::vec3 background{0.0f};
     float near_plane = static_cast<float>(NEAR_DEFAULT);  // world units
     float error_max = 0.25f;   // mean absolute difference that is shown hottest
-    float count_max = 500.0f;  // pairs that are shown hottest
+    float count_max = 500.0f;  // intersections that are shown hottest
 
     bool operator==(const DisplaySettings&) const = default;
 };

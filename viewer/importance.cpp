@@ -17,7 +17,7 @@ std::vector<float> importance(const SplatModel& m, const Bounds& bounds) {
         const glm::dvec3 p(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
         const double distance = std::max(glm::distance(p, middle) / bounds.radius, 1.0);
         // Logarithms: a huge splat is no infinity. ln sigmoid, for any logit.
-        const double x = m.opacity[i];
+        const double x = m.opacity_logit[i];
         const double log_opacity = x < 0 ? x - std::log1p(std::exp(x)) : -std::log1p(std::exp(-x));
         value[i] = static_cast<float>(log_opacity + log_area - 2 * std::log(distance));
     }

@@ -24,8 +24,8 @@ struct MotionCost {
     double total_ms() const { return fixed_ms + splats_ms + pixels_ms; }
 };
 
-/// From the times of the passes: what lies between splats and pixels (splat-tile pairs) counts half
-/// for either. frame_ms: the whole frame.
+/// From the times of the passes: what lies between splats and pixels (splat-tile intersections)
+/// counts half for either. frame_ms: the whole frame.
 MotionCost motion_cost(double frame_ms, std::span<const PassTime> passes);
 
 class MotionControl {

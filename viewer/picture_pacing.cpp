@@ -69,7 +69,7 @@ double PicturePacing::seconds_to_refine(Time now) const {
     return std::max(0.001, kRest_s - seconds_between(changed_at_, now));
 }
 
-double PicturePacing::settle() {
+double PicturePacing::count_still_frame() {
     unsettled_ = step_ == PictureStep::whole ? kSettlingFrames : std::max(unsettled_ - 1, 0);
     return unsettled_ > 0 ? 0 : kForever;
 }

@@ -61,7 +61,7 @@ class PicturePacing {
     void unsettle(int frames = kSettlingFrames) { unsettled_ = frames; }
     /// A frame is over: seconds until the panels want the next, 0 or infinity. A whole picture
     /// unsettles them.
-    double settle();
+    double count_still_frame();
     bool settled() const { return unsettled_ == 0; }
 
     MotionControl& motion() { return motion_; }

@@ -48,7 +48,7 @@ struct FrameTimes {
     double picture_ms = 0;         // wall clock, of the last picture
     double frame_ms = 0;           // the whole frame: picture, panels, presentation
     MotionQuality quality;         // that it had
-    std::uint32_t visible = 0, pairs = 0;
+    std::uint32_t visible = 0, intersections = 0;
     double full_ms = 0;            // of the last picture at full resolution
     std::deque<double> moving_ms;  // whole frames in motion, latest last
 };

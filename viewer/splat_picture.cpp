@@ -32,10 +32,10 @@ SplatModel in_style(const SplatModel& own, SplatStyle style) {
     model.log_scale = own.log_scale;
     for (float& s : model.log_scale)
         s = style == SplatStyle::points ? kPointLogScale : s + kEllipsoidGrowth;
-    model.opacity.assign(own.size(), kOpaqueLogit);
+    model.opacity_logit.assign(own.size(), kOpaqueLogit);
     if (style == SplatStyle::ellipsoids) {  // what is nearly transparent would hide the rest
         for (size_t i = 0; i < model.size(); ++i)
-            if (own.opacity[i] < kTransparentLogit) model.opacity[i] = kRemovedLogit;
+            if (own.opacity_logit[i] < kTransparentLogit) model.opacity_logit[i] = kRemovedLogit;
         model.kernel = KERNEL_GAUSSIAN;
     }
     return model;
@@ -87,10 +87,10 @@ void SplatPicture::clear() {
 void SplatPicture::set_removed(const std::vector<std::uint8_t>& removed) {
     if (!own_) return;
     removed_ = removed;
-    std::vector<float> opacity = model_->opacity;
+    std::vector<float> opacity = model_->opacity_logit;
     for (size_t i = 0; i < removed_.size(); ++i)
         if (removed_[i] != 0) opacity[i] = kRemovedLogit;
-    if (!opacity.empty()) own_->parameters(kOpacity).upload(opacity);
+    if (!opacity.empty()) own_->parameters(kOpacityLogit).upload(opacity);
     styled_.reset();
     some_.reset();
 }
@@ -100,7 +100,7 @@ const GpuSplats& SplatPicture::styled(SplatStyle style) {
     if (styled_ && styled_as_ == style) return *styled_;
     SplatModel model = in_style(*model_, style);
     for (size_t i = 0; i < removed_.size(); ++i)
-        if (removed_[i] != 0) model.opacity[i] = kRemovedLogit;
+        if (removed_[i] != 0) model.opacity_logit[i] = kRemovedLogit;
     styled_.reset();
     styled_.emplace(*device_, model, false);
     styled_as_ = style;
@@ -113,7 +113,7 @@ const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
     if (!some_ || some_as_ != style) {
         SplatModel model = in_style(pick_splats(*model_, important_), style);
         for (size_t i = 0; i < important_.size() && !removed_.empty(); ++i)
-            if (removed_[important_[i]] != 0) model.opacity[i] = kRemovedLogit;
+            if (removed_[important_[i]] != 0) model.opacity_logit[i] = kRemovedLogit;
         compiled_ = true;
         some_.reset();
         some_.emplace(*device_, model, false);
@@ -134,7 +134,7 @@ ForwardOptions SplatPicture::options_for(const Key& key) {
     options.kernel = key.kernel;
     options.footprint = key.footprint;
     options.effects = key.effects;
-    options.crowds = key.crowds;
+    options.huge_splat_path = key.huge_splat_path;
     options.store_for_backward = key.store;
     options.backward_follows = false;
     if (key.ellipsoids) options.alpha_cutoff = kEllipsoidCutoff;
@@ -154,7 +154,7 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
     key.accuracy.choice[kRenderScale] = 0;  // of the camera
     key.effects = display.effects;
     key.effects.antialias &= display.style == SplatStyle::splats;
-    key.crowds = display.crowds;
+    key.huge_splat_path = display.huge_splat_path;
     key.store = display.mode == VIEW_COUNT;
     key.depth = display.mode == VIEW_DEPTH;
     key.ellipsoids = display.style == SplatStyle::ellipsoids && own_;
@@ -228,10 +228,10 @@ void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
                          depth ? glm::vec3(0.0f) : display.background};
     const std::uint64_t bytes = std::uint64_t(camera.width) * camera.height * 4;
     if (pixels_.bytes() < bytes) pixels_ = Buffer(*device_, "pixels", bytes);
-    const std::uint32_t pairs =
+    const std::uint32_t intersections =
         std::max(frame.size.intersections,
                  std::min(shown.count() * 2, FrameBuffers::max_intersections(*device_)));
-    buffers.reserve(shown.count(), pairs, rendered.width, rendered.height);
+    buffers.reserve(shown.count(), intersections, rendered.width, rendered.height);
     do {
         commands_.begin();
         exchange_.send(commands_, view.camera);
@@ -293,7 +293,7 @@ void SplatPicture::record_display(const Frame& frame, const Buffer& image, const
     const Groups g = groups_for(std::uint64_t(args.width) * args.height, VIEW_GROUP);
     commands_.dispatch(pipeline, args,
                        {image, has_photo ? *photo.photo : no_photo_, frame.intersections.tile_range,
-                        frame.images.last_pair, pixels_},
+                        frame.images.last_intersection, pixels_},
                        g.x, g.y);
 }
 

@@ -83,7 +83,7 @@ class SplatPicture {
         Footprint footprint = Footprint::psi;
         Accuracy accuracy;
         ProjectionEffects effects;
-        Crowds crowds = Crowds::by_counters;
+        HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;
         bool ellipsoids = false, store = false, depth = false;
         bool operator==(const Key&) const = default;
     };

@@ -67,7 +67,7 @@ int chosen(int row, const DisplaySettings& display) {
         return -1;
     }
     if (row == effect_row(EFFECT_VIEW_COLOUR)) return display.sh_degree;
-    if (row == effect_row(EFFECT_HUGE)) return static_cast<int>(display.crowds);
+    if (row == effect_row(EFFECT_HUGE)) return static_cast<int>(display.huge_splat_path);
     if (row == kFootprint) return display.footprint == Footprint::exact ? 1 : 0;
     if (row < kAccuracyCount) return display.accuracy.choice[static_cast<size_t>(row)];
     ProjectionEffects effects = display.effects;
@@ -80,7 +80,7 @@ void choose(int row, int choice, DisplaySettings& display) {
     else if (row == effect_row(EFFECT_VIEW_COLOUR))
         display.sh_degree = choice;
     else if (row == effect_row(EFFECT_HUGE))
-        display.crowds = static_cast<Crowds>(choice);
+        display.huge_splat_path = static_cast<HugeSplatPath>(choice);
     else if (row == kFootprint)
         display.footprint = choice == 1 ? Footprint::exact : Footprint::psi;
     else if (row < kAccuracyCount)

@@ -32,7 +32,7 @@ std::optional<glm::dvec3> pick(const SplatModel& m, const std::vector<std::uint8
     std::optional<glm::dvec3> best;
     double best_depth = 0;
     for (size_t i = 0; i < m.size(); ++i) {
-        if ((!removed.empty() && removed[i] != 0) || m.opacity[i] < kPickLogit) continue;
+        if ((!removed.empty() && removed[i] != 0) || m.opacity_logit[i] < kPickLogit) continue;
         const glm::dvec3 world = position_of(m, i);
         const glm::dvec3 p = camera.rotation * world + camera.translation;
         if (p.z <= 0 || (best && p.z >= best_depth)) continue;

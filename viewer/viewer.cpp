@@ -99,10 +99,10 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     if (continuous_) return 0;
     const double refine_s = pacing_.seconds_to_refine(frame_start_);
     if (!picture_.empty() && std::isfinite(refine_s)) return std::min(look_s, refine_s);
-    return std::min(look_s, pacing_.settle());
+    return std::min(look_s, pacing_.count_still_frame());
 }
 
-void Viewer::settle(int width, int height) {
+void Viewer::draw_whole(int width, int height) {
     frame({}, width, height, true);
     pacing_.forget();  // the times are those of a second picture: the first may have compiled
     do frame({}, width, height, true);

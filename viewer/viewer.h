@@ -58,7 +58,7 @@ class Viewer {
     /// frame is wanted: 0 at once, infinity when nothing happens by itself.
     double frame(const Input& input, int width, int height, bool full);
     /// Full frames until the panels, too, have found their size and show the picture's times.
-    void settle(int width, int height);
+    void draw_whole(int width, int height);
     /// The canvas was shown: the whole frame's time is known.
     void presented();
 

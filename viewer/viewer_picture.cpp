@@ -77,7 +77,7 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
     if (whole) t.full_ms = t.picture_ms;
     t.quality = quality;
     t.visible = picture_.status().visible;
-    t.pairs = picture_.status().pairs;
+    t.intersections = picture_.status().intersections;
     if (session_.plan && whole)
         session_.plan->note_frame(picture_.status().huge_splats, picture_.status().longest_list);
 }

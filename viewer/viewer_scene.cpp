@@ -124,7 +124,7 @@ void Viewer::show_as_meant(const Scene& s, bool first) {
     d.effects = {};
     d.effects.antialias = s.model.antialias;
     d.effects.lens = any_lens(session_.photos.views);
-    d.crowds = Crowds::by_counters;
+    d.huge_splat_path = HugeSplatPath::by_counters;
     // That of training, which does not see what is nearer: such splats hang before the training
     // cameras, and a nearer plane would show them. Less only where a scene is so small that it is
     // looked at from nearer.
@@ -149,7 +149,7 @@ void Viewer::follow_plan() {
     const EffectPlan& plan = *session_.plan;
     DisplaySettings& d = session_.display;
     d.effects = plan.projection();
-    d.crowds = plan.crowds();
+    d.huge_splat_path = plan.huge_splat_path();
     d.sh_degree = plan.row(EFFECT_VIEW_COLOUR).degree;
 }
 

@@ -63,7 +63,7 @@ SplatModel poisoned(const SplatModel& healthy, size_t n, std::uint64_t seed) {
                 m.sh_dc[3 * i + rng.below(3)] = std::isfinite(poison) ? 1e38f : kNan;
                 break;
             case 3:
-                m.opacity[i] = rng.below(2) ? kNan : -1e38f;
+                m.opacity_logit[i] = rng.below(2) ? kNan : -1e38f;
                 break;
             default:
                 m.log_scale[3 * i + rng.below(3)] = kNan;
@@ -122,7 +122,7 @@ std::vector<Row> check_hard_case(Device& device, const HardCase& c, const std::s
         rows[0].float_alone =
             compare_row(group, "", truth.image, in_float.image, c.image_tolerance).error;
     }
-    const bool seen = walk.status.visible > 0 && walk.status.pairs > 0;
+    const bool seen = walk.status.visible > 0 && walk.status.intersections > 0;
     if (seen != c.expects_splats)
         rows.push_back(fact_row(group, c.name + " visible splats", false,
                                 fmt::format("{} are visible", walk.status.visible)));

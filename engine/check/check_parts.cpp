@@ -11,7 +11,7 @@
 #include "engine/primitives/scan.h"
 #include "engine/raster/kernel_constants.h"
 #include "engine/raster/loss.h"
-#include "engine/reference/loss.h"
+#include "engine/reference/reference_loss.h"
 #include "shaders/shared/kernel_probe_args.h"
 
 namespace darb::check {

@@ -45,7 +45,7 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
     const size_t floats = size_t(camera.width) * camera.height * 3;
     Buffer d_planes(device, "d_image", floats * sizeof(float));
     if (!d_image.data.empty()) d_planes.upload(to_planes(d_image));
-    buffers.reserve(splats.count(), settings.pairs, camera.width, camera.height);
+    buffers.reserve(splats.count(), settings.intersections, camera.width, camera.height);
 
     Commands commands(device);
     DeviceWalk walk;
@@ -62,7 +62,8 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
     walk.image =
         planes_to_image(frame.images.image.download<float>(floats), camera.width, camera.height);
     if (splats.count() > 0)
-        walk.pair_count = frame.splats.intersection_count.download<std::uint32_t>(splats.count());
+        walk.intersection_count =
+            frame.splats.intersection_count.download<std::uint32_t>(splats.count());
     if (d_image.data.empty()) return walk;
     for (int a = 0; a < kAttributeCount; ++a) walk.d[a] = gradients.download(a);
     const auto sums = gradients.views().download<float>(size_t{splats.count()} * 2);

@@ -16,7 +16,7 @@ struct DeviceWalk {
     ImageF image;                                       // [H][W][3]
     std::array<std::vector<float>, kAttributeCount> d;  // dL/d(attribute), layout of SplatModel
     std::vector<float> mean_gradient_ndc;               // [N] |dL/dmean|
-    std::vector<std::uint32_t> pair_count;              // [N] tiles that list the splat; 0: culled
+    std::vector<std::uint32_t> intersection_count;      // [N] tiles that list the splat; 0: culled
 };
 
 struct WalkSettings {
@@ -27,8 +27,8 @@ struct WalkSettings {
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};
-    int sh_degree = 3;              // in use, at most the model's
-    std::uint32_t pairs = 100'000;  // capacity at first; it grows
+    int sh_degree = 3;                      // in use, at most the model's
+    std::uint32_t intersections = 100'000;  // capacity at first; it grows
 };
 
 ForwardOptions forward_options(const SplatModel& model, const WalkSettings& settings);

@@ -42,7 +42,7 @@ struct Stage {
         m.position[3 * i + 2] = static_cast<float>(depth);
         const float turn[] = {0.9f, 0.1f, -0.3f, 0.2f}, stretch[] = {1, 0.8f, 1.25f};
         for (size_t a = 0; a < 4; ++a) m.rotation[4 * i + a] = turn[(a + i) % 4];
-        m.opacity[i] = static_cast<float>(logit);
+        m.opacity_logit[i] = static_cast<float>(logit);
         for (size_t a = 0; a < 3; ++a) {
             // The centre of the camera has no scale of its own.
             const double world = scale / c.fx * std::max(std::abs(depth), 0.01);
@@ -139,7 +139,7 @@ void Cases::projection() {
     TestScene points = random(80, 104);
     for (size_t i = 0; i < points.model.log_scale.size(); ++i)
         points.model.log_scale[i] = -19.5f + 0.5f * static_cast<float>(i % 3);
-    for (float& o : points.model.opacity) o = 3;
+    for (float& o : points.model.opacity_logit) o = 3;
     add("tiny_determinant", "infinite conic", std::move(points));
 
     TestScene far = random(80, 105);
@@ -183,8 +183,8 @@ void Cases::parameters() {
         if (i % 4 == 0) limits.model.log_scale[3 * i] = -50;
         if (i % 12 == 1)
             for (size_t a = 0; a < 3; ++a) limits.model.log_scale[3 * i + a] = 50;
-        if (i % 4 == 2) limits.model.opacity[i] = 1e4f;
-        if (i % 4 == 3) limits.model.opacity[i] = -1e4f;
+        if (i % 4 == 2) limits.model.opacity_logit[i] = 1e4f;
+        if (i % 4 == 3) limits.model.opacity_logit[i] = -1e4f;
     }
     add("parameter_limits", "overflow of exp", std::move(limits));
 
@@ -244,7 +244,7 @@ void Cases::frames() {
     away.camera.translation.z = -30;
     add("none_visible", "crash of densifiers", std::move(away)).expects_splats = false;
     TestScene faint = random(30, 112);
-    for (float& o : faint.model.opacity) o = -8;
+    for (float& o : faint.model.opacity_logit) o = -8;
     add("all_too_faint", "crash of densifiers", std::move(faint)).expects_splats = false;
     for (const auto& [width, height] : {std::pair{1, 1}, {1, 1024}, {1023, 3}, {17, 5}}) {
         TestScene odd = random(120, 113, 64, 64);

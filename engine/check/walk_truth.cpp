@@ -1,7 +1,7 @@
 #include "engine/check/walk_truth.h"
 
 #include "engine/core/rng.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 
 namespace darb::check {
 

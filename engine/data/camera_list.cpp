@@ -7,7 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/data/pose.h"
 
 namespace darb {

@@ -4,7 +4,7 @@
 
 #include "engine/data/byte_reader.h"
 #include "engine/data/colmap.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/data/pose.h"
 
 namespace darb {

@@ -7,7 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/data/resample.h"
 #include "engine/data/source.h"
 

@@ -67,7 +67,7 @@ SplatModel points_as_splats(const PointCloud& points) {
                 static_cast<float>(dc_of_colour(points.colour[3 * i + k] / 255.0));
         }
         model.rotation[4 * i] = 1;
-        model.opacity[i] = static_cast<float>(std::log(kPointOpacity / (1 - kPointOpacity)));
+        model.opacity_logit[i] = static_cast<float>(std::log(kPointOpacity / (1 - kPointOpacity)));
     }
     return model;
 }

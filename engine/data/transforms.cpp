@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/data/pose.h"
 
 namespace darb {

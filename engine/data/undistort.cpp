@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "engine/core/error.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/data/resample.h"
 
 namespace darb {

@@ -78,9 +78,9 @@ void EffectPlan::note_frame(std::uint32_t huge_splats, std::uint32_t longest_lis
     longest_list_ = std::max(longest_list_, longest_list);
     const bool needed = most_huge_ > 0 || longest_list_ > LIST_SEGMENT;
     huge.measured = most_huge_;
-    const std::string counters =
-        fmt::format("{} splats of a frame over more than {} tiles, longest list {} of {} pairs",
-                    most_huge_, HUGE_PAIRS, longest_list_, LIST_SEGMENT);
+    const std::string counters = fmt::format(
+        "{} splats of a frame over more than {} tiles, longest list {} of {} intersections",
+        most_huge_, HUGE_INTERSECTIONS, longest_list_, LIST_SEGMENT);
     huge.reason = huge.overridden ? "--effects; the counters: " + counters : counters;
     if (!huge.overridden) huge.on = needed;
 }

@@ -45,9 +45,9 @@ struct EffectPlan {
     /// Of a rendering: without the 3D filter, which training alone has.
     ProjectionEffects projection() const;
     /// Counters decide, frame by frame, where the command line does not.
-    Crowds crowds() const {
-        if (!row(EFFECT_HUGE).overridden) return Crowds::by_counters;
-        return on(EFFECT_HUGE) ? Crowds::always : Crowds::never;
+    HugeSplatPath huge_splat_path() const {
+        if (!row(EFFECT_HUGE).overridden) return HugeSplatPath::by_counters;
+        return on(EFFECT_HUGE) ? HugeSplatPath::always : HugeSplatPath::never;
     }
     /// EFFECT_HUGE as the counters of a frame say; the most of several frames counts.
     void note_frame(std::uint32_t huge_splats, std::uint32_t longest_list);

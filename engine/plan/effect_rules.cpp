@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/kernels/kernel_family.h"
 #include "engine/plan/effect_rules.h"
 

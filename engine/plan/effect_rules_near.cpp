@@ -36,7 +36,7 @@ Ball ball_of(const SplatModel& model, std::size_t i) {
     Ball ball;
     ball.centre = glm::dvec3(p[0], p[1], p[2]) + model.origin;
     const double logit =
-        std::clamp(double{model.opacity[i]}, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT);
+        std::clamp(double{model.opacity_logit[i]}, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT);
     const double opacity = sigmoid(logit), support = kernel_support(model.kernel);
     const double gaussian = 2 * std::log(opacity / kSmallestCutoff);
     ball.reach2 = opacity > kSmallestCutoff ? (std::isfinite(support) ? support : gaussian) : 0;

@@ -19,12 +19,13 @@ namespace {
 constexpr std::uint64_t kCopyBytes = 32u << 20;  // beyond the last-level cache of most CPUs
 constexpr int kRuns = 4;                         // the first compiles
 
-// Of a splat and a pair, from the layouts in shaders/shared/render_args.h and Forward.
+// Of a splat and an intersection, from the layouts in shaders/shared/render_args.h and Forward.
 constexpr double kProjectedBytes = 4 * 16;               // shape, light, bound, cover
-constexpr double kPairBytes = 2 * 4 + 3 * 16;            // order, splat, and the projected splat
-constexpr double kSumsBytes = PARTIALS * sizeof(float);  // of the gradients of a pair
+constexpr double kIntersectionBytes = 2 * 4 + 3 * 16;    // order, splat, and the projected splat
+constexpr double kSumsBytes = PARTIALS * sizeof(float);  // of the gradients of an intersection
 constexpr double kSortBytes = 4 + 8 + 8;  // a digit: histogram, scatter's read and write
-constexpr double kTouchedShare = 0.6;     // of a tile's four blocks that a pair's ellipse touches
+constexpr double kTouchedShare =
+    0.6;  // of a tile's four blocks that an intersection's ellipse touches
 constexpr double kPixelsOfTile = TILE_SIZE * TILE_SIZE;
 // Multiply-adds, counted in the shaders.
 constexpr double kProjectFma = 250, kProjectBackwardFma = 600, kShFma = 3;
@@ -67,29 +68,31 @@ DeviceRates measure_rates(Device& device) {
 std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
     const double rest = c.rest_floats;
     const double others = splat_floats(0), floats = others + rest;  // of a splat
-    const double samples = c.evaluated > 0 ? c.evaluated : c.pairs * kPixelsOfTile * kTouchedShare;
+    const double samples =
+        c.evaluated > 0 ? c.evaluated : c.intersections * kPixelsOfTile * kTouchedShare;
     if (pass == "project")
         return PassWork{c.splats * 8 + c.visible * (4 * floats + kProjectedBytes),
                         c.visible * (kProjectFma + kShFma * rest)};
     if (pass == "compact") return PassWork{c.splats * 4 * 4 + c.visible * (16 + 8), 0};
     if (pass == "depth sort") return PassWork{c.visible * 4 * kSortBytes, 0};
-    if (pass == "emit") return PassWork{c.visible * (16 + 32 + 5 * 4) + c.pairs * 8, 0};
-    if (pass == "tile sort") return PassWork{c.pairs * 2 * kSortBytes, 0};
+    if (pass == "emit") return PassWork{c.visible * (16 + 32 + 5 * 4) + c.intersections * 8, 0};
+    if (pass == "tile sort") return PassWork{c.intersections * 2 * kSortBytes, 0};
     if (pass == "scan") return PassWork{c.splats * 3 * 4, 0};  // read twice, written once
-    if (pass == "tile ranges") return PassWork{c.pairs * 4, 0};
-    if (pass == "blend") return PassWork{c.pairs * kPairBytes + c.pixels * 20, samples * kBlendFma};
+    if (pass == "tile ranges") return PassWork{c.intersections * 4, 0};
+    if (pass == "blend")
+        return PassWork{c.intersections * kIntersectionBytes + c.pixels * 20, samples * kBlendFma};
     if (pass == "loss") return PassWork{c.pixels * (12 + 4 + 12), c.pixels * kLossFma};
     if (pass == "exposure")  // the map, and its gradient and that of the picture before it
         return PassWork{c.pixels * (24 + 36), c.pixels * kExposureFma};
     if (pass == "blend backward")
-        return PassWork{c.pairs * (kPairBytes + 2 * kSumsBytes) + c.pixels * 20,
+        return PassWork{c.intersections * (kIntersectionBytes + 2 * kSumsBytes) + c.pixels * 20,
                         samples * kBlendBackwardFma};
     if (pass == "project backward") {  // parameters and two moments, read and written, or the sum
         const double steps = 1 / c.rest_every;
         const double sums =
             c.rest_every > 1 ? (c.visible * (1 - steps) + c.splats * steps) * 8 * rest : 0;
         return PassWork{
-            c.splats * (24 * (others + rest * steps) + 16) + sums + c.pairs * kSumsBytes,
+            c.splats * (24 * (others + rest * steps) + 16) + sums + c.intersections * kSumsBytes,
             c.visible * (kProjectBackwardFma + 3 * kShFma * rest)};
     }
     return std::nullopt;

@@ -19,9 +19,9 @@ DeviceRates measure_rates(Device& device);
 
 /// Means of the frames or iterations that a time belongs to.
 struct FrameCounts {
-    double splats = 0, visible = 0, pairs = 0, pixels = 0;
+    double splats = 0, visible = 0, intersections = 0, pixels = 0;
     double rest_floats = 0;  // of a splat in the buffers: 3 ((d + 1)^2 - 1) at SH degree d
-    double evaluated = 0;    // splat-pixels of blending; 0: estimated from the pairs
+    double evaluated = 0;    // splat-pixels of blending; 0: estimated from the intersections
     double rest_every = 1;   // iterations between steps of these floats, as AdamStep::rest_every
 };
 

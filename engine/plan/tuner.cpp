@@ -51,7 +51,7 @@ SplatModel tuning_scene(const Size& size) {
         }
         for (std::size_t a = 0; a < 4; ++a)
             model.rotation[4 * i + a] = static_cast<float>(random.normal());
-        model.opacity[i] = static_cast<float>(1.5 * random.normal());
+        model.opacity_logit[i] = static_cast<float>(1.5 * random.normal());
     }
     return model;
 }

@@ -48,9 +48,9 @@ class TuningFrame {
     bool has_timestamps_;
 };
 
-/// The usual choice unless another takes 3 % less. Never buckets, which hold 17 to 34 million pairs
-/// a frame in the 4 GiB that Vulkan binds at most, the other way 134 million: how many a run will
-/// need is not known here, so they are for who asks for them.
+/// The usual choice unless another takes 3 % less. Never buckets, which hold 17 to 34 million
+/// intersections a frame in the 4 GiB that Vulkan binds at most, the other way 134 million: how
+/// many a run will need is not known here, so they are for who asks for them.
 std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTime>& times);
 
 /// Each group with all others at their usual choice, and the fastest of each. One that a driver

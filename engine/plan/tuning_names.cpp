@@ -13,7 +13,8 @@ namespace darb {
 namespace {
 
 constexpr std::uint32_t kTilePixels = TILE_SIZE * TILE_SIZE, kBlocks = 4;
-constexpr std::uint32_t kListBytes = 128 * 8;  // lib/hits.glsl: CHUNK pairs of two words a subgroup
+constexpr std::uint32_t kListBytes =
+    128 * 8;  // lib/hits.glsl: CHUNK intersections of two words a subgroup
 
 std::uint32_t clamped_subgroup(const DeviceInfo& info) {
     return std::clamp(info.subgroup_size, 4u, 64u);
@@ -55,7 +56,8 @@ void check_names(const DeviceInfo& info, const TuningNames& names, const std::st
         if (group == groups.end())
             throw Error(where, fmt::format("'{}' names no choice", name), known);
         if (std::find(group->choices.begin(), group->choices.end(), choice) == group->choices.end())
-            throw Error(where, fmt::format("'{}' is no way of '{}' on {}", choice, name, info.name),
+            throw Error(where,
+                        fmt::format("'{}' is no choice of '{}' on {}", choice, name, info.name),
                         known);
     }
 }
@@ -86,7 +88,7 @@ TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const st
         text.remove_prefix(std::min(one.size() + 1, text.size()));
         const std::size_t equals = one.find('=');
         if (equals == std::string_view::npos)
-            throw Error(where, fmt::format("'{}' is not of the form NAME=WAY", one),
+            throw Error(where, fmt::format("'{}' is not of the form NAME=CHOICE", one),
                         "Known here: " + known_names(tuning_groups(info)) + ".");
         names[std::string(one.substr(0, equals))] = one.substr(equals + 1);
     }

@@ -92,8 +92,8 @@ void AdamUpdate::record_fading(Commands& commands, GpuSplats& splats,
     const Groups g = groups_for(splats.count());
     commands.pass("adam");
     commands.dispatch(fade_, gpu::FadeNearArgs{splats.count(), view.index, clearance},
-                      {*view.cameras, splats.parameters(kPosition), splats.parameters(kOpacity),
-                       gradients.views(), status},
+                      {*view.cameras, splats.parameters(kPosition),
+                       splats.parameters(kOpacityLogit), gradients.views(), status},
                       g.x, g.y);
 }
 

@@ -39,7 +39,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = sh_stored;
     add_constants(options_.effects, constants);
-    constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(blend_.window_pairs());
+    constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(blend_.window_intersections());
     constants["UPDATE"] = update;
     constants["REST"] = rest;
     return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;
@@ -53,9 +53,9 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t intersections, std::u
         splat_capacity_ = splats;
         gradient_sum_.upload(std::vector<float>(size_t{splat_capacity_} * 2, 0.0f));
     }
-    const std::uint32_t window_pairs = blend_.window_pairs();
+    const std::uint32_t window_intersections = blend_.window_intersections();
     blend_.reserve(intersections, records);
-    if (blend_.window_pairs() != window_pairs) project_.clear();
+    if (blend_.window_intersections() != window_intersections) project_.clear();
 }
 
 void Backward::record_shares(Commands& commands, const FrameView& view, const Frame& frame,
@@ -67,16 +67,16 @@ void Backward::record_shares(Commands& commands, const FrameView& view, const Fr
 
 void Backward::record_project(Commands& commands, const FrameView& view, const Frame& frame,
                               const GpuSplats& splats, Pipeline& pipeline,
-                              const gpu::ProjectBackwardArgs& args, const ProjectBuffers& beside) {
+                              const gpu::ProjectBackwardArgs& args, const ProjectBuffers& extra) {
     const SplatRange range{args.first_splat, args.splat_end - args.first_splat};
     std::vector<BufferRange> buffers{*view.cameras};
     splats.bind_parameters(range, buffers);
-    buffers.insert(buffers.end(), beside.state.begin(), beside.state.end());
+    buffers.insert(buffers.end(), extra.state.begin(), extra.state.end());
     buffers.insert(buffers.end(),
                    {frame.splats.intersection_count, frame.splats.first_intersection});
     for (std::uint32_t w = 0; w < PARTIAL_WINDOWS; ++w) buffers.push_back(blend_.partials(w));
-    buffers.insert(buffers.end(), {blend_.rest(), beside.sums, frame.counters.status,
-                                   splats.smoothing(), beside.rest_sum});
+    buffers.insert(buffers.end(), {blend_.rest(), extra.sums, frame.counters.status,
+                                   splats.smoothing(), extra.rest_sum});
     const Groups g = groups_for(range.count);
     commands.dispatch(pipeline, args, buffers, g.x, g.y);
 }
@@ -110,9 +110,9 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
     for (const SplatRange& range : splats.ranges()) {
         args.first_splat = range.first;
         args.splat_end = range.first + range.count;
-        ProjectBuffers beside{{}, gradient_sum_, splats.rest_sum(range)};
-        splats.bind_moments(range, beside.state);
-        record_project(commands, view, frame, splats, pipeline, args, beside);
+        ProjectBuffers extra{{}, gradient_sum_, splats.rest_sum(range)};
+        splats.bind_moments(range, extra.state);
+        record_project(commands, view, frame, splats, pipeline, args, extra);
     }
 }
 
@@ -139,9 +139,9 @@ void Backward::record_gradients(Commands& commands, const FrameView& view, const
         args.splat_end = range.first + range.count;
         // In place of a sum of harmonics, which is not touched.
         const BufferRange rest = bound_rows(to.of(kShRest), kShRest, range, to.stride(kShRest));
-        ProjectBuffers beside{{}, to.views(), rest};
-        to.bind(range, beside.state);
-        record_project(commands, view, frame, splats, pipeline, args, beside);
+        ProjectBuffers extra{{}, to.views(), rest};
+        to.bind(range, extra.state);
+        record_project(commands, view, frame, splats, pipeline, args, extra);
     }
 }
 

@@ -58,7 +58,7 @@ class Backward {
     };
     void record_project(Commands& commands, const FrameView& view, const Frame& frame,
                         const GpuSplats& splats, Pipeline& pipeline,
-                        const gpu::ProjectBackwardArgs& args, const ProjectBuffers& beside);
+                        const gpu::ProjectBackwardArgs& args, const ProjectBuffers& extra);
 
     Device* device_;
     ForwardOptions options_;

@@ -33,8 +33,8 @@ BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
 }
 
 BufferList<BlendBackward> BlendBackward::intersection_buffers(std::uint64_t k) {
-    return {{&BlendBackward::partials_, "pair partials", k * kPartialBytes},
-            {&BlendBackward::rest_, "pair partials, rest", k * 4}};
+    return {{&BlendBackward::partials_, "intersection partials", k * kPartialBytes},
+            {&BlendBackward::rest_, "intersection partials, rest", k * 4}};
 }
 
 BufferList<BlendBackward> BlendBackward::segment_buffers(const FrameSize& size) {
@@ -61,7 +61,7 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["THREADS"] = static_cast<std::int32_t>(subgroup);
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
-    constants["WINDOW_PAIRS"] = static_cast<std::int32_t>(window_pairs_);
+    constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);
     segmented_ = segmented;
     if (method_ == BackwardBlend::subgroup) {
         blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
@@ -83,14 +83,14 @@ void BlendBackward::reserve(std::uint32_t intersections, std::uint32_t records) 
     make_buffers(*device_, *this, intersection_buffers(intersections), "blend backward");
     capacity_ = intersections;
     const std::uint64_t most = of_a_binding(*device_);
-    if (window_pairs_ > 0 || capacity_ <= most) return;
-    window_pairs_ = static_cast<std::uint32_t>(most);
+    if (window_intersections_ > 0 || capacity_ <= most) return;
+    window_intersections_ = static_cast<std::uint32_t>(most);
     make_pipelines(segmented_);
 }
 
 BufferRange BlendBackward::partials(std::uint32_t window) const {
-    if (window_pairs_ == 0) return partials_;
-    const std::uint64_t bytes = window_pairs_ * kPartialBytes;
+    if (window_intersections_ == 0) return partials_;
+    const std::uint64_t bytes = window_intersections_ * kPartialBytes;
     const std::uint64_t first = window * bytes < partials_.bytes() ? window * bytes : 0;
     return {partials_, first, std::min(bytes, partials_.bytes() - first)};
 }
@@ -133,7 +133,7 @@ void BlendBackward::record_subgroup(Commands& commands, const Frame& frame, cons
         commands.dispatch(
             blend_, args,
             {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape, s.light,
-             s.bound, d_image, images.final_transmittance, images.last_pair, partials(0),
+             s.bound, d_image, images.final_transmittance, images.last_intersection, partials(0),
              partials(1), partials(2), partials(3), partials(4), rest_, behind_},
             args.tiles_x, tiles_y);
 }
@@ -153,14 +153,14 @@ void BlendBackward::record_buckets(Commands& commands, const Frame& frame, const
     commands.fill(bucket_tile_, 0);
     commands.dispatch(bucket_tiles_, buckets, {t.tile_range, bucket_tile_}, args.tiles_x, tiles_y);
     for (args.segment = args.segments; args.segment-- > 0;)
-        commands.dispatch(
-            bucket_behind_, args,
-            {t.tile_range, d_image, images.last_pair, images.checkpoints, behind_, bucket_rest_},
-            args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
+        commands.dispatch(bucket_behind_, args,
+                          {t.tile_range, d_image, images.last_intersection, images.checkpoints,
+                           behind_, bucket_rest_},
+                          args.tiles_x, tiles_y, TILE_SIZE * TILE_SIZE / SPLAT_GROUP);
     const Groups g = groups_for(records, 1);
     commands.dispatch(blend_, buckets,
                       {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape,
-                       s.light, s.bound, d_image, images.last_pair, bucket_tile_,
+                       s.light, s.bound, d_image, images.last_intersection, bucket_tile_,
                        images.checkpoints, bucket_rest_, partials_, rest_},
                       g.x, g.y);
 }

@@ -33,7 +33,7 @@ class BlendBackward {
     /// [K][8]. Shaders bind PARTIAL_WINDOWS windows of it, as lib/partials.glsl says.
     const Buffer& partials() const { return partials_; }
     BufferRange partials(std::uint32_t window) const;
-    std::uint32_t window_pairs() const { return window_pairs_; }
+    std::uint32_t window_intersections() const { return window_intersections_; }
     const Buffer& rest() const { return rest_; }  // float [K]
 
   private:
@@ -54,7 +54,7 @@ class BlendBackward {
     bool segmented_ = false;                 // whether the pipelines take segments
     Buffer behind_;                          // pixels' state between their dispatches
     Buffer bucket_tile_, bucket_rest_;       // of buckets
-    std::uint32_t capacity_ = 0, window_pairs_ = 0;
+    std::uint32_t capacity_ = 0, window_intersections_ = 0;
     Buffer partials_, rest_;
 };
 

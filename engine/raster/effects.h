@@ -11,7 +11,7 @@ namespace darb {
 /// When a frame is ready for huge splats (cooperative emission) and for long lists (blend passes of
 /// several dispatches). Lists that need it are cut into parts in any case, as a driver may end
 /// them.
-enum class Crowds {
+enum class HugeSplatPath {
     by_counters,  // where the last frame had any
     always,
     never,

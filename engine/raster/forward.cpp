@@ -35,7 +35,7 @@ std::uint32_t blend_subgroup(const Device& device) {
 }
 
 std::uint32_t bucket_length(const Device& device) {
-    return std::max(BUCKET_PAIRS, blend_subgroup(device));
+    return std::max(BUCKET_INTERSECTIONS, blend_subgroup(device));
 }
 
 std::uint32_t add_block_constants(const Device& device, SpecConstants& constants) {
@@ -119,9 +119,9 @@ void Forward::record_intersections(Commands& commands, const GpuSplats& splats,
                     fmt::format("{} splats at {} x {} px, buffers for {} and {} px", n,
                                 camera.width, camera.height, frame.size.splats, frame.size.pixels),
                     "Call FrameBuffers::reserve for them first.");
-    const gpu::PairArgs args{frame.size.intersections, camera.tiles_x,
-                             camera.tiles_x * camera.tiles_y,
-                             frame.size.list_segments * LIST_SEGMENT};
+    const gpu::IntersectionArgs args{frame.size.intersections, camera.tiles_x,
+                                     camera.tiles_x * camera.tiles_y,
+                                     frame.size.list_segments * LIST_SEGMENT};
     record_projection(commands, splats, view, frame);
     record_depth_order(commands, n, camera.near_plane, frame);
     record_emission(commands, n, args, frame);
@@ -157,7 +157,7 @@ void Forward::record_depth_order(Commands& commands, std::uint32_t n, float near
     commands.pass("compact");
     commands.fill(c.splats, n);
     frame.sorts.scan->record(commands, s.visible, s.visible_offset, c.splats, 0, c.visible);
-    commands.dispatch(groups_visible_, gpu::PairArgs{frame.size.intersections, 0, 0, 0},
+    commands.dispatch(groups_visible_, gpu::IntersectionArgs{frame.size.intersections, 0, 0, 0},
                       {c.status, c.groups, c.visible, c.visible_in_use}, 1);
     commands.dispatch(compact_, gpu::CompactArgs{n, near_plane},
                       {s.visible, s.visible_offset, s.bound, s.depth_key, s.splat_from_depth}, g.x,
@@ -168,8 +168,8 @@ void Forward::record_depth_order(Commands& commands, std::uint32_t n, float near
                                  key_bits);
 }
 
-void Forward::record_emission(Commands& commands, std::uint32_t n, const gpu::PairArgs& args,
-                              Frame& frame) {
+void Forward::record_emission(Commands& commands, std::uint32_t n,
+                              const gpu::IntersectionArgs& args, Frame& frame) {
     const FrameCounters& c = frame.counters;
     const ProjectedSplats& s = frame.splats;
     const TileIntersections& out = frame.intersections;
@@ -197,7 +197,7 @@ void Forward::record_emission(Commands& commands, std::uint32_t n, const gpu::Pa
                           EMIT_HUGE_GROUPS);
 }
 
-void Forward::record_tiles(Commands& commands, const gpu::PairArgs& args, Frame& frame) {
+void Forward::record_tiles(Commands& commands, const gpu::IntersectionArgs& args, Frame& frame) {
     const FrameCounters& c = frame.counters;
     const TileIntersections& t = frame.intersections;
     commands.pass("tile sort");
@@ -206,7 +206,7 @@ void Forward::record_tiles(Commands& commands, const gpu::PairArgs& args, Frame&
     commands.pass("tile ranges");
     commands.fill(t.tile_range, 0);
     commands.dispatch_indirect(tile_ranges_, args, {c.intersections_in_use, t.tile, t.tile_range},
-                               c.groups, offsetof(gpu::FrameGroups, pairs_x));
+                               c.groups, offsetof(gpu::FrameGroups, intersections_x));
     const Groups g = groups_for(args.tile_count);
     commands.dispatch(list_lengths_, args, {c.status, t.tile_range}, g.x, g.y);
 }
@@ -225,7 +225,7 @@ void Forward::record_blend(Commands& commands, const FrameView& view, Frame& fra
         commands.dispatch(
             pipeline, blend,
             {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape, s.light,
-             s.bound, out.image, out.final_transmittance, out.last_pair, out.checkpoints},
+             s.bound, out.image, out.final_transmittance, out.last_intersection, out.checkpoints},
             camera.tiles_x, camera.tiles_y);
     }
 }

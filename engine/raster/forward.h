@@ -54,9 +54,9 @@ class Forward {
                            const Frame& frame);
     void record_depth_order(Commands& commands, std::uint32_t splats, float near_plane,
                             Frame& frame);
-    void record_emission(Commands& commands, std::uint32_t splats, const gpu::PairArgs& args,
-                         Frame& frame);
-    void record_tiles(Commands& commands, const gpu::PairArgs& args, Frame& frame);
+    void record_emission(Commands& commands, std::uint32_t splats,
+                         const gpu::IntersectionArgs& args, Frame& frame);
+    void record_tiles(Commands& commands, const gpu::IntersectionArgs& args, Frame& frame);
 
     Device* device_;
     ForwardOptions options_;

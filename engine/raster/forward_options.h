@@ -22,7 +22,7 @@ struct ForwardOptions {
     ProjectionEffects effects;
     bool store_for_backward = false;
     bool backward_follows = true;  // false: what is stored is looked at, without a backward pass
-    Crowds crowds = Crowds::by_counters;
+    HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;
 };
 
 /// The constants of these options that several passes share: kernel, storage and depth order.

@@ -63,15 +63,15 @@ struct TileIntersections {
     Buffer splat_from_intersection;   // [K] in the order of emission: splat and blocks of the tile
     Buffer intersection_from_sorted;  // [K] by tile, then by depth
     Buffer tile_range;                // [T][2] of that
-    Buffer huge_rank;                 // [K / HUGE_PAIRS + 1], once a frame had huge splats
+    Buffer huge_rank;                 // [K / HUGE_INTERSECTIONS + 1], once a frame had huge splats
     Buffer no_huge_rank;              // a word, in its place until then
 };
 
 /// float [3][H][W] not clamped; what the backward pass walks back from.
 struct FrameImages {
     Buffer image;
-    Buffer final_transmittance, last_pair;  // [H][W], where they are stored
-    Buffer checkpoints;                     // shaders/lib/bucket.glsl; where there are buckets
+    Buffer final_transmittance, last_intersection;  // [H][W], where they are stored
+    Buffer checkpoints;  // shaders/lib/bucket.glsl; where there are buckets
 };
 
 /// Scratch memory of the sorts, each for a capacity.

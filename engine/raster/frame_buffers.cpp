@@ -38,8 +38,8 @@ BufferList<FrameCounters> counter_buffers() {
             {&C::splats, "splat total", 4},
             {&C::visible, "visible total", 4},
             {&C::visible_in_use, "visible in use", 4},
-            {&C::intersections, "pairs total", 4},
-            {&C::intersections_in_use, "pairs in use", 4}};
+            {&C::intersections, "intersections total", 4},
+            {&C::intersections_in_use, "intersections in use", 4}};
 }
 
 BufferList<ProjectedSplats> splat_buffers(const ForwardOptions& options, std::uint64_t n) {
@@ -49,30 +49,31 @@ BufferList<ProjectedSplats> splat_buffers(const ForwardOptions& options, std::ui
             {&S::light, "splat light", n * light},
             {&S::bound, "splat bound", n * 16},
             {&S::cover, "tile cover", n * 16},
-            {&S::intersection_count, "pair count", n * 4},
+            {&S::intersection_count, "intersection count", n * 4},
             {&S::visible, "visible", n * 4},
             {&S::visible_offset, "visible offset", n * 4},
             {&S::depth_key, "depth key", n * 4},
             {&S::splat_from_depth, "depth order", n * 4},
-            {&S::count_by_depth, "pair count by depth", n * 4},
-            {&S::offset_by_depth, "pair offset", n * 4},
-            {&S::first_intersection, "pair begin", n * 4}};
+            {&S::count_by_depth, "count by depth", n * 4},
+            {&S::offset_by_depth, "offset by depth", n * 4},
+            {&S::first_intersection, "first intersection", n * 4}};
 }
 
 BufferList<TileIntersections> intersection_buffers(std::uint64_t k) {
     using I = TileIntersections;
-    return {{&I::tile, "pair tile", k * 4},
-            {&I::splat_from_intersection, "pair splat", k * 4},
-            {&I::intersection_from_sorted, "pair order", k * 4}};
+    return {{&I::tile, "tile from intersection", k * 4},
+            {&I::splat_from_intersection, "splat from intersection", k * 4},
+            {&I::intersection_from_sorted, "intersection from sorted", k * 4}};
 }
 
 BufferList<TileIntersections> no_huge_buffers() {
     return {{&TileIntersections::no_huge_rank, "no huge splats", 4}};
 }
 
-// At most so many huge splats begin within the capacity, each with more than HUGE_PAIRS tiles.
+// At most so many huge splats begin within the capacity, each with more than HUGE_INTERSECTIONS
+// tiles.
 BufferList<TileIntersections> huge_buffers(std::uint64_t k) {
-    return {{&TileIntersections::huge_rank, "huge splats", (k / HUGE_PAIRS + 1) * 4}};
+    return {{&TileIntersections::huge_rank, "huge splats", (k / HUGE_INTERSECTIONS + 1) * 4}};
 }
 
 BufferList<TileIntersections> tile_buffers(std::uint64_t tiles) {
@@ -90,7 +91,7 @@ BufferList<FrameImages> pixel_buffers(const ForwardOptions& options, std::uint64
     return {{&FrameImages::image, "image", pixels * 12},
             {&FrameImages::final_transmittance, "final transmittance",
              store || list_segments > 1 ? pixels * 4 : 4},
-            {&FrameImages::last_pair, "last pair", store ? pixels * 4 : 4}};
+            {&FrameImages::last_intersection, "last intersection", store ? pixels * 4 : 4}};
 }
 
 Error too_many(const Device& device, std::uint32_t wanted, std::uint32_t most, bool buckets) {
@@ -100,8 +101,8 @@ Error too_many(const Device& device, std::uint32_t wanted, std::uint32_t most, b
             ? fmt::format("Start again with --tune backward=subgroup, which holds {}, or lower",
                           without)
             : "Lower";
-    return Error("splat-tile pairs",
-                 fmt::format("a frame needs {}{} pairs, this device's buffers hold {}",
+    return Error("splat-tile intersections",
+                 fmt::format("a frame needs {}{} intersections, this device's buffers hold {}",
                              wanted == 0xFFFFFFFFu ? "more than " : "", wanted, most),
                  instead + " the resolution (-r) or the number of splats (--cap-max).");
 }
@@ -114,7 +115,7 @@ FrameBuffers::FrameBuffers(Device& device, const ForwardOptions& options)
     make_buffers(device, frame_.counters, counter_buffers(), "project");
     make_buffers(device, frame_.intersections, no_huge_buffers(), "project");
     make_buffers(device, frame_.images, checkpoint_buffers(0), "blend");
-    if (options.crowds == Crowds::always) {
+    if (options.huge_splat_path == HugeSplatPath::always) {
         frame_.cooperates = true;
         make_huge_buffers();
         frame_.size.list_segments = 2;
@@ -215,7 +216,7 @@ void FrameBuffers::make_huge_buffers() {
 }
 
 void FrameBuffers::note_status(const gpu::FrameStatus& status) {
-    if (options_.crowds != Crowds::by_counters) return;
+    if (options_.huge_splat_path != HugeSplatPath::by_counters) return;
     frame_.cooperates = status.huge_splats > 0;
     if (frame_.cooperates && !frame_.size.cooperates) make_huge_buffers();
 }
@@ -261,9 +262,9 @@ bool FrameBuffers::make_room(const gpu::FrameStatus& status,
     if (status.overflow == 0) return false;
     const std::uint32_t most = most_intersections(*device_, options_);
     const std::uint32_t wanted =
-        (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.pairs;
+        (status.overflow & OVERFLOW_TOTAL) != 0 ? 0xFFFFFFFFu : status.intersections;
     if (wanted > most) throw too_many(*device_, wanted, most, frame_.size.bucket > 0);
-    if ((status.overflow & OVERFLOW_PAIRS) != 0) grow(wanted, most, make_other_buffers);
+    if ((status.overflow & OVERFLOW_INTERSECTIONS) != 0) grow(wanted, most, make_other_buffers);
     segment_lists(status.longest_list);
     clear_status();
     return true;

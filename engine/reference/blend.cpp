@@ -143,7 +143,7 @@ Vec3<T> background_of(const RenderSettings& settings) {
 template <class T>
 void pixel_backward(std::span<const ProjectedSplat<T>> list, std::span<const Blended<T>> blended,
                     const Vec3<T>& d_colour, T d_alpha_out, const Vec3<T>& background,
-                    const KernelTable& kernel, ProjectedGradient<T>* pairs) {
+                    const KernelTable& kernel, ProjectedGradient<T>* intersections) {
     Vec3<T> behind = background;
     T open = 1;
     for (size_t i = blended.size(); i-- > 0;) {
@@ -151,8 +151,8 @@ void pixel_backward(std::span<const ProjectedSplat<T>> list, std::span<const Ble
         const ProjectedSplat<T>& s = list[b.entry];
         const T alpha = b.sample.alpha;
         const T d_alpha = b.before * (glm::dot(d_colour, s.colour - behind) + d_alpha_out * open);
-        pairs[b.entry].d_colour += d_colour * (b.before * alpha);
-        add_sample_gradient(s, b.sample, d_alpha, kernel, pairs[b.entry]);
+        intersections[b.entry].d_colour += d_colour * (b.before * alpha);
+        add_sample_gradient(s, b.sample, d_alpha, kernel, intersections[b.entry]);
         behind = alpha * s.colour + (1 - alpha) * behind;
         open *= 1 - alpha;
     }
@@ -187,7 +187,7 @@ template <class T>
 Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                             const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
                             const RenderSettings& settings, const ImageGradient<T>& d_image,
-                            ProjectedGradient<T>* pairs) {
+                            ProjectedGradient<T>* intersections) {
     const std::vector<ProjectedSplat<T>> list = gather(lists, tile, splats);
     const Vec3<T> background = background_of<T>(settings);
     std::vector<Blended<T>> blended;
@@ -202,7 +202,7 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
         const Vec3<T> d_pixel(d_rgb.at(x, y, 0), d_rgb.at(x, y, 1), d_rgb.at(x, y, 2));
         const T d_out = d_alpha.data.empty() ? T(0) : d_alpha.at(x, y, 0);
         d_background += d_pixel * transmittance;
-        pixel_backward<T>(list, blended, d_pixel, d_out, background, kernel, pairs);
+        pixel_backward<T>(list, blended, d_pixel, d_out, background, kernel, intersections);
     };
     for_each_pixel(lists, tile, d_image.colour.width, d_image.colour.height, pixel);
     return d_background;

@@ -28,12 +28,12 @@ struct ImageGradient {
     const Image<T>& alpha;
 };
 
-/// Writes one gradient per entry of the tile's list into pairs[0 .. length), and returns
+/// Writes one gradient per entry of the tile's list into intersections[0 .. length), and returns
 /// dL/d(background) of this tile's pixels.
 template <class T>
 Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
                             const std::vector<ProjectedSplat<T>>& splats, const KernelTable& kernel,
                             const RenderSettings& settings, const ImageGradient<T>& d_image,
-                            ProjectedGradient<T>* pairs);
+                            ProjectedGradient<T>* intersections);
 
 }  // namespace darb::reference

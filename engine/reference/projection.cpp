@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "engine/core/check.h"
-#include "engine/reference/lens.h"
 #include "engine/reference/projection_terms.h"
+#include "engine/reference/reference_lens.h"
 #include "engine/reference/sh.h"
 
 namespace darb::reference {
@@ -258,7 +258,7 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     const CovarianceTerms<T> terms =
         covariance_terms(mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index),
                          camera, settings.low_pass, kernel.covariance_scale());
-    p.opacity = sigmoid_of_clamped(splats.opacity[index]) * opacity_factor(splats, terms);
+    p.opacity = sigmoid_of_clamped(splats.opacity_logit[index]) * opacity_factor(splats, terms);
     const bool half = settings.storage == STORAGE_FLOAT16;
     if (half) {
         p.opacity = static_cast<T>(round_to_half(static_cast<double>(p.opacity)));
@@ -340,9 +340,9 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     for (int c = 0; c < 4; ++c) {
         out.rotation[index * 4 + c] = d_rotation[c];
     }
-    const T sigmoid = sigmoid_of_clamped(splats.opacity[index]);
-    out.opacity[index] =
-        inside(splats.opacity[index], OPACITY_LOGIT_LIMIT)
+    const T sigmoid = sigmoid_of_clamped(splats.opacity_logit[index]);
+    out.opacity_logit[index] =
+        inside(splats.opacity_logit[index], OPACITY_LOGIT_LIMIT)
             ? gradient.d_opacity * opacity_factor(splats, terms) * sigmoid * (1 - sigmoid)
             : T(0);
 }

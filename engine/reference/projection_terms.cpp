@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/reference/lens.h"
+#include "engine/reference/reference_lens.h"
 
 namespace darb::reference {
 

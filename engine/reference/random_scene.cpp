@@ -57,7 +57,7 @@ TestScene random_scene(const SceneOptions& options) {
     fill(model.log_scale,
          [&] { return rng.uniform(options.min_log_scale, options.max_log_scale); });
     fill(model.rotation, [&] { return rng.normal(); });
-    fill(model.opacity, [&] { return rng.uniform(options.min_logit, options.max_logit); });
+    fill(model.opacity_logit, [&] { return rng.uniform(options.min_logit, options.max_logit); });
     fill(model.sh_dc, [&] { return rng.uniform(-0.5, 1.5); });
     fill(model.sh_rest, [&] { return rng.uniform(-0.1, 0.1); });
     return scene;

@@ -31,7 +31,7 @@ struct Splats : SplatArrays<T> {
     bool antialias = false;    // opacity times sqrt(det S / det(S + low_pass I))
     std::vector<T> smoothing;  // [N] deviation of the 3D filter, world units; empty: none
 
-    size_t size() const { return this->opacity.size(); }
+    size_t size() const { return this->opacity_logit.size(); }
     int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }
 };
 

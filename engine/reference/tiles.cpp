@@ -112,18 +112,18 @@ TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>&
     TileLists lists;
     lists.tiles_x = (width + kTileSize - 1) / kTileSize;
     lists.tiles_y = (height + kTileSize - 1) / kTileSize;
-    struct Pair {
+    struct Intersection {
         std::uint32_t tile, splat;
     };
-    std::vector<Pair> pairs;
+    std::vector<Intersection> intersections;
     lists.begin.assign(lists.tile_count() + 1, 0);
     for (const std::uint32_t i : depth_order(splats, settings)) {
-        const size_t before = pairs.size();
+        const size_t before = intersections.size();
         for_each_tile(splats[i], width, height, lists.tiles_x, lists.tiles_y, [&](size_t tile) {
-            pairs.push_back({static_cast<std::uint32_t>(tile), i});
+            intersections.push_back({static_cast<std::uint32_t>(tile), i});
             ++lists.begin[tile + 1];
         });
-        if (pairs.size() == before) {
+        if (intersections.size() == before) {
             splats[i].cull = Cull::outside;
         }
     }
@@ -131,9 +131,9 @@ TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>&
         lists.begin[tile + 1] += lists.begin[tile];
     }
     std::vector<std::uint32_t> next(lists.begin.begin(), lists.begin.end() - 1);
-    lists.splats.resize(pairs.size());
-    for (const Pair& pair : pairs) {
-        lists.splats[next[pair.tile]++] = pair.splat;
+    lists.splats.resize(intersections.size());
+    for (const Intersection& intersection : intersections) {
+        lists.splats[next[intersection.tile]++] = intersection.splat;
     }
     return lists;
 }

@@ -16,7 +16,7 @@ struct TileLists {
     std::vector<std::uint32_t> splats;  // [K] splat index, nearest first within a tile
 
     size_t tile_count() const { return static_cast<size_t>(tiles_x) * tiles_y; }
-    size_t pair_count() const { return splats.size(); }
+    size_t intersection_count() const { return splats.size(); }
 };
 
 /// Indices of the splats that are not culled, by camera z, or by its 16-bit key; equal depths keep

@@ -9,10 +9,10 @@ namespace darb {
 namespace {
 
 FrameAccuracy frame_of(const SplatModel& model, const Accuracy& accuracy,
-                       const ProjectionEffects& effects, Crowds crowds) {
+                       const ProjectionEffects& effects, HugeSplatPath huge_splat_path) {
     FrameAccuracy frame = frame_accuracy(accuracy, model);
     frame.options.effects = effects;
-    frame.options.crowds = crowds;
+    frame.options.huge_splat_path = huge_splat_path;
     frame.options.effects.antialias = model.antialias;
     return frame;
 }
@@ -37,8 +37,8 @@ ImageF planes_to_image(const std::vector<float>& planes, int width, int height) 
 }
 
 Renderer::Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy,
-                   const ProjectionEffects& effects, Crowds crowds)
-    : Renderer(device, model, frame_of(model, accuracy, effects, crowds)) {}
+                   const ProjectionEffects& effects, HugeSplatPath huge_splat_path)
+    : Renderer(device, model, frame_of(model, accuracy, effects, huge_splat_path)) {}
 
 Renderer::Renderer(Device& device, const SplatModel& model, const ForwardOptions& options)
     : Renderer(device, model, frame_of(model, options)) {}

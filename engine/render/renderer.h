@@ -17,13 +17,14 @@ class Renderer {
     /// Uploads the model; effects.antialias is taken from it. Cameras with a lens need
     /// effects.lens.
     Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy = {},
-             const ProjectionEffects& effects = {}, Crowds crowds = Crowds::by_counters);
+             const ProjectionEffects& effects = {},
+             HugeSplatPath huge_splat_path = HugeSplatPath::by_counters);
     /// options as they are, but for kernel, footprint and effects.antialias, which are the
     /// model's.
     Renderer(Device& device, const SplatModel& model, const ForwardOptions& options);
 
     /// RGB, not clamped. sh_degree -1: all that the accuracy allows. Grows its buffers and repeats
-    /// the frame when it has more splat-tile pairs than before.
+    /// the frame when it has more splat-tile intersections than before.
     ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
                   int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
 

@@ -90,7 +90,7 @@ void unpack_splat(const std::array<std::uint32_t, 4>& packed, const Chunk& chunk
         const double colour = place(6 + i, unit_of(packed[3], 24 - 8 * static_cast<int>(i), 8));
         model.sh_dc[3 * at + i] = static_cast<float>(dc_of_colour(colour));
     }
-    model.opacity[at] = logit_of_byte(static_cast<std::uint8_t>(packed[3] & 255));
+    model.opacity_logit[at] = logit_of_byte(static_cast<std::uint8_t>(packed[3] & 255));
     SmallestThree three{packed[1] >> 30, {}};
     for (std::size_t i = 0; i < 3; ++i)
         three.others[i] =
@@ -166,9 +166,9 @@ std::array<std::uint32_t, 4> pack_splat(const SplatModel& model, std::size_t i,
     auto rotation = static_cast<std::uint32_t>(three.largest);
     for (const double other : three.others)
         rotation = rotation << 10 | to_unit(other / std::numbers::sqrt2, -0.5, 0.5, 10);
-    return {
-        pack_11_10_11(0), rotation, pack_11_10_11(3),
-        part(6, 8) << 24 | part(7, 8) << 16 | part(8, 8) << 8 | byte_of_logit(model.opacity[i])};
+    return {pack_11_10_11(0), rotation, pack_11_10_11(3),
+            part(6, 8) << 24 | part(7, 8) << 16 | part(8, 8) << 8 |
+                byte_of_logit(model.opacity_logit[i])};
 }
 
 Chunk bounds_of(const SplatModel& model, std::span<const std::uint32_t> splats) {

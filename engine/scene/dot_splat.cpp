@@ -35,7 +35,7 @@ void store_record(std::span<const std::byte> record, std::size_t at, SplatModel&
         model.sh_dc[3 * at + i] =
             static_cast<float>(dc_of_colour(static_cast<double>(record[24 + i]) / 255));
     }
-    model.opacity[at] = logit_of_byte(static_cast<std::uint8_t>(record[27]));
+    model.opacity_logit[at] = logit_of_byte(static_cast<std::uint8_t>(record[27]));
     const std::array<float, 4> q = rotation_of_record(record);
     std::copy(q.begin(), q.end(), &model.rotation[4 * at]);
 }
@@ -93,7 +93,7 @@ std::vector<std::byte> encode_dot_splat(const SplatModel& model) {
             std::memcpy(record + 12 + 4 * k, &values[1], 4);
             record[24 + k] = std::byte{nearest_byte(255 * colour_of_dc(model.sh_dc[3 * i + k]))};
         }
-        record[27] = std::byte{byte_of_logit(model.opacity[i])};
+        record[27] = std::byte{byte_of_logit(model.opacity_logit[i])};
         for (std::size_t k = 0; k < 4; ++k)
             record[28 + k] = std::byte{nearest_byte(128 + (length > 0 ? 128 * q[k] / length : 0))};
     }

@@ -148,7 +148,7 @@ std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel
 
 bool has_only_finite(const SplatModel& model) {
     for (const std::vector<float>* values : {&model.position, &model.log_scale, &model.rotation,
-                                             &model.opacity, &model.sh_dc, &model.sh_rest})
+                                             &model.opacity_logit, &model.sh_dc, &model.sh_rest})
         if (!row_is_finite(*values, 0, values->size())) return false;
     return true;
 }
@@ -183,7 +183,8 @@ std::size_t crop_splats(const glm::dvec3& low, const glm::dvec3& high, SplatMode
 }
 
 std::size_t prune_opacity(double least, SplatModel& model) {
-    return keep_splats([&](std::size_t i) { return sigmoid(model.opacity[i]) >= least; }, model);
+    return keep_splats([&](std::size_t i) { return sigmoid(model.opacity_logit[i]) >= least; },
+                       model);
 }
 
 void limit_sh_degree(int degree, SplatModel& model) {

@@ -24,7 +24,7 @@ SplatModel as_gaussians(const SplatModel& model, bool keep_opacity, GaussianEqui
         const double grown = 0.5 * std::log(nearest.covariance);
         for (float& value : result.log_scale) value = static_cast<float>(value + grown);
         if (nearest.opacity != 1)
-            for (float& value : result.opacity) value = scaled_logit(value, nearest.opacity);
+            for (float& value : result.opacity_logit) value = scaled_logit(value, nearest.opacity);
     }
     result.kernel = KERNEL_GAUSSIAN;
     result.footprint = Footprint::psi;

@@ -89,7 +89,7 @@ void apply_filter(const PlyColumns& columns, double* row) {
         row[column] = log_of_blurred(log_scale, row[columns.filter]);
         shrink += row[column] - log_scale;
     }
-    double& logit = row[columns.of[kOpacity][0]];
+    double& logit = row[columns.of[kOpacityLogit][0]];
     logit = -shrink - std::log(std::exp(-logit) - std::expm1(-shrink));
 }
 

@@ -118,7 +118,7 @@ void read_scales_and_colours(Scene& scene) {
             scene.model.log_scale[3 * i + k] = scale[scales.rgba[4 * i + k]];
             scene.model.sh_dc[3 * i + k] = dc[colours.rgba[4 * i + k]];
         }
-        scene.model.opacity[i] = logit_of_byte(colours.rgba[4 * i + 3]);
+        scene.model.opacity_logit[i] = logit_of_byte(colours.rgba[4 * i + 3]);
     }
 }
 

@@ -18,7 +18,7 @@ enum Attribute {
     kPosition = ATTRIBUTE_POSITION,
     kLogScale = ATTRIBUTE_LOG_SCALE,
     kRotation = ATTRIBUTE_ROTATION,
-    kOpacity = ATTRIBUTE_OPACITY_LOGIT,
+    kOpacityLogit = ATTRIBUTE_OPACITY_LOGIT,
     kShDc = ATTRIBUTE_SH_DC,
     kShRest = ATTRIBUTE_SH_REST,
     kAttributeCount = ATTRIBUTES
@@ -27,12 +27,12 @@ enum Attribute {
 /// Values or gradients of N splats, an array each; T: float, double in the reference.
 template <class T>
 struct SplatArrays {
-    std::vector<T> position;   // [N][3] world
-    std::vector<T> log_scale;  // [N][3] natural log of the standard deviation, world
-    std::vector<T> rotation;   // [N][4] quaternion w x y z, any norm above 1e-6
-    std::vector<T> opacity;    // [N] logit
-    std::vector<T> sh_dc;      // [N][3]; colour = 0.5 + SH_C0 * dc
-    std::vector<T> sh_rest;    // [N][C-1][3]: coefficient-major, rgb innermost
+    std::vector<T> position;       // [N][3] world
+    std::vector<T> log_scale;      // [N][3] natural log of the standard deviation, world
+    std::vector<T> rotation;       // [N][4] quaternion w x y z, any norm above 1e-6
+    std::vector<T> opacity_logit;  // [N]
+    std::vector<T> sh_dc;          // [N][3]; colour = 0.5 + SH_C0 * dc
+    std::vector<T> sh_rest;        // [N][C-1][3]: coefficient-major, rgb innermost
 };
 
 /// The array of an attribute.
@@ -40,7 +40,7 @@ template <class T>
 std::vector<T>& attribute_values(SplatArrays<T>& arrays, int attribute) {
     using Arrays = SplatArrays<T>;
     constexpr std::vector<T> Arrays::*members[] = {&Arrays::position, &Arrays::log_scale,
-                                                   &Arrays::rotation, &Arrays::opacity,
+                                                   &Arrays::rotation, &Arrays::opacity_logit,
                                                    &Arrays::sh_dc,    &Arrays::sh_rest};
     static_assert(std::size(members) == kAttributeCount);
     return arrays.*members[attribute];
@@ -66,7 +66,7 @@ constexpr std::array<SplatAttribute, kAttributeCount> kSplatAttributes{{
     {"position", "xyz", 0, 3, false, false, true, STEP_PLAIN, nullptr},
     {"log_scale", "scale", 4, 3, false, false, true, STEP_SCALE, limit_infinite_log_scale},
     {"rotation", "rot", 5, 4, false, false, true, STEP_PLAIN, nullptr},
-    {"opacity", "opacity", 3, 1, false, false, true, STEP_OPACITY, limit_infinite_logit},
+    {"opacity_logit", "opacity", 3, 1, false, false, true, STEP_OPACITY, limit_infinite_logit},
     {"sh_dc", "f_dc", 1, 3, false, false, true, STEP_PLAIN, nullptr},
     {"sh_rest", "f_rest", 2, 3, true, false, true, STEP_REST, nullptr},
 }};

@@ -19,7 +19,7 @@ struct SplatModel : SplatArrays<float> {
     bool antialias = false;  // SplatRenderMode: mip
     glm::dvec3 origin{0.0};  // added to every position on save; positions are relative to it
 
-    size_t size() const { return opacity.size(); }
+    size_t size() const { return opacity_logit.size(); }
     int rest_count() const { return static_cast<int>(attribute_floats(kShRest, sh_degree)); }
     /// Floats of a splat; 0 of an optional attribute that is not there.
     std::uint32_t floats(int attribute) const {

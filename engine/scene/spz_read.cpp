@@ -246,7 +246,7 @@ SplatModel decode(const Content& content) {
     read_positions(content, model);
     const auto& at = content.attributes;
     for (std::size_t i = 0; i < model.size(); ++i) {
-        model.opacity[i] = logit_of_byte(static_cast<std::uint8_t>(at[1][i]));
+        model.opacity_logit[i] = logit_of_byte(static_cast<std::uint8_t>(at[1][i]));
         const std::array<double, 4> q = rotation_of(content, i);
         for (std::size_t k = 0; k < 4; ++k)
             model.rotation[4 * i + k] = static_cast<float>(q[(k + 3) % 4]);

@@ -78,7 +78,7 @@ std::array<Stream, 6> pack(const SplatModel& model, int fractional_bits) {
     const auto rest = static_cast<std::size_t>(model.rest_count());
     for (std::size_t i = 0; i < model.size(); ++i) {
         const glm::dvec3 p = position_of(model, i);
-        streams[1].push_back(std::byte{byte_of_logit(model.opacity[i])});
+        streams[1].push_back(std::byte{byte_of_logit(model.opacity_logit[i])});
         append(pack_rotation(&model.rotation[4 * i]), 4, streams[4]);
         for (int axis = 0; axis < 3; ++axis) {
             const std::size_t at = 3 * i + static_cast<std::size_t>(axis);

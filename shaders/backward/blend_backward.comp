@@ -1,11 +1,12 @@
 // Gradients of blend.comp: from dL/dimage to sums over pixels from which dL/d(mean, l11, l21, l22, opacity, colour)
-// follow, PARTIALS floats for each splat-tile pair in the pair's own slot, so that sums per splat need no
-// atomics and repeat bit by bit. Place: after the loss. Source: docs/math.md, Gradients.
+// follow, PARTIALS floats for each splat-tile intersection in the intersection's own slot, so that sums per splat need
+// no atomics and repeat bit by bit. Place: after the loss. Source: docs/math.md, Gradients.
 // One of two ways to the same sums; the other is blend_backward_buckets.comp.
 // Work: one subgroup a tile, its areas one after another, pixels dealt as in blend.comp; the lanes' sums are
 // reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.
 // Reads what the forward pass stored; slots must be zero before. Lists too long for one dispatch are worked off
-// SEGMENT pairs at a time, the last ones first; final_transmittance and behind hold the pixels' state in between.
+// SEGMENT intersections at a time, the last ones first; final_transmittance and behind hold the pixels' state in
+// between.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,16 +20,16 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 8;  // SUBGROUP_SIZE
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
-layout(constant_id = 4) const uint SEGMENT = 0;  // pairs of a list a dispatch; 0: all of them
+layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer PairOrder { uint pair_order[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer LastPair { uint last_pair[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 14, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
 layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
 
@@ -66,7 +67,7 @@ uint load_pixels(uvec2 first, out Pixels px) {
             const uint o = at.y * args.width + at.x;
             px.d_colour[k] = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
             px.transmittance[k] = final_transmittance[o];
-            px.last[k] = last_pair[o];
+            px.last[k] = last_intersection[o];
         }
         px.behind[k] = dot(px.d_colour[k], background);
         last = max(last, px.last[k]);
@@ -93,9 +94,9 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
         uint number = 0u, slot = 0u;
         if (gl_SubgroupInvocationID < size) {
             const uint at = hits_base() + rest + gl_SubgroupInvocationID;
-            const uint splat = hit_pair[at];
+            const uint splat = hit_splat[at];
             number = hit_index[at] + 1u;
-            slot = pair_order[number - 1u];
+            slot = intersection_from_sorted[number - 1u];
             shape = load_shape(splat, l22);
             light = load_light(splat);
         }
@@ -114,7 +115,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
     } while (rest > 0u);
 }
 
-// What is behind the pairs of this dispatch, from and for the other dispatches.
+// What is behind the intersections of this dispatch, from and for the other dispatches.
 void load_behind(inout Pixels px, uvec2 first) {
     for (uint k = 0u; k < PIXELS; ++k) {
         const uvec2 at = first + slot_offset(k);

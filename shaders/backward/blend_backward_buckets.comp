@@ -1,10 +1,10 @@
-// Gradients of blend.comp as blend_backward.comp sums them, the other way round: a thread owns a pair and walks the
-// tile's pixels, so that its sums stay in registers and go to the pair's slot whole, without reductions, atomics or
-// additions to memory. Place: after bucket_behind. Source: Taming 3DGS (Mallick et al. 2024), section 4, with what is
-// behind a bucket from bucket_behind.comp, so that the steps within a bucket are those of blend_backward.comp.
-// Work: one subgroup, which is the workgroup, a bucket; where subgroups are smaller than buckets, one part of it after
-// another, the last first. Thread 0 has the last pair; pixels enter there from the checkpoints, and their
-// transmittance and what is behind them pass along the subgroup by shuffles, one thread a step.
+// Gradients of blend.comp as blend_backward.comp sums them, the other way round: a thread owns an intersection and
+// walks the tile's pixels, so that its sums stay in registers and go to the intersection's slot whole, without
+// reductions, atomics or additions to memory. Place: after bucket_behind. Source: Taming 3DGS (Mallick et al. 2024),
+// section 4, with what is behind a bucket from bucket_behind.comp, so that the steps within a bucket are those of
+// blend_backward.comp. Work: one subgroup, which is the workgroup, a bucket; where subgroups are smaller than buckets,
+// one part of it after another, the last first. Thread 0 has the last intersection; pixels enter there from the
+// checkpoints, and their transmittance and what is behind them pass along the subgroup by shuffles, one thread a step.
 // Shared memory: the pixels of the tile that reach into the bucket and that one of its ellipses may touch, packed.
 // Slots of buckets that no pixel reaches must be zero before.
 #version 460
@@ -24,10 +24,10 @@ layout(constant_id = 3) const uint SUBGROUP_SIZE = 32;
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BucketArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer PairOrder { uint pair_order[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
-layout(set = 0, binding = 7, scalar) readonly buffer LastPair { uint last_pair[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer BucketTile { uint bucket_tile[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer Checkpoints { float checkpoints[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer BucketBehind { float bucket_behind[]; };  // [records][TILE_PIXELS]
@@ -43,16 +43,16 @@ layout(set = 0, binding = 12, scalar) writeonly buffer PartialRest { float parti
 #include "backward/splat_sums.glsl"
 
 const uint SLOT_BITS = 8u;  // of TILE_PIXELS
-shared uint pixel_word[TILE_PIXELS];  // slot, and above it how many of the bucket's pairs the pixel looks at
+shared uint pixel_word[TILE_PIXELS];  // slot, and above it how many of the bucket's intersections the pixel looks at
 shared float pixel_transmittance[TILE_PIXELS], pixel_behind[TILE_PIXELS];
 shared float pixel_d_red[TILE_PIXELS], pixel_d_green[TILE_PIXELS], pixel_d_blue[TILE_PIXELS];
 
-// The blocks that pairs [begin, end) touch, as the bits of a pair.
+// The blocks that intersections [begin, end) touch, as the bits of an intersection.
 uint touched_blocks(uint begin, uint end) {
     uint bits = 0u;
     for (uint batch = begin; batch < end; batch += SUBGROUP_SIZE) {
         const uint j = batch + gl_SubgroupInvocationID;
-        if (j < end) bits |= pair_splat[pair_order[j]];
+        if (j < end) bits |= splat_from_intersection[intersection_from_sorted[j]];
     }
     return subgroupOr(bits);
 }
@@ -67,7 +67,7 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
         const uint o = at.y * args.width + at.x;
         uint seen = 0u;
         if (at.x < args.width && at.y < args.height && (bits & block_bit(slot / BLOCK_PIXELS)) != 0u) {
-            const uint last = last_pair[o];
+            const uint last = last_intersection[o];
             seen = last > begin ? min(last - begin, BUCKET) : 0u;
         }
         const uvec4 ballot = subgroupBallot(seen > 0u);
@@ -85,8 +85,8 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
     return count;
 }
 
-// One pair a thread, all pixels; `local` is the pair's number within the bucket. A pixel is at thread t in the step
-// that is t after its own number. What leaves at the last thread enters the part before this one.
+// One intersection a thread, all pixels; `local` is the intersection's number within the bucket. A pixel is at thread t
+// in the step that is t after its own number. What leaves at the last thread enters the part before this one.
 Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, vec4 light) {
     const uint lane = gl_SubgroupInvocationID;
     Sums sums = NO_SUMS;
@@ -121,8 +121,8 @@ void blend_part(uint part, uvec2 tile, uint begin, uint end, uint count) {
     float l22 = 0.0;
     uint slot = 0u;
     if (has_pair) {
-        slot = pair_order[begin + local];
-        const uint splat = pair_splat[slot] & PAIR_SPLAT_MASK;
+        slot = intersection_from_sorted[begin + local];
+        const uint splat = splat_from_intersection[slot] & INTERSECTION_SPLAT_MASK;
         shape = load_shape(splat, l22);
         light = load_light(splat);
     }

@@ -13,12 +13,12 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;  // BLOCK_PIXELS
-layout(constant_id = 4) const uint SEGMENT = 0;  // pairs of a list a dispatch; 0: all of them
+layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
 
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
-layout(set = 0, binding = 2, scalar) readonly buffer LastPair { uint last_pair[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Checkpoints { float checkpoints[]; };
 layout(set = 0, binding = 4, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
 layout(set = 0, binding = 5, scalar) writeonly buffer BucketBehind { float bucket_behind[]; };  // [records][TILE_PIXELS]
@@ -37,7 +37,7 @@ void main() {
     const uvec2 at = tile * TILE_SIZE + slot_to_pixel(slot);
     if (at.x >= args.width || at.y >= args.height) return;
     const uint o = at.y * args.width + at.x, plane = args.width * args.height;
-    const uint last = last_pair[o];
+    const uint last = last_intersection[o];
     if (last <= range.x) return;
 
     const vec3 d_colour = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);

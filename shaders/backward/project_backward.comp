@@ -4,7 +4,7 @@
 // With REST_GATHER the harmonics above the first band of a splat in view add to rest_sum instead.
 // Place: last pass of an iteration. Source: docs/math.md, Gradients and Optimizer.
 // Work: one thread a splat, all N of them: Adam is dense, an unseen splat's moments decay and move it.
-// Shared memory: none. Does nothing when the frame overflowed its pair buffers: the host repeats it.
+// Shared memory: none. Does nothing when the frame overflowed its intersection buffers: the host repeats it.
 // A splat whose gradient is not finite, or whose square is not, is counted and left as it is for this step.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -47,8 +47,8 @@ layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_OPACITY_LOGIT, scalar) buffe
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer DShDc { float d_sh_dc[]; };
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer DShRest { float d_sh_rest[]; };
 
-layout(set = 0, binding = FRAME_BINDING, scalar) readonly buffer PairCount { uint pair_count[]; };
-layout(set = 0, binding = FRAME_BINDING + 1, scalar) readonly buffer PairBegin { uint pair_begin[]; };
+layout(set = 0, binding = FRAME_BINDING, scalar) readonly buffer IntersectionCount { uint intersection_count[]; };
+layout(set = 0, binding = FRAME_BINDING + 1, scalar) readonly buffer FirstIntersection { uint first_intersection[]; };
 layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer PartialRest { float partial_rest[]; };
 layout(set = 0, binding = FRAME_BINDING + 8, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // norms, views
 layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus status; };
@@ -73,8 +73,8 @@ const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 
 Partial sum_partials(uint i) {
     Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
-    uint e = pair_begin[i];
-    const uint end = e + pair_count[i];
+    uint e = first_intersection[i];
+    const uint end = e + intersection_count[i];
     if (e == end) return sums;
     do {  // loops end at their bottoms: see emit_cells
         const uint stop = min(e + 32768u, end);  // some drivers end loops at 65,535
@@ -145,7 +145,7 @@ void update_splat(uint i, SplatGradient g) {
                  args.rate[ATTRIBUTE_OPACITY_LOGIT])
     if (UPDATE == UPDATE_ADAM && stands_near(cameras[args.camera_index], i, args.clearance))
         opacity_logit[i] -= FADING;
-    if (SH_DEGREE > 0 && (REST != REST_GATHER || pair_count[i] > 0u)) update_rest(i, g);
+    if (SH_DEGREE > 0 && (REST != REST_GATHER || intersection_count[i] > 0u)) update_rest(i, g);
     if (UPDATE == UPDATE_STORE) {  // the bands beyond the degree in use
         const uint row = (i - args.first_splat) * SH_STRIDE;
         for (uint c = uint(SH_USED) * 3u; c < SH_STRIDE; ++c) d_sh_rest[row + c] = 0.0;
@@ -175,7 +175,7 @@ void main() {
     if (i >= args.splat_end || status.overflow != 0u) return;
     SplatGradient g = no_gradient();
     vec2 shown = vec2(0.0);  // norm of the gradient of the mean, NDC; 1
-    if (pair_count[i] > 0u) {
+    if (intersection_count[i] > 0u) {
         const CameraData camera = cameras[args.camera_index];
         g = project_gradient(camera, i, sum_partials(i));
         shown = vec2(length(g.mean * 0.5 * vec2(camera.width, camera.height)), 1.0);
@@ -190,10 +190,10 @@ void main() {
     }
     if (UPDATE == UPDATE_STORE)
         gradient_sum[i] = shown;
-    else if (pair_count[i] > 0u)
+    else if (intersection_count[i] > 0u)
         gradient_sum[i] += shown;
     // Adam makes a step of full length of any gradient that comes alone: at all frames that do not show a splat the
     // regularisers would take, in a large set, what a few of its photos never get to hold up.
-    if (UPDATE == UPDATE_ADAM && (pair_count[i] > 0u || args.regularise_unseen == 1u)) regularise(i, g);
+    if (UPDATE == UPDATE_ADAM && (intersection_count[i] > 0u || args.regularise_unseen == 1u)) regularise(i, g);
     update_splat(i, g);
 }

@@ -1,5 +1,5 @@
-// What one splat and one pixel give to the gradients of a pair, walking back to front: T before a splat is T after
-// it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; what is behind, dotted with dL/dcolour, is a convex
+// What one splat and one pixel give to the gradients of an intersection, walking back to front: T before a splat is T
+// after it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; what is behind, dotted with dL/dcolour, is a convex
 // combination, so nothing cancels. Needs kernels/kernel.glsl.
 
 // Sums over pixels; G = opacity dL/dalpha dw/dq without the opacity.

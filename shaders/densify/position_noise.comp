@@ -1,7 +1,7 @@
 // Noise on positions: the covariance times a normal vector, for splats that are nearly transparent, so that they find
 // places where something is missing. Place: mcmc, after every step of the optimiser.
 // Source: 3DGS-MCMC (arXiv 2404.09591) equation 8; the gate sigmoid(-100 (opacity - 0.005)) is its authors' choice.
-// Work: one thread a splat. Shared memory: none. Does nothing when the frame overflowed its pair buffers.
+// Work: one thread a splat. Shared memory: none. Does nothing when the frame overflowed its intersection buffers.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -3,10 +3,11 @@
 // of the forward walk.
 // Source: 3DGS section 4; kernels of DARB-Splatting.
 // Work: one workgroup a tile, one subgroup an area of it, PIXELS pixels a thread in registers. Each lane loads one
-// pair of the tile's list; those whose ellipse touches the area are broadcast in turn. Shared memory: a subgroup's
-// own lists; no barrier. Reads pairs and projected splats; writes the image and, for the backward pass, the final
-// transmittance and where each pixel ended, with CHECKPOINTS also those of lib/bucket.glsl. Lists too long for one
-// dispatch are worked off SEGMENT pairs at a time; between the dispatches the outputs hold the pixels' state.
+// intersection of the tile's list; those whose ellipse touches the area are broadcast in turn. Shared memory: a
+// subgroup's own lists; no barrier. Reads intersections and projected splats; writes the image and, for the backward
+// pass, the final transmittance and where each pixel ended, with CHECKPOINTS also those of lib/bucket.glsl. Lists too
+// long for one dispatch are worked off SEGMENT intersections at a time; between the dispatches the outputs hold the
+// pixels' state.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -21,17 +22,17 @@ layout(constant_id = 0) const uint THREADS = 32;       // TILE_PIXELS / PIXELS
 layout(constant_id = 1) const int STORE_FOR_BACKWARD = 0;
 layout(constant_id = 2) const float MIN_TRANSMITTANCE = TRANSMITTANCE_STOP * (1.0 - TRANSMITTANCE_SLACK);
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
-layout(constant_id = 4) const uint SEGMENT = 0;  // pairs of a list a dispatch; 0: all of them
+layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
 layout(constant_id = 8) const int CHECKPOINTS = 0;  // 1: a record a bucket for the backward pass
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer PairOrder { uint pair_order[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer PairSplat { uint pair_splat[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
 layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W]
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
-layout(set = 0, binding = 8, scalar) buffer LastPair { uint last_pair[]; };
+layout(set = 0, binding = 8, scalar) buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 9, scalar) writeonly buffer Checkpoints { float checkpoints[]; };  // where CHECKPOINTS
 
 #define SHAPE_BINDING 3
@@ -48,7 +49,7 @@ const uint CHUNK = CHECKPOINTS == 1 ? BUCKET : 128u;
 struct Pixels {
     float transmittance[PIXELS];  // negative once the pixel has ended
     vec3 colour[PIXELS];
-    uint last[PIXELS];  // 1 + the last pair looked at while it was alive; 0: none
+    uint last[PIXELS];  // 1 + the last intersection looked at while it was alive; 0: none
 };
 
 // Light of the current bucket; not in Pixels, so that nothing of it is left without checkpoints.
@@ -99,7 +100,7 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
         float l22 = 0.0;
         uint number = 0u;
         if (mine < count) {
-            const uint splat = hit_pair[hits_base() + mine];
+            const uint splat = hit_splat[hits_base() + mine];
             number = hit_index[hits_base() + mine] + 1u;
             shape = load_shape(splat, l22);
             light = load_light(splat);
@@ -130,7 +131,7 @@ void load(inout Pixels px, uvec2 first) {
         const uint o = at.y * args.width + at.x;
         px.transmittance[k] = final_transmittance[o];
         px.colour[k] = vec3(image[o], image[plane + o], image[2u * plane + o]);
-        if (STORE_FOR_BACKWARD == 1) px.last[k] = last_pair[o];
+        if (STORE_FOR_BACKWARD == 1) px.last[k] = last_intersection[o];
     }
 }
 
@@ -148,7 +149,7 @@ void store(Pixels px, uvec2 first) {
         image[o] = colour.r;
         image[plane + o] = colour.g;
         image[2u * plane + o] = colour.b;
-        if (STORE_FOR_BACKWARD == 1) last_pair[o] = px.last[k];
+        if (STORE_FOR_BACKWARD == 1) last_intersection[o] = px.last[k];
         if (STORE_FOR_BACKWARD == 1 || SEGMENT > 0u)
             final_transmittance[o] = more ? px.transmittance[k] : transmittance;
     }

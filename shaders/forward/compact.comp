@@ -18,12 +18,12 @@ layout(set = 0, binding = 0, scalar) readonly buffer Visible { uint visible[]; }
 layout(set = 0, binding = 1, scalar) readonly buffer VisibleOffset { uint visible_offset[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer SplatBound { vec4 splat_bound[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer DepthKey { uint depth_key[]; };
-layout(set = 0, binding = 4, scalar) writeonly buffer DepthOrder { uint depth_order[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer SplatFromDepth { uint splat_from_depth[]; };
 
 void main() {
     const uint i = linear_id();
     if (i >= args.splat_count || visible[i] == 0u) return;
     const uint slot = visible_offset[i];
     depth_key[slot] = sort_key(splat_bound[i].z, args.near_plane);
-    depth_order[slot] = i;
+    splat_from_depth[slot] = i;
 }

@@ -1,6 +1,6 @@
-// Writes one pair for each tile that a visible splat touches, in depth order: the tile as sort key and the
-// splat. Place: after the scan of the pair counts. Work: one thread a visible splat. Shared memory: none. Counts the
-// huge splats; with COOPERATE it lists their ranks instead of writing their pairs.
+// Writes one intersection for each tile that a visible splat touches, in depth order: the tile as sort key and the
+// splat. Place: after the scan of the intersection counts. Work: one thread a visible splat. Shared memory: none.
+// Counts the huge splats; with COOPERATE it lists their ranks instead of writing their intersections.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -15,14 +15,14 @@ layout(constant_id = 1) const int COOPERATE = 0;  // huge splats are left to emi
 #include "lib/linear_id.glsl"
 #include "lib/tile.glsl"
 
-layout(push_constant, scalar) uniform Push { PairArgs args; };
+layout(push_constant, scalar) uniform Push { IntersectionArgs args; };
 layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
-layout(set = 0, binding = 1, scalar) readonly buffer DepthOrder { uint depth_order[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer PairOffset { uint pair_offset[]; };  // by rank
+layout(set = 0, binding = 1, scalar) readonly buffer SplatFromDepth { uint splat_from_depth[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer OffsetByDepth { uint offset_by_depth[]; };  // by rank
 layout(set = 0, binding = 3, scalar) readonly buffer Cover { uvec4 cover[]; };
-layout(set = 0, binding = 4, scalar) writeonly buffer PairTile { uint pair_tile[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer PairSplat { uint pair_splat[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer PairBegin { uint pair_begin[]; };  // by splat
+layout(set = 0, binding = 4, scalar) writeonly buffer TileFromIntersection { uint tile_from_intersection[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer FirstIntersection { uint first_intersection[]; };  // by splat
 #define SHAPE_BINDING 7
 #define BOUND_BINDING 8
 #include "lib/projected.glsl"
@@ -32,25 +32,25 @@ layout(set = 0, binding = 9, scalar) writeonly buffer HugeRank { uint huge_rank[
 void main() {
     const uint rank = linear_id();
     if (rank >= status.visible) return;
-    const uint splat = depth_order[rank];
+    const uint splat = splat_from_depth[rank];
     const TileCover c = unpack_cover(cover[splat]);
     float l22;
     const vec4 shape = load_shape(splat, l22);  // mean, l11, l21
     const EllipseRows e = ellipse_rows(shape.xy, shape.z, shape.w, l22, splat_bound[splat].y);
-    uint slot = pair_offset[rank];
-    pair_begin[splat] = slot;
+    uint slot = offset_by_depth[rank];
+    first_intersection[splat] = slot;
     // Offsets only grow, unless their sum left 32 bits.
-    const uint next = rank + 1u < status.visible ? pair_offset[rank + 1u] : status.pairs;
+    const uint next = rank + 1u < status.visible ? offset_by_depth[rank + 1u] : status.intersections;
     if (next < slot) {
         atomicOr(status.overflow, OVERFLOW_TOTAL);
-        atomicMax(status.pairs, 0xFFFFFFFFu);
+        atomicMax(status.intersections, 0xFFFFFFFFu);
     }
-    if (slot >= args.pair_capacity) return;  // the frame is repeated
-    if (next > slot && next - slot > HUGE_PAIRS) {
-        // Less than pair_capacity / HUGE_PAIRS + 1, unless the sum of the counts left 32 bits.
+    if (slot >= args.intersection_capacity) return;  // the frame is repeated
+    if (next > slot && next - slot > HUGE_INTERSECTIONS) {
+        // Less than intersection_capacity / HUGE_INTERSECTIONS + 1, unless the sum of the counts left 32 bits.
         const uint at = atomicAdd(status.huge_splats, 1u);
         if (COOPERATE == 1) {
-            if (at <= args.pair_capacity / HUGE_PAIRS) huge_rank[at] = rank;
+            if (at <= args.intersection_capacity / HUGE_INTERSECTIONS) huge_rank[at] = rank;
             return;
         }
     }

@@ -1,5 +1,5 @@
-// The pairs of cells of a splat's cover, for emit.comp and emit_huge.comp, which declare args, pair_tile and
-// pair_splat. Needs tile.glsl.
+// The intersections of cells of a splat's cover, for emit.comp and emit_huge.comp, which declare args,
+// tile_from_intersection and splat_from_intersection. Needs tile.glsl.
 
 uint touched_blocks(EllipseRows e, uvec2 tile) {
     const vec2 corner = vec2(tile * TILE_SIZE) + 0.5;
@@ -10,11 +10,11 @@ uint touched_blocks(EllipseRows e, uvec2 tile) {
         if (x.x <= x.y && x.x <= 7.0 && x.y >= 0.0) bits |= 1u << (2u * row);
         if (x.x <= x.y && x.x <= 15.0 && x.y >= 8.0) bits |= 2u << (2u * row);
     }
-    return bits << PAIR_BLOCK_SHIFT;
+    return bits << INTERSECTION_BLOCK_SHIFT;
 }
 
-// A pair for each tile of the cells in `bits`, which are not empty, from `slot` on. One loop that ends at its bottom:
-// lavapipe goes through the body of one that ends at its top once more, behind a mask.
+// An intersection for each tile of the cells in `bits`, which are not empty, from `slot` on. One loop that ends at its
+// bottom: lavapipe goes through the body of one that ends at its top once more, behind a mask.
 void emit_cells(TileCover c, uvec2 bits, uint splat, EllipseRows e, uint slot) {
     const uvec2 size = cell_size(c.extent);
     uvec2 tile = uvec2(0), first = uvec2(0), last = uvec2(0);  // of the cell; none yet
@@ -26,10 +26,10 @@ void emit_cells(TileCover c, uvec2 bits, uint splat, EllipseRows e, uint slot) {
             last = min(first + size, c.extent);
             tile = first;
         }
-        if (slot < args.pair_capacity) {
+        if (slot < args.intersection_capacity) {
             const uvec2 at = c.origin + tile;
-            pair_tile[slot] = at.y * args.tiles_x + at.x;
-            pair_splat[slot] = splat | touched_blocks(e, at);
+            tile_from_intersection[slot] = at.y * args.tiles_x + at.x;
+            splat_from_intersection[slot] = splat | touched_blocks(e, at);
         }
         ++slot;
         ++tile.x;

@@ -1,7 +1,7 @@
-// The pairs of the splats that emit.comp left over: the same pairs in the same slots, so that the lists are bit-equal.
-// Place: after emit.comp, in frames whose predecessor had huge splats. Work: a workgroup takes every
+// The intersections of the splats that emit.comp left over: the same intersections in the same slots, so that the lists
+// are bit-equal. Place: after emit.comp, in frames whose predecessor had huge splats. Work: a workgroup takes every
 // EMIT_HUGE_GROUPS-th huge splat, a thread one of the 64 cells of its cover. Shared memory: none. Reads covers and
-// projected splats; writes pairs.
+// projected splats; writes intersections.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -13,13 +13,13 @@ layout(local_size_x = EMIT_HUGE_THREADS) in;
 
 #include "lib/tile.glsl"
 
-layout(push_constant, scalar) uniform Push { PairArgs args; };
+layout(push_constant, scalar) uniform Push { IntersectionArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Status { FrameStatus status; };
-layout(set = 0, binding = 1, scalar) readonly buffer DepthOrder { uint depth_order[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer PairOffset { uint pair_offset[]; };  // by rank
+layout(set = 0, binding = 1, scalar) readonly buffer SplatFromDepth { uint splat_from_depth[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer OffsetByDepth { uint offset_by_depth[]; };  // by rank
 layout(set = 0, binding = 3, scalar) readonly buffer Cover { uvec4 cover[]; };
-layout(set = 0, binding = 4, scalar) writeonly buffer PairTile { uint pair_tile[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer PairSplat { uint pair_splat[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer TileFromIntersection { uint tile_from_intersection[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer HugeRank { uint huge_rank[]; };
 #define SHAPE_BINDING 7
 #define BOUND_BINDING 8
@@ -43,13 +43,13 @@ uint cell_tiles(TileCover c, uint cell) {
 
 void main() {
     const uint mine = gl_LocalInvocationID.x;
-    const uint listed = min(status.huge_splats, args.pair_capacity / HUGE_PAIRS + 1u);
+    const uint listed = min(status.huge_splats, args.intersection_capacity / HUGE_INTERSECTIONS + 1u);
     for (uint k = gl_WorkGroupID.x; k < listed; k += EMIT_HUGE_GROUPS) {
         const uint rank = huge_rank[k];
-        const uint splat = depth_order[rank];
+        const uint splat = splat_from_depth[rank];
         const TileCover c = unpack_cover(cover[splat]);
         if (!has_cell(c, mine)) continue;
-        uint slot = pair_offset[rank];
+        uint slot = offset_by_depth[rank];
         for (uint cell = 0u; cell < mine; ++cell)
             if (has_cell(c, cell)) slot += cell_tiles(c, cell);
         float l22;

@@ -1,4 +1,4 @@
-// Sizes the dispatches over visible splats and over pairs, and notes an overflow of the pair buffers.
+// Sizes the dispatches over visible splats and over intersections, and notes an overflow of the intersection buffers.
 // One: after the scan of the flags (STAGE 0), one after the scan of the counts (STAGE 1).
 // Work: one thread. Shared memory: none.
 #version 460
@@ -13,7 +13,7 @@ layout(constant_id = 0) const uint THREADS = 1;
 
 layout(constant_id = 1) const int STAGE = 0;
 
-layout(push_constant, scalar) uniform Push { PairArgs args; };
+layout(push_constant, scalar) uniform Push { IntersectionArgs args; };
 layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 1, scalar) buffer Groups { FrameGroups groups; };
 layout(set = 0, binding = 2, scalar) readonly buffer Total { uint total; };  // of the scan
@@ -34,13 +34,13 @@ void main() {
         groups.visible_y = n.y;
         groups.visible_z = 1u;
     } else {
-        const uint stored = min(total, args.pair_capacity);
-        status.pairs = total;
-        if (total > args.pair_capacity) status.overflow |= OVERFLOW_PAIRS;
+        const uint stored = min(total, args.intersection_capacity);
+        status.intersections = total;
+        if (total > args.intersection_capacity) status.overflow |= OVERFLOW_INTERSECTIONS;
         in_use = stored;
         const uvec2 n = split_groups(stored);
-        groups.pairs_x = n.x;
-        groups.pairs_y = n.y;
-        groups.pairs_z = 1u;
+        groups.intersections_x = n.x;
+        groups.intersections_y = n.y;
+        groups.intersections_z = 1u;
     }
 }

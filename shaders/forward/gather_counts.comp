@@ -1,4 +1,4 @@
-// The pair counts in depth order, ready for their scan. Place: after the depth sort.
+// The intersection counts in depth order, ready for their scan. Place: after the depth sort.
 // Work: one thread a visible splat. Shared memory: none.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -14,12 +14,12 @@ layout(constant_id = 0) const uint THREADS = 64;
 
 layout(push_constant, scalar) uniform Push { SplatArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Status { FrameStatus status; };
-layout(set = 0, binding = 1, scalar) readonly buffer DepthOrder { uint depth_order[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer PairCount { uint pair_count[]; };
-layout(set = 0, binding = 3, scalar) writeonly buffer PairCountSorted { uint pair_count_sorted[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer SplatFromDepth { uint splat_from_depth[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer IntersectionCount { uint intersection_count[]; };
+layout(set = 0, binding = 3, scalar) writeonly buffer CountByDepth { uint count_by_depth[]; };
 
 void main() {
     const uint rank = linear_id();
     if (rank >= min(status.visible, args.splat_count)) return;
-    pair_count_sorted[rank] = pair_count[depth_order[rank]];
+    count_by_depth[rank] = intersection_count[splat_from_depth[rank]];
 }

@@ -12,14 +12,14 @@ layout(constant_id = 0) const uint THREADS = 64;
 
 #include "lib/linear_id.glsl"
 
-layout(push_constant, scalar) uniform Push { PairArgs args; };
+layout(push_constant, scalar) uniform Push { IntersectionArgs args; };
 layout(set = 0, binding = 0, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = 1, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 
 void main() {
     const uint tile = linear_id();
     if (tile >= args.tile_count) return;
-    const uint pairs = tile_range[tile].y - tile_range[tile].x;
-    if (pairs > status.longest_list) atomicMax(status.longest_list, pairs);  // seldom: most are shorter
-    if (pairs > args.list_capacity) atomicOr(status.overflow, OVERFLOW_LISTS);
+    const uint intersections = tile_range[tile].y - tile_range[tile].x;
+    if (intersections > status.longest_list) atomicMax(status.longest_list, intersections);  // seldom: most are shorter
+    if (intersections > args.list_capacity) atomicOr(status.overflow, OVERFLOW_LISTS);
 }

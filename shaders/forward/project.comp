@@ -39,7 +39,7 @@ layout(set = 0, binding = FRAME_BINDING + 1, scalar) writeonly buffer SplatLight
 layout(set = 0, binding = FRAME_BINDING + 1, scalar) writeonly buffer SplatLightHalf { uvec2 splat_light_half[]; };
 layout(set = 0, binding = FRAME_BINDING + 2, scalar) writeonly buffer SplatBound { vec4 splat_bound[]; };  // l22, reach, depth, slope
 layout(set = 0, binding = FRAME_BINDING + 3, scalar) writeonly buffer Cover { uvec4 cover[]; };
-layout(set = 0, binding = FRAME_BINDING + 4, scalar) writeonly buffer PairCount { uint pair_count[]; };
+layout(set = 0, binding = FRAME_BINDING + 4, scalar) writeonly buffer IntersectionCount { uint intersection_count[]; };
 layout(set = 0, binding = FRAME_BINDING + 5, scalar) writeonly buffer Visible { uint visible[]; };
 layout(set = 0, binding = FRAME_BINDING + 6, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
@@ -110,7 +110,7 @@ uint find_cover(CameraData camera, vec2 mean, Factor f, float reach, out TileCov
     return count;
 }
 
-// 0 pairs and the reason, or the number of pairs.
+// 0 intersections and the reason, or the number of intersections.
 uint project(uint i, out int reason) {
     const CameraData camera = cameras[args.camera_index];
     const vec3 to_splat = from_centre(camera, position[i]);
@@ -178,7 +178,7 @@ void main() {
     if (i >= args.splat_end) return;
     int reason;
     const uint count = project(i, reason);
-    pair_count[i] = count;
+    intersection_count[i] = count;
     visible[i] = count > 0u ? 1u : 0u;
     if (count == 0u) atomicAdd(status.culled[reason], 1u);
 }

@@ -18,7 +18,7 @@ uvec2 slot_offset(uint k) {
     return slot_to_pixel(k * SUBGROUP_SIZE);
 }
 
-// The bits of a pair that say whether its ellipse touches the blocks of an area.
+// The bits of an intersection that say whether its ellipse touches the blocks of an area.
 uint area_bits(uint area) {
     return ((1u << AREA_BLOCKS) - 1u) * block_bit(area * AREA_PIXELS / BLOCK_PIXELS);
 }

@@ -4,11 +4,11 @@
 // the bucket, dotted with dL/dcolour, into a plane of its own, so that a frame can be walked back more than once.
 #include "lib/pixel_slot.glsl"
 
-layout(constant_id = 7) const uint BUCKET = BUCKET_PAIRS;  // a multiple of SUBGROUP_SIZE; divides SEGMENT
+layout(constant_id = 7) const uint BUCKET = BUCKET_INTERSECTIONS;  // a multiple of SUBGROUP_SIZE; divides SEGMENT
 
 const uint TRANSMITTANCE_PLANE = 3u, CHECKPOINT_PLANES = 4u;
 
-// Records of all tiles are apart, and at most pairs / BUCKET + tiles. list_begin: of the tile's whole list.
+// Records of all tiles are apart, and at most intersections / BUCKET + tiles. list_begin: of the tile's whole list.
 uint bucket_record(uint tile, uint list_begin, uint bucket) {
     return list_begin / BUCKET + tile + bucket;
 }

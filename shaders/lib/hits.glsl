@@ -1,29 +1,30 @@
-// The pairs of a stretch of the tile's list that touch the subgroup's area, packed together, so that the loop over
-// them has neither gaps nor branches. Needs the constants THREADS, SUBGROUP_SIZE and CHUNK, the pairs that are looked
-// at before those found are worked off, and the buffers pair_order and pair_splat.
+// The intersections of a stretch of the tile's list that touch the subgroup's area, packed together, so that the loop
+// over them has neither gaps nor branches. Needs the constants THREADS, SUBGROUP_SIZE and CHUNK, the intersections that
+// are looked at before those found are worked off, and the buffers intersection_from_sorted and
+// splat_from_intersection.
 #include "lib/lockstep.glsl"
 
-shared uint hit_pair[THREADS / SUBGROUP_SIZE * CHUNK];
+shared uint hit_splat[THREADS / SUBGROUP_SIZE * CHUNK];
 shared uint hit_index[THREADS / SUBGROUP_SIZE * CHUNK];
 
 uint hits_base() {
     return gl_SubgroupID * CHUNK;
 }
 
-// Fills the subgroup's lists from pairs [begin, end), at least one and at most CHUNK of them, that have one of bits;
-// returns how many.
+// Fills the subgroup's lists from intersections [begin, end), at least one and at most CHUNK of them, that have one of
+// bits; returns how many.
 uint collect_hits(uint begin, uint end, uint bits) {
     order_within_subgroup();  // the lists may still be read
     uint count = 0u, batch = begin;
     do {  // ends at its bottom: see emit_cells
         const uint j = batch + gl_SubgroupInvocationID;
-        uint pair = 0u;
-        if (j < end) pair = pair_splat[pair_order[j]];
-        const bool hit = (pair & bits) != 0u;
+        uint intersection = 0u;
+        if (j < end) intersection = splat_from_intersection[intersection_from_sorted[j]];
+        const bool hit = (intersection & bits) != 0u;
         const uvec4 hits = subgroupBallot(hit);
         if (hit) {
             const uint at = hits_base() + count + subgroupBallotExclusiveBitCount(hits);
-            hit_pair[at] = pair & PAIR_SPLAT_MASK;
+            hit_splat[at] = intersection & INTERSECTION_SPLAT_MASK;
             hit_index[at] = j;
         }
         count += subgroupBallotBitCount(hits);

@@ -1,4 +1,4 @@
-// The stretch of a tile's list that a dispatch works off. Needs the specialization constant SEGMENT: pairs of a
+// The stretch of a tile's list that a dispatch works off. Needs the specialization constant SEGMENT: intersections of a
 // stretch, or 0 for whole lists in one dispatch.
 uvec2 list_part(uvec2 range) {
     if (SEGMENT == 0u) return range;

@@ -1,8 +1,8 @@
-// The sums of splat-tile pairs, PARTIALS floats each, in the order of the pairs' slots: blend_backward adds to them
-// (define PARTIALS_ADD), others read them. Where they are more than one binding holds, the buffer is bound in
-// PARTIAL_WINDOWS windows of WINDOW_PAIRS pairs each, from PARTIALS_BINDING on.
+// The sums of splat-tile intersections, PARTIALS floats each, in the order of the intersections' slots: blend_backward
+// adds to them (define PARTIALS_ADD), others read them. Where they are more than one binding holds, the buffer is bound
+// in PARTIAL_WINDOWS windows of WINDOW_INTERSECTIONS intersections each, from PARTIALS_BINDING on.
 
-layout(constant_id = 9) const uint WINDOW_PAIRS = 0;  // 0: the first window has them all
+layout(constant_id = 9) const uint WINDOW_INTERSECTIONS = 0;  // 0: the first window has them all
 
 #ifdef PARTIALS_ADD
 #define PARTIALS_WINDOW(number) layout(set = 0, binding = PARTIALS_BINDING + number, scalar) buffer
@@ -19,26 +19,26 @@ PARTIALS_WINDOW(4) Partials4 { PARTIALS_OF partials4[]; };
 
 // The window of a slot, which becomes the number within it.
 uint partial_window(inout uint slot) {
-    if (WINDOW_PAIRS == 0u) return 0u;
-    const uint window = slot / max(WINDOW_PAIRS, 1u);
-    slot -= window * WINDOW_PAIRS;
+    if (WINDOW_INTERSECTIONS == 0u) return 0u;
+    const uint window = slot / max(WINDOW_INTERSECTIONS, 1u);
+    slot -= window * WINDOW_INTERSECTIONS;
     return window;
 }
 
 #ifdef PARTIALS_ADD
 void add_partial(uint slot, uint i, float value) {
     const uint window = partial_window(slot), at = slot * PARTIALS + i;
-    if (WINDOW_PAIRS == 0u || window == 0u) partials0[at] += value;
+    if (WINDOW_INTERSECTIONS == 0u || window == 0u) partials0[at] += value;
     else if (window == 1u) partials1[at] += value;
     else if (window == 2u) partials2[at] += value;
     else if (window == 3u) partials3[at] += value;
     else partials4[at] += value;
 }
 #else
-// part: 0, the first four of a pair's sums, or 1, the others.
+// part: 0, the first four of an intersection's sums, or 1, the others.
 vec4 load_partial(uint slot, uint part) {
     const uint window = partial_window(slot), at = 2u * slot + part;
-    if (WINDOW_PAIRS == 0u || window == 0u) return partials0[at];
+    if (WINDOW_INTERSECTIONS == 0u || window == 0u) return partials0[at];
     if (window == 1u) return partials1[at];
     if (window == 2u) return partials2[at];
     if (window == 3u) return partials3[at];

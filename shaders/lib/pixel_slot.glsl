@@ -10,9 +10,9 @@ uvec2 slot_to_pixel(uint slot) {
     return uvec2((slot & 7u) | ((slot >> 3) & 8u), ((slot >> 3) & 7u) | ((slot >> 4) & 8u));
 }
 
-// The bit of a pair that says whether its ellipse touches the block.
+// The bit of an intersection that says whether its ellipse touches the block.
 uint block_bit(uint block) {
-    return 1u << (PAIR_BLOCK_SHIFT + block);
+    return 1u << (INTERSECTION_BLOCK_SHIFT + block);
 }
 
 #endif

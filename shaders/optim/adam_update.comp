@@ -1,7 +1,7 @@
 // The Adam step of one attribute, of gradients that stand in buffers: of several views, or the caller's own.
 // The same step as project_backward.comp makes of one view, with its regularisers and limits.
 // Place: once an attribute and range, after the gradients of all views. Source: Kingma and Ba 2015.
-// Work: one thread a float. Shared memory: none. Does nothing when a frame overflowed its pair buffers.
+// Work: one thread a float. Shared memory: none. Does nothing when a frame overflowed its intersection buffers.
 // A splat with a gradient that was not finite is left as it is; a float whose own is not is counted and left.
 #version 460
 #extension GL_GOOGLE_include_directive : require

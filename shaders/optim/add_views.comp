@@ -1,6 +1,6 @@
 // Adds what the views of a step show of each splat to the sums that density control reads.
 // Place: after adam_update. Work: one thread a splat. Shared memory: none. Does nothing when a frame overflowed its
-// pair buffers; a splat with a gradient that was not finite adds nothing.
+// intersection buffers; a splat with a gradient that was not finite adds nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

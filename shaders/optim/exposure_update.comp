@@ -1,7 +1,8 @@
 // One Adam step of one photo's exposure, after which the mean of all maps is the identity again: a change common to
 // all photos is the scene's own. Place: after exposure_backward. Source: Kingma and Ba 2015.
-// Work: one group, a thread a term of the map. Shared memory: none. Does nothing when the frame overflowed its pair
-// buffers, as the step of the splats, or when the gradient or its square is not finite. Reads partial sums; writes maps, moments.
+// Work: one group, a thread a term of the map. Shared memory: none. Does nothing when the frame overflowed its
+// intersection buffers, as the step of the splats, or when the gradient or its square is not finite. Reads partial
+// sums; writes maps, moments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -11,7 +11,7 @@
 #define EFFECT_LENS 4         // lens distortion in the projection
 #define EFFECT_ALPHA 5        // photos with alpha or masks, and a background behind them
 #define EFFECT_DEPTH 6        // a picture of depths
-#define EFFECT_HUGE 7         // splats over very many tiles, and tiles' lists of very many pairs
+#define EFFECT_HUGE 7  // splats over very many tiles, and tiles' lists of very many intersections
 #define EFFECT_NEAR 8  // splats beside the picture that reach into it: the Jacobian is clamped
 #define EFFECT_COUNT 9
 

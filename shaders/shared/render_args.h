@@ -1,49 +1,49 @@
 // Argument structs of the render passes, read by C++ and GLSL alike (scalar layout).
-// N splats, V visible, K splat-tile pairs, T tiles.
+// N splats, V visible, K splat-tile intersections, T tiles.
 #ifndef DARB_RENDER_ARGS_H
 #define DARB_RENDER_ARGS_H
 
 #include "limits.h"
 #include "types.h"
 
-#define SPLAT_GROUP 64     // threads of the passes that run once per splat or pair
+#define SPLAT_GROUP 64     // threads of the passes that run once per splat or intersection
 #define MAX_GROUPS 65535u  // the portable limit of one dispatch dimension
 #define CULL_REASONS 8     // see CULL_* below
 
-// A pair names its splat in the low bits and, in the high ones, which of the tile's four 8 x 8
-// blocks its ellipse touches: bit 0 the top left, 1 the top right, 2 the bottom left, 3 the bottom
-// right.
-#define PAIR_BLOCK_SHIFT 28
-#define PAIR_SPLAT_MASK 0x0FFFFFFFu
+// An intersection names its splat in the low bits and, in the high ones, which of the tile's four 8
+// x 8 blocks its ellipse touches: bit 0 the top left, 1 the top right, 2 the bottom left, 3 the
+// bottom right.
+#define INTERSECTION_BLOCK_SHIFT 28
+#define INTERSECTION_SPLAT_MASK 0x0FFFFFFFu
 
-// Pairs of one tile's list that a dispatch of a blend pass works off; longer lists take several.
-// The lavapipe of Mesa 22.3 ends every loop of a subgroup once all of them together made 65,535
-// rounds, which cuts a list after 51,000 pairs forward and 10,700 backward; and a GPU may end a
-// dispatch that takes seconds.
+// Intersections of one tile's list that a dispatch of a blend pass works off; longer lists take
+// several. The lavapipe of Mesa 22.3 ends every loop of a subgroup once all of them together made
+// 65,535 rounds, which cuts a list after 51,000 intersections forward and 10,700 backward; and a
+// GPU may end a dispatch that takes seconds.
 #define LIST_SEGMENT 8192u
 
-// Pairs of a tile's list between two checkpoints of the forward blend, where the backward blend
-// works off buckets of them side by side (shaders/lib/bucket.glsl); where subgroups are larger, as
-// many as their threads. A record is four floats for each pixel of the tile.
-#define BUCKET_PAIRS 32u
+// Intersections of a tile's list between two checkpoints of the forward blend, where the backward
+// blend works off buckets of them side by side (shaders/lib/bucket.glsl); where subgroups are
+// larger, as many as their threads. A record is four floats for each pixel of the tile.
+#define BUCKET_INTERSECTIONS 32u
 #define CHECKPOINT_BYTES (TILE_SIZE * TILE_SIZE * 16u)
 
-// Sums that the backward blend leaves for a pair, beside one more in a buffer of its own, and the
-// windows in which their buffer is bound where one binding does not hold it.
+// Sums that the backward blend leaves for an intersection, beside one more in a buffer of its own,
+// and the windows in which their buffer is bound where one binding does not hold it.
 #define PARTIALS 8u
 #define PARTIAL_WINDOWS 5u
 
-// A splat of more pairs than this is huge: one thread would write them long after all others are
-// done. With COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one cell of the
-// cover a thread.
-#define HUGE_PAIRS 256u
+// A splat of more intersections than this is huge: one thread would write them long after all
+// others are done. With COOPERATE of emit.comp a workgroup of EMIT_HUGE_THREADS writes them, one
+// cell of the cover a thread.
+#define HUGE_INTERSECTIONS 256u
 #define EMIT_HUGE_THREADS 64  // cells of a cover
 #define EMIT_HUGE_GROUPS 64u  // that share the huge splats of a frame
 
 // What did not fit into a frame; bits of FrameStatus.overflow.
-#define OVERFLOW_PAIRS 1u  // more pairs than their buffers hold
-#define OVERFLOW_LISTS 2u  // a tile's list is longer than the blend dispatches take on
-#define OVERFLOW_TOTAL 4u  // the number of pairs exceeds 32 bits
+#define OVERFLOW_INTERSECTIONS 1u  // more intersections than their buffers hold
+#define OVERFLOW_LISTS 2u          // a tile's list is longer than the blend dispatches take on
+#define OVERFLOW_TOTAL 4u          // the number of intersections exceeds 32 bits
 
 // Why a splat takes no part in a frame; index into FrameStatus.culled.
 #define CULL_NEAR 0        // not in front of the near plane, or position not finite
@@ -85,18 +85,18 @@ struct CameraData {
 // What one frame counts, written by the passes, read by later passes and by the host afterwards.
 struct FrameStatus {
     uint visible;        // V
-    uint pairs;          // K as wanted, may exceed the capacity
+    uint intersections;  // K as wanted, may exceed the capacity
     uint overflow;       // OVERFLOW_*: the frame is to be repeated; sticky until the host clears it
     uint bad_gradients;  // splats whose gradient was not finite
     uint culled[CULL_REASONS];
-    uint longest_list;  // pairs of the tile that has most
-    uint huge_splats;   // of more than HUGE_PAIRS pairs
+    uint longest_list;  // intersections of the tile that has most
+    uint huge_splats;   // of more than HUGE_INTERSECTIONS intersections
 };
 
 // VkDispatchIndirectCommand of the passes over V and over K.
 struct FrameGroups {
     uint visible_x, visible_y, visible_z;
-    uint pairs_x, pairs_y, pairs_z;
+    uint intersections_x, intersections_y, intersections_z;
 };
 
 struct ProjectArgs {
@@ -115,11 +115,11 @@ struct SplatArgs {     // gather_counts
     uint splat_count;  // N
 };
 
-struct PairArgs {  // frame_groups, emit, tile_ranges, list_lengths
-    uint pair_capacity;
+struct IntersectionArgs {  // frame_groups, emit, tile_ranges, list_lengths
+    uint intersection_capacity;
     uint tiles_x;
     uint tile_count;
-    uint list_capacity;  // pairs of one tile that the blend dispatches take on
+    uint list_capacity;  // intersections of one tile that the blend dispatches take on
 };
 
 struct BlendArgs {

@@ -10,7 +10,7 @@
 #define VIEW_COLOUR 0  // the picture
 #define VIEW_ERROR 1   // mean absolute difference to the photo, as heat
 #define VIEW_DEPTH 2   // mean depth of what was blended, as heat; nothing blended: background
-#define VIEW_COUNT 3   // pairs of the tile's list that the pixel walked through, as heat
+#define VIEW_COUNT 3   // intersections of the tile's list that the pixel walked through, as heat
 
 #ifdef __cplusplus
 namespace darb::gpu {

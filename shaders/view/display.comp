@@ -18,7 +18,7 @@ layout(push_constant, scalar) uniform Push { DisplayArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer ImageIn { float image[]; };       // [3][H][W]
 layout(set = 0, binding = 1, scalar) readonly buffer Photo { uint photo[]; };          // R in the low byte
 layout(set = 0, binding = 2, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer LastPair { uint last_pair[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Pixels { uint pixels[]; };
 
 #include "lib/finite.glsl"
@@ -64,7 +64,7 @@ void main() {
     } else {
         const uvec2 tile = at / TILE_SIZE;
         const uint begin = tile_range[tile.y * args.tiles_x + tile.x].x;
-        const uint last = last_pair[i];
+        const uint last = last_intersection[i];
         colour = heat(last > begin ? float(last - begin) / args.heat_max : 0.0);
     }
     colour = any_nan(colour) ? vec3(1.0, 0.0, 1.0) : colour;

@@ -20,7 +20,7 @@
 #include "engine/scene/splat_file.h"
 #include "engine/scene/spz_layout.h"
 #include "tests/support/photo_files.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 #include "trainer/checkpoint.h"
 
 namespace darb::test {
@@ -63,7 +63,7 @@ std::string ascii_ply(const SplatModel& model) {
         };
         put(model.position, 3);
         put(model.sh_dc, 3);
-        put(model.opacity, 1);
+        put(model.opacity_logit, 1);
         put(model.log_scale, 3);
         put(model.rotation, 4);
         text += "\n";

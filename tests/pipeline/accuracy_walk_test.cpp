@@ -4,8 +4,8 @@
 
 #include "engine/core/rng.h"
 #include "engine/plan/accuracy.h"
-#include "engine/reference/render.h"
-#include "tests/support/device_walk.h"
+#include "engine/reference/reference_render.h"
+#include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
@@ -98,8 +98,8 @@ TEST_P(EveryChoice, matches_the_double_reference_at_the_same_settings) {
     const reference::Gradients g =
         reference::backward(scene.model, scene.camera, raster, truth, weights);
     const std::array<const std::vector<double>*, kAttributeCount> expected = {
-        &g.splats.position, &g.splats.log_scale, &g.splats.rotation,
-        &g.splats.opacity,  &g.splats.sh_dc,     &g.splats.sh_rest};
+        &g.splats.position,      &g.splats.log_scale, &g.splats.rotation,
+        &g.splats.opacity_logit, &g.splats.sh_dc,     &g.splats.sh_rest};
     for (int a = 0; a < kAttributeCount; ++a)
         EXPECT_TRUE(
             compare_scaled(std::string("d_") + attribute_name(a), *expected[a], walk.d[a],
@@ -172,7 +172,7 @@ TEST(Accuracy, resorting_shows_the_nearer_of_two_crossing_splats) {
         m.position.insert(m.position.end(), {0, 0, sign * 1e-3f});
         m.log_scale.insert(m.log_scale.end(), {0.0f, 0.0f, -4.0f});
         m.rotation.insert(m.rotation.end(), {cosine, 0, sign * half_turn, 0});
-        m.opacity.push_back(8);
+        m.opacity_logit.push_back(8);
         m.sh_dc.insert(m.sh_dc.end(), {sign * 1.5f, 0, -sign * 1.5f});
     }
     Camera camera;

@@ -23,7 +23,7 @@ namespace {
 SplatModel dense_scene(std::size_t splats) {
     SplatModel model = random_scene(splats, 1);
     for (float& scale : model.log_scale) scale += 1.5f;
-    for (float& logit : model.opacity) logit += 2.0f;
+    for (float& logit : model.opacity_logit) logit += 2.0f;
     return model;
 }
 
@@ -47,7 +47,7 @@ TEST(NativeBlend, Other_kernelsAreRefusedByTheMeasurement) {
     const BlendFigures figures = measure_blend(shared_device(), model, {camera}, {}, {0, 1, 1, 1});
     EXPECT_TRUE(figures.yardsticks.empty());
     EXPECT_EQ(figures.counts.evaluated, 0);
-    EXPECT_GT(figures.counts.pairs, 0);
+    EXPECT_GT(figures.counts.intersections, 0);
 }
 
 // One tile; splats of radius about 2 px on the centre of the top left block.
@@ -57,8 +57,8 @@ BlendFrame frame_of(std::uint32_t splats, float opacity) {
     f.tiles_x = f.tiles_y = 1;
     f.tile_range = {{0, splats}};
     for (std::uint32_t i = 0; i < splats; ++i) {
-        f.pair_order.push_back(i);
-        f.pair_splat.push_back(i | 1u << PAIR_BLOCK_SHIFT);
+        f.intersection_from_sorted.push_back(i);
+        f.splat_from_intersection.push_back(i | 1u << INTERSECTION_BLOCK_SHIFT);
         f.shape.emplace_back(4.0f, 4.0f, 0.5f, 0.1f);
         f.light.emplace_back(1.0f, 0.5f, 0.25f, opacity);
         f.bound.emplace_back(0.6f, 9.0f, 1.0f, 0.0f);
@@ -74,7 +74,7 @@ std::uint64_t contributions(const BlendFrame& f) {
     std::uint64_t count = 0;
     for (int p = 0; p < 64; ++p) {
         double transmittance = 1;
-        for (std::size_t i = 0; i < f.pair_order.size(); ++i) {
+        for (std::size_t i = 0; i < f.intersection_from_sorted.size(); ++i) {
             const glm::dvec4 s(f.shape[i]);
             const double dx = s.x - (p % 8 + 0.5), dy = s.y - (p / 8 + 0.5);
             const double x = s.z * dx + s.w * dy, y = double{f.bound[i].x} * dy;
@@ -148,7 +148,7 @@ TEST(Measure, Share_isThatOfAllPasses) {
     const PassWork work = *pass_work("blend", result.counts);
     EXPECT_EQ(total_work(result).fma, work.fma);
     EXPECT_NEAR(roofline_share(result, rates), roofline_share(work, rates, 8), 1e-12);
-    result.counts.evaluated *= 2;  // counted, not estimated from the pairs
+    result.counts.evaluated *= 2;  // counted, not estimated from the intersections
     EXPECT_DOUBLE_EQ(pass_work("blend", result.counts)->fma, 2 * work.fma);
 }
 
@@ -157,14 +157,14 @@ TEST(Growth, Exponent_isFittedOverTheLargestDecade) {
     for (const double x : {1e3, 1e4, 3e4, 1e5}) {
         GrowthPoint p;
         p.splats = x;
-        p.pairs = 100 * std::sqrt(x);
+        p.intersections = 100 * std::sqrt(x);
         p.ms.median = x < 5e3 ? 50 : 2e-3 * std::pow(x, 0.8);  // fixed costs first
         points.push_back(p);
     }
     EXPECT_NEAR(growth_exponent(points, "splats"), 0.8, 1e-9);
     EXPECT_TRUE(std::isnan(growth_exponent({points[0]}, "splats")));
     points.erase(points.begin());
-    EXPECT_NEAR(growth_exponent(points, "pairs"), 1.6, 1e-9);
+    EXPECT_NEAR(growth_exponent(points, "intersections"), 1.6, 1e-9);
 }
 
 TEST(Growth, Page_saysWhatIsHeld) {

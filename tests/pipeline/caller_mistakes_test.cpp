@@ -3,7 +3,7 @@
 #include "engine/core/error.h"
 #include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/data/metrics.h"
 #include "engine/data/resample.h"
 #include "engine/plan/accuracy.h"
@@ -15,8 +15,8 @@
 #include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {

@@ -186,10 +186,10 @@ TEST(Command, info_warns_of_odd_splats) {
     }
     model.position[0] = std::numeric_limits<float>::quiet_NaN();
     model.rotation[4] = 0;
-    model.log_scale[6] = 5;      // huge, and a needle
-    model.log_scale[9] = 0.65f;  // a needle
-    model.opacity[4] = 20;       // 1
-    model.opacity[5] = -20;      // 0
+    model.log_scale[6] = 5;        // huge, and a needle
+    model.log_scale[9] = 0.65f;    // a needle
+    model.opacity_logit[4] = 20;   // 1
+    model.opacity_logit[5] = -20;  // 0
     const std::string file = scratch() / "odd.ply", none = scratch() / "none.ply";
     write_ply(file, model);
     const json info = json::parse(darb("info --json - " + file).out);

@@ -9,11 +9,11 @@
 #include "engine/check/dump.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 #include "engine/scene/ply.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {

@@ -7,11 +7,11 @@
 
 #include "engine/plan/effect_plan.h"
 #include "engine/render/renderer.h"
-#include "tests/support/compare.h"
-#include "tests/support/device_options.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_device_options.h"
 #include "tests/support/test_lenses.h"
+#include "tests/support/test_scene.h"
 #include "tests/support/tiny_training.h"
 
 namespace darb::test {
@@ -55,7 +55,7 @@ Drawn draw(const Scene& scene, const char* effects) {
     apply_plan(drawn.plan, model);
     apply_plan(drawn.plan, views);
     Renderer renderer(shared_device(), model, Accuracy{}, drawn.plan.projection(),
-                      drawn.plan.crowds());
+                      drawn.plan.huge_splat_path());
     for (int frame = 0; frame < 2; ++frame) {  // the counters of the first decide on the second
         drawn.picture = renderer.render(views[0].camera);
         drawn.plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
@@ -87,7 +87,7 @@ void expect_right_on_both(int effect, Change needs) {
     for (int e = 0; e < EFFECT_COUNT; ++e)
         EXPECT_EQ(on.plan.on(e), e == effect) << effect_name(e) << ": " << on.plan.row(e).reason;
     EXPECT_EQ(on.picture.data, draw(scene, "all").picture.data);
-    if (effect == EFFECT_HUGE)  // how pairs are written changes no picture
+    if (effect == EFFECT_HUGE)  // how intersections are written changes no picture
         EXPECT_EQ(on.picture.data, draw(scene, without.c_str()).picture.data);
     else
         expect_another_picture(on.picture, draw(scene, without.c_str()).picture);
@@ -139,7 +139,7 @@ TEST(EffectPicture, near_plane) {
             s.model.log_scale[k] = -1.2f;
             s.model.sh_dc[k] = 2;
         }
-        s.model.opacity[0] = 4;
+        s.model.opacity_logit[0] = 4;
     });
 }
 
@@ -168,7 +168,7 @@ TEST(EffectMemory, frames_hold_no_buffer_of_an_effect_that_is_off) {
             plan_rendering(scene.model, scene.views, {}, parse_effects(effects));
         SplatModel model = scene.model;
         apply_plan(plan, model);
-        Renderer renderer(device, model, Accuracy{}, plan.projection(), plan.crowds());
+        Renderer renderer(device, model, Accuracy{}, plan.projection(), plan.huge_splat_path());
         renderer.render(scene.views[0].camera);
         return device.peak_bytes();
     };
@@ -292,8 +292,8 @@ TEST(EffectTraining, near_plane_care_is_always_on_as_splats_move) {
 TEST(EffectTraining, cooperation_and_segments_change_no_bit) {
     const TinyTraining t = tiny_training({.width = 640, .height = 480});
     TrainOptions always = plain_options(), never = always;
-    always.crowds = Crowds::always;
-    never.crowds = Crowds::never;
+    always.huge_splat_path = HugeSplatPath::always;
+    never.huge_splat_path = HugeSplatPath::never;
     EXPECT_EQ(trained(t, always, 3), trained(t, never, 3));
     Device device{test::device_options()};
     Trainer trainer(device, t.dataset, t.photos, t.start(), plain_options());

@@ -175,7 +175,7 @@ TEST_F(PassSpirv, loss_without_alpha_reads_neither_alpha_nor_background) {
 }
 
 // Constant 1 of emit is COOPERATE, 4 of blend is SEGMENT.
-TEST_F(PassSpirv, frames_without_crowds_know_no_list_of_huge_splats_and_no_segments) {
+TEST_F(PassSpirv, frames_without_huge_splats_know_no_list_of_huge_splats_and_no_segments) {
     const Left alone = left_in("emit", "1:0"), cooperating = left_in("emit", "1:1");
     EXPECT_FALSE(alone.bindings.count(9));
     EXPECT_TRUE(cooperating.bindings.count(9));
@@ -186,7 +186,7 @@ TEST_F(PassSpirv, frames_without_crowds_know_no_list_of_huge_splats_and_no_segme
     EXPECT_GT(parts.instructions, whole.instructions);
 }
 
-// Constant 9 of these is WINDOW_PAIRS.
+// Constant 9 of these is WINDOW_INTERSECTIONS.
 TEST_F(PassSpirv, sums_that_one_binding_holds_know_no_windows) {
     for (const auto& [shader, first] : {std::pair{"blend_backward", 9}, {"project_backward", 15}}) {
         const Left whole = left_in(shader, "9:0"), windows = left_in(shader, "9:640");

@@ -10,9 +10,9 @@
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/frame_limit.h"
-#include "tests/support/device_walk.h"
 #include "tests/support/projected_frame.h"
 #include "tests/support/scoped_variants.h"
+#include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
@@ -25,14 +25,14 @@ struct ShownFrame {
     std::vector<float> image;
     std::vector<glm::uvec2> ranges;  // [T]
     std::vector<Words> tiles;        // [T] splats in order of blending
-    std::uint64_t tile_pairs() const {
+    std::uint64_t tile_intersections() const {
         return std::accumulate(tiles.begin(), tiles.end(), std::uint64_t{0},
                                [](std::uint64_t sum, const Words& t) { return sum + t.size(); });
     }
 };
 
 ShownFrame render_frame(const SplatModel& model, const Camera& camera,
-                        std::uint32_t pairs = 200'000) {
+                        std::uint32_t intersections = 200'000) {
     Device& device = shared_device();
     GpuSplats splats(device, model, false);
     FrameBuffers buffers(device, forward_options(model, {}));
@@ -41,7 +41,7 @@ ShownFrame render_frame(const SplatModel& model, const Camera& camera,
                    glm::vec3(0.25f)};
     const Buffer cameras = upload_cameras(device, {view.camera});
     view.cameras = &cameras;
-    buffers.reserve(splats.count(), pairs, camera.width, camera.height);
+    buffers.reserve(splats.count(), intersections, camera.width, camera.height);
     Frame& frame = buffers.frame();
     Commands commands(device);
     commands.begin();
@@ -52,13 +52,13 @@ ShownFrame render_frame(const SplatModel& model, const Camera& camera,
     const size_t tile_count = size_t{view.camera.tiles_x} * view.camera.tiles_y;
     const TileIntersections& t = frame.intersections;
     f.ranges = t.tile_range.download<glm::uvec2>(tile_count);
-    const std::uint32_t stored = std::min(f.status.pairs, frame.size.intersections);
+    const std::uint32_t stored = std::min(f.status.intersections, frame.size.intersections);
     const Words order = t.intersection_from_sorted.download<std::uint32_t>(stored);
     const Words splat = t.splat_from_intersection.download<std::uint32_t>(stored);
     for (const glm::uvec2& range : f.ranges) {
         f.tiles.emplace_back();
         for (std::uint32_t j = range.x; j < range.y; ++j)
-            f.tiles.back().push_back(splat.at(order.at(j)) & PAIR_SPLAT_MASK);
+            f.tiles.back().push_back(splat.at(order.at(j)) & INTERSECTION_SPLAT_MASK);
     }
     return f;
 }
@@ -87,7 +87,7 @@ TEST(Frame, lists_match_the_covers_sorted_by_depth_on_the_host) {
     EXPECT_EQ(f.status.visible, order.size());
     EXPECT_EQ(f.status.overflow, 0U);
     EXPECT_EQ(f.tiles, expected);
-    EXPECT_EQ(f.status.pairs, f.tile_pairs());
+    EXPECT_EQ(f.status.intersections, f.tile_intersections());
 }
 
 TEST(Frame, equal_depths_keep_file_order) {
@@ -141,7 +141,7 @@ TEST(Frame, splats_that_nobody_sees_change_no_bit) {
             const size_t stride = values.size() / s.model.size();
             for (size_t c = 0; c < stride; ++c) values[i * stride + c] = values[twin * stride + c];
         }
-        if (i % 3 == 0) s.model.opacity[i] = -7;
+        if (i % 3 == 0) s.model.opacity_logit[i] = -7;
         if (i % 3 == 1) s.model.rotation[i * 4] = std::nanf("");
         if (i % 3 == 2) s.model.position[i * 3] = 1e5f;
     }
@@ -174,7 +174,7 @@ TEST(Frame, tiles_rendered_apart_equal_the_whole) {
 void expect_background(const ShownFrame& f) {
     for (const float value : f.image) ASSERT_EQ(value, 0.25f);
     EXPECT_EQ(f.status.visible, 0U);
-    EXPECT_EQ(f.status.pairs, 0U);
+    EXPECT_EQ(f.status.intersections, 0U);
     EXPECT_EQ(f.status.overflow, 0U);
     for (const Words& tile : f.tiles) EXPECT_TRUE(tile.empty());
 }
@@ -188,7 +188,7 @@ TEST(Frame, zero_visible_splats_show_the_background) {
     s.camera.translation.z = -30;
     expect_background(render_frame(s.model, s.camera));
     TestScene faint = random_scene(kScene);
-    for (float& logit : faint.model.opacity) logit = -8;
+    for (float& logit : faint.model.opacity_logit) logit = -8;
     expect_background(render_frame(faint.model, faint.camera));
 }
 
@@ -221,23 +221,23 @@ TEST(Frame, one_splat_over_the_whole_image_is_in_every_tile) {
         s.model.position[c] = 0;
         s.model.log_scale[c] = 3;
     }
-    s.model.opacity[0] = 4;
+    s.model.opacity_logit[0] = 4;
     const ShownFrame f = render_frame(s.model, s.camera);
-    EXPECT_EQ(f.status.pairs, 44U * 32U);
+    EXPECT_EQ(f.status.intersections, 44U * 32U);
     for (const Words& tile : f.tiles) EXPECT_EQ(tile, Words{0});
     for (size_t i = 0; i < size_t{700} * 500; ++i) ASSERT_NE(f.image[i], 0.25f);
 }
 
-TEST(Frame, pairs_beyond_the_capacity_raise_the_flag_and_keep_the_rest_in_bounds) {
+TEST(Frame, intersections_beyond_the_capacity_raise_the_flag_and_keep_the_rest_in_bounds) {
     TestScene s = random_scene({.count = 500, .width = 300, .height = 200, .sh_degree = 0});
     const ShownFrame full = render_frame(s.model, s.camera);
     const ShownFrame cut =
         render_frame(s.model, s.camera, 1);  // raised to the least capacity, 1,024
-    ASSERT_GT(full.status.pairs, 2000U);
+    ASSERT_GT(full.status.intersections, 2000U);
     EXPECT_EQ(full.status.overflow, 0U);
     EXPECT_EQ(cut.status.overflow, 1U);
-    EXPECT_EQ(cut.status.pairs, full.status.pairs);
-    EXPECT_EQ(cut.tile_pairs(), 1024U);
+    EXPECT_EQ(cut.status.intersections, full.status.intersections);
+    EXPECT_EQ(cut.tile_intersections(), 1024U);
     for (const glm::uvec2& range : cut.ranges) EXPECT_LE(range.y, 1024U);
 }
 
@@ -247,11 +247,12 @@ TEST(Frame, renderer_grows_and_repeats_until_everything_fits) {
     Renderer renderer(shared_device(), s.model);
     const ImageF image = renderer.render(s.camera, glm::vec3(0.25f));
     EXPECT_EQ(renderer.status().overflow, 0U);
-    EXPECT_EQ(renderer.status().pairs, full.status.pairs);
+    EXPECT_EQ(renderer.status().intersections, full.status.intersections);
     EXPECT_EQ(image.data, planes_to_image(full.image, 300, 200).data);
 }
 
-// A frame that wanted more pairs gets half as many again, or just those where the budget ends.
+// A frame that wanted more intersections gets half as many again, or just those where the budget
+// ends.
 TEST(Frame, a_budget_without_ample_room_gets_the_room_it_needs) {
     const TestScene s = random_scene({.count = 500, .width = 300, .height = 200, .sh_degree = 0});
     Device& device = shared_device();
@@ -259,9 +260,9 @@ TEST(Frame, a_budget_without_ample_room_gets_the_room_it_needs) {
         ForwardOptions options = forward_options(s.model, {});
         options.store_for_backward = store;
         gpu::FrameStatus status{};
-        status.overflow = OVERFLOW_PAIRS;
-        status.pairs = 300'000;
-        const auto grown = [&](std::uint32_t budget_pairs) {
+        status.overflow = OVERFLOW_INTERSECTIONS;
+        status.intersections = 300'000;
+        const auto grown = [&](std::uint32_t budget_intersections) {
             FrameBuffers buffers(device, options);
             buffers.reserve(500, 1024, 300, 200);
             BlendBackward backward(device, options);
@@ -273,9 +274,10 @@ TEST(Frame, a_budget_without_ample_room_gets_the_room_it_needs) {
                     FrameBuffers::device_bytes(device, options, size).intersections;
                 return store ? own + BlendBackward::device_bytes(size).intersections : own;
             };
-            device.set_memory_budget(budget_pairs == 0 ? 0
-                                                       : device.allocated_bytes() +
-                                                             bytes(budget_pairs) - bytes(1024));
+            device.set_memory_budget(budget_intersections == 0
+                                         ? 0
+                                         : device.allocated_bytes() + bytes(budget_intersections) -
+                                               bytes(1024));
             buffers.make_room(status);
             if (store) backward.reserve(buffers.size().intersections);
             return buffers.size().intersections;
@@ -312,7 +314,7 @@ TEST(Frame, a_picture_beyond_a_binding_names_its_camera_and_a_resolution) {
     EXPECT_THROW(buffers.reserve(1, 1, 2 * side, side), Error);
 }
 
-TEST(Frame, pairs_beyond_the_buckets_name_the_way_that_holds_them) {
+TEST(Frame, intersections_beyond_the_buckets_name_the_way_that_holds_them) {
     const TestScene s = random_scene({.count = 5, .width = 30, .height = 20, .sh_degree = 0});
     Device& device = shared_device();
     ForwardOptions options = forward_options(s.model, {});
@@ -326,10 +328,10 @@ TEST(Frame, pairs_beyond_the_buckets_name_the_way_that_holds_them) {
     ASSERT_LT(FrameBuffers::max_intersections(device), most);
     FrameBuffers buffers(device, options);
     buffers.reserve(5, 1024, 30, 20);
-    const auto hint = [&](std::uint32_t pairs) -> std::string {
+    const auto hint = [&](std::uint32_t intersections) -> std::string {
         gpu::FrameStatus status{};
-        status.overflow = OVERFLOW_PAIRS;
-        status.pairs = pairs;
+        status.overflow = OVERFLOW_INTERSECTIONS;
+        status.intersections = intersections;
         try {
             buffers.make_room(status);
         } catch (const Error& error) {
@@ -352,9 +354,10 @@ TEST(Frame, a_list_of_20000_splats_is_shown_to_its_end) {
             s.model.position[i * 3 + c] = c < 2 ? 0 : last ? 1 : 0;
             s.model.log_scale[i * 3 + c] = 0;
         }
-        s.model.opacity[i] = last ? 6.0f : -5.54f;  // just below the cut-off, but for the last one
+        s.model.opacity_logit[i] =
+            last ? 6.0f : -5.54f;  // just below the cut-off, but for the last one
     }
-    for (size_t i = 0; i < 9000; ++i) s.model.opacity[i] = -5.5f;
+    for (size_t i = 0; i < 9000; ++i) s.model.opacity_logit[i] = -5.5f;
     WalkSettings settings;
     settings.alpha_cutoff = 1e-5f;
     settings.transmittance_stop = 1e-30f;
@@ -363,7 +366,7 @@ TEST(Frame, a_list_of_20000_splats_is_shown_to_its_end) {
     EXPECT_EQ(walk.status.overflow, 0U);
 
     s.model.resize(13'000);  // the renderer, at its finest: 2.6e-6 of the light passes all of them
-    std::fill(s.model.opacity.begin(), s.model.opacity.end(), -6.9167f);
+    std::fill(s.model.opacity_logit.begin(), s.model.opacity_logit.end(), -6.9167f);
     settings.alpha_cutoff = 1.0f / 1024;
     settings.transmittance_stop = 1e-6f;
     const DeviceWalk fine = walk_on_device(s.model, s.camera, {}, settings);
@@ -385,7 +388,7 @@ TEST(Frame, a_million_splats_in_one_tile_are_all_shown_slow) {
     s.camera.rotation = glm::dmat3(1.0);
     std::fill(s.model.position.begin(), s.model.position.end(), 0.0f);
     std::fill(s.model.log_scale.begin(), s.model.log_scale.end(), 8.0f);  // flat over the image
-    std::fill(s.model.opacity.begin(), s.model.opacity.end(), -20 * std::log(2.0f));
+    std::fill(s.model.opacity_logit.begin(), s.model.opacity_logit.end(), -20 * std::log(2.0f));
     std::fill(s.model.sh_dc.begin(), s.model.sh_dc.end(), 0.0f);  // grey
     WalkSettings settings;
     settings.alpha_cutoff = 1e-7f;
@@ -417,7 +420,7 @@ TEST(Frame, more_than_65536_tiles_are_told_apart) {
         s.model.position[i * 3 + 1] = i % 2 == 0 ? -26.214f : 26.214f;
         s.model.position[i * 3 + 2] = 0;
         for (size_t c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = -8;
-        s.model.opacity[i] = 4;
+        s.model.opacity_logit[i] = 4;
     }
     const ShownFrame f = render_frame(s.model, s.camera);
     ASSERT_EQ(f.tiles.size(), 65'538U);

@@ -2,8 +2,8 @@
 // differences: of the device's own float images, which no formula of the reference takes part in,
 // and of the reference's images in double.
 #include "engine/core/rng.h"
-#include "engine/reference/render.h"
-#include "tests/support/device_walk.h"
+#include "engine/reference/reference_render.h"
+#include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
@@ -120,7 +120,7 @@ void compare_with_double_images(SceneOptions o, size_t most_left_out) {
     using Splats = reference::Splats<double>;
     const std::pair<const char*, std::vector<double> Splats::*> arrays[] = {
         {"position", &Splats::position}, {"log_scale", &Splats::log_scale},
-        {"rotation", &Splats::rotation}, {"opacity", &Splats::opacity},
+        {"rotation", &Splats::rotation}, {"opacity", &Splats::opacity_logit},
         {"sh_dc", &Splats::sh_dc},       {"sh_rest", &Splats::sh_rest}};
     constexpr double kStep = 1e-6;
     size_t compared = 0, band = 0;

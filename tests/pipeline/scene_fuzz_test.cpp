@@ -11,7 +11,7 @@
 #include "engine/check/walk_truth.h"
 #include "engine/core/rng.h"
 #include "engine/scene/edit_splats.h"
-#include "tests/support/device_walk.h"
+#include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
@@ -89,7 +89,7 @@ FuzzScene fuzz_scene(std::uint64_t seed) {
     f.settings.polynomial_degree = static_cast<int>(2 + rng.below(4));
     f.settings.storage = rng.below(4) == 0 ? STORAGE_FLOAT16 : STORAGE_FLOAT32;
     f.settings.sh_degree = static_cast<int>(rng.below(4));
-    f.settings.pairs = 1 + rng.below(2000);  // often too few at first
+    f.settings.intersections = 1 + rng.below(2000);  // often too few at first
     f.settings.depth_order = one_of(kOrders, rng);
     f.gradient = f.settings.depth_order != DEPTH_ORDER_PIXEL;
     return f;
@@ -103,11 +103,11 @@ size_t not_finite(const std::vector<float>& values) {
 
 // Of the kept splats, in order.
 std::vector<float> rows_of(const std::vector<float>& values,
-                           const std::vector<std::uint32_t>& pairs) {
+                           const std::vector<std::uint32_t>& intersections) {
     std::vector<float> rows;
-    const size_t stride = pairs.empty() ? 0 : values.size() / pairs.size();
-    for (size_t i = 0; i < pairs.size(); ++i)
-        if (pairs[i] > 0)
+    const size_t stride = intersections.empty() ? 0 : values.size() / intersections.size();
+    for (size_t i = 0; i < intersections.size(); ++i)
+        if (intersections[i] > 0)
             rows.insert(rows.end(), values.begin() + static_cast<std::ptrdiff_t>(i * stride),
                         values.begin() + static_cast<std::ptrdiff_t>((i + 1) * stride));
     return rows;
@@ -125,12 +125,12 @@ size_t expect_sound(std::uint64_t seed) {
         EXPECT_EQ(not_finite(walk.d[a]), 0U) << "d_" << attribute_name(a);
 
     SplatModel seen = f.scene.model;
-    keep_splats([&](size_t i) { return walk.pair_count[i] > 0; }, seen);
+    keep_splats([&](size_t i) { return walk.intersection_count[i] > 0; }, seen);
     EXPECT_EQ(seen.size(), walk.status.visible);
     const DeviceWalk alone = walk_on_device(seen, f.scene.camera, weights, f.settings);
     EXPECT_EQ(alone.image.data, walk.image.data) << "culled splats change the picture";
     for (int a = 0; a < kAttributeCount; ++a)
-        EXPECT_EQ(alone.d[a], rows_of(walk.d[a], walk.pair_count))
+        EXPECT_EQ(alone.d[a], rows_of(walk.d[a], walk.intersection_count))
             << "culled splats change d_" << attribute_name(a);
     return seen.size();
 }

@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "engine/core/rng.h"
-#include "tests/support/device_walk.h"
 #include "tests/support/scoped_variants.h"
+#include "tests/support/test_walk.h"
 #include "tests/support/tiny_training.h"
 #include "trainer/checkpoint.h"
 #include "trainer/run.h"
@@ -32,14 +32,14 @@ struct WalkScene {
 TEST(TuningWalk, ways_change_bits_only_where_the_table_says_so) {
     const WalkScene s;
     const DeviceWalk usual = s.walk();
-    ASSERT_GT(usual.status.pairs, 600U);
+    ASSERT_GT(usual.status.intersections, 600U);
     for (const TuningGroup& group : tuning_groups(shared_device().info()))
         for (const std::string& way : group.choices) {
             if (way == group.choices.front()) continue;  // the usual one
             SCOPED_TRACE(group.name + "=" + way);
             const ScopedVariants variants(shared_device(), group.name + "=" + way);
             const DeviceWalk walk = s.walk();
-            EXPECT_EQ(walk.status.pairs, usual.status.pairs);
+            EXPECT_EQ(walk.status.intersections, usual.status.intersections);
             if (group.name == "blend") {  // rounds q otherwise
                 for (std::size_t i = 0; i < walk.image.data.size(); ++i)
                     ASSERT_NEAR(walk.image.data[i], usual.image.data[i], 2e-6);

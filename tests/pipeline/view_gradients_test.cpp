@@ -10,7 +10,7 @@
 #include "engine/raster/adam_update.h"
 #include "engine/reference/adam.h"
 #include "engine/render/render_gradients.h"
-#include "tests/support/device_walk.h"
+#include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
@@ -120,7 +120,7 @@ TEST(ViewGradients, repeat_bit_by_bit_and_follow_an_update) {
     GradientRenderer renderer(shared_device(), scene.model);
     renderer.render(scene.camera);
     renderer.backward(weights);
-    for (float& value : scene.model.opacity) value += 0.1f;
+    for (float& value : scene.model.opacity_logit) value += 0.1f;
     renderer.update(scene.model);
     const ImageF image = renderer.render(scene.camera);
     const ViewGradients again = renderer.backward(weights);

@@ -7,10 +7,10 @@
 #include <set>
 
 #include "engine/core/rng.h"
-#include "engine/reference/render.h"
-#include "tests/support/device_walk.h"
+#include "engine/reference/reference_render.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_lenses.h"
+#include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
@@ -52,7 +52,7 @@ void expect_walk_matches(const TestScene& scene, const WalkSettings& settings,
     raster.sh_degree = settings.sh_degree;
     const reference::RenderResult truth = reference::render(scene.model, scene.camera, raster);
     ASSERT_GT(walk.status.visible, scene.model.size() / 2);
-    ASSERT_GT(walk.status.pairs, walk.status.visible);
+    ASSERT_GT(walk.status.intersections, walk.status.visible);
     // The slack of the tile test may list a splat that reaches no pixel centre.
     EXPECT_GE(walk.status.visible, truth.visible_count());
     EXPECT_LE(walk.status.visible, truth.visible_count() + 1);
@@ -63,8 +63,8 @@ void expect_walk_matches(const TestScene& scene, const WalkSettings& settings,
     const reference::Gradients g =
         reference::backward(scene.model, scene.camera, raster, truth, weights);
     const std::array<const std::vector<double>*, kAttributeCount> expected = {
-        &g.splats.position, &g.splats.log_scale, &g.splats.rotation,
-        &g.splats.opacity,  &g.splats.sh_dc,     &g.splats.sh_rest};
+        &g.splats.position,      &g.splats.log_scale, &g.splats.rotation,
+        &g.splats.opacity_logit, &g.splats.sh_dc,     &g.splats.sh_rest};
     for (int a = 0; a < kAttributeCount; ++a) {
         if (expected[a]->empty()) continue;
         EXPECT_TRUE(compare_scaled(std::string("d_") + attribute_name(a), *expected[a], walk.d[a],
@@ -118,7 +118,8 @@ TEST(WalkCoverage, every_pair_of_choices_is_walked) {
 INSTANTIATE_TEST_SUITE_P(every_kernel, Walk, testing::ValuesIn(all_cases()),
                          [](const auto& c) { return c.param.name(); });
 
-// Many layers of all opacities, small and large splats mixed, several thousand pairs, every degree.
+// Many layers of all opacities, small and large splats mixed, several thousand intersections, every
+// degree.
 class WalkDegree : public testing::TestWithParam<int> {};
 
 TEST_P(WalkDegree, dense_scene_matches_double) {

@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "tests/support/backward_pass.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -167,9 +167,9 @@ TEST(AdamUpdate, regularisers_pull_opacity_and_scale) {
     const PassState after = run_backward_pass(training.scene.model, training.scene.camera, 3,
                                               UPDATE_ADAM, state, training.partials, step);
     for (size_t i = 0; i < 20; ++i) {
-        const double o = 1 / (1 + std::exp(-double(state.parameters[kOpacity][i])));
-        EXPECT_NEAR(after.moments[kOpacity][2 * i], 0.1 * 0.3 * o * (1 - o), 1e-6);
-        EXPECT_LT(after.parameters[kOpacity][i], state.parameters[kOpacity][i]);
+        const double o = 1 / (1 + std::exp(-double(state.parameters[kOpacityLogit][i])));
+        EXPECT_NEAR(after.moments[kOpacityLogit][2 * i], 0.1 * 0.3 * o * (1 - o), 1e-6);
+        EXPECT_LT(after.parameters[kOpacityLogit][i], state.parameters[kOpacityLogit][i]);
     }
     for (size_t i = 0; i < 60; ++i) {
         const double scale = std::exp(double(state.parameters[kLogScale][i]));
@@ -193,7 +193,8 @@ TEST(AdamUpdate, regularisers_leave_what_the_frame_does_not_show) {
     for (size_t i = 0; i < 20; ++i) {
         const bool shown = training.partials.count[i] > 0;
         seen += shown;
-        EXPECT_EQ(after.moments[kOpacity][2 * i] != plain.moments[kOpacity][2 * i], shown) << i;
+        EXPECT_EQ(after.moments[kOpacityLogit][2 * i] != plain.moments[kOpacityLogit][2 * i], shown)
+            << i;
         for (size_t at = 3 * i; at < 3 * i + 3; ++at)
             EXPECT_EQ(after.moments[kLogScale][2 * at] != plain.moments[kLogScale][2 * at], shown)
                 << i;
@@ -262,9 +263,9 @@ TEST(AdamUpdate, splats_beside_the_camera_fade) {
     step.clearance = static_cast<float>((distances[9] + distances[10]) / 2);
     PassState faded = updated();
     for (size_t i = 0; i < 20; ++i)
-        EXPECT_NEAR(faded.parameters[kOpacity][i],
-                    free.parameters[kOpacity][i] - (from_camera(i) < step.clearance), 1e-5);
-    faded.parameters[kOpacity] = free.parameters[kOpacity];
+        EXPECT_NEAR(faded.parameters[kOpacityLogit][i],
+                    free.parameters[kOpacityLogit][i] - (from_camera(i) < step.clearance), 1e-5);
+    faded.parameters[kOpacityLogit] = free.parameters[kOpacityLogit];
     EXPECT_EQ(faded, free) << "nothing else changes";
     const PassState gradient = run_backward_pass(model, training.scene.camera, 3, UPDATE_STORE,
                                                  state, training.partials, step);
@@ -304,7 +305,7 @@ TEST(AdamUpdate, a_gradient_that_is_not_finite_is_counted_and_skipped) {
             const PassState start = start_state(training.scene.model);
             PassState expected = training.update(start, 1);
             ASSERT_GT(training.partials.count[3], 0U);
-            training.partials.pairs[training.partials.begin[3]][value] = bad;
+            training.partials.intersections[training.partials.begin[3]][value] = bad;
             const PassState after = training.update(start, 1);
             EXPECT_EQ(after.status.bad_gradients, 1U);
             expected.status.bad_gradients = 1;

@@ -1,42 +1,42 @@
 // Both ways of the backward blend alone, blend_backward.comp and blend_backward_buckets.comp,
-// against the reference: one gradient for each splat-tile pair.
+// against the reference: one gradient for each splat-tile intersection.
 #include "tests/support/blend_scene.h"
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 
 namespace darb::test {
 namespace {
 
-using Pairs = std::vector<reference::ProjectedGradient<double>>;
+using Intersections = std::vector<reference::ProjectedGradient<double>>;
 
 /// By the chain rule of q = x^2 + y^2, x = l11 dx + l21 dy, y = l22 dy.
-Pairs gradients_of(const BlendScene& scene, const reference::TileLists& lists,
-                   const BlendOutput& out) {
-    Pairs pairs;
-    for (size_t k = 0; k < lists.pair_count(); ++k) {
+Intersections gradients_of(const BlendScene& scene, const reference::TileLists& lists,
+                           const BlendOutput& out) {
+    Intersections intersections;
+    for (size_t k = 0; k < lists.intersection_count(); ++k) {
         const auto& s = scene.splats[lists.splats[k]];
-        const PairSums& p = out.pairs[k];
+        const IntersectionSums& p = out.intersections[k];
         const double d_l21 = 2.0 * p.gx_dy;
-        pairs.push_back({{2 * s.l11 * p.gx, 2 * (s.l21 * p.gx + s.l22 * s.l22 * p.g_dy)},
-                         (2.0 * p.gxx - s.l21 * d_l21) / s.l11,  // x = l11 dx + l21 dy
-                         d_l21,
-                         2 * s.l22 * p.g_dy_dy,
-                         p.d_opacity,
-                         glm::dvec3(p.d_colour)});
+        intersections.push_back({{2 * s.l11 * p.gx, 2 * (s.l21 * p.gx + s.l22 * s.l22 * p.g_dy)},
+                                 (2.0 * p.gxx - s.l21 * d_l21) / s.l11,  // x = l11 dx + l21 dy
+                                 d_l21,
+                                 2 * s.l22 * p.g_dy_dy,
+                                 p.d_opacity,
+                                 glm::dvec3(p.d_colour)});
     }
-    return pairs;
+    return intersections;
 }
 
-/// One quantity of every pair in a row.
+/// One quantity of every intersection in a row.
 template <class Get>
-std::vector<double> column(const Pairs& pairs, const Get& get) {
+std::vector<double> column(const Intersections& intersections, const Get& get) {
     std::vector<double> values;
-    for (const auto& p : pairs) values.push_back(get(p));
+    for (const auto& p : intersections) values.push_back(get(p));
     return values;
 }
 
 struct Result {
     reference::TileLists lists;
-    Pairs truth, got;
+    Intersections truth, got;
     BlendOutput out;
 };
 
@@ -67,7 +67,7 @@ Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed
             d_colour.data[i * 3 + c] = planes[c * pixels + i];
         }
     Result r{scene.lists(), {}, {}, {}};
-    r.truth.resize(r.lists.pair_count());
+    r.truth.resize(r.lists.intersection_count());
     for (size_t t = 0; t < r.lists.tile_count(); ++t)
         reference::blend_tile_backward(r.lists, t, scene.splats, scene.table(), scene.settings(),
                                        {d_colour, {}}, r.truth.data() + r.lists.begin[t]);
@@ -112,7 +112,7 @@ TEST_P(BlendBackward, random_layers_match_double) {
     BlendScene scene = GetParam().scene(53, 37);
     scene.add_random(120, 4, 0.01, 0.98);
     const Result r = expect_backward_matches(scene, allowed());
-    EXPECT_GT(r.lists.pair_count(), 200U);
+    EXPECT_GT(r.lists.intersection_count(), 200U);
 }
 
 // The kernels' own code is that of the other way, so that one case of each is enough.
@@ -123,7 +123,7 @@ TEST_P(ByBuckets, random_layers_match_double) {
     scene.buckets = true;
     scene.add_random(120, 4, 0.01, 0.98);
     const Result r = expect_backward_matches(scene, allowed());
-    EXPECT_GT(r.lists.pair_count(), 200U);
+    EXPECT_GT(r.lists.intersection_count(), 200U);
 }
 
 TEST_P(BlendBackward, opaque_layers_match_double_through_clamp_and_stop) {
@@ -180,19 +180,19 @@ TEST_P(BothWays, odd_image_sizes_match_double) {
         BlendScene scene = empty_scene(width, height);
         scene.add_random(100, 6, 0.1, 0.9);
         const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
-        EXPECT_GT(r.lists.pair_count(), 5U);
+        EXPECT_GT(r.lists.intersection_count(), 5U);
     }
 }
 
-TEST_P(BothWays, pairs_behind_the_stop_get_zero) {
+TEST_P(BothWays, intersections_behind_the_stop_get_zero) {
     BlendScene scene = empty_scene();
     for (int i = 0; i < 100; ++i) scene.add({8.5, 8.5}, {400, 0, 400}, 0.97, {1, 0.5, 0.2});
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
     for (size_t k = 5; k < 100; ++k) {
-        const PairSums& p = r.out.pairs[k];
-        EXPECT_EQ(glm::vec4(p.gx, p.gxx, p.gx_dy, p.g_dy), glm::vec4(0)) << "pair " << k;
-        EXPECT_EQ(glm::vec4(p.d_colour, p.g_dy_dy), glm::vec4(0)) << "pair " << k;
-        EXPECT_EQ(p.d_opacity, 0) << "pair " << k;
+        const IntersectionSums& p = r.out.intersections[k];
+        EXPECT_EQ(glm::vec4(p.gx, p.gxx, p.gx_dy, p.g_dy), glm::vec4(0)) << "intersection " << k;
+        EXPECT_EQ(glm::vec4(p.d_colour, p.g_dy_dy), glm::vec4(0)) << "intersection " << k;
+        EXPECT_EQ(p.d_opacity, 0) << "intersection " << k;
     }
 }
 
@@ -200,7 +200,7 @@ TEST_P(BothWays, alpha_at_its_limit_moves_only_the_colour) {
     BlendScene scene = empty_scene();
     scene.add({8, 8}, {1e6, 0, 1e6}, 0.9999, {1, 0.5, 0.2});  // above 0.99 in every pixel
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
-    const PairSums& p = r.out.pairs[0];
+    const IntersectionSums& p = r.out.intersections[0];
     EXPECT_EQ(glm::vec4(p.gx, p.gxx, p.gx_dy, p.g_dy), glm::vec4(0));
     EXPECT_EQ(p.g_dy_dy, 0);
     EXPECT_EQ(p.d_opacity, 0);
@@ -211,13 +211,14 @@ TEST_P(BothWays, the_second_of_two_clamped_layers_gets_its_gradient) {
     BlendScene scene = empty_scene();
     for (int i = 0; i < 3; ++i) scene.add({8, 8}, {1e6, 0, 1e6}, 0.9999, {1, 0.5, 0.2});
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
-    EXPECT_NE(r.out.pairs[1].d_colour, glm::vec3(0));
-    EXPECT_EQ(r.out.pairs[2].d_colour, glm::vec3(0));
+    EXPECT_NE(r.out.intersections[1].d_colour, glm::vec3(0));
+    EXPECT_EQ(r.out.intersections[2].d_colour, glm::vec3(0));
 }
 
 bool same_bits(const BlendOutput& a, const BlendOutput& b) {
-    return a.pairs.size() == b.pairs.size() && a.image == b.image &&
-           std::memcmp(a.pairs.data(), b.pairs.data(), a.pairs.size() * sizeof(PairSums)) == 0;
+    return a.intersections.size() == b.intersections.size() && a.image == b.image &&
+           std::memcmp(a.intersections.data(), b.intersections.data(),
+                       a.intersections.size() * sizeof(IntersectionSums)) == 0;
 }
 
 TEST_P(BothWays, a_second_run_gives_the_same_bits) {
@@ -227,7 +228,7 @@ TEST_P(BothWays, a_second_run_gives_the_same_bits) {
     const reference::TileLists lists = scene.lists();
     const BlendOutput one = blend_on_device(scene, lists, true, d_image);
     EXPECT_TRUE(same_bits(one, blend_on_device(scene, lists, true, d_image)));
-    EXPECT_NE(one.pairs[0].d_colour, glm::vec3(0));
+    EXPECT_NE(one.intersections[0].d_colour, glm::vec3(0));
 }
 
 TEST_P(BothWays, skipping_blocks_that_are_not_touched_changes_no_bit) {

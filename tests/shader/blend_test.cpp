@@ -1,7 +1,7 @@
 // blend.comp alone against the blending of the reference, on splats set by hand.
 #include "engine/plan/tuning_names.h"
 #include "tests/support/blend_scene.h"
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 
 namespace darb::test {
 namespace {
@@ -38,7 +38,7 @@ TEST_P(Blend, random_layers_match_double) {
     BlendScene scene = GetParam().scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);
     const Blended b = expect_blend_matches(scene);
-    EXPECT_GT(b.lists.pair_count(), 300U);
+    EXPECT_GT(b.lists.intersection_count(), 300U);
 }
 
 TEST_P(Blend, mean_on_a_pixel_centre_shows_the_full_opacity) {
@@ -118,7 +118,7 @@ TEST(BlendCases, image_sizes_that_are_no_multiple_of_a_tile_match_double) {
         BlendScene scene = kCosine.scene(width, height);
         scene.add_random(200, 6, 0.1, 0.9);
         const Blended b = expect_blend_matches(scene);
-        EXPECT_GT(b.lists.pair_count(), 20U);
+        EXPECT_GT(b.lists.intersection_count(), 20U);
     }
 }
 
@@ -137,8 +137,8 @@ double largest_difference(const std::vector<float>& a, const std::vector<float>&
     return most;
 }
 
-// Where a pixel ended may differ by pairs that miss its block, of which a larger area sees some; q
-// rounds otherwise, as a thread has it from its first pixel.
+// Where a pixel ended may differ by intersections that miss its block, of which a larger area sees
+// some; q rounds otherwise, as a thread has it from its first pixel.
 TEST(BlendCases, every_shape_of_workgroup_gives_the_same_picture) {
     BlendScene scene = kCosine.scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);

@@ -6,9 +6,9 @@
 
 #include "engine/core/rng.h"
 #include "engine/raster/backward.h"
-#include "engine/reference/density_control.h"
-#include "tests/support/random_scene.h"
+#include "engine/reference/reference_density_control.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 #include "trainer/density/density_control.h"
 
 namespace darb::test {
@@ -78,7 +78,8 @@ struct Population {
             sums.push_back(g.x);
             seen.push_back(static_cast<std::uint32_t>(g.y));
         }
-        return reference::density_actions(sums, seen, model.log_scale, model.opacity, settings);
+        return reference::density_actions(sums, seen, model.log_scale, model.opacity_logit,
+                                          settings);
     }
 };
 
@@ -209,12 +210,12 @@ TEST(Densify, an_empty_model_stays_empty) {
 
 TEST(Densify, values_that_are_not_finite_do_not_grow) {
     Population population(6);
-    population.model.opacity.assign(6, 0.0f);
+    population.model.opacity_logit.assign(6, 0.0f);
     population.model.log_scale.assign(18, -3.0f);
     population.gradient_sum.assign(6, glm::vec2(1, 1));
     population.gradient_sum[0].x = std::nanf("");
-    population.gradient_sum[1] = glm::vec2(1, 0);  // never seen
-    population.model.opacity[2] = std::nanf("");   // pruned
+    population.gradient_sum[1] = glm::vec2(1, 0);       // never seen
+    population.model.opacity_logit[2] = std::nanf("");  // pruned
     DensityResult result;
     population.run(args_for({}), result);
     EXPECT_EQ(result.pruned, 1U);
@@ -229,7 +230,7 @@ std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t 
         for (size_t c = 0; c < 3; ++c) population.model.position[i * 3 + c] = 1;
         std::copy_n(log_scale, 3, population.model.log_scale.begin() + std::ptrdiff_t(i * 3));
         std::copy_n(rotation, 4, population.model.rotation.begin() + std::ptrdiff_t(i * 4));
-        population.model.opacity[i] = 1;
+        population.model.opacity_logit[i] = 1;
         population.gradient_sum[i] = glm::vec2(1, 1);
     }
     gpu::DensifyArgs args = args_for({});
@@ -298,12 +299,13 @@ TEST(ResetOpacity, opacities_come_down_and_moments_are_zero) {
     const SplatModel after = splats.download();
     int lowered = 0;
     for (size_t i = 0; i < 300; ++i) {
-        EXPECT_FLOAT_EQ(after.opacity[i], reference::reset_opacity(population.model.opacity[i]));
-        lowered += after.opacity[i] != population.model.opacity[i];
+        EXPECT_FLOAT_EQ(after.opacity_logit[i],
+                        reference::reset_opacity(population.model.opacity_logit[i]));
+        lowered += after.opacity_logit[i] != population.model.opacity_logit[i];
     }
     EXPECT_GT(lowered, 100);
     EXPECT_LT(lowered, 300);
-    EXPECT_EQ(splats.moments(kOpacity).download<float>(600), std::vector<float>(600, 0.0f));
+    EXPECT_EQ(splats.moments(kOpacityLogit).download<float>(600), std::vector<float>(600, 0.0f));
     EXPECT_EQ(splats.moments(kShDc).download<float>(1800), population.moments_before(kShDc));
     EXPECT_EQ(after.position, population.model.position);
 }

@@ -2,11 +2,11 @@
 // 3D smoothing filter, the depth image.
 #include "engine/core/rng.h"
 #include "engine/reference/adam.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 #include "engine/render/renderer.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 #include "trainer/exposure.h"
 #include "trainer/smoothing.h"
 

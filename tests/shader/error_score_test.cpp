@@ -3,13 +3,13 @@
 #include "trainer/density/error_score.h"
 
 #include "engine/core/rng.h"
-#include "engine/reference/density_control.h"
-#include "engine/reference/render.h"
-#include "tests/support/compare.h"
-#include "tests/support/device_walk.h"
-#include "tests/support/random_scene.h"
+#include "engine/reference/reference_density_control.h"
+#include "engine/reference/reference_render.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
+#include "tests/support/test_walk.h"
 #include "trainer/density/density_control.h"
 #include "trainer/resolution_ramp.h"
 
@@ -126,7 +126,7 @@ TEST(ErrorScore, masked_pixels_do_not_count) {
 
 TEST(ErrorScore, unseen_splats_have_no_share) {
     TestScene scene = random_scene({.count = 20, .width = 32, .height = 32, .seed = 3});
-    scene.model.opacity[4] = -20;
+    scene.model.opacity_logit[4] = -20;
     const Shares shares = shares_on_device(scene, random_photo(32, 32, 1), {}, glm::vec3(0), 1);
     EXPECT_EQ(shares.got[4], glm::vec2(0));
 }
@@ -195,9 +195,9 @@ TEST(DecayOpacity, matches_double_and_leaves_the_rest) {
     density.decay_opacity(splats, 0.9f);
     const SplatModel after = splats.download();
     for (size_t i = 0; i < 300; ++i)
-        EXPECT_NEAR(after.opacity[i], reference::decayed_opacity(model.opacity[i], double{0.9f}),
-                    2e-5)
-            << model.opacity[i];
+        EXPECT_NEAR(after.opacity_logit[i],
+                    reference::decayed_opacity(model.opacity_logit[i], double{0.9f}), 2e-5)
+            << model.opacity_logit[i];
     EXPECT_EQ(after.log_scale, model.log_scale);
     EXPECT_EQ(after.position, model.position);
 }

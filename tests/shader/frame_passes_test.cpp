@@ -4,9 +4,9 @@
 #include <numeric>
 
 #include "engine/core/rng.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 #include "tests/support/projected_frame.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -73,7 +73,7 @@ GroupsOutcome frame_groups(int stage, std::uint32_t total, std::uint32_t capacit
     const GuardedBuffer status(device, "status", before),
         groups(device, "groups", sizeof(gpu::FrameGroups)), sum(device, "total", Words{total}),
         in_use(device, "in use", 4);
-    run("frame_groups", gpu::PairArgs{capacity, 1, 1, 0}, {status, groups, sum, in_use}, 1,
+    run("frame_groups", gpu::IntersectionArgs{capacity, 1, 1, 0}, {status, groups, sum, in_use}, 1,
         {{"STAGE", stage}}, true);
     EXPECT_TRUE(status.intact() && groups.intact() && in_use.intact());
     return {status.read<gpu::FrameStatus>()[0], groups.read<gpu::FrameGroups>()[0],
@@ -94,20 +94,23 @@ TEST(FrameGroups, dispatches_hold_every_count) {
         EXPECT_EQ(visible.in_use, n);
         expect_groups_hold(visible.groups.visible_x, visible.groups.visible_y,
                            visible.groups.visible_z, n);
-        const GroupsOutcome pairs = frame_groups(1, n, n);
-        EXPECT_EQ(pairs.status.pairs, n);
-        EXPECT_EQ(pairs.status.overflow, 0U);
-        expect_groups_hold(pairs.groups.pairs_x, pairs.groups.pairs_y, pairs.groups.pairs_z, n);
+        const GroupsOutcome intersections = frame_groups(1, n, n);
+        EXPECT_EQ(intersections.status.intersections, n);
+        EXPECT_EQ(intersections.status.overflow, 0U);
+        expect_groups_hold(intersections.groups.intersections_x,
+                           intersections.groups.intersections_y,
+                           intersections.groups.intersections_z, n);
     }
 }
 
-TEST(FrameGroups, more_pairs_than_room_raise_the_flag_and_are_cut) {
+TEST(FrameGroups, more_intersections_than_room_raise_the_flag_and_are_cut) {
     for (const std::uint32_t total : {1001U, 5000U, 0xffffffffU}) {
         const GroupsOutcome o = frame_groups(1, total, 1000);
         EXPECT_EQ(o.status.overflow, 1U);
-        EXPECT_EQ(o.status.pairs, total);
+        EXPECT_EQ(o.status.intersections, total);
         EXPECT_EQ(o.in_use, 1000U);
-        expect_groups_hold(o.groups.pairs_x, o.groups.pairs_y, o.groups.pairs_z, 1000);
+        expect_groups_hold(o.groups.intersections_x, o.groups.intersections_y,
+                           o.groups.intersections_z, 1000);
     }
     EXPECT_EQ(frame_groups(1, 1000, 1000).status.overflow, 0U);
     EXPECT_EQ(frame_groups(1, 10, 1000, 1).status.overflow, 1U)
@@ -118,7 +121,7 @@ struct EmitInput {
     TestScene scene;
     ProjectedFrame frame;
     Words order, offset;  // by rank
-    std::uint32_t pairs = 0, tiles_x = 0;
+    std::uint32_t intersections = 0, tiles_x = 0;
 
     explicit EmitInput(const SceneOptions& options)
         : scene(random_scene(options)), frame(project_on_device(scene.model, scene.camera)) {
@@ -128,8 +131,8 @@ struct EmitInput {
             return frame.bound[a].z < frame.bound[b].z;
         });
         for (const std::uint32_t i : order) {
-            offset.push_back(pairs);
-            pairs += frame.pair_count[i];
+            offset.push_back(intersections);
+            intersections += frame.intersection_count[i];
         }
         tiles_x = static_cast<std::uint32_t>(scene.camera.width + TILE_SIZE - 1) / TILE_SIZE;
     }
@@ -145,14 +148,15 @@ Emitted emit(const EmitInput& in, std::uint32_t capacity, bool cooperate = false
     const auto visible = static_cast<std::uint32_t>(in.order.size());
     std::vector<gpu::FrameStatus> counts(1);
     counts[0].visible = visible;
-    counts[0].pairs = in.pairs;
+    counts[0].intersections = in.intersections;
     const GuardedBuffer status(device, "status", counts), order(device, "order", in.order),
         offset(device, "offset", in.offset), cover(device, "cover", in.frame.cover),
-        tile(device, "pair tile", capacity * 4), splat(device, "pair splat", capacity * 4),
-        begin(device, "pair begin", in.frame.visible.size() * 4),
+        tile(device, "tile from intersection", capacity * 4),
+        splat(device, "splat from intersection", capacity * 4),
+        begin(device, "first intersection", in.frame.visible.size() * 4),
         shape(device, "shape", in.frame.shape), bound(device, "bound", in.frame.bound),
-        huge(device, "huge splats", (capacity / HUGE_PAIRS + 1) * 4);
-    const gpu::PairArgs args{capacity, in.tiles_x, 0, 0};
+        huge(device, "huge splats", (capacity / HUGE_INTERSECTIONS + 1) * 4);
+    const gpu::IntersectionArgs args{capacity, in.tiles_x, 0, 0};
     run("emit", args, {status, order, offset, cover, tile, splat, begin, shape, bound, huge},
         visible, {{"COOPERATE", cooperate ? 1 : 0}});
     if (cooperate) {
@@ -179,38 +183,38 @@ const SceneOptions kEmitScene{.count = 120,
                               .min_logit = -4,
                               .seed = 31};
 
-TEST(Emit, pairs_follow_depth_and_cover) {
+TEST(Emit, intersections_follow_depth_and_cover) {
     const EmitInput in(kEmitScene);
-    ASSERT_GT(in.pairs, 1000U);
-    const Emitted out = emit(in, in.pairs);
+    ASSERT_GT(in.intersections, 1000U);
+    const Emitted out = emit(in, in.intersections);
     std::uint32_t slot = 0;
     for (std::uint32_t rank = 0; rank < in.order.size(); ++rank) {
         const std::uint32_t i = in.order[rank];
         EXPECT_EQ(out.begin[i], slot) << "splat " << i;
         for (const std::uint32_t tile : cover_tiles(in.frame.cover[i], in.tiles_x)) {
             ASSERT_EQ(out.tile[slot], tile) << "slot " << slot;
-            ASSERT_EQ(out.splat[slot] & PAIR_SPLAT_MASK, i) << "slot " << slot;
+            ASSERT_EQ(out.splat[slot] & INTERSECTION_SPLAT_MASK, i) << "slot " << slot;
             ++slot;
         }
     }
-    EXPECT_EQ(slot, in.pairs);
+    EXPECT_EQ(slot, in.intersections);
     EXPECT_EQ(out.status.overflow, 0U);
-    EXPECT_EQ(out.status.pairs, in.pairs);
+    EXPECT_EQ(out.status.intersections, in.intersections);
 }
 
-// Splats over hundreds of tiles: their pairs come from emit_huge, in the same slots.
-TEST(Emit, huge_splats_get_the_same_pairs_from_a_workgroup_each) {
+// Splats over hundreds of tiles: their intersections come from emit_huge, in the same slots.
+TEST(Emit, huge_splats_get_the_same_intersections_from_a_workgroup_each) {
     SceneOptions options = kEmitScene;
     options.width = 900;
     options.height = 620;
     options.min_log_scale = -2.5;
     options.max_log_scale = 1;
     const EmitInput in(options);
-    const Emitted alone = emit(in, in.pairs), together = emit(in, in.pairs, true);
+    const Emitted alone = emit(in, in.intersections), together = emit(in, in.intersections, true);
     std::uint32_t huge = 0, most = 0;
     for (const std::uint32_t i : in.order) {
-        huge += in.frame.pair_count[i] > HUGE_PAIRS ? 1 : 0;
-        most = std::max(most, in.frame.pair_count[i]);
+        huge += in.frame.intersection_count[i] > HUGE_INTERSECTIONS ? 1 : 0;
+        most = std::max(most, in.frame.intersection_count[i]);
     }
     EXPECT_GT(huge, 20U);
     EXPECT_LT(huge, in.order.size()) << "some are meant to be small";
@@ -220,7 +224,8 @@ TEST(Emit, huge_splats_get_the_same_pairs_from_a_workgroup_each) {
     EXPECT_EQ(alone.tile, together.tile);
     EXPECT_EQ(alone.splat, together.splat);
     EXPECT_EQ(alone.begin, together.begin);
-    for (const std::uint32_t capacity : {1U, 300U, in.pairs / 2}) {  // guard words stand behind
+    for (const std::uint32_t capacity :
+         {1U, 300U, in.intersections / 2}) {  // guard words stand behind
         const Emitted cut = emit(in, capacity, true);
         EXPECT_TRUE(std::equal(cut.tile.begin(), cut.tile.end(), alone.tile.begin()));
         EXPECT_TRUE(std::equal(cut.splat.begin(), cut.splat.end(), alone.splat.begin()));
@@ -231,9 +236,10 @@ TEST(Emit, a_scene_without_huge_splats_counts_none) {
     SceneOptions options = kEmitScene;
     options.max_log_scale = -2;
     const EmitInput in(options);
-    for (const std::uint32_t count : in.frame.pair_count) ASSERT_LE(count, HUGE_PAIRS);
-    EXPECT_EQ(emit(in, in.pairs).status.huge_splats, 0U);
-    EXPECT_EQ(emit(in, in.pairs, true).splat, emit(in, in.pairs).splat);
+    for (const std::uint32_t count : in.frame.intersection_count)
+        ASSERT_LE(count, HUGE_INTERSECTIONS);
+    EXPECT_EQ(emit(in, in.intersections).status.huge_splats, 0U);
+    EXPECT_EQ(emit(in, in.intersections, true).splat, emit(in, in.intersections).splat);
 }
 
 // The sum of the counts leaves 32 bits between two splats, or after the last one.
@@ -242,13 +248,13 @@ TEST(Emit, a_total_beyond_32_bits_is_noted) {
         EmitInput in(kEmitScene);
         if (last) {
             in.offset.back() = 0xffffff00U;
-            in.pairs = 0xffffff00U + 0x200U;  // wraps to 0x100
+            in.intersections = 0xffffff00U + 0x200U;  // wraps to 0x100
         } else {
             in.offset[50] = 5;
         }
         const Emitted out = emit(in, 1000);
         EXPECT_EQ(out.status.overflow, OVERFLOW_TOTAL) << last;
-        EXPECT_EQ(out.status.pairs, 0xffffffffU) << last;
+        EXPECT_EQ(out.status.intersections, 0xffffffffU) << last;
     }
 }
 
@@ -259,24 +265,24 @@ TEST(Emit, a_total_beyond_32_bits_lists_no_more_huge_splats_than_fit) {
     for (size_t rank = 0; rank < in.offset.size(); ++rank) in.offset[rank] = rank % 2 ? 400 : 10;
     const Emitted out = emit(in, 1000, true);  // guard words stand behind the list
     EXPECT_EQ(out.status.overflow, OVERFLOW_TOTAL);
-    EXPECT_GT(out.status.huge_splats, 2 * (1000 / HUGE_PAIRS + 1));
+    EXPECT_GT(out.status.huge_splats, 2 * (1000 / HUGE_INTERSECTIONS + 1));
 }
 
 // Against every pixel: a block that the bits leave out holds no pixel above the cut-off, and one
 // that they name is within the ellipse and its slack.
 TEST(Emit, block_bits_name_the_blocks_that_are_touched) {
     const EmitInput in(kEmitScene);
-    const Emitted out = emit(in, in.pairs);
+    const Emitted out = emit(in, in.intersections);
     const auto truth = reference::render(in.scene.model, in.scene.camera, {});
     const auto& kernel = reference::kernel_table(KERNEL_GAUSSIAN, Footprint::psi);
     size_t set = 0, needed = 0;
-    for (std::uint32_t slot = 0; slot < in.pairs; ++slot) {
-        const auto& s = truth.projected[out.splat[slot] & PAIR_SPLAT_MASK];
+    for (std::uint32_t slot = 0; slot < in.intersections; ++slot) {
+        const auto& s = truth.projected[out.splat[slot] & INTERSECTION_SPLAT_MASK];
         if (s.cull != reference::Cull::none) continue;
         for (std::uint32_t block = 0; block < 4; ++block) {
             const auto x0 = static_cast<int>(out.tile[slot] % in.tiles_x * 16 + block % 2 * 8);
             const auto y0 = static_cast<int>(out.tile[slot] / in.tiles_x * 16 + block / 2 * 8);
-            const bool bit = (out.splat[slot] >> (PAIR_BLOCK_SHIFT + block) & 1) != 0;
+            const bool bit = (out.splat[slot] >> (INTERSECTION_BLOCK_SHIFT + block) & 1) != 0;
             bool seen = false;
             for (int k = 0; k < 64; ++k) {
                 const double dx = s.mean_px.x - x0 - k % 8 - 0.5;
@@ -293,14 +299,14 @@ TEST(Emit, block_bits_name_the_blocks_that_are_touched) {
                 << "slot " << slot << " block " << block << ", q " << q << ", reach " << s.reach;
         }
     }
-    EXPECT_GT(needed, in.pairs);
-    EXPECT_LT(set, in.pairs * size_t{4}) << "some blocks must be left out";
+    EXPECT_GT(needed, in.intersections);
+    EXPECT_LT(set, in.intersections * size_t{4}) << "some blocks must be left out";
 }
 
-TEST(Emit, pairs_beyond_the_capacity_are_left_out) {
+TEST(Emit, intersections_beyond_the_capacity_are_left_out) {
     const EmitInput in(kEmitScene);
-    const Emitted all = emit(in, in.pairs);
-    for (const std::uint32_t capacity : {1U, 64U, in.pairs / 2, in.pairs - 1}) {
+    const Emitted all = emit(in, in.intersections);
+    for (const std::uint32_t capacity : {1U, 64U, in.intersections / 2, in.intersections - 1}) {
         const Emitted out = emit(in, capacity);  // guard words stand behind the capacity
         EXPECT_TRUE(std::equal(out.tile.begin(), out.tile.end(), all.tile.begin()));
         EXPECT_TRUE(std::equal(out.splat.begin(), out.splat.end(), all.splat.begin()));
@@ -309,9 +315,9 @@ TEST(Emit, pairs_beyond_the_capacity_are_left_out) {
 
 Words tile_ranges(const Words& tiles, std::uint32_t tile_count, std::uint32_t in_use) {
     Device& device = shared_device();
-    const GuardedBuffer count(device, "pairs in use", Words{in_use}), tile(device, "tiles", tiles),
-        range(device, "range", Words(tile_count * size_t{2}, 0));
-    run("tile_ranges", gpu::PairArgs{1000, 1, tile_count, 0}, {count, tile, range}, 1000);
+    const GuardedBuffer count(device, "intersections in use", Words{in_use}),
+        tile(device, "tiles", tiles), range(device, "range", Words(tile_count * size_t{2}, 0));
+    run("tile_ranges", gpu::IntersectionArgs{1000, 1, tile_count, 0}, {count, tile, range}, 1000);
     EXPECT_TRUE(range.intact());
     return range.read<std::uint32_t>();
 }
@@ -323,7 +329,7 @@ TEST(TileRanges, runs_begin_and_end_where_the_tile_changes) {
     EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 3), (Words{0, 1, 1, 2, 2, 3}));
 }
 
-TEST(TileRanges, only_pairs_in_use_count) {
+TEST(TileRanges, only_intersections_in_use_count) {
     EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 0), (Words{0, 0, 0, 0, 0, 0}));
     EXPECT_EQ(tile_ranges({0, 1, 2}, 3, 2), (Words{0, 1, 1, 2, 0, 0}));
     EXPECT_EQ(tile_ranges({0, 1, 1}, 3, 2), (Words{0, 1, 1, 2, 0, 0}));
@@ -350,12 +356,14 @@ TEST(ListLengths, the_longest_is_found_and_lists_beyond_the_capacity_are_noted) 
         ranges[tiles / 2].y = ranges[tiles / 2].x + 300;
         for (const std::uint32_t capacity : {299U, 300U}) {
             std::vector<gpu::FrameStatus> before(1);
-            before[0].overflow = OVERFLOW_PAIRS;
+            before[0].overflow = OVERFLOW_INTERSECTIONS;
             const GuardedBuffer status(device, "status", before), range(device, "ranges", ranges);
-            run("list_lengths", gpu::PairArgs{0, 1, tiles, capacity}, {status, range}, tiles);
+            run("list_lengths", gpu::IntersectionArgs{0, 1, tiles, capacity}, {status, range},
+                tiles);
             const auto after = status.read<gpu::FrameStatus>()[0];
             EXPECT_EQ(after.longest_list, 300U);
-            EXPECT_EQ(after.overflow, OVERFLOW_PAIRS | (capacity < 300 ? OVERFLOW_LISTS : 0U));
+            EXPECT_EQ(after.overflow,
+                      OVERFLOW_INTERSECTIONS | (capacity < 300 ? OVERFLOW_LISTS : 0U));
         }
     }
 }

@@ -3,9 +3,9 @@
 // training has and each rule beside Adam.
 #include "engine/raster/adam_update.h"
 #include "tests/support/backward_pass.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/test_lenses.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -182,7 +182,7 @@ TEST(GradientStep, both_ways_leave_a_splat_whose_gradient_is_not_finite) {
     const TestScene scene = random_scene({.count = kSplats, .sh_degree = 1, .seed = 76});
     Partials partials = Partials::random(kSplats, 9);
     ASSERT_GT(partials.count[3], 0U);
-    partials.pairs[partials.begin[3]][5] = std::nanf("");
+    partials.intersections[partials.begin[3]][5] = std::nanf("");
     const PassState start = start_state(scene.model);
     const AdamStep step = adam_step(rates_with_all_rules(), 1);
     const PassState fused =
@@ -199,7 +199,7 @@ TEST(GradientStep, views_add_up_and_a_bad_one_stays_bad) {
     const TestScene scene = random_scene({.count = kSplats, .sh_degree = 1, .seed = 77});
     const Partials first = Partials::random(kSplats, 10);
     Partials second = Partials::random(kSplats, 11), bad = second;
-    bad.pairs[bad.begin[3]][5] = std::nanf("");
+    bad.intersections[bad.begin[3]][5] = std::nanf("");
     const auto pass = [&](int update, const PassState& before, const Partials& partials) {
         return run_backward_pass(scene.model, scene.camera, 1, update, before, partials);
     };

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/core/rng.h"
-#include "tests/support/device_options.h"
+#include "tests/support/test_device_options.h"
 
 namespace darb {
 namespace {

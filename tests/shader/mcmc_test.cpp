@@ -3,15 +3,15 @@
 #include "trainer/density/relocation.h"
 
 #include "engine/core/rng.h"
-#include "engine/kernels/relocation.h"
+#include "engine/kernels/relocation_table.h"
 #include "engine/primitives/groups.h"
-#include "engine/reference/mcmc.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_mcmc.h"
+#include "engine/reference/reference_render.h"
 #include "shaders/shared/strategy_args.h"
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/guarded_buffer.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -43,15 +43,15 @@ void run_pass(const char* shader, const Args& args, std::initializer_list<Buffer
 
 TEST(RelocationWeight, is_the_opacity_of_the_living) {
     SplatModel model = population(1000);
-    model.opacity[7] = std::nanf("");
+    model.opacity_logit[7] = std::nanf("");
     Device& d = shared_device();
     const float scale = 1e6f;
-    const GuardedBuffer opacity(d, "opacity", model.opacity), dead(d, "dead", 4000),
+    const GuardedBuffer opacity(d, "opacity", model.opacity_logit), dead(d, "dead", 4000),
         weight(d, "weight", 4000), copies(d, "copies", 4000);
     const gpu::RelocationArgs args{1000, 1000, 0, 0, kDead, scale, 0};
     run_pass("relocation_weight", args, {opacity, dead, weight, copies}, 1000);
     const auto expected =
-        reference::relocation_weights(model.opacity, double{kDead}, double{scale});
+        reference::relocation_weights(model.opacity_logit, double{kDead}, double{scale});
     const auto got = weight.read<std::uint32_t>(), no = dead.read<std::uint32_t>();
     int dead_count = 0;
     for (size_t i = 0; i < 1000; ++i) {
@@ -116,7 +116,7 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
     std::vector<std::uint32_t> copies(n);
     std::vector<glm::uvec2> sources(n);
     for (size_t i = 0; i < n; ++i) {
-        model.opacity[i] = static_cast<float>(rng.uniform(-5.3, 6));
+        model.opacity_logit[i] = static_cast<float>(rng.uniform(-5.3, 6));
         copies[i] = i % 7 == 0 ? 70 : rng.below(8);  // more than the table has rows for
         sources[i] = {static_cast<std::uint32_t>(i), copies[i] > 0 ? DENSIFY_CLONE : DENSIFY_KEEP};
     }
@@ -126,24 +126,24 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
             table(
                 d, "table",
                 relocation_table(kernel, Footprint::psi, RELOCATION_OPACITIES, RELOCATION_COUNTS)),
-            scale(d, "log_scale", model.log_scale), opacity(d, "opacity", model.opacity);
+            scale(d, "log_scale", model.log_scale), opacity(d, "opacity", model.opacity_logit);
         const auto count = static_cast<std::uint32_t>(n);
         run_pass("relocate", gpu::RelocationArgs{count, count, 0, 0, kDead, 0, 0},
                  {source, copy, table, scale, opacity}, count);
         const auto logit = opacity.read<float>(), log_scale = scale.read<float>();
         for (size_t i = 0; i < n; ++i) {
             if (copies[i] == 0) {
-                ASSERT_EQ(logit[i], model.opacity[i]) << i;
+                ASSERT_EQ(logit[i], model.opacity_logit[i]) << i;
                 ASSERT_EQ(log_scale[3 * i], model.log_scale[3 * i]) << i;
                 continue;
             }
             const auto expected =
-                reference::relocated(kernel, Footprint::psi, model.opacity[i], copies[i] + 1);
+                reference::relocated(kernel, Footprint::psi, model.opacity_logit[i], copies[i] + 1);
             ASSERT_NEAR(logit[i], expected.opacity, 3e-5 + 1e-5 * std::abs(expected.opacity)) << i;
             for (size_t c = 0; c < 3; ++c)  // between the table's columns: up to 0.3 %
                 ASSERT_NEAR(log_scale[3 * i + c] - model.log_scale[3 * i + c], expected.log_factor,
                             4e-3)
-                    << i << ": " << model.opacity[i] << ", " << copies[i];
+                    << i << ": " << model.opacity_logit[i] << ", " << copies[i];
         }
         EXPECT_TRUE(scale.intact() && opacity.intact());
     }
@@ -159,7 +159,7 @@ TEST(PositionNoise, matches_double_and_spares_the_opaque) {
         status.overflow = overflow;
         const GuardedBuffer position(d, "position", model.position),
             scale(d, "log_scale", model.log_scale), rotation(d, "rotation", model.rotation),
-            opacity(d, "opacity", model.opacity), frame(d, "status", std::vector{status});
+            opacity(d, "opacity", model.opacity_logit), frame(d, "status", std::vector{status});
         run_pass("position_noise", args, {position, scale, rotation, opacity, frame}, n);
         const auto got = position.read<float>();
         EXPECT_TRUE(position.intact());
@@ -171,7 +171,7 @@ TEST(PositionNoise, matches_double_and_spares_the_opaque) {
         for (std::uint32_t i = 0; i < n; ++i) {
             const glm::dvec3 noise =
                 reference::position_noise(&model.rotation[4 * i], &model.log_scale[3 * i],
-                                          model.opacity[i], double{kDead}, 3.5, 4711, i);
+                                          model.opacity_logit[i], double{kDead}, 3.5, 4711, i);
             for (int c = 0; c < 3; ++c) {
                 const double before = model.position[3 * i + static_cast<std::uint32_t>(c)];
                 // The gate rounds with 100 times the opacity in its exponent.
@@ -230,7 +230,7 @@ TEST(Relocation, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_cha
     SplatModel model = population(500);
     std::uint32_t dead = 0;
     for (size_t i = 0; i < 500; ++i) {
-        model.opacity[i] = i % 5 == 3 ? -9.0f : 0.0f;
+        model.opacity_logit[i] = i % 5 == 3 ? -9.0f : 0.0f;
         dead += i % 5 == 3;
     }
     const Round round = run_round(model, 25);
@@ -239,8 +239,9 @@ TEST(Relocation, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_cha
     EXPECT_EQ(round.result.pruned, dead);
     EXPECT_EQ(round.result.grown, 25U);
     const double scale = 0.99 * 4'294'967'295.0 / 500;
-    const auto weights = reference::relocation_weights(
-        model.opacity, double{kDead}, double{static_cast<float>(std::min(scale, 16'777'216.0))});
+    const auto weights =
+        reference::relocation_weights(model.opacity_logit, double{kDead},
+                                      double{static_cast<float>(std::min(scale, 16'777'216.0))});
     const auto plan = reference::relocation_plan(weights, 25, 5);
     ASSERT_EQ(round.model.size(), plan.sources.size());
     for (size_t i = 0; i < plan.sources.size(); ++i) {
@@ -249,9 +250,9 @@ TEST(Relocation, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_cha
             ASSERT_EQ(round.model.position[3 * i + c], model.position[3 * from + c]) << i;
             ASSERT_EQ(round.model.sh_dc[3 * i + c], model.sh_dc[3 * from + c]) << i;
         }
-        const auto expected = reference::relocated(model.kernel, model.footprint,
-                                                   model.opacity[from], plan.copies[from] + 1);
-        ASSERT_NEAR(round.model.opacity[i], changed ? expected.opacity : 0, 1e-4) << i;
+        const auto expected = reference::relocated(
+            model.kernel, model.footprint, model.opacity_logit[from], plan.copies[from] + 1);
+        ASSERT_NEAR(round.model.opacity_logit[i], changed ? expected.opacity : 0, 1e-4) << i;
         ASSERT_NEAR(round.model.log_scale[3 * i] - model.log_scale[3 * from],
                     changed ? expected.log_factor : 0, 4e-3);
         for (int a = 0; a < kAttributeCount; ++a)
@@ -264,18 +265,18 @@ TEST(Relocation, a_round_repeats_with_its_seed_and_differs_with_another) {
     const Round one = run_round(model, 20, 8), same = run_round(model, 20, 8),
                 other = run_round(model, 20, 9);
     EXPECT_EQ(one.model.position, same.model.position);
-    EXPECT_EQ(one.model.opacity, same.model.opacity);
+    EXPECT_EQ(one.model.opacity_logit, same.model.opacity_logit);
     EXPECT_NE(one.model.position, other.model.position);
 }
 
 TEST(Relocation, without_a_live_splat_or_without_work_nothing_happens) {
     SplatModel model = population(50);
-    model.opacity.assign(50, -9.0f);
-    EXPECT_EQ(run_round(model, 5).model.opacity, model.opacity);
-    model.opacity.assign(50, 0.0f);
+    model.opacity_logit.assign(50, -9.0f);
+    EXPECT_EQ(run_round(model, 5).model.opacity_logit, model.opacity_logit);
+    model.opacity_logit.assign(50, 0.0f);
     const Round idle = run_round(model, 0);
     EXPECT_EQ(idle.model.log_scale, model.log_scale);
-    EXPECT_EQ(idle.moments[kOpacity], std::vector<float>(100, 1.0f));
+    EXPECT_EQ(idle.moments[kOpacityLogit], std::vector<float>(100, 1.0f));
     model.resize(0);
     EXPECT_EQ(run_round(model, 5).model.size(), 0U);
 }
@@ -323,12 +324,12 @@ TEST_P(RelocationPicture, stays_when_three_take_the_place_of_one) {
             model.log_scale[3 * i + c] = -0.7f;  // 12 px: the low-pass is a thousandth of it
             model.sh_dc[3 * i + c] = 1.0f;
         }
-        model.opacity[i] = i == 0 ? 0.0f : -9.0f;
+        model.opacity_logit[i] = i == 0 ? 0.0f : -9.0f;
     }
     const Round round = run_round(model, 0);
     ASSERT_EQ(round.result.pruned, 2U);
     SplatModel copied = model;
-    copied.opacity.assign(3, 0.0f);
+    copied.opacity_logit.assign(3, 0.0f);
     const auto picture = [&](const SplatModel& m) {  // in double: the round alone is the device's
         return reference::render(m, camera, reference::RenderSettings{}).images.colour;
     };

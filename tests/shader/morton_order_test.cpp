@@ -10,8 +10,8 @@
 #include <numeric>
 
 #include "engine/render/renderer.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {

@@ -1,8 +1,8 @@
 // project_backward.comp alone, its gradients stored and not applied, against the reference for the
-// same sums of pairs.
+// same sums of intersections.
 #include "tests/support/backward_pass.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -121,7 +121,7 @@ TEST(ProjectBackward, needles_and_discs_match_double) {
 TEST(ProjectBackward, parameters_beyond_their_limits_have_no_gradient) {
     TestScene s = random_scene({.count = 8, .seed = 56});
     for (size_t i = 0; i < 8; ++i) {
-        s.model.opacity[i] = i % 2 == 0 ? 1e4f : 31.0f;
+        s.model.opacity_logit[i] = i % 2 == 0 ? 1e4f : 31.0f;
         s.model.log_scale[i * 3] = -50;
     }
     const Partials partials = Partials::random(8, 5);
@@ -129,7 +129,7 @@ TEST(ProjectBackward, parameters_beyond_their_limits_have_no_gradient) {
         run_backward_pass(s.model, s.camera, 3, UPDATE_STORE, start_state(s.model), partials);
     const auto d = after.d;
     for (size_t i = 0; i < 8; ++i) {
-        EXPECT_EQ(d[kOpacity][i], 0) << "splat " << i;
+        EXPECT_EQ(d[kOpacityLogit][i], 0) << "splat " << i;
         EXPECT_EQ(d[kLogScale][i * 3], 0) << "splat " << i;
         EXPECT_EQ(d[kLogScale][i * 3 + 1] != 0, partials.count[i] > 0) << "splat " << i;
     }
@@ -151,12 +151,12 @@ TEST(ProjectBackward, colours_clamped_at_zero_have_no_gradient) {
 }
 
 // Every tile of the largest image that one buffer binding of 128 MiB holds.
-TEST(ProjectBackward, a_splat_with_43000_pairs_sums_all_of_them) {
+TEST(ProjectBackward, a_splat_with_43000_intersections_sums_all_of_them) {
     const TestScene s = random_scene({.count = 1, .seed = 58});
     Partials partials;
     partials.begin = {0};
     partials.count = {43'000};
-    partials.pairs.assign(43'000, {1, 0.5f, -0.25f, 1, 2, 1, 1, 1, 0.5f});
+    partials.intersections.assign(43'000, {1, 0.5f, -0.25f, 1, 2, 1, 1, 1, 0.5f});
     const DoubleGradients expected = gradients_in_double(s.model, s.camera, 3, partials);
     const auto got =
         run_backward_pass(s.model, s.camera, 3, UPDATE_STORE, start_state(s.model), partials).d;

@@ -3,10 +3,10 @@
 #include <limits>
 
 #include "engine/core/rng.h"
-#include "engine/reference/render.h"
-#include "tests/support/compare.h"
+#include "engine/reference/reference_render.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/projected_frame.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -58,7 +58,7 @@ size_t expect_outputs_match(const SplatModel& model, const Camera& camera, int s
     size_t visible = 0;
     for (size_t i = 0; i < model.size(); ++i) {
         const auto& t = truth[i];
-        EXPECT_EQ(frame.visible[i], frame.pair_count[i] > 0 ? 1U : 0U) << "splat " << i;
+        EXPECT_EQ(frame.visible[i], frame.intersection_count[i] > 0 ? 1U : 0U) << "splat " << i;
         if (t.cull != reference::Cull::none) continue;
         EXPECT_EQ(frame.visible[i], 1U) << "splat " << i;
         if (frame.visible[i] != 1) continue;
@@ -161,7 +161,7 @@ TEST(Project, parameters_beyond_their_limits_act_as_at_the_limit) {
     for (size_t i = 0; i < 4; ++i) {
         for (int c = 0; c < 3; ++c) s.model.position[i * 3 + c] = 0.1f * static_cast<float>(i);
         const float side = i % 2 == 0 ? -1.0f : 1.0f;
-        s.model.opacity[i] = i < 2 ? 1e4f : kInfinity;
+        s.model.opacity_logit[i] = i < 2 ? 1e4f : kInfinity;
         for (int c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = c == 0 && side < 0 ? -50.0f : -2;
     }
     EXPECT_EQ(expect_outputs_match(s.model, s.camera), 4U);
@@ -174,7 +174,7 @@ TestScene one_splat() {
         s.model.position[c] = 0;
         s.model.log_scale[c] = -2;
     }
-    s.model.opacity[0] = 1;
+    s.model.opacity_logit[0] = 1;
     return s;
 }
 
@@ -189,7 +189,7 @@ int cull_reason(const TestScene& s, double low_pass = LOW_PASS_DEFAULT) {
         if (frame.status.culled[r] > 0) reason = r;
     }
     EXPECT_EQ(sum + frame.visible[0], 1U);
-    EXPECT_EQ(frame.pair_count[0] > 0, reason < 0);
+    EXPECT_EQ(frame.intersection_count[0] > 0, reason < 0);
     return reason;
 }
 
@@ -202,7 +202,7 @@ TEST(Project, the_largest_scales_are_clamped_and_cover_the_image) {
         s.model.log_scale = scale;
         EXPECT_EQ(expect_outputs_match(s.model, s.camera), 1U);
         const auto tiles = static_cast<std::uint32_t>(image_tiles(s.camera.width, s.camera.height));
-        EXPECT_EQ(project_on_device(s.model, s.camera).pair_count[0], tiles);
+        EXPECT_EQ(project_on_device(s.model, s.camera).intersection_count[0], tiles);
     }
 }
 
@@ -227,9 +227,9 @@ TEST(Project, each_cull_reason_is_counted) {
     };
     expect(CULL_ROTATION, "zero quaternion", rotate(0));
     expect(CULL_ROTATION, "quaternion of norm 4e-7", rotate(2e-7f));
-    expect(CULL_OPACITY, "faint", [](TestScene& s) { s.model.opacity[0] = -5.6f; });
-    expect(-1, "just visible", [](TestScene& s) { s.model.opacity[0] = -5.5f; });
-    expect(CULL_OPACITY, "-1e4", [](TestScene& s) { s.model.opacity[0] = -1e4f; });
+    expect(CULL_OPACITY, "faint", [](TestScene& s) { s.model.opacity_logit[0] = -5.6f; });
+    expect(-1, "just visible", [](TestScene& s) { s.model.opacity_logit[0] = -5.5f; });
+    expect(CULL_OPACITY, "-1e4", [](TestScene& s) { s.model.opacity_logit[0] = -1e4f; });
     expect(-1, "scale exp(50)", [](TestScene& s) { s.model.log_scale.assign(3, 50.0f); });
     TestScene point = one_splat();
     point.model.log_scale.assign(3, -20.0f);
@@ -258,9 +258,9 @@ TEST(Project, values_that_are_not_finite_are_culled_with_their_reason) {
             EXPECT_EQ(set(&SplatModel::rotation, c, bad), CULL_ROTATION) << "rotation " << c;
         EXPECT_EQ(set(&SplatModel::sh_rest, 0, kNan), CULL_COLOUR);
     }
-    EXPECT_EQ(set(&SplatModel::opacity, 0, kNan), CULL_OPACITY);
-    EXPECT_EQ(set(&SplatModel::opacity, 0, -kInfinity), CULL_OPACITY);
-    EXPECT_EQ(set(&SplatModel::opacity, 0, kInfinity), -1);
+    EXPECT_EQ(set(&SplatModel::opacity_logit, 0, kNan), CULL_OPACITY);
+    EXPECT_EQ(set(&SplatModel::opacity_logit, 0, -kInfinity), CULL_OPACITY);
+    EXPECT_EQ(set(&SplatModel::opacity_logit, 0, kInfinity), -1);
 }
 
 TEST(Project, zero_splats_write_nothing) {

@@ -1,10 +1,10 @@
 // project.comp and project_backward.comp with effects compiled in, against the reference.
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 #include "tests/support/backward_pass.h"
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/projected_frame.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/test_lenses.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -138,7 +138,7 @@ TEST(ProjectionEffects, antialias_of_needles_and_discs_matches_double) {
         for (size_t i = 0; i < s.model.size(); ++i)
             for (int c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = (c == 0) == disc ? -7 : -1;
         s.model.antialias = true;
-        for (float& logit : s.model.opacity) logit = 8;
+        for (float& logit : s.model.opacity_logit) logit = 8;
         EXPECT_GT(expect_walks_match(s, {.antialias = true}), 60u);
     }
 }

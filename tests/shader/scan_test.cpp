@@ -8,7 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
-#include "tests/support/device_options.h"
+#include "tests/support/test_device_options.h"
 
 namespace darb {
 namespace {

@@ -2,9 +2,9 @@
 // the alpha cut-off is missing, and no listed cell lies outside the ellipse and its slack.
 #include <set>
 
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 #include "tests/support/projected_frame.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 constexpr double kCutoff = ALPHA_CUTOFF_DEFAULT;
 
 struct CoverCounts {
-    size_t visible = 0, pairs = 0, reference_pairs = 0, tiles_with_pixels = 0;
+    size_t visible = 0, intersections = 0, reference_intersections = 0, tiles_with_pixels = 0;
 };
 
 /// The tiles with a pixel whose alpha, in double, is above the cut-off by more than rounding.
@@ -37,7 +37,7 @@ CoverCounts expect_cover_exact(const SplatModel& model, const Camera& camera) {
     const reference::RenderResult truth = reference::render(model, camera, {});
     const auto tiles_x = static_cast<std::uint32_t>(truth.tiles.tiles_x);
     CoverCounts counts;
-    counts.reference_pairs = truth.tiles.pair_count();
+    counts.reference_intersections = truth.tiles.intersection_count();
     for (size_t i = 0; i < model.size(); ++i) {
         const auto& s = truth.projected[i];
         if (frame.visible[i] == 0) {
@@ -45,11 +45,11 @@ CoverCounts expect_cover_exact(const SplatModel& model, const Camera& camera) {
             continue;
         }
         ++counts.visible;
-        counts.pairs += frame.pair_count[i];
+        counts.intersections += frame.intersection_count[i];
         const std::vector<std::uint32_t> tiles = cover_tiles(frame.cover[i], tiles_x);
         const std::set<std::uint32_t> listed(tiles.begin(), tiles.end());
         EXPECT_EQ(listed.size(), tiles.size()) << "splat " << i << " lists a tile twice";
-        EXPECT_EQ(frame.pair_count[i], tiles.size()) << "splat " << i;
+        EXPECT_EQ(frame.intersection_count[i], tiles.size()) << "splat " << i;
         EXPECT_LT(*listed.rbegin(), truth.tiles.tile_count()) << "splat " << i;
         for (const std::uint32_t tile : tiles_with_pixels(s, kernel, camera, tiles_x)) {
             ++counts.tiles_with_pixels;
@@ -87,7 +87,8 @@ TEST(TileCover, small_splats_are_listed_tile_by_tile) {
             EXPECT_GT(counts.visible, 40U);
             EXPECT_GT(counts.tiles_with_pixels, 80U);
             // The slack of the test: a thousandth of the reach and of a unit of q.
-            EXPECT_LE(counts.pairs, counts.reference_pairs + 2 + counts.reference_pairs / 50);
+            EXPECT_LE(counts.intersections,
+                      counts.reference_intersections + 2 + counts.reference_intersections / 50);
         }
 }
 
@@ -102,9 +103,9 @@ TEST(TileCover, large_splats_are_listed_in_cells) {
                                 .seed = 13});
     const CoverCounts counts = expect_cover_exact(s.model, s.camera);
     EXPECT_GT(counts.visible, 30U);
-    EXPECT_GT(counts.pairs, 5000U);
+    EXPECT_GT(counts.intersections, 5000U);
     // Cells of 2 x 2 to 4 x 4 tiles hold some that the ellipse misses.
-    EXPECT_LE(counts.pairs, counts.reference_pairs * 115 / 100);
+    EXPECT_LE(counts.intersections, counts.reference_intersections * 115 / 100);
 }
 
 TEST(TileCover, needles_across_the_image_miss_most_tiles) {
@@ -113,7 +114,7 @@ TEST(TileCover, needles_across_the_image_miss_most_tiles) {
         for (int c = 0; c < 3; ++c) s.model.log_scale[i * 3 + c] = c == 0 ? 1.0f : -9.0f;
     const CoverCounts counts = expect_cover_exact(s.model, s.camera);
     EXPECT_GT(counts.visible, 20U);
-    EXPECT_LT(counts.pairs, counts.visible * 19 * 19 / 2);
+    EXPECT_LT(counts.intersections, counts.visible * 19 * 19 / 2);
 }
 
 TEST(TileCover, odd_image_sizes_end_at_their_last_pixel) {
@@ -139,9 +140,9 @@ TEST(TileCover, one_splat_over_everything_lists_every_tile) {
         s.model.position[c] = 0;
         s.model.log_scale[c] = 4;
     }
-    s.model.opacity[0] = 3;
+    s.model.opacity_logit[0] = 3;
     const ProjectedFrame frame = project_on_device(s.model, s.camera);
-    EXPECT_EQ(frame.pair_count[0], 63U * 44U);
+    EXPECT_EQ(frame.intersection_count[0], 63U * 44U);
     EXPECT_EQ(cover_tiles(frame.cover[0], 63).size(), 63U * 44U);
 }
 

@@ -1,5 +1,5 @@
-// project_backward.comp alone: parameters and moments of a model on the device, sums of pairs set
-// by the test, and the reference's gradients for the same sums.
+// project_backward.comp alone: parameters and moments of a model on the device, sums of
+// intersections set by the test, and the reference's gradients for the same sums.
 #pragma once
 
 #include <array>
@@ -9,33 +9,33 @@
 #include "engine/primitives/groups.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/kernel_constants.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 
 namespace darb::test {
 
-/// What blend_backward leaves for one pair: [0..3] sums of G x, G x x, G x dy, G dy, [4]
+/// What blend_backward leaves for one intersection: [0..3] sums of G x, G x x, G x dy, G dy, [4]
 /// d_opacity, [5..7] d_colour, [8] sum of G dy dy.
-using PairPartials = std::array<float, 9>;
+using IntersectionPartials = std::array<float, 9>;
 
-/// The pairs of every splat, one after another.
+/// The intersections of every splat, one after another.
 struct Partials {
-    std::vector<std::uint32_t> count, begin;  // [N]
-    std::vector<PairPartials> pairs;          // [K]
+    std::vector<std::uint32_t> count, begin;          // [N]
+    std::vector<IntersectionPartials> intersections;  // [K]
 
-    /// 0 to 5 pairs each; every fifth splat has none. The size of the sums differs by 1e4 between
-    /// splats, as it does in scenes.
+    /// 0 to 5 intersections each; every fifth splat has none. The size of the sums differs by 1e4
+    /// between splats, as it does in scenes.
     static Partials random(size_t splats, std::uint64_t seed) {
         Pcg32 rng(seed);
         Partials p;
         for (size_t i = 0; i < splats; ++i) {
-            p.begin.push_back(static_cast<std::uint32_t>(p.pairs.size()));
+            p.begin.push_back(static_cast<std::uint32_t>(p.intersections.size()));
             p.count.push_back(i % 5 == 4 ? 0 : 1 + rng.below(5));
             const double size = std::pow(10.0, rng.uniform(-4, 0));
             for (std::uint32_t k = 0; k < p.count.back(); ++k) {
-                p.pairs.emplace_back();
-                for (float& value : p.pairs.back())
+                p.intersections.emplace_back();
+                for (float& value : p.intersections.back())
                     value = static_cast<float>(size * rng.uniform(-1, 1));
             }
         }
@@ -102,9 +102,9 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);
     std::vector<float> sums, rest;
-    for (const PairPartials& pair : partials.pairs) {
-        sums.insert(sums.end(), pair.begin(), pair.begin() + 8);
-        rest.push_back(pair[8]);
+    for (const IntersectionPartials& intersection : partials.intersections) {
+        sums.insert(sums.end(), intersection.begin(), intersection.begin() + 8);
+        rest.push_back(intersection[8]);
     }
     const auto& b = before;
     const GuardedBuffer cameras(device, "cameras", std::vector{camera_data(camera, model.origin)});
@@ -113,8 +113,8 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
         p.emplace_back(device, attribute_name(a), b.parameters[a]);
         held.emplace_back(device, "state", update == UPDATE_ADAM ? b.moments[a] : b.d[a]);
     }
-    const GuardedBuffer count(device, "pair count", partials.count),
-        begin(device, "pair begin", partials.begin), sum(device, "partials", sums),
+    const GuardedBuffer count(device, "intersection count", partials.count),
+        begin(device, "first intersection", partials.begin), sum(device, "partials", sums),
         rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
         status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters),
         rest_sum(device, "rest sum", b.rest_sum);
@@ -164,7 +164,7 @@ inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera
         const auto s = reference::project(splats, i, camera, settings, kernel);
         double sum[9] = {};
         for (std::uint32_t e = 0; e < partials.count[i]; ++e)
-            for (int c = 0; c < 9; ++c) sum[c] += partials.pairs[partials.begin[i] + e][c];
+            for (int c = 0; c < 9; ++c) sum[c] += partials.intersections[partials.begin[i] + e][c];
         const reference::ProjectedGradient<double> g{
             {2 * s.l11 * sum[0], 2 * (s.l21 * sum[0] + s.l22 * s.l22 * sum[3])},
             2 * (sum[1] - s.l21 * sum[2]) / s.l11,  // x = l11 dx + l21 dy

@@ -24,7 +24,7 @@ struct BlendScene {
     float cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float stop = static_cast<float>(TRANSMITTANCE_STOP);
     glm::vec3 background{0.0f};
-    std::uint32_t segment = 0;  // pairs of a list a dispatch; 0: all
+    std::uint32_t segment = 0;  // intersections of a list a dispatch; 0: all
     std::uint32_t threads = 0;  // of a workgroup of blend.comp; 0: a subgroup a block
     bool buckets = false;       // back by blend_backward_buckets.comp
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first
@@ -116,30 +116,32 @@ inline std::vector<BlendVariant> every_blend_variant() {
     return all;
 }
 
-/// Sums over the pixels of a tile that a pair's gradients follow from; G = opacity dL/dalpha dw/dq,
-/// d = mean - pixel centre, x = l11 dx + l21 dy.
-struct PairSums {
+/// Sums over the pixels of a tile that an intersection's gradients follow from; G = opacity
+/// dL/dalpha dw/dq, d = mean - pixel centre, x = l11 dx + l21 dy.
+struct IntersectionSums {
     float gx, gxx, gx_dy, g_dy, d_opacity;
     glm::vec3 d_colour;
     float g_dy_dy;
 };
 
-/// What the passes leave. Pairs are in the order of the lists.
+/// What the passes leave. Intersections are in the order of the lists.
 struct BlendOutput {
-    std::vector<float> image;          // [3][H][W]
-    std::vector<float> transmittance;  // [H][W], with store
-    std::vector<std::uint32_t> last;   // [H][W], with store
-    std::vector<PairSums> pairs;       // [K], with d_image
+    std::vector<float> image;                     // [3][H][W]
+    std::vector<float> transmittance;             // [H][W], with store
+    std::vector<std::uint32_t> last;              // [H][W], with store
+    std::vector<IntersectionSums> intersections;  // [K], with d_image
 };
 
-/// Pairs as emit.comp writes them, but in slots of any order that only pair_order knows.
-struct ShuffledPairs {
-    std::vector<std::uint32_t> order, pair_splat;
+/// Intersections as emit.comp writes them, but in slots of any order that only
+/// intersection_from_sorted knows.
+struct ShuffledIntersections {
+    std::vector<std::uint32_t> order, splat_from_intersection;
     std::vector<glm::uvec2> ranges;
 
-    /// all_blocks: every pair claims to touch every block of its tile.
-    ShuffledPairs(const BlendScene& scene, const reference::TileLists& lists, bool all_blocks)
-        : order(lists.pair_count()), pair_splat(lists.pair_count()) {
+    /// all_blocks: every intersection claims to touch every block of its tile.
+    ShuffledIntersections(const BlendScene& scene, const reference::TileLists& lists,
+                          bool all_blocks)
+        : order(lists.intersection_count()), splat_from_intersection(lists.intersection_count()) {
         std::iota(order.begin(), order.end(), 0U);
         Pcg32 rng(17);
         for (size_t i = order.size(); i > 1; --i)
@@ -152,7 +154,7 @@ struct ShuffledPairs {
             for (std::uint32_t j = begin; j < end; ++j) {
                 const std::uint32_t splat = lists.splats[j];
                 const std::uint32_t bits = all_blocks ? 15 : blocks(scene.splats[splat], x, y);
-                pair_splat[order[j]] = splat | bits << PAIR_BLOCK_SHIFT;
+                splat_from_intersection[order[j]] = splat | bits << INTERSECTION_BLOCK_SHIFT;
             }
         }
     }
@@ -170,7 +172,7 @@ struct ShuffledPairs {
 
 struct BlendPipelines {
     Pipeline blend, backward, bucket_tiles, bucket_behind;
-    std::uint32_t bucket = 0;  // pairs
+    std::uint32_t bucket = 0;  // intersections
 
     BlendPipelines(Device& device, const BlendScene& scene, bool store) {
         SpecConstants constants =
@@ -201,26 +203,29 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
                                    bool all_blocks = false) {
     Device& device = shared_device();
     const BlendPipelines pipelines(device, scene, store);
-    const ShuffledPairs shuffled(scene, lists, all_blocks);
+    const ShuffledIntersections shuffled(scene, lists, all_blocks);
     std::vector<glm::vec4> shape, light, bound;
     for (const auto& s : scene.splats) {
         shape.emplace_back(s.mean_px.x, s.mean_px.y, s.l11, s.l21);
         light.emplace_back(s.colour.x, s.colour.y, s.colour.z, s.opacity);
         bound.emplace_back(s.l22, s.reach * (1 + 1e-5), s.depth, 0.0);
     }
-    const size_t pixels = size_t(scene.width) * scene.height, pairs = lists.pair_count();
-    const size_t records = pairs / pipelines.bucket + lists.tile_count();
+    const size_t pixels = size_t(scene.width) * scene.height,
+                 intersections = lists.intersection_count();
+    const size_t records = intersections / pipelines.bucket + lists.tile_count();
     // A record that no pixel reaches must not be read: NaN would show.
     const std::vector<float> unwritten(scene.buckets ? records * CHECKPOINT_BYTES / 4 : 1, NAN);
     const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
-        order(device, "pair order", shuffled.order), splats(device, "pairs", shuffled.pair_splat),
+        order(device, "intersection from sorted", shuffled.order),
+        splats(device, "splat from intersection", shuffled.splat_from_intersection),
         shapes(device, "shape", shape), lights(device, "light", light),
         bounds(device, "bound", bound), image(device, "image", pixels * 12),
         final_t(device, "final T", store || scene.segment > 0 ? pixels * 4 : 4),
         behind(device, "behind", scene.segment > 0 ? pixels * 4 : 4),
-        last(device, "last pair", store ? pixels * 4 : 4), d_images(device, "d_image", d_image),
-        partials(device, "partials", std::vector<float>(pairs * 8, 0.0f)),
-        rest(device, "partial rest", std::vector<float>(pairs, 0.0f)),
+        last(device, "last intersection", store ? pixels * 4 : 4),
+        d_images(device, "d_image", d_image),
+        partials(device, "partials", std::vector<float>(intersections * 8, 0.0f)),
+        rest(device, "partial rest", std::vector<float>(intersections, 0.0f)),
         checkpoints(device, "checkpoints", unwritten),
         bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0)),
         bucket_rest(device, "behind buckets",
@@ -275,9 +280,9 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
           &rest, &behind, &checkpoints, &bucket_tile, &bucket_rest})
         EXPECT_TRUE(buffer->intact());
     const auto sums = partials.read<float>(), rests = rest.read<float>();
-    for (size_t j = 0; j < pairs; ++j) {
+    for (size_t j = 0; j < intersections; ++j) {
         const float* p = &sums[shuffled.order[j] * size_t{8}];
-        out.pairs.push_back(
+        out.intersections.push_back(
             {p[0], p[1], p[2], p[3], p[4], {p[5], p[6], p[7]}, rests[shuffled.order[j]]});
     }
     return out;

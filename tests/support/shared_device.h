@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "engine/gpu/device.h"
-#include "tests/support/device_options.h"
+#include "tests/support/test_device_options.h"
 
 namespace darb::test {
 

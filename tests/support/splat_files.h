@@ -14,7 +14,7 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/scene/splat_model.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 
@@ -45,7 +45,7 @@ inline std::string error_of(const std::function<void()>& action) {
 inline bool same_splats(const SplatModel& a, const SplatModel& b) {
     return a.sh_degree == b.sh_degree && a.antialias == b.antialias && a.origin == b.origin &&
            a.position == b.position && a.log_scale == b.log_scale && a.rotation == b.rotation &&
-           a.opacity == b.opacity && a.sh_dc == b.sh_dc && a.sh_rest == b.sh_rest;
+           a.opacity_logit == b.opacity_logit && a.sh_dc == b.sh_dc && a.sh_rest == b.sh_rest;
 }
 
 inline void append_text(const std::string& text, FileBytes& to) {

@@ -6,8 +6,8 @@
 
 #include "engine/core/rng.h"
 #include "engine/render/renderer.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
 #include "trainer/trainer.h"
@@ -72,7 +72,7 @@ inline TinyTraining tiny_training(const TinyOptions& tiny = {}) {
     }
     TrainOptions& o = t.options;
     o.iterations = 60;
-    o.paced = false;
+    o.speed_up_short_runs = false;
     o.seed = 5;
     o.kernel = KERNEL_RAISED_COSINE;
     o.sh_degree = 2;

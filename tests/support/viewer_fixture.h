@@ -12,8 +12,8 @@
 #include "engine/data/image_io.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/ply.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 #include "viewer/viewer.h"
 
 namespace darb::test {

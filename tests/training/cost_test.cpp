@@ -1,14 +1,14 @@
 // darb cost: errors, fronts and predictions on known numbers; the whole measurement on small
 // scenes; and its pages in a browser.
-#include "tools/cost/cost.h"
+#include "tools/cost/accuracy_cost.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
 #include "tests/support/chromium.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 #include "tools/cost/cost_report.h"
 #include "tools/cost/train_cost.h"
 #include "trainer/initial_model.h"

@@ -1,8 +1,8 @@
 // Effects in training: probes for view-dependent colour, exposure, anti-aliasing, and runs that go
 // on bit by bit with all of them.
 #include "engine/plan/effect_plan.h"
-#include "tests/support/compare.h"
-#include "tests/support/device_options.h"
+#include "tests/support/compare_arrays.h"
+#include "tests/support/test_device_options.h"
 #include "tests/support/tiny_training.h"
 
 namespace darb::test {

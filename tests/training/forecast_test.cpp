@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/files.h"
-#include "tests/support/device_options.h"
+#include "tests/support/test_device_options.h"
 #include "trainer/initial_model.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
@@ -29,7 +29,7 @@ Dataset small_scene(int divisor = 4) {  // at 4 its photos are too small for the
 
 TEST(PredictSplats, without_density_control_stays_at_the_start) {
     TrainOptions options;
-    options.paced = false;
+    options.speed_up_short_runs = false;
     options.iterations = 900;  // ends at 450, before it begins
     EXPECT_EQ(predict_splats(4'000, kManyPixels, options, kNoLimit), 4'000U);
     options.iterations = 30'000;
@@ -49,7 +49,7 @@ TEST(PredictSplats, is_bounded_by_pixels_start_and_limit) {
 
 TEST(PredictSplats, few_rounds_grow_less) {
     TrainOptions options;
-    options.paced = false;
+    options.speed_up_short_runs = false;
     options.iterations = 1'300;
     const std::uint32_t one_round = predict_splats(4'000, kManyPixels, options, kNoLimit);
     options.iterations = 1'500;
@@ -118,7 +118,7 @@ TEST(Forecast, measures_on_the_scratch_device) {
     EXPECT_GE(f.end_ms, f.start_ms);
     EXPECT_GE(f.seconds, options.iterations * f.start_ms * 0.999e-3);
     EXPECT_LE(f.seconds, options.iterations * f.end_ms * 1.001e-3);
-    EXPECT_GE(f.demand.pairs, 4U * f.splats);
+    EXPECT_GE(f.demand.intersections, 4U * f.splats);
 }
 
 TEST(Forecast, a_random_start_goes_in_the_first_round) {
@@ -148,8 +148,9 @@ TEST(Forecast, a_random_start_goes_in_the_first_round) {
                     1e-6 * f.seconds * 1e3)
             << strategy_name(strategy);
         options.resolution_ramp = false;
-        EXPECT_GT(f.start_pairs, 0);
-        EXPECT_LT(f.start_pairs, forecast_training(scratch, dataset, options).start_pairs);
+        EXPECT_GT(f.start_intersections, 0);
+        EXPECT_LT(f.start_intersections,
+                  forecast_training(scratch, dataset, options).start_intersections);
     }
 }
 
@@ -205,7 +206,7 @@ TEST(Forecast, stays_within_the_memory_budget) {
     const std::uint64_t all = plan_memory(scratch, free.demand).total();
     MemoryDemand start = free.demand;
     start.splats = free.start_splats;
-    start.pairs = 6 * start.splats;
+    start.intersections = 6 * start.splats;
     const std::uint64_t budget = (plan_memory(scratch, start).total() + all) / 2;
     const Forecast tight = predicted(budget);
     scratch.set_memory_budget(0);

@@ -1,8 +1,8 @@
 // Where splats stop growing in number, and what a run does with the memory that there is.
 #include "engine/core/error.h"
-#include "tests/support/device_options.h"
 #include "tests/support/resumed_run.h"
 #include "tests/support/scoped_variants.h"
+#include "tests/support/test_device_options.h"
 
 namespace darb::test {
 namespace {
@@ -118,10 +118,10 @@ TEST(Limits, a_run_in_a_memory_budget_is_resumed_to_the_same_bits) {
     shared_device().set_memory_budget(0);
 }
 
-TEST(Limits, growth_stops_before_the_pairs_that_the_bindings_hold) {
+TEST(Limits, growth_stops_before_the_intersections_that_the_bindings_hold) {
     TinyTraining t = growing({.width = 32, .height = 24, .splats = 300});
     t.options.sh_degree = 0;
-    // Five windows of 640 pairs; of which one buffer holds 2,560 in the second.
+    // Five windows of 640 intersections; of which one buffer holds 2,560 in the second.
     for (const auto& [fault, most, scale] :
          {std::tuple{"binding:20480", 3200U, 3.0f},
           std::tuple{"binding:20480,allocation:81920", 2560U, 2.0f}}) {
@@ -131,9 +131,9 @@ TEST(Limits, growth_stops_before_the_pairs_that_the_bindings_hold) {
         EXPECT_EQ(FrameBuffers::max_intersections(*narrow), most);
         Trainer trainer(*narrow, t.dataset, t.photos, t.start(), t.options);
         run_to(trainer, 60);
-        EXPECT_GT(trainer.counters().most_pairs, most * 7 / 10);
-        EXPECT_GT(trainer.stopped_by_pairs(), 300U);
-        EXPECT_EQ(trainer.splat_count(), trainer.stopped_by_pairs());
+        EXPECT_GT(trainer.counters().most_intersections, most * 7 / 10);
+        EXPECT_GT(trainer.stopped_by_intersections(), 300U);
+        EXPECT_EQ(trainer.splat_count(), trainer.stopped_by_intersections());
     }
 }
 
@@ -147,14 +147,14 @@ TEST(Limits, growth_stops_at_the_largest_buffer) {
     EXPECT_EQ(trainer.splat_count(), 500U);
 }
 
-// Half more pairs than wanted are more than the device has: it gets those that are wanted.
+// Half more intersections than wanted are more than the device has: it gets those that are wanted.
 TEST(Limits, a_device_without_ample_room_for_the_backward_pass_gets_what_it_needs) {
-    // One view wants more pairs than the first room of 1,024.
+    // One view wants more intersections than the first room of 1,024.
     TinyTraining t = tiny_training({.width = 320, .height = 200, .splats = 24, .close_up = 3});
     t.options.resolution_ramp = false;
     t.options.densify_until = 0;
     std::string backward;
-    const auto pairs = [&](const std::string& fault, std::uint64_t& peak) {
+    const auto intersections = [&](const std::string& fault, std::uint64_t& peak) {
         const std::unique_ptr<Device> device = faulty_device(fault);
         const ScopedVariants variants(*device, "backward=" + backward);
         Trainer trainer(*device, t.dataset, t.photos, t.start(), t.options);
@@ -162,14 +162,14 @@ TEST(Limits, a_device_without_ample_room_for_the_backward_pass_gets_what_it_need
         trainer.drain();
         peak = device->peak_bytes();
         EXPECT_GT(trainer.counters().redone_iterations, 0U);
-        return trainer.memory_demand().pairs;
+        return trainer.memory_demand().intersections;
     };
     for (const char* way : {"subgroup", "buckets"}) {
         SCOPED_TRACE(way);
         backward = way;
         std::uint64_t peak = 0, within = 0;
-        const std::uint64_t ample = pairs("", peak);
-        EXPECT_LT(pairs(fmt::format("memory:{}", peak - 1), within), ample);
+        const std::uint64_t ample = intersections("", peak);
+        EXPECT_LT(intersections(fmt::format("memory:{}", peak - 1), within), ample);
         EXPECT_LT(within, peak);
     }
 }

@@ -4,8 +4,8 @@
 #include "engine/check/hard_cases.h"
 #include "engine/check/walk_truth.h"
 #include "engine/reference/adam.h"
-#include "engine/reference/loss.h"
-#include "tests/support/compare.h"
+#include "engine/reference/reference_loss.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/tiny_training.h"
 
 namespace darb::test {
@@ -90,7 +90,7 @@ std::vector<double> losses_in_double(const Training& t, const check::HardCase& c
     const TrainOptions& o = t.options;
     const Schedule::Rates first = Schedule(o).first;
     const double rates[] = {first.position * extent, first.scale, first.rotation,
-                            first.opacity,           first.sh_dc, first.sh_rest};
+                            first.opacity_logit,     first.sh_dc, first.sh_rest};
     std::array<std::vector<double>, kAttributeCount> value, m1, m2;
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& from = attribute_values(model, a);
@@ -123,7 +123,7 @@ void adapt_cutoff(check::HardCase& c, TrainOptions& options) {
     if (c.settings.alpha_cutoff > 0.5 * ALPHA_CUTOFF_DEFAULT) return;
     options.accuracy.choice[kAlphaCutoff] = find_choice(kAlphaCutoff, "1/1024");
     c.settings.alpha_cutoff = 1.0f / 1024;
-    std::fill(c.scene.model.opacity.begin(), c.scene.model.opacity.end(), -6.7f);
+    std::fill(c.scene.model.opacity_logit.begin(), c.scene.model.opacity_logit.end(), -6.7f);
 }
 
 // The steps before which a scene has gradients that float32 knows and an order of its splats: equal

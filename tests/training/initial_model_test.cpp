@@ -27,8 +27,8 @@ Dataset looking_at(size_t points, bool same_place) {
 }
 
 void expect_finite(const SplatModel& model) {
-    for (const auto* values : {&model.position, &model.log_scale, &model.rotation, &model.opacity,
-                               &model.sh_dc, &model.sh_rest})
+    for (const auto* values : {&model.position, &model.log_scale, &model.rotation,
+                               &model.opacity_logit, &model.sh_dc, &model.sh_rest})
         for (const float v : *values) ASSERT_TRUE(std::isfinite(v));
 }
 

@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/files.h"
-#include "tests/support/device_options.h"
 #include "tests/support/scoped_variants.h"
+#include "tests/support/test_device_options.h"
 #include "trainer/forecast.h"
 #include "trainer/initial_model.h"
 #include "trainer/run.h"
@@ -53,9 +53,9 @@ void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats,
     MemoryDemand demand;
     add_photos(dataset.views, options, demand);
     demand.splats = splats;
-    demand.pairs = trainer.memory_demand().pairs;
+    demand.intersections = trainer.memory_demand().intersections;
     demand.densifies = false;
-    ASSERT_GE(demand.pairs, 4U * splats);
+    ASSERT_GE(demand.intersections, 4U * splats);
     EXPECT_EQ(plan_memory(device, demand).resident(), device.allocated_bytes())
         << splats << " splats, degree " << options.sh_degree << ", effects " << options.exposure
         << ", " << ways << strategy_name(options.strategy);
@@ -223,7 +223,7 @@ TEST(MemoryPlan, splats_within_a_budget_meet_it) {
     const Device device{test::device_options()};
     MemoryDemand demand;
     demand.splats = 1'000'000;
-    demand.pairs = 3'000'000;
+    demand.intersections = 3'000'000;
     demand.photo_pixels = 50'000'000;
     demand.width = 1'000;
     demand.height = 800;
@@ -231,7 +231,7 @@ TEST(MemoryPlan, splats_within_a_budget_meet_it) {
     const std::uint64_t splats = splats_within(device, demand, budget);
     ASSERT_GT(splats, 0U);
     ASSERT_LT(splats, demand.splats);
-    demand.pairs = 3 * splats;
+    demand.intersections = 3 * splats;
     demand.splats = splats;
     EXPECT_LE(plan_memory(device, demand).total(), budget);
     EXPECT_NEAR(static_cast<double>(plan_memory(device, demand).total()),

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "engine/core/files.h"
-#include "tests/support/device_options.h"
+#include "tests/support/test_device_options.h"
 #include "trainer/initial_model.h"
 
 namespace darb {

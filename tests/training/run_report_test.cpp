@@ -48,7 +48,7 @@ ReportData example() {
                                     static_cast<std::uint32_t>(4000 + 3 * i)});
     data.passes = {{"project", 1.21, {}}, {"blend", 6.5, 0.12}, {"loss", 2.0, 0.4}};
     data.settings = {{"kernel", "gaussian"}, {"--odd", "'<&>'"}};
-    data.notes = {"2 iterations were done again: their pairs did not fit."};
+    data.notes = {"2 iterations were done again: their intersections did not fit."};
     ImageU8 picture(60, 15, 3);
     for (int y = 0; y < 15; ++y)
         for (int x = 0; x < 60; ++x) picture.at(x, y, 1) = static_cast<std::uint8_t>(4 * x);

@@ -66,14 +66,16 @@ TEST_P(EveryStrategy, held_out_picture_gets_closer_to_the_photo) {
     EXPECT_EQ(trainer.counters().bad_gradients, 0U);
 }
 
-// Frames that want more pairs than there is room for are done again, noise and scores with them.
+// Frames that want more intersections than there is room for are done again, noise and scores with
+// them.
 TEST_P(EveryStrategy, frames_that_overflow_leave_no_trace) {
     TinyTraining t =
         tiny_with(GetParam(), {.width = 320, .height = 200, .splats = 24, .close_up = 3});
     t.options.initial_scale = 1;
     t.options.resolution_ramp = false;
     t.options.iterations = 30;
-    if (GetParam() == Strategy::mcmc) t.options.max_splats = 26;  // there is room for their pairs
+    if (GetParam() == Strategy::mcmc)
+        t.options.max_splats = 26;  // there is room for their intersections
     Trainer tight = t.trainer(), roomy = t.trainer();
     for (const View& view : t.dataset.views) roomy.render(view.camera);
     run_to(tight, 30);
@@ -144,12 +146,12 @@ TEST(Strategy, mcmc_keeps_every_splat_and_moves_the_dead) {
     t.options.max_splats = 60;
     Trainer trainer = t.trainer();
     Trainer::State state = trainer.state();
-    for (size_t i = 0; i < 60; i += 4) state.model.opacity[i] = -9;
+    for (size_t i = 0; i < 60; i += 4) state.model.opacity_logit[i] = -9;
     trainer.restore(state);
     run_to(trainer, 21);  // opens with the first round
     EXPECT_EQ(trainer.splat_count(), 60U);
     EXPECT_EQ(trainer.counters().pruned, 15U);
-    for (const float logit : trainer.model().opacity) EXPECT_GT(logit, -5);
+    for (const float logit : trainer.model().opacity_logit) EXPECT_GT(logit, -5);
 }
 
 TEST(Strategy, budget_ends_at_its_budget) {
@@ -167,13 +169,13 @@ TEST(Regularisers, fade_what_no_photo_shows) {
         start.position[1] = 1000;
         Trainer trainer(shared_device(), t.dataset, t.photos, start, t.options);
         run_to(trainer, 1);
-        const float first = trainer.model().opacity[0];
+        const float first = trainer.model().opacity_logit[0];
         run_to(trainer, 2);
-        const float second = trainer.model().opacity[0];
+        const float second = trainer.model().opacity_logit[0];
         if (views == 6)
-            EXPECT_LT(first, start.opacity[0]);
+            EXPECT_LT(first, start.opacity_logit[0]);
         else
-            EXPECT_EQ(first, start.opacity[0]);
+            EXPECT_EQ(first, start.opacity_logit[0]);
         EXPECT_LT(second, first);
     }
 }
@@ -212,7 +214,7 @@ TEST(GrowthTarget, the_forecast_knows_it) {
         EXPECT_GT(mean, 50'000);
         EXPECT_LT(mean, 100'000);
     }
-    options.paced = false;
+    options.speed_up_short_runs = false;
     options.iterations = 1'200;  // one round of budget, which at most doubles
     EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 4'000U);
     options.iterations = 1'300;

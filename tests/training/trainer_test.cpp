@@ -2,8 +2,8 @@
 // never stopped, survive frames that need more room, and bring the loss down.
 #include "engine/core/error.h"
 #include "engine/data/metrics.h"
-#include "tests/support/device_options.h"
 #include "tests/support/resumed_run.h"
+#include "tests/support/test_device_options.h"
 #include "tests/support/tiny_training.h"
 
 namespace darb::test {
@@ -41,7 +41,8 @@ TEST(Training, a_random_background_makes_surfaces_opaque) {
         Trainer trainer = t.trainer();
         run_to(trainer, 60);
         double opacity = 0;
-        for (const float logit : trainer.model().opacity) opacity += 1 / (1 + std::exp(-logit));
+        for (const float logit : trainer.model().opacity_logit)
+            opacity += 1 / (1 + std::exp(-logit));
         return opacity;
     };
     EXPECT_GT(darkness(true), 1.1 * darkness(false));
@@ -154,7 +155,8 @@ TEST(Training, looking_at_pictures_meanwhile_changes_nothing) {
     EXPECT_TRUE(same_state(one, two));
 }
 
-/// Wide splats and a close-up, so that one view wants more pairs than the first room of 1,024.
+/// Wide splats and a close-up, so that one view wants more intersections than the first room of
+/// 1,024.
 TinyTraining overflowing() {
     TinyTraining t = tiny_training({.width = 320, .height = 200, .splats = 24, .close_up = 3});
     t.options.resolution_ramp = false;
@@ -182,8 +184,8 @@ TEST(Training, frames_that_overflow_are_done_again_and_leave_no_trace) {
     for (int i = 0; i < 30; ++i) {
         EXPECT_EQ(results[0][i].iteration, i + 1) << "each iteration once and in order";
         EXPECT_EQ(results[0][i].loss, results[1][i].loss) << i;
-        EXPECT_EQ(results[0][i].pairs, results[1][i].pairs) << i;
-        most = std::max(most, results[0][i].pairs);
+        EXPECT_EQ(results[0][i].intersections, results[1][i].intersections) << i;
+        most = std::max(most, results[0][i].intersections);
     }
     EXPECT_GT(most, 1024U);
     EXPECT_EQ(tight.counters().culled, roomy.counters().culled);
@@ -260,7 +262,7 @@ TEST(Training, poisoned_splats_leave_the_others_alone) {
     sick.position[3 * at++] = std::nanf("");
     sick.rotation[4 * at++] = std::numeric_limits<float>::infinity();
     sick.log_scale[3 * at++] = std::nanf("");
-    sick.opacity[at++] = std::nanf("");
+    sick.opacity_logit[at++] = std::nanf("");
     sick.sh_dc[3 * at++] = 1e38f;
     Trainer clean(shared_device(), t.dataset, t.photos, start, t.options);
     Trainer poisoned(shared_device(), t.dataset, t.photos, sick, t.options);
@@ -317,8 +319,8 @@ TEST(Training, a_device_of_small_bindings_trains_the_same_bits) {
     }
 }
 
-// So are the sums of pairs, window by window.
-TEST(Training, a_device_whose_bindings_hold_few_pairs_trains_the_same_bits) {
+// So are the sums of intersections, window by window.
+TEST(Training, a_device_whose_bindings_hold_few_intersections_trains_the_same_bits) {
     for (const Strategy strategy : {Strategy::adc, Strategy::budget}) {
         TinyTraining t = tiny_training({.width = 32, .height = 24, .splats = 330});
         t.options.strategy = strategy;
@@ -327,13 +329,13 @@ TEST(Training, a_device_whose_bindings_hold_few_pairs_trains_the_same_bits) {
         if (!grows) t.options.densify_until = 0;
         t.options.initial_scale = grows ? 2 : 5;
         Trainer whole = t.trainer();
-        ::setenv("DARB_FAULT", "binding:20480", 1);  // 640 pairs a window
+        ::setenv("DARB_FAULT", "binding:20480", 1);  // 640 intersections a window
         Device narrow{test::device_options()};
         ::unsetenv("DARB_FAULT");
         Trainer windows(narrow, t.dataset, t.photos, t.start(), t.options);
         run_to(whole, 45);
         run_to(windows, 45);
-        EXPECT_GT(windows.counters().most_pairs, (grows ? 1 : 4) * 640U);
+        EXPECT_GT(windows.counters().most_intersections, (grows ? 1 : 4) * 640U);
         EXPECT_TRUE(same_state(whole, windows));
     }
 }
@@ -350,7 +352,7 @@ bool resets_after_25(int densify_until, bool late_resets) {
     Trainer trainer = t.trainer();
     const auto largest = [&] {
         const SplatModel model = trainer.model();
-        return *std::max_element(model.opacity.begin(), model.opacity.end());
+        return *std::max_element(model.opacity_logit.begin(), model.opacity_logit.end());
     };
     run_to(trainer, 25);
     const float before = largest();
@@ -420,7 +422,7 @@ TEST(Training, splats_beside_a_photo_fade_where_no_point_is_as_near) {
         for (int c = 0; c < 3; ++c) start.position[c] = static_cast<float>(beside[c]);
         Trainer trainer(shared_device(), t.dataset, t.photos, start, t.options);
         run_to(trainer, 40);
-        return trainer.model().opacity[0] - start.opacity[0];
+        return trainer.model().opacity_logit[0] - start.opacity_logit[0];
     };
     EXPECT_LT(opacity_beside_a_photo(0.5f), -4);
     EXPECT_GT(opacity_beside_a_photo(0), -4);

@@ -43,7 +43,7 @@ TEST_F(ViewerTest, Depth_near_is_lighter_than_far) {
         m.position[3 * i] = i == 0 ? -0.5f : 0.5f;
         m.position[3 * i + 2] = i == 0 ? -0.3f : 0.3f;
         m.rotation[4 * i] = 1;
-        m.opacity[i] = 6;
+        m.opacity_logit[i] = 6;
         for (size_t c = 0; c < 3; ++c) m.log_scale[3 * i + c] = -1.5f;
     }
     write_ply(file_, m);
@@ -171,7 +171,7 @@ TEST_F(ViewerTest, The_first_frame_in_motion_has_nothing_to_wait_for) {
 
 // Half of the splats, the larger ones, are much of the picture; and the deleted ones stay away.
 TEST_F(ViewerTest, Motion_shows_the_important_splats_and_no_deleted_ones) {
-    for (size_t i = 0; i < scene_.model.size(); ++i) scene_.model.opacity[i] = 4;
+    for (size_t i = 0; i < scene_.model.size(); ++i) scene_.model.opacity_logit[i] = 4;
     write_ply(file_, scene_.model);
     load(file_);
     viewer_->choose_camera(0);

@@ -25,7 +25,7 @@ TEST_F(ViewerTest, Panels_cover_a_part_of_the_picture) {
     load(file_);
     const ImageU8 without = shot();
     viewer_->session().panels = true;
-    viewer_->settle(kWidth, kHeight);
+    viewer_->draw_whole(kWidth, kHeight);
     EXPECT_GT(largest_difference(shot(), without), 50);
 }
 

@@ -8,8 +8,8 @@
 #include "engine/data/image_io.h"
 #include "engine/scene/ply.h"
 #include "engine/scene/splat_file.h"
-#include "tests/support/random_scene.h"
 #include "tests/support/test_data.h"
+#include "tests/support/test_scene.h"
 #include "tests/support/window_fixture.h"
 #include "tests/support/x_drop.h"
 

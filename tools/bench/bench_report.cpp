@@ -51,7 +51,7 @@ std::string counters(const BenchResult& r, const DeviceRates& rates) {
     };
     add("splats", r.counts.splats);
     add("visible", r.counts.visible);
-    add("pairs", r.counts.pairs);
+    add("pairs", r.counts.intersections);
     add("evaluated", r.counts.evaluated);
     add("contributing", r.contributing);
     const PassWork work = total_work(r);
@@ -66,7 +66,7 @@ std::string counters(const BenchResult& r, const DeviceRates& rates) {
 Json counts_json(const BenchResult& r) {
     return {{"splats", r.counts.splats},
             {"visible", r.counts.visible},
-            {"pairs", r.counts.pairs},
+            {"pairs", r.counts.intersections},
             {"pixels", r.counts.pixels},
             {"evaluated_splat_pixels", r.counts.evaluated},
             {"contributing_splat_pixels", r.contributing}};

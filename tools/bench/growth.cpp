@@ -31,7 +31,7 @@ Camera camera_of(int width, double x) {
 
 GrowthPoint point_of(const BenchResult& result, std::uint32_t splats, int width) {
     return {static_cast<double>(splats), static_cast<double>(width) * height_of(width),
-            result.counts.pairs, result.ms, result.passes};
+            result.counts.intersections, result.ms, result.passes};
 }
 
 GrowthPoint frame(Device& device, std::uint32_t splats, int width, const Sampling& sampling) {
@@ -62,7 +62,7 @@ using Measure = GrowthPoint (*)(Device&, std::uint32_t splats, int width, const 
 }  // namespace
 
 double growth_value(const GrowthPoint& point, const std::string& by) {
-    return by == "splats" ? point.splats : by == "pixels" ? point.pixels : point.pairs;
+    return by == "splats" ? point.splats : by == "pixels" ? point.pixels : point.intersections;
 }
 
 double growth_exponent(const std::vector<GrowthPoint>& points, const std::string& by) {
@@ -91,8 +91,8 @@ std::vector<GrowthCurve> measure_growth(Device& device, const GrowthPlan& plan,
             fmt::format("{} of {} splats at {}x{}", curve.name, splats, width, height_of(width));
         try {
             curve.points.push_back(measure(device, splats, width, plan.sampling));
-            progress(fmt::format("{}: {:.3f} ms, {:.0f} pairs", what, curve.points.back().ms.median,
-                                 curve.points.back().pairs));
+            progress(fmt::format("{}: {:.3f} ms, {:.0f} intersections", what,
+                                 curve.points.back().ms.median, curve.points.back().intersections));
         } catch (const Error& e) {
             progress(fmt::format("{} is left out: {}", what, e.reason));
         }

@@ -1,5 +1,5 @@
-// How frame and iteration time grow with splats, pixels and splat-tile pairs on the random scene of
-// `darb bench`: curves with fitted exponents, as a table, JSON and a page of plots.
+// How frame and iteration time grow with splats, pixels and splat-tile intersections on the random
+// scene of `darb bench`: curves with fitted exponents, as a table, JSON and a page of plots.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@
 namespace darb {
 
 struct GrowthPoint {
-    double splats = 0, pixels = 0, pairs = 0;
+    double splats = 0, pixels = 0, intersections = 0;
     Spread ms;
     std::vector<PassFigure> passes;
 };
@@ -33,7 +33,7 @@ struct GrowthPlan {
 std::vector<GrowthCurve> measure_growth(Device& device, const GrowthPlan& plan,
                                         const std::function<void(const std::string&)>& progress);
 
-/// The value of a point that a name stands for: splats, pixels or pairs.
+/// The value of a point that a name stands for: splats, pixels or intersections.
 double growth_value(const GrowthPoint& point, const std::string& by);
 /// b of ms = a x^b, least squares of the logarithms over the points whose x is at least a tenth of
 /// the largest: below that fixed costs rule. NaN with fewer than two such points.

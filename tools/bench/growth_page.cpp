@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Of the curve on which the splats, and with them the pairs, vary.
+// Of the curve on which the splats, and with them the intersections, vary.
 std::vector<GrowthPoint> points_by_splats(const std::vector<GrowthCurve>& curves,
                                           const std::string& name) {
     std::vector<GrowthPoint> points;
@@ -36,9 +36,9 @@ PlotSeries series(const std::string& name, const std::vector<GrowthPoint>& point
     s.dots = true;
     for (const GrowthPoint& p : points) {
         s.points.emplace_back(growth_value(p, by), p.ms.median);
-        s.titles.push_back(fmt::format("{}: {} splats, {} pixels, {} pairs, {:.2f} ms", name,
-                                       format_number(p.splats), format_number(p.pixels),
-                                       format_number(p.pairs), p.ms.median));
+        s.titles.push_back(fmt::format("{}: {} splats, {} pixels, {} intersections, {:.2f} ms",
+                                       name, format_number(p.splats), format_number(p.pixels),
+                                       format_number(p.intersections), p.ms.median));
     }
     return s;
 }
@@ -82,13 +82,13 @@ Plot pass_plot(const GrowthCurve& curve) {
 std::string page_table(const GrowthCurve& curve) {
     std::string html = fmt::format(
         "<h2>{} by {}</h2><div class='wide'><table><tr><th>splats</th><th>pixels</th>"
-        "<th>pairs</th><th>ms</th><th>quartiles</th></tr>\n",
+        "<th>intersections</th><th>ms</th><th>quartiles</th></tr>\n",
         curve.name, curve.by);
     for (const GrowthPoint& p : curve.points)
         html += fmt::format(
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f} to {:.3f}</td></tr>\n",
-            format_number(p.splats), format_number(p.pixels), format_number(p.pairs), p.ms.median,
-            p.ms.low, p.ms.high);
+            format_number(p.splats), format_number(p.pixels), format_number(p.intersections),
+            p.ms.median, p.ms.low, p.ms.high);
     return html + "</table></div>\n";
 }
 
@@ -97,15 +97,15 @@ std::string page_table(const GrowthCurve& curve) {
 std::string growth_table(const std::vector<GrowthCurve>& curves) {
     std::string text;
     for (const GrowthCurve& curve : curves) {
-        text += fmt::format("{} by {}: exponent {}, by pairs {}\n", curve.name, curve.by,
+        text += fmt::format("{} by {}: exponent {}, by intersections {}\n", curve.name, curve.by,
                             exponent_text(growth_exponent(curve.points, curve.by)),
-                            exponent_text(growth_exponent(curve.points, "pairs")));
-        text += fmt::format("{:>12} {:>12} {:>12} {:>12} {:>8}\n", "splats", "pixels", "pairs",
-                            "ms", "+- %");
+                            exponent_text(growth_exponent(curve.points, "intersections")));
+        text += fmt::format("{:>12} {:>12} {:>12} {:>12} {:>8}\n", "splats", "pixels",
+                            "intersections", "ms", "+- %");
         for (const GrowthPoint& p : curve.points)
             text +=
                 fmt::format("{:>12} {:>12} {:>12} {:>12.3f} {:>8.1f}\n", format_number(p.splats),
-                            format_number(p.pixels), format_number(p.pairs), p.ms.median,
+                            format_number(p.pixels), format_number(p.intersections), p.ms.median,
                             p.ms.median > 0 ? 50 * (p.ms.high - p.ms.low) / p.ms.median : 0.0);
     }
     return text;
@@ -121,24 +121,25 @@ Json growth_json(const std::vector<GrowthCurve>& curves) {
             for (const PassFigure& pass : p.passes) passes[pass.name] = pass.ms.median;
             points.push_back({{"splats", p.splats},
                               {"pixels", p.pixels},
-                              {"pairs", p.pairs},
+                              {"pairs", p.intersections},
                               {"ms", p.ms.median},
                               {"quartile_low", p.ms.low},
                               {"quartile_high", p.ms.high},
                               {"passes_ms", passes}});
         }
-        all.push_back({{"name", curve.name},
-                       {"by", curve.by},
-                       {"exponent", number(growth_exponent(curve.points, curve.by))},
-                       {"exponent_by_pairs", number(growth_exponent(curve.points, "pairs"))},
-                       {"points", points}});
+        all.push_back(
+            {{"name", curve.name},
+             {"by", curve.by},
+             {"exponent", number(growth_exponent(curve.points, curve.by))},
+             {"exponent_by_pairs", number(growth_exponent(curve.points, "intersections"))},
+             {"points", points}});
     }
     return all;
 }
 
 std::string growth_html(const std::vector<GrowthCurve>& curves, const Json& context) {
     Plot splats = log_plot("By splats", "splats"), pixels = log_plot("By pixels", "pixels"),
-         pairs = log_plot("By splat-tile pairs", "pairs");
+         intersections = log_plot("By splat-tile intersections", "intersections");
     std::string passes, tables;
     for (const GrowthCurve& curve : curves) {
         (curve.by == "splats" ? splats : pixels)
@@ -147,15 +148,16 @@ std::string growth_html(const std::vector<GrowthCurve>& curves, const Json& cont
         tables += page_table(curve);
     }
     for (const char* name : {"frame", "iteration"})
-        pairs.series.push_back(series(name, points_by_splats(curves, name), "pairs"));
+        intersections.series.push_back(
+            series(name, points_by_splats(curves, name), "intersections"));
     return html_page(
         "Growth",
         fmt::format("{}, {}; {} x {}; {}; darb {}", context["device"].get<std::string>(),
                     context["driver"].get<std::string>(), context["num_cpus"].get<unsigned>(),
                     context["processor"].get<std::string>(), context["date"].get<std::string>(),
                     context["commit"].get<std::string>()),
-        "<div class='plots'>" + svg_plot(splats) + svg_plot(pixels) + svg_plot(pairs) + passes +
-            "</div>\n" + tables +
+        "<div class='plots'>" + svg_plot(splats) + svg_plot(pixels) + svg_plot(intersections) +
+            passes + "</div>\n" + tables +
             "<h2>How to read it</h2><p>Random splats in the unit sphere, seen from outside, degree "
             "0. A frame has " +
             held_text(curves, "frame") + "; an iteration (forward, loss, backward, Adam) has " +

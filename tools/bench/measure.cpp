@@ -79,9 +79,10 @@ double milliseconds(const std::function<void()>& work) {
         .count();
 }
 
-Beside::Beside() : wall_(seconds_of(CLOCK_MONOTONIC)), own_(own_seconds()), all_(busy_seconds()) {}
+OtherLoad::OtherLoad()
+    : wall_(seconds_of(CLOCK_MONOTONIC)), own_(own_seconds()), all_(busy_seconds()) {}
 
-double Beside::cores() const {
+double OtherLoad::cores() const {
     const double wall = seconds_of(CLOCK_MONOTONIC) - wall_;
     const double others = busy_seconds() - all_ - (own_seconds() - own_);
     return wall > 0 ? std::max(0.0, others / wall) : 0;
@@ -97,7 +98,7 @@ void take_samples(const Sampling& sampling, int per_sample,
     result.per_sample = per_sample;
     std::vector<double> cpu;
     std::vector<std::pair<std::string, std::vector<double>>> passes;
-    const Beside beside;
+    const OtherLoad others;
     const double start = seconds_of(CLOCK_MONOTONIC);
     const auto more = [&] {
         const int taken = static_cast<int>(result.samples.size());
@@ -119,7 +120,7 @@ void take_samples(const Sampling& sampling, int per_sample,
             known->second.push_back(pass.ms / per_sample);
         }
     }
-    result.beside_cores = beside.cores();
+    result.beside_cores = others.cores();
     result.ms = spread_of(result.samples);
     result.cpu_ms = spread_of(cpu).median;
     for (const auto& [name, values] : passes) result.passes.push_back({name, spread_of(values)});

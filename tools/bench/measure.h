@@ -9,7 +9,7 @@
 
 #include "engine/gpu/commands.h"
 #include "engine/plan/roofline.h"
-#include "tools/cost/cost.h"
+#include "tools/cost/accuracy_cost.h"
 
 namespace darb {
 
@@ -61,9 +61,9 @@ double roofline_share(const BenchResult& result, const DeviceRates& rates);
 PassWork total_work(const BenchResult& result);
 
 /// Processor time of other processes since construction, in cores; 0 where the system does not say.
-class Beside {
+class OtherLoad {
   public:
-    Beside();
+    OtherLoad();
     double cores() const;
 
   private:

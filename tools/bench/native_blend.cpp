@@ -19,7 +19,7 @@ constexpr int kBatch = 8;  // splats between two looks whether every pixel has e
                            // with 8 lanes
 constexpr float kAlphaMax = static_cast<float>(ALPHA_MAX);
 
-/// The pairs of a tile's list that touch a block.
+/// The intersections of a tile's list that touch a block.
 struct Hits {
     std::vector<std::uint32_t> splat, number;  // number: 1 + the place in the list
 };
@@ -129,9 +129,9 @@ BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, con
     f.tiles_y = view.camera.tiles_y;
     f.tile_range =
         frame.intersections.tile_range.download<glm::uvec2>(std::size_t{f.tiles_x} * f.tiles_y);
-    f.pair_order =
+    f.intersection_from_sorted =
         frame.intersections.intersection_from_sorted.download<std::uint32_t>(intersections);
-    f.pair_splat =
+    f.splat_from_intersection =
         frame.intersections.splat_from_intersection.download<std::uint32_t>(intersections);
     f.shape = frame.splats.shape.download<glm::vec4>(splats);
     f.light = frame.splats.light.download<glm::vec4>(splats);
@@ -150,14 +150,14 @@ void native_blend(const BlendFrame& frame, BlendedImage& result, int threads) {
     const std::size_t pixels = std::size_t{frame.width} * frame.height;
     result.image.resize(3 * pixels);
     result.final_transmittance.resize(pixels);
-    result.last_pair.resize(pixels);
+    result.last_intersection.resize(pixels);
     run_tiles({frame, &result, nullptr, nullptr}, best_instructions().forward, threads);
 }
 
 void native_blend_backward(const BlendFrame& frame, const BlendedImage& image,
                            const std::vector<float>& d_image, BlendPartials& result, int threads) {
-    result.first.resize(frame.pair_order.size() * 8);
-    result.rest.resize(frame.pair_order.size());
+    result.first.resize(frame.intersection_from_sorted.size() * 8);
+    result.rest.resize(frame.intersection_from_sorted.size());
     // The loops of both directions share Work; this one only reads the image.
     run_tiles({frame, const_cast<BlendedImage*>(&image), &d_image, &result},
               best_instructions().backward, threads);

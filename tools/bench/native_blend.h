@@ -17,12 +17,13 @@ namespace darb {
 
 /// What the blend passes of one frame read, on the host. Gaussian splats in float32.
 struct BlendFrame {
-    std::uint32_t width = 0, height = 0;         // px
-    std::uint32_t tiles_x = 0, tiles_y = 0;      // tiles
-    std::vector<glm::uvec2> tile_range;          // [T] begin and end in pair_order
-    std::vector<std::uint32_t> pair_order;       // [K] slots, tile after tile, front to back
-    std::vector<std::uint32_t> pair_splat;       // [K] by slot, with block bits
-    std::vector<glm::vec4> shape, light, bound;  // [N] as project.comp leaves them
+    std::uint32_t width = 0, height = 0;     // px
+    std::uint32_t tiles_x = 0, tiles_y = 0;  // tiles
+    std::vector<glm::uvec2> tile_range;      // [T] begin and end in intersection_from_sorted
+    std::vector<std::uint32_t>
+        intersection_from_sorted;  // [K] slots, tile after tile, front to back
+    std::vector<std::uint32_t> splat_from_intersection;  // [K] by slot, with block bits
+    std::vector<glm::vec4> shape, light, bound;          // [N] as project.comp leaves them
     glm::vec3 background{0.0f};
     std::array<float, 6> polynomial{};  // of 2^f, rising powers
     float alpha_cutoff = 0;
@@ -38,7 +39,8 @@ BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, con
 struct BlendedImage {
     std::vector<float> image;                // [3][H][W]
     std::vector<float> final_transmittance;  // [H][W]
-    std::vector<std::uint32_t> last_pair;    // [H][W] 1 + the last pair looked at; 0: none
+    std::vector<std::uint32_t>
+        last_intersection;  // [H][W] 1 + the last intersection looked at; 0: none
 };
 
 struct BlendCounts {
@@ -46,7 +48,7 @@ struct BlendCounts {
     std::uint64_t contributing = 0;  // of these, the ones that change a pixel
 };
 
-/// Partial sums of a pair, in its slot, as blend_backward.comp writes them.
+/// Partial sums of an intersection, in its slot, as blend_backward.comp writes them.
 struct BlendPartials {
     std::vector<float> first;  // [K][8]
     std::vector<float> rest;   // [K]

@@ -24,10 +24,10 @@ inline std::size_t collect(const BlendFrame& f, std::uint32_t begin, std::uint32
     }
     std::size_t count = 0;
     for (std::uint32_t j = begin; j < end; ++j) {
-        const std::uint32_t pair = f.pair_splat[f.pair_order[j]];
-        hits.splat[count] = pair & PAIR_SPLAT_MASK;
+        const std::uint32_t intersection = f.splat_from_intersection[f.intersection_from_sorted[j]];
+        hits.splat[count] = intersection & INTERSECTION_SPLAT_MASK;
         hits.number[count] = j + 1;
-        count += (pair >> (PAIR_BLOCK_SHIFT + block)) & 1u;
+        count += (intersection >> (INTERSECTION_BLOCK_SHIFT + block)) & 1u;
     }
     return count;
 }
@@ -78,7 +78,7 @@ inline void write_block(const BlendFrame& f, const Block& at, const BlockLight& 
         out.image[plane + o] = light.green[p / W][p % W] + t * f.background.g;
         out.image[2 * plane + o] = light.blue[p / W][p % W] + t * f.background.b;
         out.final_transmittance[o] = t;
-        out.last_pair[o] = static_cast<std::uint32_t>(light.last[p / W][p % W]);
+        out.last_intersection[o] = static_cast<std::uint32_t>(light.last[p / W][p % W]);
     }
 }
 
@@ -184,7 +184,7 @@ inline std::uint32_t load_pixels(const BlendFrame& f, const BlendedImage& image,
         const glm::vec3 d = inside
                                 ? glm::vec3(d_image[o], d_image[plane + o], d_image[2 * plane + o])
                                 : glm::vec3(0.0f);
-        const std::uint32_t ended = inside ? image.last_pair[o] : 0;
+        const std::uint32_t ended = inside ? image.last_intersection[o] : 0;
         px.red[p / W][p % W] = d.r;
         px.green[p / W][p % W] = d.g;
         px.blue[p / W][p % W] = d.b;
@@ -260,7 +260,7 @@ inline void backward_block(const BlendFrame& f, const BlendedImage& image,
     const std::uint32_t end = std::min(last, range.y);
     if (end <= range.x) return;
     for (std::size_t i = collect(f, range.x, end, block, hits); i-- > 0;) {
-        const std::uint32_t slot = f.pair_order[hits.number[i] - 1];
+        const std::uint32_t slot = f.intersection_from_sorted[hits.number[i] - 1];
         backward_splat(f, hits.splat[i], hits.number[i], at, px,
                        out.first.data() + std::size_t{slot} * 8, &out.rest[slot]);
     }
@@ -272,12 +272,12 @@ inline void forward_tile(const Work& work, std::uint32_t tile, Hits& hits) {
         forward_block<false>(work.frame, tile, block, hits, *work.image, none);
 }
 
-/// The slots of a tile's pairs belong to it alone and are set to zero first.
+/// The slots of a tile's intersections belong to it alone and are set to zero first.
 inline void backward_tile(const Work& work, std::uint32_t tile, Hits& hits) {
     const BlendFrame& f = work.frame;
     BlendPartials& out = *work.partials;
     for (std::uint32_t j = f.tile_range[tile].x; j < f.tile_range[tile].y; ++j) {
-        const std::size_t slot = f.pair_order[j];
+        const std::size_t slot = f.intersection_from_sorted[j];
         std::fill_n(out.first.begin() + static_cast<std::ptrdiff_t>(slot * 8), 8, 0.0f);
         out.rest[slot] = 0;
     }

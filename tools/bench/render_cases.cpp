@@ -51,7 +51,7 @@ BenchResult measure_frames(Device& device, const SplatModel& model, const Camera
     ForwardOptions options = frame_accuracy({}, p.model).options;
     options.effects = p.plan.projection();
     options.effects.antialias = p.model.antialias;
-    options.crowds = p.plan.crowds();
+    options.huge_splat_path = p.plan.huge_splat_path();
     const GpuSplats splats(device, p.model, false);
     FrameBuffers buffers(device, options);
     Forward forward(device, options);
@@ -76,7 +76,7 @@ BenchResult measure_frames(Device& device, const SplatModel& model, const Camera
         result);
     result.counts = {static_cast<double>(splats.count()),
                      static_cast<double>(status.visible),
-                     static_cast<double>(status.pairs),
+                     static_cast<double>(status.intersections),
                      static_cast<double>(camera.width) * camera.height,
                      static_cast<double>(p.model.rest_count()),
                      0};

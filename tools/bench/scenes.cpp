@@ -29,7 +29,7 @@ SplatModel random_scene(std::size_t splats, int sh_degree) {
             model.sh_dc[3 * i + a] = static_cast<float>(0.5 * coordinate / SH_C0);
         }
         for (std::size_t a = 0; a < 4; ++a) model.rotation[4 * i + a] = normal(0, 1);
-        model.opacity[i] = normal(0, 1.5);
+        model.opacity_logit[i] = normal(0, 1.5);
         for (std::size_t a = 0; a < rest; ++a) model.sh_rest[rest * i + a] = normal(0, 0.05);
     }
     return model;

@@ -125,7 +125,7 @@ BenchResult measure(Device& device, int width, int height, const BenchOptions& o
         result);
     result.counts.splats = kSplats;
     result.counts.visible = frame.status().visible;
-    result.counts.pairs = frame.status().pairs;
+    result.counts.intersections = frame.status().intersections;
     result.counts.pixels = double(width) * height;
     result.counts.rest_floats = attribute_floats(kShRest, kDegree);
     double fused = 0, apart = 0;

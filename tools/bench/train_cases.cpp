@@ -55,8 +55,8 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     effects.antialias = train.antialias;
     const BlendFigures blend = measure_blend(device, model, some_cameras(dataset, kYardstickViews),
                                              effects, options.sampling);
-    // The steps' own means; evaluated splat-pixels follow the pairs.
-    const double scale = result.counts.pairs / std::max(blend.counts.pairs, 1.0);
+    // The steps' own means; evaluated splat-pixels follow the intersections.
+    const double scale = result.counts.intersections / std::max(blend.counts.intersections, 1.0);
     result.counts.evaluated = scale * blend.counts.evaluated;
     result.contributing = scale * blend.contributing;
     result.counts.rest_floats = model.rest_count();
@@ -72,10 +72,10 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
 
 BenchResult measure_steps(Trainer& trainer, int steps_a_sample, const Sampling& sampling) {
     BenchResult result;
-    double visible = 0, pairs = 0, finished = 0;
+    double visible = 0, intersections = 0, finished = 0;
     trainer.on_result = [&](const IterationResult& one) {
         visible += one.visible;
-        pairs += one.pairs;
+        intersections += one.intersections;
         finished += 1;
     };
     take_samples(
@@ -97,7 +97,7 @@ BenchResult measure_steps(Trainer& trainer, int steps_a_sample, const Sampling& 
     trainer.on_result = {};
     result.counts.splats = trainer.splat_count();
     result.counts.visible = visible / std::max(finished, 1.0);
-    result.counts.pairs = pairs / std::max(finished, 1.0);
+    result.counts.intersections = intersections / std::max(finished, 1.0);
     return result;
 }
 

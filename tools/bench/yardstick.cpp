@@ -70,7 +70,7 @@ class Side {
         draw();
         if (forward_.options().kernel == KERNEL_GAUSSIAN)
             frame_ = download_frame(forward_.options(), buffers_.frame(), view_, splats_.count(),
-                                    status_.pairs);
+                                    status_.intersections);
     }
 
     /// Milliseconds of the passes "blend" and "blend backward".
@@ -146,7 +146,7 @@ BlendFigures measure_blend(Device& device, const SplatModel& model,
     for (const Camera& camera : cameras) {
         Side side(device, model, camera, effects);
         figures.counts.visible += share * side.status().visible;
-        figures.counts.pairs += share * side.status().pairs;
+        figures.counts.intersections += share * side.status().intersections;
         figures.counts.pixels += share * camera.width * camera.height;
         if (side.frame().width == 0) continue;  // a kernel without native loops
         const BlendCounts counts = count_blend(side.frame());

@@ -25,7 +25,7 @@ BlendFigures measure_blend(Device& device, const SplatModel& model,
                            const Sampling& sampling);
 
 /// The two blend passes and the native loops once, on one camera, for tests: PSNR of the pictures
-/// and relative error of the sums a pair are the agreements.
+/// and relative error of the sums an intersection are the agreements.
 std::vector<Yardstick> compare_blend(Device& device, const SplatModel& model, const Camera& camera,
                                      int threads = 0);
 

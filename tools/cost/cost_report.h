@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "tools/cost/cost.h"
+#include "tools/cost/accuracy_cost.h"
 
 namespace darb {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "tools/cost/cost.h"
+#include "tools/cost/accuracy_cost.h"
 
 namespace darb {
 

@@ -5,7 +5,7 @@
 
 #include "engine/core/check.h"
 #include "engine/plan/accuracy.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 
 namespace darb {
 

@@ -9,7 +9,7 @@
 
 #include "engine/check/walk_truth.h"
 #include "engine/core/error.h"
-#include "engine/reference/loss.h"
+#include "engine/reference/reference_loss.h"
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
 #include "trainer/schedule.h"
@@ -65,8 +65,9 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         add("no regularisers", [](TrainOptions& o) { o.opacity_weight = o.scale_weight = 0; });
     if (options.clearance > 0)
         add("splats beside photos", [](TrainOptions& o) { o.clearance = 0; });
-    if (schedule.pace > 1)
-        add("rates and rounds of a long run", [](TrainOptions& o) { o.paced = false; });
+    if (schedule.speedup > 1)
+        add("rates and rounds of a long run",
+            [](TrainOptions& o) { o.speed_up_short_runs = false; });
     TrainOptions late = options;
     late.late_resets = true;
     const bool follows_3dgs = strategy_row(options.strategy).follows_3dgs;

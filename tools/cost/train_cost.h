@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
-#include "tools/cost/cost.h"
+#include "tools/cost/accuracy_cost.h"
 #include "trainer/options.h"
 
 namespace darb {

@@ -62,7 +62,7 @@ CostViews dataset_views(const Dataset& dataset, size_t most) {
 CostViews orbit_views(const SplatModel& model, int count, int width, int height) {
     DARB_CHECK(model.size() > 0, "no splats");
     std::vector<double> opacity;
-    for (const float logit : model.opacity) opacity.push_back(sigmoid(logit));
+    for (const float logit : model.opacity_logit) opacity.push_back(sigmoid(logit));
     glm::dvec3 centre(0);
     for (int c = 0; c < 3; ++c) {
         std::vector<Weighted> values;

@@ -14,7 +14,7 @@
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
 #include "tools/darb/bench_growth.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"

@@ -9,8 +9,9 @@
 namespace darb {
 
 void add_growth_flags(CLI::App& command, GrowthFlags& flags) {
-    command.add_flag("--growth", flags.on,
-                     "time against splats, pixels and pairs instead, with fitted exponents");
+    command.add_flag(
+        "--growth", flags.on,
+        "time against splats, pixels and intersections instead, with fitted exponents");
     command.add_option("--most-splats", flags.plan.most_splats, "of --growth")
         ->capture_default_str()
         ->check(CLI::Range(1'000u, 100'000'000u));

@@ -11,7 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/text.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"

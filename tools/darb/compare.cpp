@@ -13,7 +13,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/gpu/device.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/outputs.h"

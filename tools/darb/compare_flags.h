@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "tools/darb/train_flags.h"
-#include "tools/paper/compare.h"
+#include "tools/paper/compare_runs.h"
 #include "tools/paper/lpips.h"
 
 namespace darb {

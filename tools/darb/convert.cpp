@@ -10,7 +10,7 @@
 #include "engine/core/text.h"
 #include "engine/scene/gaussian_scene.h"
 #include "tools/cost/views.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/compare_scenes.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"

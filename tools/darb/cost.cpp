@@ -9,7 +9,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "tools/cost/cost_report.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"

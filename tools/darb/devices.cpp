@@ -6,7 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/gpu/device.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/tune_flags.h"
 
 namespace darb {

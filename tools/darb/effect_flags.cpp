@@ -68,7 +68,7 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
     options.exposure = plan.on(EFFECT_EXPOSURE);
     options.projection = plan.projection();
     options.alpha = plan.on(EFFECT_ALPHA);
-    options.crowds = plan.crowds();
+    options.huge_splat_path = plan.huge_splat_path();
 }
 
 }  // namespace darb

@@ -6,7 +6,7 @@
 
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/dataset_info.h"
 #include "tools/darb/info_text.h"
 #include "tools/darb/outputs.h"

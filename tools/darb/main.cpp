@@ -17,7 +17,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/help.h"
 #include "tools/darb/numbers.h"
 #include "tools/darb/stop_signals.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/plan_subject.h"
 #include "tools/darb/scene_file.h"

@@ -41,7 +41,7 @@ Measured measure_rendering(const DeviceOptions& device_options, const SplatModel
     apply_plan(plan, planned);
     std::vector<View> seen = views;
     apply_plan(plan, seen);
-    Renderer renderer(device, planned, Accuracy{}, plan.projection(), plan.crowds());
+    Renderer renderer(device, planned, Accuracy{}, plan.projection(), plan.huge_splat_path());
     std::vector<double> ms;
     std::uint32_t huge = 0, longest = 0;
     const std::size_t count = std::min(views.size(), kViews);

@@ -7,7 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/paper/psi_report.h"

@@ -13,7 +13,7 @@
 #include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/depth_file.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
@@ -84,7 +84,7 @@ int render(RenderFlags flags) {
     apply_plan(plan, views);
     for (const View& view : views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
-    Renderer renderer(device, model, accuracy, plan.projection(), plan.crowds());
+    Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
     DepthFiles depths(flags.depth);
     std::vector<double> frame_ms;

@@ -73,11 +73,11 @@ void add_splats(const SplatModel& model, json& info) {
         for (size_t k = 0; k < 3; ++k) s[k] = std::exp(double{model.log_scale[3 * i + k]});
         std::sort(s.begin(), s.end());
         scales.push_back(s[2]);
-        opacities.push_back(sigmoid(model.opacity[i]));
+        opacities.push_back(sigmoid(model.opacity_logit[i]));
         zero_rotations += !has_rotation(model, i);
         huge += s[2] > huge_scale;
         needles += s[2] > kNeedleRatio * s[1];
-        saturated += model.opacity[i] > kSaturatedLogit;
+        saturated += model.opacity_logit[i] > kSaturatedLogit;
         invisible += opacities.back() < ALPHA_CUTOFF_DEFAULT;
     }
     info["scale"] = percentiles(scales);

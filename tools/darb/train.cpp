@@ -11,7 +11,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
 #include "tools/darb/stop_signals.h"

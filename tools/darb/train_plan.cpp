@@ -65,7 +65,7 @@ std::string memory_text(const Device& device, const Forecast& f) {
         return static_cast<double>(plan_memory(device, demand).total());
     };
     MemoryDemand empty = f.peak;
-    empty.splats = empty.pairs = 0;
+    empty.splats = empty.intersections = 0;
     const double all = bytes(f.peak), fixed = bytes(empty);
     return fmt::format("{} of device memory ({} and {:.0f} bytes a splat)", format_bytes(all),
                        format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.peak.splats)));

@@ -10,7 +10,7 @@
 #include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/image_io.h"
-#include "tools/darb/commands.h"
+#include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/outputs.h"
@@ -53,7 +53,7 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     viewer.session().note = note;
     if (!flags.scene.empty()) viewer.open(flags.scene);
     viewer.finish_loading();
-    viewer.settle(size.width, size.height);
+    viewer.draw_whole(size.width, size.height);
     if (!viewer.session().error.empty()) throw Error("darb view", viewer.session().error);
     if (!flags.screenshot.empty()) {
         viewer.compose();

@@ -1,7 +1,7 @@
 #include "tools/paper/blending.h"
 
 #include "engine/core/check.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 #include "engine/render/renderer.h"
 #include "tools/paper/quantile.h"
 
@@ -26,10 +26,10 @@ BlendStatistics measure_blending(Device& device, const SplatModel& model,
     for (const Camera& camera : cameras) effects.lens |= camera.lens.active;
     Renderer renderer(device, model, {}, effects);
     BlendStatistics sum;
-    double splats = 0, pixels = 0, pairs = 0, visible = 0;
+    double splats = 0, pixels = 0, intersections = 0, visible = 0;
     for (const Camera& camera : cameras) {
         renderer.render(camera);  // warm-up, and buffers of their size
-        pairs += renderer.status().pairs;
+        intersections += renderer.status().intersections;
         visible += renderer.status().visible;
         splats += blended_splats(model, camera);
         pixels += double(camera.width) * camera.height;
@@ -49,7 +49,7 @@ BlendStatistics measure_blending(Device& device, const SplatModel& model,
     }
     const double count = static_cast<double>(cameras.size());
     sum.blended_per_pixel = splats / pixels;
-    sum.pairs_per_splat = visible > 0 ? pairs / visible : 0;
+    sum.intersections_per_splat = visible > 0 ? intersections / visible : 0;
     sum.ns_per_splat_pixel = splats > 0 ? 1e6 * sum.blend_ms / splats : 0;
     sum.blend_ms /= count;
     sum.frame_ms /= count;

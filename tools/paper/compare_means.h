@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/paper/compare.h"
+#include "tools/paper/compare_runs.h"
 #include "tools/paper/compare_stats.h"
 
 namespace darb {

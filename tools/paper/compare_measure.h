@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/gpu/device.h"
-#include "tools/paper/compare.h"
+#include "tools/paper/compare_runs.h"
 #include "tools/paper/lpips.h"
 
 namespace darb {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/paper/compare.h"
+#include "tools/paper/compare_runs.h"
 
 namespace darb {
 

@@ -10,7 +10,7 @@
 #include "engine/data/image_io.h"
 #include "engine/data/run_events.h"
 #include "engine/report/html.h"
-#include "tools/paper/compare.h"
+#include "tools/paper/compare_runs.h"
 
 namespace darb {
 

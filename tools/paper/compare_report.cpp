@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include "engine/report/html.h"
-#include "tools/paper/compare.h"
 #include "tools/paper/compare_means.h"
 #include "tools/paper/compare_pulses.h"
+#include "tools/paper/compare_runs.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 
@@ -48,7 +48,7 @@ Json run_json(const ComparedRun& run) {
                                  {"splats", p.splats}});
     if (const auto& b = run.blending)
         json["blending"] = {{"blended_per_pixel", b->blended_per_pixel},
-                            {"pairs_per_splat", b->pairs_per_splat},
+                            {"pairs_per_splat", b->intersections_per_splat},
                             {"ns_per_splat_pixel", b->ns_per_splat_pixel},
                             {"blend_ms", b->blend_ms},
                             {"frame_ms", b->frame_ms}};

@@ -57,8 +57,8 @@ const std::vector<Column>& blending_columns() {
     static const std::vector<Column> columns{
         {"blended per pixel", "splats", "blended_per_pixel", 2, false,
          of_blending(&BlendStatistics::blended_per_pixel)},
-        {"pairs per splat", "", "pairs_per_splat", 2, false,
-         of_blending(&BlendStatistics::pairs_per_splat)},
+        {"intersections per splat", "", "pairs_per_splat", 2, false,
+         of_blending(&BlendStatistics::intersections_per_splat)},
         {"per splat and pixel", "ns", "ns_per_splat_pixel", 2, false,
          of_blending(&BlendStatistics::ns_per_splat_pixel)},
         {"blend pass", "ms", "blend_ms", 2, false, of_blending(&BlendStatistics::blend_ms)},

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/paper/compare.h"
+#include "tools/paper/compare_runs.h"
 
 namespace darb {
 
@@ -29,7 +29,7 @@ struct Column {
 const std::vector<Column>& quality_columns();
 /// Those of quality_columns that a table shows: without LPIPS where no run has it.
 std::vector<Column> shown_columns(const Comparison& comparison);
-/// splats blended per pixel, pairs per splat, ns per splat-pixel, blend ms, frame ms.
+/// splats blended per pixel, intersections per splat, ns per splat-pixel, blend ms, frame ms.
 const std::vector<Column>& blending_columns();
 
 /// Of a failed run what it came to counts.

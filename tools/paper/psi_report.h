@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/paper/psi.h"
+#include "tools/paper/psi_measure.h"
 
 namespace darb {
 

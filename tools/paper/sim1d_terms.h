@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/kernels/kernel_coefficients.h"
-#include "tools/paper/sim1d.h"
+#include "tools/paper/approximate1d.h"
 
 namespace darb {
 

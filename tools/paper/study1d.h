@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/paper/sim1d.h"
+#include "tools/paper/approximate1d.h"
 
 namespace darb {
 

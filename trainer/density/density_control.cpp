@@ -69,8 +69,8 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
     commands_.pass("densify");
     commands_.fill(count, n);
     commands_.dispatch(decide_, args,
-                       {splats.parameters(kLogScale), splats.parameters(kOpacity), gradient_sum,
-                        keep, grow, action},
+                       {splats.parameters(kLogScale), splats.parameters(kOpacityLogit),
+                        gradient_sum, keep, grow, action},
                        g.x, g.y);
     scan.record(commands_, keep, keep_offset, count, 0, keep_total);
     scan.record(commands_, grow, grow_offset, count, 0, grow_total);
@@ -157,7 +157,7 @@ void DensityControl::reset_opacity(GpuSplats& splats, float opacity) {
     commands_.begin();
     commands_.pass("reset opacity");
     commands_.dispatch(reset_, gpu::ResetOpacityArgs{splats.count(), logit},
-                       {splats.parameters(kOpacity), splats.moments(kOpacity)}, g.x, g.y);
+                       {splats.parameters(kOpacityLogit), splats.moments(kOpacityLogit)}, g.x, g.y);
     commands_.submit_and_wait();
 }
 
@@ -167,7 +167,7 @@ void DensityControl::decay_opacity(GpuSplats& splats, float keep) {
     commands_.begin();
     commands_.pass("decay opacity");
     commands_.dispatch(decay_, gpu::DecayOpacityArgs{splats.count(), keep},
-                       {splats.parameters(kOpacity)}, g.x, g.y);
+                       {splats.parameters(kOpacityLogit)}, g.x, g.y);
     commands_.submit_and_wait();
 }
 

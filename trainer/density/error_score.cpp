@@ -8,10 +8,10 @@ namespace darb {
 
 namespace {
 
-Pipeline share_pipeline(Device& device, std::uint32_t window_pairs) {
-    return Pipeline(
-        device, "error_share",
-        {{"THREADS", SPLAT_GROUP}, {"WINDOW_PAIRS", static_cast<std::int32_t>(window_pairs)}});
+Pipeline share_pipeline(Device& device, std::uint32_t window_intersections) {
+    return Pipeline(device, "error_share",
+                    {{"THREADS", SPLAT_GROUP},
+                     {"WINDOW_INTERSECTIONS", static_cast<std::int32_t>(window_intersections)}});
 }
 
 }  // namespace
@@ -77,9 +77,9 @@ void ErrorScore::record(Commands& commands, const FrameView& view, const Frame& 
     backward.record_shares(commands, view, frame, images.d_image);
     if (several) commands.copy(transmittance_, transmittance, std::uint64_t{pixels} * 4);
     const BlendBackward& sums = backward.blend();
-    if (sums.window_pairs() != window_pairs_) {
-        window_pairs_ = sums.window_pairs();
-        share_ = share_pipeline(*device_, window_pairs_);
+    if (sums.window_intersections() != window_intersections_) {
+        window_intersections_ = sums.window_intersections();
+        share_ = share_pipeline(*device_, window_intersections_);
     }
     commands.dispatch(share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
                       {frame.splats.intersection_count, frame.splats.first_intersection,

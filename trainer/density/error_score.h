@@ -47,8 +47,8 @@ class ErrorScore {
 
     Device* device_;
     Pipeline image_, share_;
-    std::uint32_t window_pairs_ = 0;  // of the partials that share_ reads
-    Buffer shares_, transmittance_;   // the latter: a copy, where lists take several dispatches
+    std::uint32_t window_intersections_ = 0;  // of the partials that share_ reads
+    Buffer shares_, transmittance_;  // the latter: a copy, where lists take several dispatches
 };
 
 }  // namespace darb

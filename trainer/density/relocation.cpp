@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/kernels/relocation.h"
+#include "engine/kernels/relocation_table.h"
 #include "engine/primitives/groups.h"
 #include "shaders/shared/strategy_args.h"
 
@@ -53,7 +53,7 @@ DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float 
     commands_.begin();
     commands_.pass("relocate");
     commands_.fill(count, n);
-    commands_.dispatch(weight_, args, {splats.parameters(kOpacity), dead, weight, copies}, g.x,
+    commands_.dispatch(weight_, args, {splats.parameters(kOpacityLogit), dead, weight, copies}, g.x,
                        g.y);
     scan.record(commands_, dead, dead_offset, count, 0, dead_total);
     scan.record(commands_, weight, weight_offset, count, 0, weight_total);
@@ -80,7 +80,7 @@ DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float 
     commands_.pass("relocate");
     commands_.dispatch(
         relocate_, args,
-        {sources, copies, table_, splats.parameters(kLogScale), splats.parameters(kOpacity)},
+        {sources, copies, table_, splats.parameters(kLogScale), splats.parameters(kOpacityLogit)},
         after.x, after.y);
     commands_.submit_and_wait();
     return result;
@@ -93,7 +93,7 @@ void Relocation::record_noise(Commands& commands, GpuSplats& splats, const Buffe
     commands.pass("position noise");
     commands.dispatch(noise_, gpu::NoiseArgs{splats.count(), seed, rate, dead_opacity},
                       {splats.parameters(kPosition), splats.parameters(kLogScale),
-                       splats.parameters(kRotation), splats.parameters(kOpacity), status},
+                       splats.parameters(kRotation), splats.parameters(kOpacityLogit), status},
                       g.x, g.y);
 }
 

@@ -20,7 +20,7 @@ void performance_panel(Session& s) {
     ImGui::Text("at rest: %.1f ms", t.full_ms);
     ImGui::Text("now: %.0f %% of the size, %.0f %% of the splats", t.quality.scale * 100,
                 t.quality.splats * 100);
-    ImGui::Text("%u visible, %u splat-tile pairs", t.visible, t.pairs);
+    ImGui::Text("%u visible, %u splat-tile intersections", t.visible, t.intersections);
     double total = 0;
     for (const PassTime& pass : t.passes) total += pass.ms;
     for (const PassTime& pass : t.passes) {

@@ -62,7 +62,8 @@ void display_panel(Session& s) {
     if (d.mode == VIEW_ERROR)
         ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f", kLogarithmic);
     if (d.mode == VIEW_COUNT)
-        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f pairs", kLogarithmic);
+        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f intersections",
+                           kLogarithmic);
     if (s.scene) {
         int style = static_cast<int>(d.style);
         if (ImGui::Combo("splats as", &style, "splats\0points\0ellipsoids\0"))

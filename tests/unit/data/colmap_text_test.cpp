@@ -8,7 +8,7 @@
 
 #include "engine/core/files.h"
 #include "engine/data/colmap.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "engine/data/point_cloud_ply.h"
 #include "tests/unit/data/data_files.h"
 

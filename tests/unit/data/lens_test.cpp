@@ -1,4 +1,4 @@
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 
 #include <gtest/gtest.h>
 

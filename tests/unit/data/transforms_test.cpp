@@ -8,7 +8,7 @@
 #include "engine/data/camera_list.h"
 #include "engine/data/colmap_write.h"
 #include "engine/data/image_io.h"
-#include "engine/data/lens.h"
+#include "engine/data/lens_model.h"
 #include "tests/unit/data/data_files.h"
 
 namespace darb {

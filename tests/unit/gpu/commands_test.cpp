@@ -8,7 +8,7 @@
 #include "engine/gpu/shader_table.h"
 #include "engine/gpu/spirv_reflect.h"
 #include "shaders/shared/scan_args.h"
-#include "tests/support/device_options.h"
+#include "tests/support/test_device_options.h"
 
 namespace darb {
 namespace {

@@ -14,7 +14,7 @@
 #include "engine/gpu/device_state.h"
 #include "engine/gpu/faults.h"
 #include "engine/gpu/shader_table.h"
-#include "tests/support/device_options.h"
+#include "tests/support/test_device_options.h"
 
 namespace darb {
 namespace {

@@ -1,5 +1,5 @@
 // Relocation factors and nearest Gaussians against printed figures, closed forms and brute force.
-#include "engine/kernels/relocation.h"
+#include "engine/kernels/relocation_table.h"
 
 #include <gtest/gtest.h>
 

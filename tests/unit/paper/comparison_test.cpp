@@ -1,5 +1,5 @@
 // Comparisons: which runs count as done, medians and marks, crops, and the paper's printed numbers.
-#include "tools/paper/compare.h"
+#include "tools/paper/compare_runs.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

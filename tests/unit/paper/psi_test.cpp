@@ -1,5 +1,5 @@
 // The correction factor: printed values, closed forms, and the paper's experiment.
-#include "tools/paper/psi.h"
+#include "tools/paper/psi_measure.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The one-dimensional study: profiles against double precision, gradients against differences, and
 // fits whose answer is known.
-#include "tools/paper/sim1d.h"
+#include "tools/paper/approximate1d.h"
 
 #include <gtest/gtest.h>
 

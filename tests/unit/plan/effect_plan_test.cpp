@@ -7,7 +7,7 @@
 
 #include "engine/core/error.h"
 #include "shaders/shared/render_args.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 namespace {
@@ -86,7 +86,7 @@ TEST(EffectPlanOfScene, counters_of_frames_call_for_cooperation) {
     plan.note_frame(0, LIST_SEGMENT + 1);
     plan.note_frame(0, 10);
     EXPECT_EQ(effects_on(plan), On{EFFECT_HUGE});
-    EXPECT_EQ(plan.crowds(), Crowds::by_counters);
+    EXPECT_EQ(plan.huge_splat_path(), HugeSplatPath::by_counters);
     plan = plan_rendering(s.model, s.views, {});
     plan.note_frame(2, 10);
     EXPECT_EQ(effects_on(plan), On{EFFECT_HUGE});
@@ -94,9 +94,9 @@ TEST(EffectPlanOfScene, counters_of_frames_call_for_cooperation) {
     plan = plan_rendering(s.model, s.views, {}, parse_effects("-huge"));
     plan.note_frame(2, 10);
     EXPECT_EQ(effects_on(plan), On{});
-    EXPECT_EQ(plan.crowds(), Crowds::never);
-    EXPECT_EQ(plan_rendering(s.model, s.views, {}, parse_effects("+huge")).crowds(),
-              Crowds::always);
+    EXPECT_EQ(plan.huge_splat_path(), HugeSplatPath::never);
+    EXPECT_EQ(plan_rendering(s.model, s.views, {}, parse_effects("+huge")).huge_splat_path(),
+              HugeSplatPath::always);
 }
 
 TEST(EffectPlanOfScene, near_plane_care_counts_what_lies_beside_a_camera) {
@@ -110,7 +110,7 @@ TEST(EffectPlanOfScene, near_plane_care_counts_what_lies_beside_a_camera) {
             s.model.position[k] = static_cast<float>(at[k]);
             s.model.log_scale[k] = log_scale;
         }
-        s.model.opacity[0] = 3;
+        s.model.opacity_logit[0] = 3;
         return plan_rendering(s.model, s.views, {}).row(EFFECT_NEAR).measured;
     };
     EXPECT_EQ(put({1, 0, 0.25}, -1), 1);
@@ -136,7 +136,7 @@ TEST(EffectPlanOfScene, near_plane_care_counts_what_the_clamp_itself_widens) {
             s.model.position[k] = static_cast<float>(at[k]);
             s.model.log_scale[k] = log_scale;
         }
-        s.model.opacity[0] = 3;
+        s.model.opacity_logit[0] = 3;
         return plan_rendering(s.model, s.views, {}).row(EFFECT_NEAR).measured;
     };
     EXPECT_EQ(count(-4), 0);

@@ -13,9 +13,9 @@
 #include "engine/core/files.h"
 #include "engine/plan/tuner.h"
 #include "engine/primitives/radix_sort.h"
-#include "tests/support/device_options.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_device_options.h"
 
 namespace darb::test {
 namespace {
@@ -115,7 +115,7 @@ TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
     EXPECT_EQ(RadixSort(device, 100).strategy(), RadixSort::Strategy::ballot);
 }
 
-TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_pairs) {
+TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_intersections) {
     const auto taken = [](const char* group, const std::vector<TuningTime>& times) {
         for (const TuningGroup& g : tuning_groups(some_gpu()))
             if (g.name == group) return fastest_choice(g, times);

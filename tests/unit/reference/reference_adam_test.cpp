@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/core/rng.h"
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 
 namespace darb::reference {
 namespace {

@@ -1,5 +1,5 @@
 // Clone, split and removal: each rule of the schedule on one splat, then the cap.
-#include "engine/reference/density_control.h"
+#include "engine/reference/reference_density_control.h"
 
 #include <gtest/gtest.h>
 

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "engine/core/rng.h"
-#include "engine/reference/lens.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "engine/reference/reference_lens.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/test_lenses.h"
+#include "tests/support/test_scene.h"
 #include "tests/unit/reference/reference_scenes.h"
 
 namespace darb::reference {
@@ -63,7 +63,7 @@ size_t expect_gradients(const std::string& name, Splats<double> splats, const Ca
         check(splats.position, out.position, 3);
         check(splats.log_scale, out.log_scale, 3);
         check(splats.rotation, out.rotation, 4);
-        check(splats.opacity, out.opacity, 1);
+        check(splats.opacity_logit, out.opacity_logit, 1);
         check(splats.sh_dc, out.sh_dc, 3);
     }
     EXPECT_TRUE(test::compare(name, expected, got, tolerance("difference")));

@@ -1,12 +1,12 @@
 // The loss against an SSIM written out window by window, and its gradient against differences.
-#include "engine/reference/loss.h"
+#include "engine/reference/reference_loss.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "engine/core/rng.h"
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 
 namespace darb::reference {
 namespace {

@@ -155,7 +155,7 @@ TEST(PinnedImage, NoSplats_IsTheBackground) {
     }
     const auto gradients = reference::backward(none, small_camera(), settings, result,
                                                random_weights(small_camera(), 3, 1));
-    EXPECT_TRUE(gradients.splats.opacity.empty());
+    EXPECT_TRUE(gradients.splats.opacity_logit.empty());
 }
 
 TEST(PinnedImage, OpaqueSplat_IsClampedAtAlphaMax) {

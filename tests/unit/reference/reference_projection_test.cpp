@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 #include "tests/unit/reference/reference_scenes.h"
 
 namespace darb::reference {
@@ -57,7 +57,7 @@ TEST(ProjectionLimits, ScaleOfFifty_CoversTheImageWithItsOpacity) {
     copy(splats.position, floats.position);
     copy(splats.log_scale, floats.log_scale);
     copy(splats.rotation, floats.rotation);
-    copy(splats.opacity, floats.opacity);
+    copy(splats.opacity_logit, floats.opacity_logit);
     copy(splats.sh_dc, floats.sh_dc);
     const auto in_float = render(floats, small_camera(), {});
     for (int y = 0; y < small_camera().height; ++y)
@@ -68,7 +68,7 @@ TEST(ProjectionLimits, ScaleOfFifty_CoversTheImageWithItsOpacity) {
         }
     const auto d =
         backward(splats, small_camera(), {}, result, test::random_weights(small_camera(), 3, 1));
-    EXPECT_NE(d.splats.opacity[0], 0);
+    EXPECT_NE(d.splats.opacity_logit[0], 0);
     for (size_t a = 0; a < 3; ++a) {
         EXPECT_EQ(d.splats.log_scale[a], 0);
         EXPECT_TRUE(std::isfinite(d.splats.position[a]));
@@ -81,9 +81,9 @@ TEST(ProjectionCull, CulledSplats_HaveZeroGradients) {
     const auto result = render(splats, small_camera(), {});
     const auto d =
         backward(splats, small_camera(), {}, result, test::random_weights(small_camera(), 3, 1));
-    EXPECT_NE(d.splats.opacity[0], 0);
+    EXPECT_NE(d.splats.opacity_logit[0], 0);
     for (const size_t i : {1, 2}) {
-        EXPECT_EQ(d.splats.opacity[i], 0);
+        EXPECT_EQ(d.splats.opacity_logit[i], 0);
         EXPECT_EQ(d.splats.position[i * 3 + 2], 0);
         EXPECT_EQ(d.splats.rotation[i * 4], 0);
         EXPECT_EQ(d.mean_gradient_ndc[i], 0);
@@ -210,7 +210,7 @@ TEST(ProjectionClamp, ExtremeScalesAndLogits_StayFiniteWithZeroGradient) {
     const auto flat = gradients({.log_scale = {-50, -1, -1}, .logit = 1e4});
     EXPECT_EQ(flat.log_scale[0], 0);
     EXPECT_NE(flat.log_scale[1], 0);
-    EXPECT_EQ(flat.opacity[0], 0);
+    EXPECT_EQ(flat.opacity_logit[0], 0);
     EXPECT_EQ(cull_of({.logit = -1e4}), Cull::opacity);
 }
 

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
+#include "tests/support/test_scene.h"
 #include "tests/unit/reference/reference_scenes.h"
 
 namespace darb::test {
@@ -68,7 +68,7 @@ class Differences {
         check(name + " position", &Splats<double>::position, d.position, allowed);
         check(name + " log_scale", &Splats<double>::log_scale, d.log_scale, allowed);
         check(name + " rotation", &Splats<double>::rotation, d.rotation, allowed);
-        check(name + " opacity", &Splats<double>::opacity, d.opacity, allowed);
+        check(name + " opacity", &Splats<double>::opacity_logit, d.opacity_logit, allowed);
         check(name + " sh_dc", &Splats<double>::sh_dc, d.sh_dc, allowed);
         if (splats_.rest_count() > 0) {
             check(name + " sh_rest", &Splats<double>::sh_rest, d.sh_rest, allowed);
@@ -96,7 +96,7 @@ class Differences {
 Differences differences_of(const GradientCase& c) {
     const TestScene scene = random_scene(c.scene);
     Splats<double> splats = reference::make_splats<double>(scene.model);
-    for (double& logit : splats.opacity) {
+    for (double& logit : splats.opacity_logit) {
         logit += c.logit_shift;
     }
     return {splats, scene.camera, c.settings};

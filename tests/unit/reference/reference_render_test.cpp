@@ -1,13 +1,13 @@
 // The tiled walk against a plain one without tiles, and the invariants of an image.
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <numeric>
 
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
+#include "tests/support/test_scene.h"
 #include "tests/unit/reference/reference_scenes.h"
 
 namespace darb::reference {
@@ -115,7 +115,7 @@ TEST(Render, PermutedSplats_GiveTheSameImageAndGradients) {
         copy(permuted.position, splats.position, 3);
         copy(permuted.log_scale, splats.log_scale, 3);
         copy(permuted.rotation, splats.rotation, 4);
-        copy(permuted.opacity, splats.opacity, 1);
+        copy(permuted.opacity_logit, splats.opacity_logit, 1);
         copy(permuted.sh_dc, splats.sh_dc, 3);
         copy(permuted.sh_rest, splats.sh_rest, 45);
     }
@@ -125,7 +125,8 @@ TEST(Render, PermutedSplats_GiveTheSameImageAndGradients) {
     const auto da = backward(splats, scene.camera, {}, a, weights);
     const auto db = backward(permuted, scene.camera, {}, b, weights);
     for (size_t i = 0; i < n; ++i) {
-        EXPECT_EQ(db.splats.opacity[i], da.splats.opacity[(i * 7 + 3) % n]) << "splat " << i;
+        EXPECT_EQ(db.splats.opacity_logit[i], da.splats.opacity_logit[(i * 7 + 3) % n])
+            << "splat " << i;
     }
 }
 
@@ -174,7 +175,7 @@ TEST(Render, Float_IsCloseToDouble) {
         EXPECT_TRUE(compare(name + " position", d.position, d_f.position, *allowed, 3));
         EXPECT_TRUE(compare(name + " log_scale", d.log_scale, d_f.log_scale, *allowed, 3));
         EXPECT_TRUE(compare(name + " rotation", d.rotation, d_f.rotation, *allowed, 4));
-        EXPECT_TRUE(compare(name + " opacity", d.opacity, d_f.opacity, *allowed));
+        EXPECT_TRUE(compare(name + " opacity", d.opacity_logit, d_f.opacity_logit, *allowed));
     }
 }
 

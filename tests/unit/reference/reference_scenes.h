@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "engine/core/rng.h"
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 
 namespace darb::test {
 
@@ -41,7 +41,7 @@ inline void add_splat(Splats<double>& splats, const OneSplat& one) {
     for (int c = 0; c < 4; ++c) {
         splats.rotation.push_back(one.rotation[c]);
     }
-    splats.opacity.push_back(one.logit);
+    splats.opacity_logit.push_back(one.logit);
     splats.sh_rest.resize(splats.size() * splats.rest_count());
 }
 

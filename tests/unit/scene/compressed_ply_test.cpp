@@ -61,7 +61,7 @@ TEST(CompressedPly, one_splat_decoded_by_hand) {
     EXPECT_NEAR(model.sh_dc[0], 0, 1e-6);
     EXPECT_NEAR(model.sh_dc[1], (0.2 - 0.5) / 0.28209479, 1e-6);
     EXPECT_NEAR(model.sh_dc[2], -0.5 / 0.28209479, 1e-5);
-    EXPECT_NEAR(model.opacity[0], std::log(4.0), 1e-5);
+    EXPECT_NEAR(model.opacity_logit[0], std::log(4.0), 1e-5);
     // x is the largest; w = sqrt(1/2), y = -sqrt(1/2), z = (511/1023 - 1/2) sqrt 2; nothing is
     // left.
     EXPECT_NEAR(model.rotation[0], std::sqrt(0.5), 1e-6);
@@ -133,7 +133,8 @@ TEST(CompressedPly, every_degree_round_trips_within_the_stated_errors) {
                 EXPECT_NEAR(read.log_scale[3 * j + k], model.log_scale[3 * i + k], 7.001 / steps);
                 EXPECT_NEAR(read.sh_dc[3 * j + k], model.sh_dc[3 * i + k], 2.001 / 510);
             }
-            EXPECT_NEAR(opacity_of(read.opacity[j]), opacity_of(model.opacity[i]), 1.001 / 510);
+            EXPECT_NEAR(opacity_of(read.opacity_logit[j]), opacity_of(model.opacity_logit[i]),
+                        1.001 / 510);
             EXPECT_GT(same_rotation(read, j, model, i), 1 - 2e-6);
             for (size_t c = 0; c < rest; ++c)
                 EXPECT_NEAR(read.sh_rest[rest * j + c], model.sh_rest[rest * i + c], 1.001 / 64);
@@ -149,7 +150,7 @@ TEST(CompressedPly, written_again_the_bytes_stay) {
         std::sort(values.begin(), values.end());
         return values;
     };
-    EXPECT_EQ(sorted(twice.opacity), sorted(once.opacity));
+    EXPECT_EQ(sorted(twice.opacity_logit), sorted(once.opacity_logit));
     EXPECT_EQ(sorted(twice.sh_rest), sorted(once.sh_rest));
 }
 
@@ -157,7 +158,7 @@ TEST(CompressedPly, no_splats_and_equal_splats_round_trip) {
     EXPECT_EQ(kRead(encode_compressed_ply(SplatModel{})).size(), 0u);
     SplatModel model = sample_model(0, 1);
     for (auto* values :
-         {&model.position, &model.log_scale, &model.rotation, &model.opacity, &model.sh_dc})
+         {&model.position, &model.log_scale, &model.rotation, &model.opacity_logit, &model.sh_dc})
         values->insert(values->end(), values->begin(), values->end());
     const SplatModel read = kRead(encode_compressed_ply(model));
     EXPECT_EQ(read.position, model.position);  // the bounds are exact

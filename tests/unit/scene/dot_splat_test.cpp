@@ -26,7 +26,7 @@ TEST(DotSplat, one_splat_decoded_by_hand) {
     EXPECT_NEAR(model.sh_dc[0], 0.5 / 0.28209479, 1e-5);
     EXPECT_NEAR(model.sh_dc[1], -0.5 / 0.28209479, 1e-5);
     EXPECT_NEAR(model.sh_dc[2], (128 / 255.0 - 0.5) / 0.28209479, 1e-6);
-    EXPECT_NEAR(model.opacity[0], std::log(0.2 / 0.8), 1e-5);
+    EXPECT_NEAR(model.opacity_logit[0], std::log(0.2 / 0.8), 1e-5);
     EXPECT_EQ(model.rotation, (std::vector<float>{0, 127 / 128.f, 0, 0}));  // x
 }
 
@@ -43,7 +43,8 @@ TEST(DotSplat, round_trips_within_the_stated_errors) {
             EXPECT_NEAR(read.log_scale[3 * i + k], model.log_scale[3 * i + k], 1e-6);
             EXPECT_NEAR(read.sh_dc[3 * i + k], model.sh_dc[3 * i + k], 1.001 / 510 / 0.28209479);
         }
-        EXPECT_NEAR(opacity_of(read.opacity[i]), opacity_of(model.opacity[i]), 1.001 / 510);
+        EXPECT_NEAR(opacity_of(read.opacity_logit[i]), opacity_of(model.opacity_logit[i]),
+                    1.001 / 510);
         EXPECT_GT(same_rotation(read, i, model, i), 1 - 1e-4);
     }
     EXPECT_EQ(encode_dot_splat(read).size(), file.size());

@@ -157,7 +157,7 @@ TEST(EditSplats, chosen_splats_keep_their_order_and_values) {
     SplatModel model = before;
     EXPECT_EQ(keep_splats([](size_t i) { return i % 3 == 1; }, model), 6u);
     ASSERT_EQ(model.size(), 3u);
-    EXPECT_EQ(model.opacity[2], before.opacity[7]);
+    EXPECT_EQ(model.opacity_logit[2], before.opacity_logit[7]);
     EXPECT_EQ(model.sh_rest[9], before.sh_rest[4 * 9]);
     EXPECT_EQ(model.rotation[4], before.rotation[16]);
 }
@@ -174,7 +174,7 @@ TEST(EditSplats, picked_splats_come_in_the_order_asked_for) {
     EXPECT_EQ(two.origin, model.origin);
     for (size_t k = 0; k < 2; ++k) {
         const size_t from = k == 0 ? 4 : 1;
-        EXPECT_EQ(two.opacity[k], model.opacity[from]);
+        EXPECT_EQ(two.opacity_logit[k], model.opacity_logit[from]);
         EXPECT_EQ(two.position[3 * k + 2], model.position[3 * from + 2]);
         EXPECT_EQ(two.log_scale[3 * k], model.log_scale[3 * from]);
         EXPECT_EQ(two.rotation[4 * k + 3], model.rotation[4 * from + 3]);
@@ -194,7 +194,7 @@ TEST(EditSplats, crop_prune_and_degree) {
         EXPECT_LE(model.position[3 * i + 2], 0.5f);
     }
     prune_opacity(0.25, model);
-    for (const float logit : model.opacity) EXPECT_GE(opacity_of(logit), 0.25);
+    for (const float logit : model.opacity_logit) EXPECT_GE(opacity_of(logit), 0.25);
     const std::vector<float> third = model.sh_rest;
     limit_sh_degree(1, model);
     EXPECT_EQ(model.sh_rest.size(), 9 * model.size());
@@ -214,10 +214,11 @@ TEST(EditSplats, splats_with_nan_go) {
 TEST(EditSplats, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     SplatModel model = sample_model(0, 3);
-    model.opacity = {kInfinity, -kInfinity, 2};
+    model.opacity_logit = {kInfinity, -kInfinity, 2};
     model.log_scale[7] = -kInfinity;
     EXPECT_EQ(drop_non_finite(model), 0u);
-    EXPECT_EQ(model.opacity, (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 2}));
+    EXPECT_EQ(model.opacity_logit,
+              (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 2}));
     EXPECT_EQ(model.log_scale[7], -LOG_SCALE_LIMIT);
 }
 

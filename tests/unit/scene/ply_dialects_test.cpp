@@ -110,7 +110,7 @@ TEST(PlyDialects, filter_3d_becomes_part_of_scales_and_opacity) {
         shrink *= s / t;
     }
     const double opacity = shrink / (1 + std::exp(-0.5));
-    EXPECT_NEAR(r.model.opacity[0], std::log(opacity / (1 - opacity)), 1e-6);
+    EXPECT_NEAR(r.model.opacity_logit[0], std::log(opacity / (1 - opacity)), 1e-6);
 }
 
 TEST(PlyDialects, a_filter_3d_of_0_changes_nothing_and_odd_values_are_no_surprise) {
@@ -131,7 +131,7 @@ TEST(PlyDialects, a_filter_3d_of_0_changes_nothing_and_odd_values_are_no_surpris
         }
         const Read r = read(row);
         ASSERT_EQ(r.model.size(), 1u) << c.logit;
-        EXPECT_NEAR(r.model.opacity[0], c.expected_logit, 1e-6);
+        EXPECT_NEAR(r.model.opacity_logit[0], c.expected_logit, 1e-6);
         if (c.filter == 0) {
             EXPECT_EQ(r.model.log_scale[0], c.expected_scale);
         }

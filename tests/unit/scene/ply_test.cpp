@@ -40,7 +40,7 @@ SplatModel random_model(int degree, std::size_t count) {
     model.sh_degree = degree;
     model.resize(count);
     Pcg32 rng(7);
-    for (auto* values : {&model.position, &model.log_scale, &model.rotation, &model.opacity,
+    for (auto* values : {&model.position, &model.log_scale, &model.rotation, &model.opacity_logit,
                          &model.sh_dc, &model.sh_rest})
         for (float& value : *values) value = static_cast<float>(rng.normal());
     return model;
@@ -55,7 +55,7 @@ void expect_same(const SplatModel& a, const SplatModel& b) {
     EXPECT_EQ(a.position, b.position);
     EXPECT_EQ(a.log_scale, b.log_scale);
     EXPECT_EQ(a.rotation, b.rotation);
-    EXPECT_EQ(a.opacity, b.opacity);
+    EXPECT_EQ(a.opacity_logit, b.opacity_logit);
     EXPECT_EQ(a.sh_dc, b.sh_dc);
     EXPECT_EQ(a.sh_rest, b.sh_rest);
 }
@@ -116,7 +116,7 @@ TEST(Ply, ascii_numbers_beyond_double_are_infinite_and_those_below_it_0) {
     EXPECT_EQ(facts.dropped, 2u);
     ASSERT_EQ(model.size(), 1u);
     EXPECT_EQ(model.position[0], 0.f);
-    EXPECT_EQ(model.opacity[0], OPACITY_LOGIT_LIMIT);
+    EXPECT_EQ(model.opacity_logit[0], OPACITY_LOGIT_LIMIT);
 }
 
 TEST(Ply, blanks_after_end_header_are_tolerated) {
@@ -173,7 +173,7 @@ TEST(Ply, big_endian_and_any_order_and_type_are_read) {
     EXPECT_EQ(model.position, (std::vector<float>{3, 2, 1}));
     EXPECT_EQ(model.rotation, (std::vector<float>{6, 5, 4, 0.25f}));
     EXPECT_EQ(model.log_scale, (std::vector<float>{9, 8, 7}));
-    EXPECT_EQ(model.opacity, (std::vector<float>{10}));
+    EXPECT_EQ(model.opacity_logit, (std::vector<float>{10}));
     EXPECT_EQ(model.sh_dc, (std::vector<float>{13, 12, 11}));
 }
 
@@ -185,8 +185,9 @@ TEST(Ply, splats_with_nan_or_infinity_are_dropped_and_counted) {
     const SplatModel read = parse_ply(encode_ply(model), "memory", &facts);
     EXPECT_EQ(facts.dropped, 2u);
     ASSERT_EQ(read.size(), 3u);
-    EXPECT_EQ(read.opacity,
-              (std::vector<float>{model.opacity[0], model.opacity[2], model.opacity[4]}));
+    EXPECT_EQ(read.opacity_logit,
+              (std::vector<float>{model.opacity_logit[0], model.opacity_logit[2],
+                                  model.opacity_logit[4]}));
     EXPECT_EQ(read.sh_rest.size(), 27u);
     EXPECT_EQ(parse(ascii_file("1", "nan" + kAsciiRow.substr(1)), &facts).size(), 0u);
     EXPECT_EQ(facts.dropped, 1u);
@@ -196,12 +197,13 @@ TEST(Ply, splats_with_nan_or_infinity_are_dropped_and_counted) {
 TEST(Ply, infinite_opacity_and_no_extent_are_kept_at_the_limits) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     SplatModel model = random_model(0, 4);
-    model.opacity = {kInfinity, -kInfinity, 1, std::numeric_limits<float>::quiet_NaN()};
+    model.opacity_logit = {kInfinity, -kInfinity, 1, std::numeric_limits<float>::quiet_NaN()};
     model.log_scale[7] = -kInfinity;
     PlyFacts facts;
     const SplatModel read = parse_ply(encode_ply(model), "memory", &facts);
     EXPECT_EQ(facts.dropped, 1u) << "NaN alone";
-    EXPECT_EQ(read.opacity, (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 1}));
+    EXPECT_EQ(read.opacity_logit,
+              (std::vector<float>{OPACITY_LOGIT_LIMIT, -OPACITY_LOGIT_LIMIT, 1}));
     ASSERT_EQ(read.log_scale.size(), 9u);
     EXPECT_EQ(read.log_scale[7], -LOG_SCALE_LIMIT);
     model.log_scale[7] = kInfinity;
@@ -236,12 +238,12 @@ TEST(Ply, what_is_not_finite_is_not_written_and_said) {
     SplatModel model = random_model(1, 3);
     EXPECT_TRUE(losses_of(SplatFormat::ply, model).empty());
     model.position[4] = kInfinity;
-    model.opacity[2] = kInfinity;  // an opacity of 1
+    model.opacity_logit[2] = kInfinity;  // an opacity of 1
     PlyFacts facts;
     const SplatModel read = parse_ply(encode_splats(SplatFormat::ply, model), "memory", &facts);
     EXPECT_EQ(facts.dropped, 0u);
     ASSERT_EQ(read.size(), 2u);
-    EXPECT_EQ(read.opacity[1], OPACITY_LOGIT_LIMIT);
+    EXPECT_EQ(read.opacity_logit[1], OPACITY_LOGIT_LIMIT);
     ASSERT_EQ(losses_of(SplatFormat::ply, model).size(), 1u);
     EXPECT_NE(losses_of(SplatFormat::ply, model)[0].find("1 splats with NaN"), std::string::npos);
 }

@@ -100,7 +100,7 @@ void expect_sample(const SplatModel& model, const SogFacts& facts) {
     EXPECT_EQ(model.log_scale[1], -9.f);
     EXPECT_EQ(model.log_scale[2], -10 + 255 * 0.03125f);
     EXPECT_EQ(model.sh_dc[1], 0.f);
-    EXPECT_NEAR(model.opacity[0], std::log(0.25), 1e-5);
+    EXPECT_NEAR(model.opacity_logit[0], std::log(0.25), 1e-5);
     // x is the largest, w = sqrt(1/2), y = -sqrt(1/2), z = 1/255 sqrt(1/2); nothing is left for x.
     EXPECT_NEAR(model.rotation[0], std::sqrt(0.5), 1e-6);
     EXPECT_NEAR(model.rotation[2], -std::sqrt(0.5), 1e-6);

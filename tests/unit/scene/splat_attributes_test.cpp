@@ -90,7 +90,7 @@ TEST(SplatAttributes, files_and_choices_carry_every_row) {
 
 TEST(SplatAttributes, arrays_that_do_not_fit_are_named) {
     for (int a = 0; a < kAttributeCount; ++a) {
-        if (a == kOpacity) continue;  // it says how many splats there are
+        if (a == kOpacityLogit) continue;  // it says how many splats there are
         SplatModel model = counted(1);
         attribute_values(model, a).pop_back();
         try {

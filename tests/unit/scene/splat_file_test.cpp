@@ -190,18 +190,19 @@ TEST(SplatFile, splats_without_a_rotation_are_left_out_where_they_would_get_one)
 
 TEST(SplatFile, opacities_of_0_and_1_stay_so) {
     SplatModel model = sample_model(0, 2);
-    model.opacity = {-30, 30};
+    model.opacity_logit = {-30, 30};
     for (const SplatFormat format : kQuantised) {
-        std::vector<float> opacity = parse_splats(encode_splats(format, model), "test").opacity;
+        std::vector<float> opacity =
+            parse_splats(encode_splats(format, model), "test").opacity_logit;
         std::sort(opacity.begin(), opacity.end());
-        EXPECT_EQ(opacity, model.opacity) << format_name(format);
+        EXPECT_EQ(opacity, model.opacity_logit) << format_name(format);
     }
 }
 
 TEST(SplatFile, files_are_written_whole_and_nan_is_left_out) {
     const fs::path path = fs::path(testing::TempDir()) / fmt::format("darb_{}.spz", ::getpid());
     SplatModel model = sample_model(1, 6);
-    model.opacity[2] = std::numeric_limits<float>::quiet_NaN();
+    model.opacity_logit[2] = std::numeric_limits<float>::quiet_NaN();
     save_splats(path, SplatFormat::spz, model);
     SplatFile file;
     EXPECT_EQ(load_splats(path, &file).size(), 5u);
@@ -261,7 +262,7 @@ TEST(SplatFile, compressed_ply_agrees_with_an_independent_expansion) {
         const fs::path base = *folder / "splats" / name;
         SplatModel a = load_splats(base.string() + ".compressed.ply");
         // It keeps opacities 1/512 away from 0 and 1.
-        for (float& logit : a.opacity)
+        for (float& logit : a.opacity_logit)
             logit = std::clamp(logit, -std::log(511.0f), std::log(511.0f));
         const SplatModel b = load_splats(base.string() + ".decoded.ply");
         ASSERT_EQ(a.size(), b.size());
@@ -275,7 +276,7 @@ TEST(SplatFile, compressed_ply_agrees_with_an_independent_expansion) {
         };
         near(a.position, b.position, 1e-6);
         near(a.log_scale, b.log_scale, 2e-6);
-        near(a.opacity, b.opacity, 1e-5);
+        near(a.opacity_logit, b.opacity_logit, 1e-5);
         near(a.sh_dc, b.sh_dc, 1e-5);
         // It takes byte / 255 where the writers of the format take the middle of a 256th.
         near(a.sh_rest, b.sh_rest, 8 * 0.5 / 256 + 1e-6);

@@ -52,7 +52,7 @@ TEST(Spz, one_splat_of_versions_1_to_3_decoded_by_hand) {
             EXPECT_TRUE(model.antialias);
             // Up and backward become down and forward.
             EXPECT_EQ(model.position, (std::vector<float>{1, 2, -3}));
-            EXPECT_NEAR(model.opacity[0], std::log(0.2 / 0.8), 1e-5);
+            EXPECT_NEAR(model.opacity_logit[0], std::log(0.2 / 0.8), 1e-5);
             EXPECT_NEAR(model.sh_dc[0], 0.5 / 0.15, 1e-5);
             EXPECT_NEAR(model.sh_dc[1], -0.5 / 0.15, 1e-5);
             EXPECT_NEAR(model.sh_dc[2], (127 / 255.0 - 0.5) / 0.15, 1e-6);
@@ -93,7 +93,8 @@ TEST(Spz, every_degree_round_trips_within_the_stated_errors) {
                 EXPECT_NEAR(read.log_scale[3 * i + k], model.log_scale[3 * i + k], 1.001 / 32);
                 EXPECT_NEAR(read.sh_dc[3 * i + k], model.sh_dc[3 * i + k], 1.001 / 76.5);
             }
-            EXPECT_NEAR(opacity_of(read.opacity[i]), opacity_of(model.opacity[i]), 1.001 / 510);
+            EXPECT_NEAR(opacity_of(read.opacity_logit[i]), opacity_of(model.opacity_logit[i]),
+                        1.001 / 510);
             EXPECT_GT(same_rotation(read, i, model, i), 1 - 3e-6);
             for (size_t c = 0; c < rest; ++c)
                 EXPECT_NEAR(read.sh_rest[rest * i + c], model.sh_rest[rest * i + c],
@@ -104,7 +105,7 @@ TEST(Spz, every_degree_round_trips_within_the_stated_errors) {
         EXPECT_EQ(again.log_scale, read.log_scale);
         EXPECT_EQ(again.sh_rest, read.sh_rest);
         EXPECT_EQ(again.sh_dc, read.sh_dc);
-        EXPECT_EQ(again.opacity, read.opacity);
+        EXPECT_EQ(again.opacity_logit, read.opacity_logit);
     }
 }
 

@@ -1,5 +1,5 @@
 // The comparison helpers against planted errors: each kind of mistake must be found.
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The scene helper: what it promises to the tests that use it.
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/test_scene.h"
 #include "trainer/checkpoint.h"
 
 namespace darb::test {
@@ -95,7 +95,7 @@ TEST_F(CheckpointFile, what_is_written_comes_back) {
         EXPECT_EQ(back.state.model.footprint, Footprint::exact);
         EXPECT_EQ(back.state.counters.culled, c.state.counters.culled);
         EXPECT_EQ(back.state.counters.pruned, 4U);
-        EXPECT_EQ(back.state.counters.most_pairs, 11U);
+        EXPECT_EQ(back.state.counters.most_intersections, 11U);
         EXPECT_EQ(back.settings, c.settings);
         EXPECT_EQ(back.dataset, c.dataset);
         EXPECT_EQ(back.seconds, 98.5);

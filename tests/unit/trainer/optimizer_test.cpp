@@ -36,7 +36,7 @@ TEST(Optimizer, a_trial_has_a_share_of_all_rates_and_steps_of_all_bands) {
     const AdamStep usual = optimizer.step(160), trial = optimizer.trial_step(160, 0.5f);
     EXPECT_EQ(trial.rest_every, 1);
     EXPECT_FLOAT_EQ(trial.rate[kPosition], 0.5f * usual.rate[kPosition]);
-    EXPECT_FLOAT_EQ(trial.rate[kOpacity], 0.5f * usual.rate[kOpacity]);
+    EXPECT_FLOAT_EQ(trial.rate[kOpacityLogit], 0.5f * usual.rate[kOpacityLogit]);
     EXPECT_FLOAT_EQ(trial.rate[kShDc], 0.5f * usual.rate[kShDc]);
     EXPECT_FLOAT_EQ(trial.rate[kShRest], 0.2f * trial.rate[kShDc]);
     EXPECT_EQ(trial.opacity_weight, usual.opacity_weight);

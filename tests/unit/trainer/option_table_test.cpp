@@ -68,7 +68,7 @@ TEST(OptionTable, settings_come_back_from_their_text) {
         EXPECT_EQ(Json::parse(settings.dump()), settings) << option_name(row);
         // What stands in the text is what the flag takes, but where it settles to something else.
         const Json::json_pointer place(row.setting);
-        if (row.settled || !settings.contains(place) || row.is_switch) continue;
+        if (row.resolved || !settings.contains(place) || row.is_switch) continue;
         TrainOptions again;
         const Json& value = settings[place];
         set_option(row, value.is_boolean() ? (value.get<bool>() ? "on" : "off") : value.dump(),
@@ -167,7 +167,7 @@ TEST(Preset, of_3dgs_changes_what_its_rows_say) {
     EXPECT_EQ(options.prune_opacity, 0.005f);
     EXPECT_EQ(options.largest_scale, 0.0f);
     EXPECT_FALSE(options.random_background);
-    EXPECT_FALSE(options.paced);
+    EXPECT_FALSE(options.speed_up_short_runs);
     EXPECT_TRUE(options.late_resets);
     EXPECT_EQ(options.average_from, 1);
 }

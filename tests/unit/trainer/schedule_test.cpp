@@ -42,7 +42,7 @@ TEST(OpacityReset, the_last_one_by_the_length_of_the_run) {
     EXPECT_EQ(Schedule(options).resets.last, 3'000);
 }
 
-TEST(Pace, a_short_run_learns_and_grows_faster) {
+TEST(Speedup, a_short_run_learns_and_grows_faster) {
     TrainOptions options;
     for (const int iterations : {30'000, 4'000}) {
         options.iterations = iterations;
@@ -66,7 +66,7 @@ TEST(Pace, a_short_run_learns_and_grows_faster) {
     EXPECT_EQ(Schedule(options).rounds.interval, 20);
 }
 
-TEST(Pace, colours_that_change_with_the_view_learn_faster_the_shorter_the_run) {
+TEST(Speedup, colours_that_change_with_the_view_learn_faster_the_shorter_the_run) {
     TrainOptions options;
     const auto rest_rate = [&](int every) {
         options.sh_rest_every = every;
@@ -84,7 +84,7 @@ TEST(Pace, colours_that_change_with_the_view_learn_faster_the_shorter_the_run) {
     EXPECT_FLOAT_EQ(rest_rate(1), 0.0001f);
 }
 
-TEST(Pace, is_not_for_what_is_given_nor_for_3dgs) {
+TEST(Speedup, is_not_for_what_is_given_nor_for_3dgs) {
     TrainOptions given;
     given.iterations = 1'000;
     given.scale_lr = given.rotation_lr = given.opacity_lr = 0.01f;

@@ -17,7 +17,7 @@ SplatModel row(size_t n, int degree = 1) {
     for (size_t i = 0; i < n; ++i) {
         const float f = static_cast<float>(i);
         m.position[3 * i] = f;
-        m.opacity[i] = f;
+        m.opacity_logit[i] = f;
         for (size_t c = 0; c < 3; ++c) m.log_scale[3 * i + c] = f, m.sh_dc[3 * i + c] = f;
         for (size_t c = 0; c < 4; ++c) m.rotation[4 * i + c] = f;
         const size_t rest = static_cast<size_t>(m.rest_count());
@@ -146,7 +146,7 @@ TEST(ViewCamera, Pick_takes_the_nearest_that_is_not_deleted) {
     for (size_t i = 0; i < 3; ++i) {
         m.position[3 * i] = 0;
         m.position[3 * i + 2] = 5 - static_cast<float>(i);  // the last is the nearest
-        m.opacity[i] = 3;
+        m.opacity_logit[i] = 3;
     }
     Camera c;
     c.width = c.height = 100;

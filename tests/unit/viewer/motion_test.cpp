@@ -107,7 +107,7 @@ SplatModel scene(const std::vector<std::array<float, 3>>& splats) {
     m.sh_degree = 1;
     m.resize(splats.size());
     for (size_t i = 0; i < splats.size(); ++i) {
-        m.opacity[i] = splats[i][0];
+        m.opacity_logit[i] = splats[i][0];
         for (size_t c = 0; c < 2; ++c) m.log_scale[3 * i + c] = splats[i][1];
         m.log_scale[3 * i + 2] = -20;
         m.position[3 * i] = splats[i][2];

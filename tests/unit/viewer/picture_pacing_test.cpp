@@ -110,12 +110,12 @@ TEST_F(PicturePacingTest, Motion_is_rehearsed_only_where_the_whole_picture_is_th
 // They show its times in the next frame, and have their size in the one after.
 TEST_F(PicturePacingTest, The_panels_get_two_frames_after_a_whole_picture) {
     frame(0);
-    EXPECT_EQ(pacing_.settle(), 0);
+    EXPECT_EQ(pacing_.count_still_frame(), 0);
     frame(0.01);
-    EXPECT_EQ(pacing_.settle(), 0);
+    EXPECT_EQ(pacing_.count_still_frame(), 0);
     EXPECT_FALSE(pacing_.settled());
     frame(0.02);
-    EXPECT_TRUE(std::isinf(pacing_.settle()));
+    EXPECT_TRUE(std::isinf(pacing_.count_still_frame()));
     EXPECT_TRUE(pacing_.settled());
 }
 

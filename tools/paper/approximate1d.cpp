@@ -1,4 +1,4 @@
-#include "tools/paper/sim1d.h"
+#include "tools/paper/approximate1d.h"
 
 #include <time.h>
 

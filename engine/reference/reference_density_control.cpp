@@ -1,4 +1,4 @@
-#include "engine/reference/density_control.h"
+#include "engine/reference/reference_density_control.h"
 
 #include <algorithm>
 #include <cmath>

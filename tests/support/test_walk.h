@@ -3,9 +3,9 @@
 
 #include "engine/check/device_walk.h"
 #include "engine/render/renderer.h"
-#include "tests/support/compare.h"
-#include "tests/support/random_scene.h"
+#include "tests/support/compare_arrays.h"
 #include "tests/support/shared_device.h"
+#include "tests/support/test_scene.h"
 
 namespace darb::test {
 

@@ -1,4 +1,4 @@
-#include "engine/reference/lens.h"
+#include "engine/reference/reference_lens.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "engine/reference/loss.h"
+#include "engine/reference/reference_loss.h"
 
 #include <array>
 #include <cmath>

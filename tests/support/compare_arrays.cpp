@@ -1,4 +1,4 @@
-#include "tests/support/compare.h"
+#include "tests/support/compare_arrays.h"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 // The strategy `mcmc` in double: weights, draws and places of a round of relocation, what a
 // relocated splat becomes, and the noise on positions. Source: 3DGS-MCMC, arXiv 2404.09591, with
-// the scale of any kernel (engine/kernels/relocation.h). Pure functions.
+// the scale of any kernel (engine/kernels/relocation_table.h). Pure functions.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "tools/cost/cost.h"
+#include "tools/cost/accuracy_cost.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "engine/kernels/relocation.h"
+#include "engine/kernels/relocation_table.h"
 
 #include <cmath>
 

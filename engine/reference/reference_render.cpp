@@ -1,4 +1,4 @@
-#include "engine/reference/render.h"
+#include "engine/reference/reference_render.h"
 
 #include <cmath>
 
@@ -83,22 +83,22 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     const KernelTable& kernel =
         kernel_table(splats.kernel, splats.footprint, settings.polynomial_degree);
     const TileLists& tiles = result.tiles;
-    // Every pair has a slot of its own and the sums run in list order, so that the result does not
-    // depend on the threads.
-    std::vector<ProjectedGradient<T>> pairs(tiles.pair_count());
+    // Every intersection has a slot of its own and the sums run in list order, so that the result
+    // does not depend on the threads.
+    std::vector<ProjectedGradient<T>> intersections(tiles.intersection_count());
     std::vector<Vec3<T>> d_background(tiles.tile_count());
     parallel_for(tiles.tile_count(), settings.threads, [&](size_t tile) {
         d_background[tile] =
             blend_tile_backward(tiles, tile, result.projected, kernel, settings, {d_image, d_alpha},
-                                pairs.data() + tiles.begin[tile]);
+                                intersections.data() + tiles.begin[tile]);
     });
 
     BasicGradients<T> gradients;
     gradients.projected.resize(splats.size());
     gradients.mean_gradient_ndc.resize(splats.size());
     gradients.splats.resize_like(splats);
-    for (size_t k = 0; k < pairs.size(); ++k) {
-        add(gradients.projected[tiles.splats[k]], pairs[k]);
+    for (size_t k = 0; k < intersections.size(); ++k) {
+        add(gradients.projected[tiles.splats[k]], intersections[k]);
     }
     for (const Vec3<T>& d : d_background) {
         gradients.background += d;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/reference/comparison.h"
-#include "tests/support/tolerance.h"
+#include "tests/support/test_tolerance.h"
 
 namespace darb::test {
 

@@ -1,4 +1,4 @@
-#include "tools/paper/psi.h"
+#include "tools/paper/psi_measure.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,11 @@
-#include "engine/reference/mcmc.h"
+#include "engine/reference/reference_mcmc.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "engine/core/check.h"
-#include "engine/kernels/relocation.h"
+#include "engine/kernels/relocation_table.h"
 #include "engine/reference/projection_terms.h"
 #include "engine/scene/splat_model.h"
 #include "shaders/shared/strategy_args.h"
