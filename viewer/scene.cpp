@@ -27,7 +27,7 @@ void refuse_by_kind(const std::filesystem::path& file) {
     std::error_code error;
     const std::filesystem::file_type kind = std::filesystem::status(file, error).type();
     using enum std::filesystem::file_type;
-    if (kind == regular || is_sog_folder(file)) return;
+    if (kind == regular || scene_file_in(file)) return;
     const char* const what = kind == not_found   ? "is not there"
                              : kind == directory ? "is a folder without a scene"
                              : kind == fifo      ? "is a pipe"
@@ -66,21 +66,17 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     scene.file = file;
     refuse_by_kind(file);
     SplatFile facts;
-    if (is_sog_folder(file) || file.filename() == "meta.json") {
-        if (progress) progress(kReadShare, "decoding");
-        scene.model = load_splats(file, &facts);
-    } else {
-        const std::vector<std::byte> bytes = read_in_blocks(file, progress);
-        const ReadProgress decoding = [&](double share) {
-            if (progress) progress(kReadShare + kDecodeShare * share, "decoding");
-        };
-        decoding(0);
-        scene.is_points = is_point_cloud(bytes, file.string());
-        scene.model =
-            scene.is_points
-                ? points_as_splats(parse_point_cloud_ply(bytes, file.string(), facts.dropped))
-                : parse_splats(bytes, file.string(), &facts, decoding);
-    }
+    const std::filesystem::path inner = scene_file_in(file).value_or(file);
+    const std::vector<std::byte> bytes = read_in_blocks(inner, progress);
+    const ReadProgress decoding = [&](double share) {
+        if (progress) progress(kReadShare + kDecodeShare * share, "decoding");
+    };
+    decoding(0);
+    scene.is_points = is_point_cloud(bytes, file.string());
+    const std::filesystem::path folder = inner.has_parent_path() ? inner.parent_path() : ".";
+    scene.model = scene.is_points
+                      ? points_as_splats(parse_point_cloud_ply(bytes, file.string(), facts.dropped))
+                      : parse_splats(bytes, inner.string(), &facts, decoding, folder);
     scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
     scene.notes = facts.notes;
     if (facts.dropped > 0)

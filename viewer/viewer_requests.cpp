@@ -117,7 +117,7 @@ void Viewer::save_scene() {
     const std::optional<SplatFormat> format = format_to_write(s.save_file);
     if (!format)
         throw Error(s.save_file.string(), "its ending names no format to write",
-                    "Use .ply, .compressed.ply, .spz or .splat.");
+                    "Use " + endings_to_write() + ".");
     saved_.check(s.save_file);
     const SplatModel model = s.edit.apply(s.scene->model);
     save_splats(s.save_file, *format, model);

@@ -14,6 +14,7 @@
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply_comments.h"
 #include "engine/scene/quantise.h"
+#include "engine/scene/splat_format.h"
 #include "engine/scene/splat_shapes.h"
 #include "shaders/shared/limits.h"
 
@@ -318,6 +319,19 @@ std::vector<std::byte> encode_compressed_ply(const SplatModel& model) {
         }
     file.insert(file.end(), packed.begin(), packed.end());
     return file;
+}
+
+// Read by the reader of PLY, whose header tells.
+const SplatFormatRow& compressed_ply_format() {
+    static const SplatFormatRow row{
+        .name = "compressed PLY",
+        .endings = {".compressed.ply"},
+        .encode = [](const SplatModel& model, const std::string&,
+                     const EncodeOptions&) { return EncodedSplats{encode_compressed_ply(model)}; },
+        .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics,
+        .cuts = [](const SplatModel& model,
+                   const std::string&) { return compressed_ply_losses(model); }};
+    return row;
 }
 
 }  // namespace darb

@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/quantise.h"
+#include "engine/scene/splat_format.h"
 #include "engine/scene/splat_shapes.h"
 #include "shaders/shared/limits.h"
 
@@ -98,6 +100,33 @@ std::vector<std::byte> encode_dot_splat(const SplatModel& model) {
             record[28 + k] = std::byte{nearest_byte(128 + (length > 0 ? 128 * q[k] / length : 0))};
     }
     return file;
+}
+
+const SplatFormatRow& dot_splat_format() {
+    static const SplatFormatRow row{
+        .name = ".splat",
+        .endings = {".splat"},
+        .recognise =
+            [](const SplatSource& source) {
+                return lower(source.where).ends_with(".splat") ||
+                       looks_like_dot_splat(source.bytes);
+            },
+        .parse =
+            [](const SplatSource& source, SplatFile& file) {
+                return parse_dot_splat(source.bytes, source.where, &file.dropped);
+            },
+        .encode = [](const SplatModel& model, const std::string&,
+                     const EncodeOptions&) { return EncodedSplats{encode_dot_splat(model)}; },
+        .cuts =
+            [](const SplatModel& model, const std::string&) {
+                const std::size_t count = count_outside(model.sh_dc, dc_of_colour(-1 / 510.0),
+                                                        dc_of_colour(1 + 1 / 510.0));
+                std::vector<std::string> losses;
+                if (count > 0)
+                    losses.push_back(fmt::format("{} colours outside 0 to 1 are cut to it", count));
+                return losses;
+            }};
+    return row;
 }
 
 }  // namespace darb

@@ -13,6 +13,7 @@
 #include "engine/scene/ply_comments.h"
 #include "engine/scene/ply_dialects.h"
 #include "engine/scene/ply_table.h"
+#include "engine/scene/splat_format.h"
 #include "engine/scene/splat_shapes.h"
 
 namespace darb {
@@ -84,6 +85,37 @@ std::byte* put_row(std::byte* to, const SplatModel& model, int attribute, std::s
     for (std::size_t c = 0; c < floats; ++c)
         put(to + file_column(attribute, model.sh_degree, c) * sizeof(float), from + c, 1);
     return to + floats * sizeof(float);
+}
+
+std::string encoding_of(const PlyHeader& header) {
+    if (header.format == PlyFormat::ascii) return "ascii";
+    return header.format == PlyFormat::big_endian ? "binary, big-endian" : "binary, little-endian";
+}
+
+// Compressed PLY too.
+SplatModel load_ply(const SplatSource& source, SplatFile& file) {
+    const PlyHeader header = parse_ply_header(source.bytes, source.where);
+    if (is_compressed_ply(header)) file.format = SplatFormat::compressed_ply;
+    file.details = encoding_of(header);
+    if (is_point_cloud(header))
+        throw Error(source.where,
+                    "is a point cloud: its vertices have no opacity, scale and rotation",
+                    "darb train starts from it where it lies beside the cameras; a viewer shows it "
+                    "as points.");
+    PlyFacts facts;
+    SplatModel model = parse_ply(source.bytes, header, source.where, &facts, source.progress);
+    file.dropped = facts.dropped;
+    file.notes = facts.notes;
+    return model;
+}
+
+std::vector<std::string> ply_losses(const SplatModel& model, const std::string&) {
+    if (!needs_double_positions(model)) return {};
+    const glm::dvec3 to_0 = 0.0 - model.origin;
+    return {fmt::format(
+        "positions are written as double, which few other programs read, as float32 does not "
+        "resolve them: --translate {},{},{} brings the scene to 0",
+        to_0.x, to_0.y, to_0.z)};
 }
 
 std::size_t floats_in_all(const SplatModel& model) {
@@ -167,6 +199,29 @@ std::vector<std::byte> encode_ply(const SplatModel& model) {
 
 void write_ply(const std::filesystem::path& path, const SplatModel& model) {
     write_file_atomic(path, encode_ply(model));
+}
+
+bool is_point_cloud(const PlyHeader& header) {
+    const PlyElement* vertex = header.find("vertex");
+    return vertex && vertex->find("x") >= 0 && vertex->find("opacity") < 0 &&
+           vertex->find("scale_0") < 0 && vertex->find("f_dc_0") < 0 && !is_compressed_ply(header);
+}
+
+const SplatFormatRow& ply_format() {
+    static const SplatFormatRow row{
+        .name = "PLY",
+        .endings = {".ply"},
+        .recognise =
+            [](const SplatSource& source) {
+                return starts_with(source.bytes, "ply\n") || starts_with(source.bytes, "ply\r");
+            },
+        .parse = load_ply,
+        .encode = [](const SplatModel& model, const std::string&,
+                     const EncodeOptions&) { return EncodedSplats{encode_ply(model)}; },
+        .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions |
+                 kKeepsUnturned,
+        .cuts = ply_losses};
+    return row;
 }
 
 }  // namespace darb

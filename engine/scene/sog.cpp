@@ -13,6 +13,7 @@
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/sog_archive.h"
+#include "engine/scene/splat_format.h"
 
 namespace darb {
 
@@ -210,6 +211,34 @@ SplatModel parse_parts(const SogPart& part, const std::string& where, std::size_
     }
 }
 
+namespace fs = std::filesystem;
+
+bool is_sog(const SplatSource& source) {
+    const fs::path name = fs::path(source.where).filename();
+    if (name == "lod-meta.json")
+        throw Error(source.where,
+                    "describes a streamed SOG scene, in levels of detail, which is not read",
+                    "Name the folder of one of its parts, which has a meta.json.");
+    return looks_like_zip(source.bytes) || (name == "meta.json" && !source.folder.empty());
+}
+
+SplatModel load_sog(const SplatSource& source, SplatFile& file) {
+    const bool zip = looks_like_zip(source.bytes);
+    SogFacts facts;
+    SplatModel model = zip ? parse_sog(source.bytes, source.where, &facts)
+                           : read_sog_folder(source.folder, &facts);
+    file.details = zip ? "zip" : "folder";
+    file.version = facts.version;
+    file.dropped = facts.dropped;
+    file.notes = facts.notes;
+    file.details += facts.generator.empty() ? "" : ", by " + facts.generator;
+    if (zip) return model;
+    file.bytes = 0;
+    for (const fs::directory_entry& entry : fs::directory_iterator(source.folder))
+        if (entry.is_regular_file()) file.bytes += entry.file_size();
+    return model;
+}
+
 }  // namespace
 
 bool looks_like_zip(std::span<const std::byte> file) {
@@ -227,6 +256,16 @@ SplatModel read_sog_folder(const std::filesystem::path& folder, SogFacts* facts)
     for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
         if (entry.is_regular_file(ignored)) stored += entry.file_size(ignored);
     return parse_parts(open_sog_folder(folder), folder.string(), stored, facts);
+}
+
+const SplatFormatRow& sog_format() {
+    static const SplatFormatRow row{.name = "SOG",
+                                    .endings = {".sog"},
+                                    .folder_file = "meta.json",
+                                    .recognise = is_sog,
+                                    .parse = load_sog,
+                                    .keeps = kKeepsRenderMode | kKeepsHarmonics};
+    return row;
 }
 
 }  // namespace darb

@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/scene/inflate.h"
+#include "engine/scene/splat_file.h"
 
 namespace darb {
 
@@ -70,8 +71,7 @@ std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::
 std::string packed_scene(zip_t* archive) {
     for (zip_int64_t i = 0; i < zip_get_num_entries(archive, 0); ++i)
         if (const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0))
-            for (const char* extension : {".ply", ".splat", ".spz"})
-                if (has_extension(name, extension)) return name;
+            if (format_to_write(name)) return name;
     return {};
 }
 

@@ -1,4 +1,5 @@
 // Every splat file there is a reader for, told apart by content, and the files that can be written.
+// What is known of each format is its row: splat_format.h.
 #pragma once
 
 #include <cstddef>
@@ -8,56 +9,80 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "engine/scene/ply_table.h"
+#include "engine/scene/splat_format_list.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
 
-enum class SplatFormat { ply, compressed_ply, dot_splat, spz, sog };
-
-/// "PLY", "compressed PLY", ".splat", "SPZ", "SOG".
+/// As sentences have it: "PLY", "compressed PLY", ".splat".
 std::string_view format_name(SplatFormat format);
 
 /// What a file says besides its splats.
 struct SplatFile {
     SplatFormat format = SplatFormat::ply;
-    int version = 0;                 // SPZ and SOG; 0 for formats without
+    int version = 0;                 // 0 for formats without
     std::string details;             // encoding, generator; may be empty
     std::uint64_t bytes = 0;         // on disk, all files of a folder
     std::size_t dropped = 0;         // splats with NaN or infinity
     std::vector<std::string> notes;  // what was left out or set right, a sentence each
 };
 
-/// path: a file of any of the formats, a folder with the meta.json of a SOG scene, or that
-/// meta.json. The content decides; the name counts for .splat alone, which has nothing to know it
-/// by. Throws Error naming file, place, reason and remedy; of a point cloud it says that it is one.
+/// path: a file of any of the formats, a folder that is a scene (scene_file_in), or the file it is
+/// known by. The content decides; the name counts for .splat, which has nothing to know it by, and
+/// for files of a folder. Throws Error naming file, place, reason and remedy; of a point cloud it
+/// says that it is one.
 SplatModel load_splats(const std::filesystem::path& path, SplatFile* file = nullptr);
-/// The same from memory, but for folders. A name that ends in .splat is believed. progress: as
-/// read_ply_rows takes it; of PLY and compressed PLY alone, the others are small or quick.
+/// The same from memory. A name that ends in .splat is believed. folder: where files are that this
+/// one names; empty: such a file is refused. progress: as read_ply_rows takes it; of PLY and
+/// compressed PLY alone, the others are small or quick.
 SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& where,
-                        SplatFile* file = nullptr, const ReadProgress& progress = {});
+                        SplatFile* file = nullptr, const ReadProgress& progress = {},
+                        const std::filesystem::path& folder = {});
 
-/// A folder with meta.json.
-bool is_sog_folder(const std::filesystem::path& path);
+/// The file that makes a folder a scene, the meta.json of SOG; nothing where there is none.
+std::optional<std::filesystem::path> scene_file_in(const std::filesystem::path& folder);
+/// Whether a file of this name is the scene_file_in of its folder.
+bool names_scene_folder(const std::filesystem::path& path);
 /// PLY whose vertices have positions and no opacity: opens as points (engine/data/point_splats.h).
 bool is_point_cloud(std::span<const std::byte> bytes, const std::string& where = "PLY");
 bool is_point_cloud(const PlyHeader& header);
 
-/// What a name asks for when writing: .compressed.ply, .ply, .splat, .spz; nothing for others.
+/// What a name ends in that asks for the format, or the whole name where there is no dot at its
+/// beginning.
+const std::vector<std::string>& endings_of(SplatFormat format);
+/// What a name asks for when writing; nothing where it asks for nothing that is written.
 std::optional<SplatFormat> format_to_write(const std::filesystem::path& path);
+/// All endings that are written, for sentences: ".ply, .spz or .splat".
+std::string endings_to_write();
 /// What of this scene the format has no place for, and what of it other programs may not read, a
-/// sentence each. Throws as encode_splats does.
+/// sentence each. Throws as encode_scene does.
 std::vector<std::string> losses_of(SplatFormat format, const SplatModel& model,
                                    const std::string& where = "scene");
 /// Drops what is left out: splats with NaN or infinity and, of all formats but PLY, those without a
 /// rotation, which are not drawn, and would be where a file holds no other length than 1.
 std::size_t drop_unwritable(SplatFormat format, SplatModel& model);
-/// All but sog, after drop_unwritable. `where` stands for the file name in errors.
+
+/// What a scene is written as: one file, and for some formats others in its folder.
+struct EncodedSplats {
+    std::vector<std::byte> file;
+    std::vector<std::pair<std::string, std::vector<std::byte>>> beside = {};  // name, bytes
+    std::size_t bytes() const;                                                // of all
+};
+/// Choices of the formats that have some.
+struct EncodeOptions {};
+/// After drop_unwritable. `where` stands for the file name in errors. Throws Error where the format
+/// is not written.
+EncodedSplats encode_scene(SplatFormat format, const SplatModel& model,
+                           const std::string& where = "scene", const EncodeOptions& options = {});
+/// The same for what is one file.
 std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model,
                                      const std::string& where = "scene");
-/// Through write_file_atomic.
+/// Each through write_file_atomic, the one at `path` last.
+void write_encoded(const std::filesystem::path& path, const EncodedSplats& encoded);
 void save_splats(const std::filesystem::path& path, SplatFormat format, const SplatModel& model);
 
 }  // namespace darb

@@ -8,6 +8,7 @@
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
+#include "engine/scene/splat_format.h"
 #include "engine/scene/spz.h"
 #include "engine/scene/spz_layout.h"
 
@@ -271,6 +272,19 @@ bool is_gzip(Bytes file) {
            file[2] == std::byte{8} && (file[3] & std::byte{0xe0}) == std::byte{0};
 }
 
+SplatModel load_spz(const SplatSource& source, SplatFile& file) {
+    SpzFacts facts;
+    SplatModel model = parse_spz(source.bytes, source.where, &facts);
+    file.version = facts.version;
+    if (facts.sh_degree > model.sh_degree)
+        file.notes.push_back(fmt::format("harmonics of degree {} were left out", facts.sh_degree));
+    if (facts.extensions_cut)
+        file.notes.push_back("what follows the splats is no whole extension record: left out");
+    if (facts.extensions > 0) file.details = fmt::format("{} extensions", facts.extensions);
+    file.dropped = drop_non_finite(model);  // version 1 stores float16
+    return model;
+}
+
 }  // namespace
 
 bool looks_like_spz(Bytes file) {
@@ -294,6 +308,20 @@ SplatModel parse_spz(Bytes file, const std::string& where, SpzFacts* facts) {
     transform_splats({1, frame_of(system), glm::dvec3(0.0)}, model);
     if (facts) *facts = found;
     return model;
+}
+
+const SplatFormatRow& spz_format() {
+    static const SplatFormatRow row{
+        .name = "SPZ",
+        .endings = {".spz"},
+        .recognise = [](const SplatSource& source) { return looks_like_spz(source.bytes); },
+        .parse = load_spz,
+        .encode = [](const SplatModel& model, const std::string& where,
+                     const EncodeOptions&) { return EncodedSplats{encode_spz(model, where)}; },
+        // Positions are steps of their own, of which spz_losses says the size.
+        .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions,
+        .cuts = spz_losses};
+    return row;
 }
 
 }  // namespace darb

@@ -57,13 +57,19 @@ void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
                d.mean_psnr_db, views.size(), d.worst_psnr_db, printable(d.worst_view));
 }
 
+Paths outputs_of(const std::filesystem::path& output, const EncodedSplats& encoded) {
+    Paths outputs{output};
+    for (const auto& one : encoded.beside) outputs.push_back(output.parent_path() / one.first);
+    return outputs;
+}
+
 int convert(const ConvertFlags& flags) {
-    refuse_to_overwrite_inputs({flags.output},
-                               together({files_of(flags.input), files_of(flags.cameras)}));
+    const Paths inputs = together({files_of(flags.input), files_of(flags.cameras)});
+    refuse_to_overwrite_inputs({flags.output}, inputs);
     const std::optional<SplatFormat> format = format_to_write(flags.output);
     if (!format)
         throw Error(flags.output.string(), "names no format that can be written",
-                    "Let it end in .ply, .compressed.ply, .splat or .spz.");
+                    "Let it end in " + endings_to_write() + ".");
     SplatModel model = load_scene(flags.input);
     std::FILE* const say = stream_beside(flags.output);
     edit_scene(flags.edits, model, say);
@@ -80,13 +86,16 @@ int convert(const ConvertFlags& flags) {
     for (const std::string& loss : losses_of(*format, model, flags.output.string()))
         darb::say("warning: {}: {}\n", flags.output.string(), loss);
     drop_unwritable(*format, model);
-    const std::vector<std::byte> file = encode_splats(*format, model, flags.output.string());
-    write_file_atomic(flags.output, file);
+    const EncodedSplats encoded = encode_scene(*format, model, flags.output.string());
+    refuse_to_overwrite_inputs(outputs_of(flags.output, encoded), inputs);
+    write_encoded(flags.output, encoded);
     fmt::print(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
-               model.size(), file.size());
+               model.size(), encoded.bytes());
     if (flags.compare)
         print_difference(say, "the file against the scene", model,
-                         parse_splats(file, flags.output.string()), flags);
+                         encoded.beside.empty() ? parse_splats(encoded.file, flags.output.string())
+                                                : load_splats(flags.output),
+                         flags);
     return 0;
 }
 
@@ -98,8 +107,7 @@ void add_convert(CLI::App& app, Action& action) {
         "convert", "Write a scene in another format, frame, kernel, degree, or a part of it");
     command->add_option("input", flags->input, "splat file, or the output folder of darb train")
         ->required();
-    command->add_option("output", flags->output, "ends in .ply, .compressed.ply, .splat or .spz")
-        ->required();
+    command->add_option("output", flags->output, "ends in " + endings_to_write())->required();
     command
         ->add_option("--kernel", flags->kernel,
                      "gaussian: the nearest Gaussians of a scene of another kernel; prints how far "

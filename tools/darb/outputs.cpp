@@ -66,7 +66,7 @@ Paths files_of(const fs::path& input) {
             add_described(input / part, files);
         if (const fs::path scene = scene_of_run(input); !scene.empty()) files.push_back(scene);
     }
-    if ((folder || input.filename() == "meta.json") && is_sog_folder(beside))
+    if ((folder || names_scene_folder(input)) && scene_file_in(beside))
         for (const fs::directory_entry& entry : fs::directory_iterator(beside, none))
             if (has_extension(entry.path(), ".webp")) files.push_back(entry.path());
     return files;

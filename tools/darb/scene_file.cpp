@@ -61,7 +61,7 @@ fs::path scene_of_run(const fs::path& output) {
 }
 
 fs::path find_scene(const fs::path& path) {
-    if (!fs::is_directory(path) || is_sog_folder(path)) return path;
+    if (!fs::is_directory(path) || scene_file_in(path)) return path;
     const fs::path found = scene_of_run(path);
     if (found.empty())
         throw Error(path.string(),
@@ -73,7 +73,7 @@ fs::path find_scene(const fs::path& path) {
 
 bool is_scene(const fs::path& path) {
     if (fs::is_regular_file(path)) return path.extension() != ".json";
-    return fs::exists(path / "point_cloud") || fs::exists(path / "meta.json");
+    return fs::exists(path / "point_cloud") || scene_file_in(path);
 }
 
 SplatModel load_scene(const fs::path& path, SplatFile* facts) {

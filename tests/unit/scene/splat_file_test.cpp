@@ -111,6 +111,40 @@ TEST(SplatFile, names_choose_what_is_written) {
     EXPECT_FALSE(format_to_write("ply"));
 }
 
+#define DARB_SPLAT_FORMAT(name) SplatFormat::name,
+constexpr SplatFormat kFormats[] = {DARB_SPLAT_FORMATS(DARB_SPLAT_FORMAT)};
+#undef DARB_SPLAT_FORMAT
+
+// A row that is not written asks for nothing; what asks for a row writes what the row reads.
+TEST(SplatFile, a_row_of_the_table_answers_everywhere) {
+    const std::string all = endings_to_write();
+    const fs::path folder = fs::path(testing::TempDir()) / fmt::format("table_{}", ::getpid());
+    const SplatModel model = sample_model(0, 40);
+    for (const SplatFormat format : kFormats) {
+        EXPECT_FALSE(format_name(format).empty());
+        EXPECT_NE(error_of([] { parse_splats({}, "none"); }).find("is empty"), std::string::npos);
+        const std::string refused = error_of([] {
+            FileBytes text;
+            append_text("no such thing", text);
+            parse_splats(text, "none");
+        });
+        EXPECT_NE(refused.find(format_name(format)), std::string::npos) << refused;
+        if (error_of([&] { encode_scene(format, model, "none"); }).find("read and not written") !=
+            std::string::npos)
+            continue;
+        for (const std::string& ending : endings_of(format)) {
+            const std::string name = ending.starts_with('.') ? "scene" + ending : ending;
+            EXPECT_EQ(format_to_write(name), format) << name;
+            EXPECT_NE(all.find(ending), std::string::npos) << all;
+            save_splats(folder / ending / name, format, model);
+            SplatFile file;
+            EXPECT_EQ(load_splats(folder / ending / name, &file).size(), 40u) << name;
+            EXPECT_EQ(file.format, format) << name;
+        }
+    }
+    fs::remove_all(folder);
+}
+
 TEST(SplatFile, what_a_format_has_no_place_for_is_said) {
     SplatModel model = sample_model(2, 5);
     for (float& dc : model.sh_dc) dc = 0;
