@@ -36,6 +36,7 @@ build    libzstd-dev          SPZ files
 build    libzip-dev           SOG files
 build    libwebp-dev          SOG files
 build    libeigen3-dev        matrix products of LPIPS
+build    libmuparser-dev      kernels as expressions
 build    libglfw3-dev         window of the viewer
 build    libimgui-dev         panels of the viewer
 run      mesa-vulkan-drivers  lavapipe, the CPU device, and the GPU drivers of Mesa

@@ -40,8 +40,7 @@ std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int
     const std::string group =
         fmt::format("walk, {} {}{}", kernel_name(kernel), footprint_name(footprint),
                     evaluation == EVALUATION_BUILTIN ? ", built-in" : "");
-    const bool steep = footprint == Footprint::exact && (kernel == KERNEL_INVERSE_QUADRATIC ||
-                                                         kernel == KERNEL_INVERSE_MULTIQUADRIC);
+    const bool steep = footprint == Footprint::exact && ends_with_a_jump(kernel);
     const char* allowed = steep ? "gradient_steep_float32" : "gradient_scaled_float32";
     // Image, every gradient and the mean gradient of the device or of the reference in float.
     const auto compared = [&](const auto& image, const auto& got) {

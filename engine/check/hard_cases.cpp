@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "engine/core/rng.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/scene/edit_splats.h"
 
 namespace darb::check {
@@ -67,8 +68,7 @@ HardCase make(const char* name, const char* what, TestScene scene) {
 class Cases {
   public:
     Cases(int kernel, Footprint footprint) : kernel_(kernel), footprint_(footprint) {
-        if (footprint == Footprint::exact &&
-            (kernel == KERNEL_INVERSE_QUADRATIC || kernel == KERNEL_INVERSE_MULTIQUADRIC))
+        if (footprint == Footprint::exact && ends_with_a_jump(kernel))
             gradient_ = "gradient_steep_float32";
     }
     std::vector<HardCase> all() {

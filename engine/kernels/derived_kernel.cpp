@@ -67,6 +67,17 @@ void ChebyshevSeries::evaluate(double u, double& value, double& derivative) cons
     derivative = 2 * (b1 + x * d1 - d2);
 }
 
+std::complex<double> ChebyshevSeries::value(std::complex<double> u) const {
+    const std::complex<double> x = 2.0 * u - 1.0;
+    std::complex<double> b1 = 0, b2 = 0;
+    for (std::size_t k = coefficients_.size() - 1; k > 0; --k) {
+        const std::complex<double> b0 = coefficients_[k] + 2.0 * x * b1 - b2;
+        b2 = b1;
+        b1 = b0;
+    }
+    return coefficients_[0] + x * b1 - b2;
+}
+
 DerivedKernel::DerivedKernel(const KernelProfile& row) : row_(row) {
     DARB_CHECK(row.edge_order >= 0 && row.support > 0, "kernel {}", row.name);
     DARB_CHECK((row.form == KERNEL_FORM_RINGS) == (row.pulses.count > 1), "kernel {}", row.name);

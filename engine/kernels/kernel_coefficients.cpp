@@ -15,8 +15,11 @@ namespace darb {
 namespace {
 
 constexpr int kNodes = 64;
-constexpr double kFullAccuracy = 1.2e-7;  // the spacing of float32 above 1
-constexpr double kSlopeShare = 0.25;      // a slope error counts this much of a value error
+constexpr double kFullAccuracy = 1.2e-7;   // the spacing of float32 above 1
+constexpr double kSlopeShare = 0.25;       // a slope error counts this much of a value error
+constexpr double kPlainSlopeShare = 0.01;  // where the polynomial is the kernel, slope included
+// A device must not be told from a wrong one by what rounding leaves of terms that cancel.
+constexpr double kMostTerms = 100;
 
 /// Chebyshev nodes of (from, to).
 std::vector<double> nodes(double from, double to) {
@@ -42,14 +45,15 @@ void take(KernelCoefficients& k, int first, const std::vector<double>& c) {
 
 /// u^a P(x), P = 1 + c1 x + ...: both w and dw/dx are fitted, the slope weakened where a < 1 makes
 /// it infinite.
-void fit_compact(const DerivedKernel& kernel, Footprint footprint, KernelCoefficients& k) {
+void fit_compact(const DerivedKernel& kernel, Footprint footprint, double slope_share,
+                 KernelCoefficients& k) {
     const double a = 0.5 * k.half_power;
     LinearRows rows;
     for (const double x : nodes(0, 1)) {
         const double t = k.squared ? std::sqrt(x) : x, q = k.support * t, u = 1 - x;
         const double power = std::pow(u, a), lower = a > 0 ? a * std::pow(u, a - 1) : 0;
         rows.add(powers(x, 1, k.degree, power), kernel.value(footprint, q) - power);
-        const double share = kSlopeShare * (a < 1 ? std::pow(u, 1 - a) : 1);
+        const double share = slope_share * (a < 1 ? std::pow(u, 1 - a) : 1);
         const double slope = kernel.slope(footprint, q) * k.support / (k.squared ? 2 * t : 1);
         std::vector<double> row;
         for (int i = 1; i <= k.degree; ++i)
@@ -112,7 +116,7 @@ void measure(const DerivedKernel& kernel, Footprint footprint, KernelCoefficient
 }
 
 KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint, int degree,
-                               bool squared) {
+                               bool squared, double slope_share = kSlopeShare) {
     const KernelProfile& row = kernel.row();
     KernelCoefficients k;
     k.form = row.form;
@@ -127,7 +131,7 @@ KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint,
     if (row.form == KERNEL_FORM_COMPACT) {
         k.half_power = 2 * row.edge_order + (footprint == Footprint::exact ? 1 : 0);
         k.squared = squared;
-        fit_compact(kernel, footprint, k);
+        fit_compact(kernel, footprint, slope_share, k);
     } else if (row.form == KERNEL_FORM_GAUSSIAN) {
         fit_gaussian(k);
     } else if (row.form == KERNEL_FORM_RINGS) {
@@ -156,10 +160,44 @@ KernelCoefficients fit_degree(const DerivedKernel& kernel, Footprint footprint, 
                                                                                      : plain;
 }
 
+double sum_of_terms(const KernelCoefficients& k) {
+    double sum = 0;
+    for (const double c : k.c) sum += std::abs(c);
+    return sum;
+}
+
+/// A negative w is below every cut-off, so it may be: see KernelProfile::given.
+template <class Fit>
+KernelCoefficients best_of_degrees(const Fit& fit) {
+    KernelCoefficients best = fit(kLeastDegree);
+    for (int degree = kLeastDegree + 1;
+         degree <= KERNEL_MAX_DEGREE && best.value_error > kFullAccuracy; ++degree) {
+        const KernelCoefficients k = fit(degree);
+        if (k.value_error < best.value_error && sum_of_terms(k) <= kMostTerms) best = k;
+    }
+    return best;
+}
+
+KernelCoefficients fit_given(const DerivedKernel& kernel, Footprint footprint, int degree) {
+    const auto fit = [&](int d) { return fit_degree(kernel, footprint, d); };
+    if (degree == kFullDegree) return best_of_degrees(fit);
+    KernelCoefficients k = fit(degree);
+    while (k.value_error > kShortAccuracy && k.degree < KERNEL_MAX_DEGREE) k = fit(k.degree + 1);
+    return k;
+}
+
 }  // namespace
+
+KernelCoefficients fit_plain(const DerivedKernel& kernel, Footprint footprint) {
+    return best_of_degrees([&](int degree) {
+        return fit_literal(kernel, footprint, degree, false, kPlainSlopeShare);
+    });
+}
 
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree) {
     DARB_CHECK(degree >= kLeastDegree && degree <= kFullDegree, "degree = {}", degree);
+    if (kernel.row().given && kernel.row().form == KERNEL_FORM_COMPACT)
+        return fit_given(kernel, footprint, degree);
     const bool full = degree == kFullDegree;
     KernelCoefficients k = fit_degree(kernel, footprint, full ? kLeastDegree : degree);
     while (full && k.value_error > kFullAccuracy && k.degree < KERNEL_MAX_DEGREE)

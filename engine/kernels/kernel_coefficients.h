@@ -14,6 +14,7 @@ namespace darb {
 /// Degrees that can be asked for. kFullDegree means full accuracy: the shortest polynomial, at most
 /// KERNEL_MAX_DEGREE, whose error is below float32 rounding. The others are taken literally.
 constexpr int kFullDegree = 5, kLeastDegree = 2;
+constexpr double kShortAccuracy = 1e-2;
 
 struct KernelCoefficients {
     int form = KERNEL_FORM_COMPACT;
@@ -35,16 +36,24 @@ struct KernelCoefficients {
 /// degree: kLeastDegree..kFullDegree; without meaning for rings, which are no polynomial. value(0)
 /// is 1 and the edge of the kernels that fall to zero
 /// is exactly zero at every degree. Costs milliseconds; kernel_coefficients keeps its results.
+/// Of a kernel that was given (KernelProfile::given) full accuracy is the best that there is, and
+/// other degrees are the least from there on that are within kShortAccuracy.
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree);
+/// The best polynomial in x = t with regard to float32, compact kernels only.
+KernelCoefficients fit_plain(const DerivedKernel& kernel, Footprint footprint);
 const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, int degree);
 
 /// Absolute, of w, that float32 on any device may add to value_error. Multiplications and additions
 /// are rounded correctly: 3e-7. Division is not, nor is a square root: Vulkan allows 2.5 ulp, 2 for
-/// inversesqrt, and for sqrt both of them, so 7 for 1/sqrt(1+q), each 6e-8 below w = 1.
+/// inversesqrt, and for sqrt both of them, so 7 for 1/sqrt(1+q), each 6e-8 below w = 1. Terms that
+/// cancel leave the rounding of the largest: built-in kernels have none.
 inline double float_rounding(const KernelCoefficients& k) {
     const bool divides = k.form == KERNEL_FORM_QUADRIC;
-    const bool has_root = k.form == KERNEL_FORM_COMPACT && k.half_power % 2 == 1;
-    return divides || has_root ? 3e-7 + 6e-7 : 3e-7;
+    const bool compact = k.form == KERNEL_FORM_COMPACT;
+    const bool has_root = compact && k.half_power % 2 == 1;
+    double terms = 0;
+    for (const double c : k.c) terms += compact ? std::abs(c) : 0;
+    return std::max(3e-7, 6e-8 * terms) + (divides || has_root ? 6e-7 : 0);
 }
 
 /// w and dw/dq as the shaders compute them with EVALUATION_POLYNOMIAL.

@@ -1,47 +1,27 @@
-#include "engine/kernels/kernel_family.h"
-
-#include <utility>
-#include <vector>
-
-#include "engine/core/check.h"
 #include "engine/kernels/kernel_profile.h"
 
 namespace darb {
-
-const DerivedKernel& derived_kernel(int kernel) {
-    static const auto kernels = [] {
-        std::vector<DerivedKernel> all;
-        for (int k = 0; k < KERNEL_ROWS; ++k) all.emplace_back(kernel_profile(k));
-        return all;
-    }();
-    DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
-    return kernels[static_cast<std::size_t>(kernel)];
-}
 
 std::string_view kernel_name(int kernel) {
     return kernel_profile(kernel).name;
 }
 
-std::optional<int> kernel_from_name(std::string_view name) {
-    for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel)
-        if (kernel_name(kernel) == name) return kernel;
-    return std::nullopt;
-}
-
 std::optional<int> kernel_with_pulses(int kernel, int pulses) {
-    const int base = kernel < KERNEL_COUNT ? kernel : kernel_profile(kernel).kernel;
+    const bool rings = kernel >= KERNEL_COUNT && kernel < KERNEL_ROWS;
+    const int base = rings ? kernel_profile(kernel).kernel : kernel;
     if (pulses == 1) return base;
     for (int row = KERNEL_COUNT; row < KERNEL_ROWS; ++row)
         if (kernel_profile(row).kernel == base && kernel_pulses(row) == pulses) return row;
     return std::nullopt;
 }
 
-int kernel_pulses(int kernel) {
-    return kernel_profile(kernel).pulses.count;
+int shader_kernel(int kernel) {
+    const int named = kernel_profile(kernel).kernel;
+    return named >= 0 ? named : kernel;
 }
 
-bool has_exact_footprint(int kernel) {
-    return kernel_profile(kernel).form != KERNEL_FORM_RINGS;
+int kernel_pulses(int kernel) {
+    return kernel_profile(kernel).pulses.count;
 }
 
 std::string_view footprint_name(Footprint footprint) {
@@ -56,6 +36,11 @@ std::optional<Footprint> footprint_from_name(std::string_view name) {
 
 double kernel_support(int kernel) {
     return kernel_profile(kernel).support;
+}
+
+bool ends_with_a_jump(int kernel) {
+    const KernelProfile& row = kernel_profile(kernel);
+    return row.edge_order == 0 && row.form != KERNEL_FORM_GAUSSIAN;
 }
 
 double kernel_value(int kernel, Footprint footprint, double q) {

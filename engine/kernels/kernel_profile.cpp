@@ -84,7 +84,7 @@ const std::array<KernelProfile, KERNEL_ROWS> kRows{{
 
 }  // namespace
 
-const KernelProfile& kernel_profile(int kernel) {
+const KernelProfile& listed_profile(int kernel) {
     DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
     return kRows[static_cast<std::size_t>(kernel)];
 }

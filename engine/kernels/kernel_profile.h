@@ -4,7 +4,9 @@
 #pragma once
 
 #include <complex>
+#include <functional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "engine/kernels/kernel_family.h"
@@ -16,7 +18,7 @@ namespace darb {
 /// Im profile(q + ih) / h with h far below rounding. It must be analytic on a neighbourhood of
 /// [0, support], accurate to a few ulp relative to its value, 1 at q = 0 and falling on the
 /// support.
-using Profile = std::complex<double> (*)(std::complex<double> q);
+using Profile = std::function<std::complex<double>(std::complex<double> q)>;
 
 /// Kernels that oscillate on beyond their first zero may keep some of their rings. w is then smooth
 /// and falls from its peak to 0 within each pulse.
@@ -33,10 +35,19 @@ struct KernelProfile {
     Profile profile;
     int kernel = -1;  // KERNEL_* of the shaders, where it is not the row's own number
     Pulses pulses{};
+    bool given = false;  // by a KernelDefinition: no more is known of its shape than that it falls
 };
 
-/// The rows, indexed by KERNEL_*, below KERNEL_ROWS.
+/// The rows, indexed by KERNEL_*, and behind them the registered kernels; kernel_registry.h.
 const KernelProfile& kernel_profile(int kernel);
+/// Those of the list and of more pulses alone, below KERNEL_ROWS.
+const KernelProfile& listed_profile(int kernel);
+/// KERNEL_* as shaders know it: of rings the kernel of one pulse, of a registered kernel one of the
+/// same form.
+int shader_kernel(int kernel);
+/// Whether w is not 0 at the support's edge, as of inverse_quadratic. The slope of the exact
+/// footprint is infinite there.
+bool ends_with_a_jump(int kernel);
 
 /// A polynomial on [0, 1] in the Chebyshev basis.
 class ChebyshevSeries {
@@ -44,8 +55,16 @@ class ChebyshevSeries {
     ChebyshevSeries() = default;
     /// Interpolates samples[j] = f((1 + cos(pi (j + 1/2) / n)) / 2); drops a negligible tail.
     explicit ChebyshevSeries(const std::vector<double>& samples);
+    static ChebyshevSeries of_coefficients(std::vector<double> coefficients) {
+        ChebyshevSeries series;
+        series.coefficients_ = std::move(coefficients);
+        return series;
+    }
+    /// Of T_k(2u - 1), rising k; never empty but for a default one.
+    const std::vector<double>& coefficients() const { return coefficients_; }
     /// value and derivative at u in [0, 1].
     void evaluate(double u, double& value, double& derivative) const;
+    std::complex<double> value(std::complex<double> u) const;
 
   private:
     std::vector<double> coefficients_;

@@ -60,6 +60,10 @@ std::vector<double> weighted_fit(const LinearRows& fitted, const std::vector<dou
 
 }  // namespace
 
+std::vector<double> least_squares_fit(const LinearRows& fitted) {
+    return weighted_fit(fitted, std::vector<double>(fitted.basis.size(), 1.0), {});
+}
+
 std::vector<double> minimax_fit(const LinearRows& fitted, const LinearRows& exact) {
     const std::size_t rows = fitted.basis.size();
     DARB_CHECK(rows > 0 && fitted.basis[0].size() > exact.basis.size(), "rows = {}", rows);

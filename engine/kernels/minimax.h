@@ -15,6 +15,9 @@ struct LinearRows {
     }
 };
 
+/// The c [unknowns] of least sum of squares; for a well-conditioned basis.
+std::vector<double> least_squares_fit(const LinearRows& fitted);
+
 /// The c [unknowns] of least max_i |error of fitted row i|, the exact rows holding exactly.
 /// Lawson's iteratively reweighted least squares. Needs fitted rows, and more unknowns than exact
 /// rows. Sized for polynomials: some 10 unknowns, some 100 rows.

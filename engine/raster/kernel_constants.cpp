@@ -7,6 +7,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/kernels/kernel_profile.h"
 
 namespace darb {
 namespace {
@@ -36,7 +37,7 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     if (k.form == KERNEL_FORM_GAUSSIAN) margin += 1.5 * k.value_error;
     DARB_CHECK(k.half_power <= 9, "half_power = {}", k.half_power);  // shaders/kernels/compact.glsl
     SpecConstants constants{
-        {"KERNEL", *kernel_with_pulses(kernel, 1)},
+        {"KERNEL", shader_kernel(kernel)},
         {"KERNEL_PULSES", kernel_pulses(kernel)},
         {"FOOTPRINT", static_cast<int>(footprint)},
         {"EVALUATION", evaluation},

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <numbers>
+#include <tuple>
 
 #include "engine/core/check.h"
 
@@ -139,17 +141,19 @@ double KernelTable::reach(double opacity, double cutoff) const {
 }
 
 const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_degree) {
-    DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
+    DARB_CHECK(kernel >= 0, "kernel = {}", kernel);
     DARB_CHECK(polynomial_degree >= 0 && polynomial_degree <= kFullDegree, "degree = {}",
                polynomial_degree);
     struct Slot {
         std::once_flag once;
         std::unique_ptr<const KernelTable> table;
     };
-    // A cache of constants, so no state: each entry is built once and never changes.
-    static std::array<Slot, KERNEL_ROWS * 2 * (kFullDegree + 1)> slots;
-    const int row = kernel * 2 + (footprint == Footprint::exact ? 1 : 0);
-    Slot& slot = slots[row * (kFullDegree + 1) + polynomial_degree];
+    // A cache of constants, so no state: each entry is built once and never moves or changes.
+    static std::mutex growing;
+    static std::map<std::tuple<int, Footprint, int>, Slot> slots;
+    std::unique_lock lock(growing);
+    Slot& slot = slots[{kernel, footprint, polynomial_degree}];
+    lock.unlock();
     std::call_once(slot.once, [&] {
         slot.table = std::make_unique<const KernelTable>(kernel, footprint, polynomial_degree);
     });
