@@ -1,0 +1,23 @@
+#include "engine/kernels/second_moment.h"
+
+#include "engine/kernels/kernel_profile.h"
+#include "engine/kernels/quadrature.h"
+
+namespace darb {
+
+// With q = r^2 the area element is pi dq, and the moment per axis is half of that of q. As in
+// equal_area_scale, q = end (1 - s^2) makes half powers at the edge analytic.
+double rendered_second_moment(int kernel, Footprint footprint) {
+    const DerivedKernel& k = derived_kernel(kernel);
+    if (k.row().form == KERNEL_FORM_GAUSSIAN) return 1;
+    const double end = k.pulses().front().end;
+    const auto integral = [&](int power) {
+        return integrate_unit([&](double s) {
+            const double q = end * (1 - s * s);
+            return 2 * end * s * (power == 1 ? q : 1) * k.value(footprint, q);
+        });
+    };
+    return k.covariance_scale(footprint) * integral(1) / integral(0) / 2;
+}
+
+}  // namespace darb

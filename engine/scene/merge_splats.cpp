@@ -1,0 +1,295 @@
+// Rounds until few enough are left: the nearest neighbours of each splat are what it may merge
+// with; pairs are taken from the cheapest on, each splat once, at most a share of all in a round,
+// so that what is merged early is cheap. Each thread works on splats of its own and ties go by
+// index, so that the number of threads changes nothing.
+#include "engine/scene/merge_splats.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <nanoflann.hpp>
+#include <numeric>
+#include <thread>
+#include <utility>
+
+#include "engine/core/error.h"
+#include "engine/core/on_threads.h"
+#include "engine/kernels/second_moment.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/splat_moments.h"
+#include "engine/scene/splat_shapes.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::size_t kNeighbours = 6;
+constexpr std::size_t kRoundDivisor = 4;  // a round merges at most a fourth of the splats
+constexpr double kApart = 1e-3;
+constexpr std::size_t kBlock = 1 << 15, kPart = 256;  // splats between reports, of a thread at once
+constexpr std::uint32_t kNone = 0xffffffff;
+
+/// Means, each moved within a thousandth of its splat's size: many in one place would make every
+/// search visit all of them.
+std::vector<glm::dvec3> apart(const std::vector<SplatMoments>& moments) {
+    std::vector<glm::dvec3> points(moments.size());
+    std::uint32_t state = 1;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Symmetric3& c = moments[i].covariance;
+        const double size = kApart * std::sqrt(c[0] + c[3] + c[5]);
+        for (int k = 0; k < 3; ++k) {
+            state = 1664525u * state + 1013904223u;  // Numerical Recipes
+            points[i][k] = moments[i].mean[k] + size * (state / 0x1p31 - 1);
+        }
+    }
+    return points;
+}
+
+struct PointsView {
+    const std::vector<glm::dvec3>& points;
+    std::size_t kdtree_get_point_count() const { return points.size(); }
+    double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+        return points[i][static_cast<int>(axis)];
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+        return false;
+    }
+};
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointsView>,
+                                                 PointsView, 3>;
+
+struct Candidate {
+    double error;
+    std::uint32_t a, b;  // a < b
+    auto operator<=>(const Candidate&) const = default;
+};
+
+/// The splats of a level that is being made.
+class Merging {
+  public:
+    Merging(const SplatModel& model, std::size_t last, const MergeOptions& options);
+    void merge_to(std::size_t count);
+    /// Of the splats as they are now.
+    SplatModel level() const;
+
+  private:
+    void drop_undrawn(std::size_t count);
+    std::vector<std::uint32_t> find_neighbours();
+    std::vector<Candidate> find_candidates(const std::vector<std::uint32_t>& neighbours);
+    std::size_t merge_cheapest(std::vector<Candidate>& candidates, std::size_t most);
+    void merge(std::uint32_t a, std::uint32_t b);
+    template <class Keep>
+    void keep_only(const Keep& keep);
+    template <class Work>
+    void for_all(double from, double to, const Work& work);
+    void report(double share_of_round) const;
+
+    SplatModel model_;  // harmonics as they are now; the rest of what was not merged
+    std::vector<SplatMoments> moments_;
+    std::vector<std::uint8_t> merged_;
+    double second_moment_;
+    std::size_t threads_, first_, last_, round_ = 0;  // splats; merges of the round under way
+    const MergeOptions& options_;
+};
+
+bool is_drawn(const SplatModel& model, std::size_t i) {
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::size_t floats = model.floats(a);
+        const float* values = attribute_values(model, a).data() + i * floats;
+        if (!std::all_of(values, values + floats, [](float v) { return std::isfinite(v); }))
+            return false;
+    }
+    return has_rotation(model, i);
+}
+
+Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& options)
+    : model_(model),
+      second_moment_(rendered_second_moment(model.kernel, model.footprint)),
+      threads_(options.threads > 0 ? options.threads
+                                   : std::max(1u, std::thread::hardware_concurrency())),
+      first_(model.size()),
+      last_(last),
+      options_(options) {
+    merged_.resize(first_);
+    moments_.resize(first_);
+    for (std::size_t i = 0; i < first_; ++i)
+        if (is_drawn(model_, i)) moments_[i] = moments_of(model_, i);
+}
+
+void Merging::report(double share) const {
+    if (!options_.progress || first_ <= last_) return;
+    const double done =
+        static_cast<double>(first_ - model_.size()) + share * static_cast<double>(round_);
+    options_.progress(std::min(done / static_cast<double>(first_ - last_), 1.0));
+}
+
+/// work(i) of all splats, on all threads; must not throw.
+template <class Work>
+void Merging::for_all(double from, double to, const Work& work) {
+    const std::size_t count = model_.size();
+    for (std::size_t begin = 0; begin < count; begin += kBlock) {
+        report(from + (to - from) * static_cast<double>(begin) / static_cast<double>(count));
+        const std::size_t end = std::min(begin + kBlock, count);
+        std::atomic<std::size_t> next{begin};
+        on_threads(threads_, [&] {
+            for (std::size_t i; (i = next.fetch_add(kPart)) < end;)
+                for (std::size_t k = i; k < std::min(i + kPart, end); ++k) work(k);
+        });
+    }
+}
+
+template <class Keep>
+void Merging::keep_only(const Keep& keep) {
+    std::size_t to = 0;
+    const std::size_t count = model_.size();
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!keep(i)) continue;
+        if (to != i) {
+            for (int a = 0; a < kAttributeCount; ++a) {
+                std::vector<float>& values = attribute_values(model_, a);
+                const auto floats = static_cast<std::ptrdiff_t>(model_.floats(a));
+                const auto begin = values.begin();
+                std::copy_n(begin + static_cast<std::ptrdiff_t>(i) * floats, floats,
+                            begin + static_cast<std::ptrdiff_t>(to) * floats);
+            }
+            moments_[to] = moments_[i];
+            merged_[to] = merged_[i];
+        }
+        ++to;
+    }
+    moments_.resize(to);
+    merged_.resize(to);
+    model_.resize(to);
+}
+
+/// The first of them, where that is enough.
+void Merging::drop_undrawn(std::size_t count) {
+    std::size_t excess = model_.size() - std::min(count, model_.size());
+    if (excess == 0) return;
+    keep_only([&](std::size_t i) {
+        if (excess == 0 || is_drawn(model_, i)) return true;
+        --excess;
+        return false;
+    });
+}
+
+std::vector<std::uint32_t> Merging::find_neighbours() {
+    const std::vector<glm::dvec3> points = apart(moments_);
+    const PointsView view{points};
+    Tree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+    tree.buildIndex();
+    std::vector<std::uint32_t> neighbours(kNeighbours * model_.size(), kNone);
+    for_all(0, 0.5, [&](std::size_t i) {
+        std::uint32_t index[kNeighbours + 1];
+        double distance2[kNeighbours + 1];
+        // The splat itself is among them.
+        const std::size_t found = tree.knnSearch(&points[i][0], kNeighbours + 1, index, distance2);
+        std::size_t to = kNeighbours * i;
+        for (std::size_t k = 0; k < found && to < kNeighbours * (i + 1); ++k)
+            if (index[k] != i) neighbours[to++] = index[k];
+    });
+    return neighbours;
+}
+
+std::vector<Candidate> Merging::find_candidates(const std::vector<std::uint32_t>& neighbours) {
+    std::vector<Candidate> candidates(neighbours.size(), {0, kNone, kNone});
+    for_all(0.5, 0.95, [&](std::size_t i) {
+        for (std::size_t k = kNeighbours * i; k < kNeighbours * (i + 1); ++k) {
+            const std::uint32_t other = neighbours[k];
+            if (other == kNone) break;
+            // A pair that the other has too is the smaller index's.
+            const auto his = neighbours.begin() + static_cast<std::ptrdiff_t>(kNeighbours * other);
+            const auto end = his + static_cast<std::ptrdiff_t>(kNeighbours);
+            if (other < i && std::find(his, end, static_cast<std::uint32_t>(i)) != end) continue;
+            const std::uint32_t a = std::min(static_cast<std::uint32_t>(i), other);
+            const std::uint32_t b = std::max(static_cast<std::uint32_t>(i), other);
+            const SplatMoments both = merge_moments(moments_[a], moments_[b], second_moment_);
+            candidates[k] = {merge_error(moments_[a], moments_[b], both, second_moment_), a, b};
+        }
+    });
+    std::erase_if(candidates, [](const Candidate& c) { return c.a == kNone; });
+    std::sort(candidates.begin(), candidates.end());
+    return candidates;
+}
+
+void Merging::merge(std::uint32_t a, std::uint32_t b) {
+    double share = 0;
+    moments_[a] = merge_moments(moments_[a], moments_[b], second_moment_, &share);
+    merged_[a] = 1;
+    for (const int attribute : {int{kShDc}, int{kShRest}}) {
+        std::vector<float>& values = attribute_values(model_, attribute);
+        const std::size_t floats = model_.floats(attribute);
+        for (std::size_t c = 0; c < floats; ++c) {
+            const double from = values[floats * a + c], to = values[floats * b + c];
+            values[floats * a + c] = static_cast<float>(from + share * (to - from));
+        }
+    }
+}
+
+std::size_t Merging::merge_cheapest(std::vector<Candidate>& candidates, std::size_t most) {
+    std::vector<std::uint8_t> taken(model_.size());  // 1: merged into, 2: gone
+    std::size_t merges = 0;
+    for (const Candidate& c : candidates) {
+        if (merges == most) break;
+        if (taken[c.a] || taken[c.b]) continue;
+        merge(c.a, c.b);
+        taken[c.a] = 1;
+        taken[c.b] = 2;
+        ++merges;
+    }
+    candidates = {};
+    keep_only([&](std::size_t i) { return taken[i] != 2; });
+    return merges;
+}
+
+void Merging::merge_to(std::size_t count) {
+    drop_undrawn(count);
+    while (model_.size() > count) {
+        round_ = std::min(model_.size() - count, model_.size() / kRoundDivisor + 1);
+        std::vector<Candidate> candidates = find_candidates(find_neighbours());
+        merge_cheapest(candidates, round_);
+        round_ = 0;
+    }
+    report(0);
+}
+
+SplatModel Merging::level() const {
+    SplatModel level = model_;
+    for (std::size_t i = 0; i < level.size(); ++i)
+        if (merged_[i]) set_moments(moments_[i], i, level);
+    return level;
+}
+
+}  // namespace
+
+std::vector<SplatModel> merge_levels(const SplatModel& model,
+                                     const std::vector<std::size_t>& counts,
+                                     const MergeOptions& options) {
+    check_splat_shapes(model);
+    std::vector<SplatModel> levels;
+    if (counts.empty()) return levels;
+    for (std::size_t i = 0; i < counts.size(); ++i)
+        if (counts[i] == 0 || (i > 0 && counts[i] > counts[i - 1]))
+            throw Error("merge_levels", fmt::format("count {} of level {}", counts[i], i),
+                        "Give counts that fall and end above 0.");
+    Merging merging(model, counts.back(), options);
+    for (const std::size_t count : counts) {
+        if (count >= model.size()) {
+            levels.push_back(model);
+            continue;
+        }
+        merging.merge_to(count);
+        levels.push_back(merging.level());
+    }
+    return levels;
+}
+
+SplatModel merge_splats(const SplatModel& model, std::size_t count, const MergeOptions& options) {
+    return std::move(merge_levels(model, {count}, options).front());
+}
+
+}  // namespace darb
