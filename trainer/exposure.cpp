@@ -1,9 +1,11 @@
 #include "trainer/exposure.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "shaders/shared/effect_args.h"
 #include "shaders/shared/render_args.h"
@@ -82,7 +84,9 @@ std::vector<float> Exposure::state() const {
 }
 
 void Exposure::restore(const std::vector<float>& state) {
-    DARB_CHECK(state.size() == state_size(photos_), "{} values, {} photos", state.size(), photos_);
+    if (state.size() != state_size(photos_))
+        throw Error("exposure", fmt::format("{} values for {} photos", state.size(), photos_),
+                    "Restore what state() gave for as many photos.");
     const auto middle = state.begin() + std::ptrdiff_t{EXPOSURE_TERMS} * photos_;
     maps_.upload(std::vector<float>(state.begin(), middle));
     moments_.upload(std::vector<float>(middle, state.end()));

@@ -1,9 +1,11 @@
 #include "trainer/iterate_average.h"
 
+#include <fmt/format.h>
+
 #include <string>
 #include <utility>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "shaders/shared/optim_args.h"
 
@@ -21,6 +23,12 @@ IterateAverage::IterateAverage(Device& device)
       average_(device, "average", SpecConstants{{"THREADS", SPLAT_GROUP}}) {}
 
 void IterateAverage::add(const GpuSplats& splats) {
+    for (int a = 0; count_ > 0 && a < kAttributeCount; ++a)
+        if (const std::uint64_t bytes = std::uint64_t{splats.count()} * splats.stride(a) * 4;
+            bytes > 0 && mean_[a].bytes() != bytes)
+            throw Error(mean_name(a),
+                        fmt::format("holds {} bytes, the splats {}", mean_[a].bytes(), bytes),
+                        "Call clear() where the splats became others.");
     if (count_ == 0)
         for (int a = 0; a < kAttributeCount; ++a)
             mean_[a] = Buffer(*device_, mean_name(a),
@@ -32,8 +40,6 @@ void IterateAverage::add(const GpuSplats& splats) {
         const Buffer& value = splats.parameters(a);
         const std::uint64_t stride = splats.stride(a), floats = splats.count() * stride;
         if (floats == 0) continue;
-        DARB_CHECK(mean_[a].bytes() == floats * 4, "{}: {} bytes, {} floats", attribute_name(a),
-                   mean_[a].bytes(), floats);
         if (count_ == 1) {
             commands_.copy(value, mean_[a], floats * 4);
             continue;

@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/plan/effect_plan.h"
@@ -121,7 +120,7 @@ const OptionRow& option_row(std::string_view flag) {
         const std::string flags = "," + std::string(row.flags) + ",";
         if (flags.find("," + std::string(flag) + ",") != std::string::npos) return row;
     }
-    DARB_CHECK(false, "no option {}", flag);
+    throw Error(std::string(flag), "is no option of training", "darb train --help-all lists them.");
 }
 
 std::string option_name(const OptionRow& row) {

@@ -51,7 +51,7 @@ struct OptionRow {
 };
 
 std::span<const OptionRow> option_rows();
-/// The row with this flag. DARB_CHECK that there is one.
+/// The row with this flag. Throws Error where there is none.
 const OptionRow& option_row(std::string_view flag);
 
 /// The longest of a row's flags, without those for false.

@@ -1,18 +1,28 @@
 #include "trainer/photos.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <span>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 
 namespace darb {
 
+namespace {
+
+constexpr const char* kFromLoadPhotos =
+    "Give RGBA of each view's size, in the order of the views, as load_photos does.";
+
+}  // namespace
+
 TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
                                const std::vector<ImageU8>& photos, const glm::dvec3& origin)
     : device_(&device), origin_(origin), nearest_(nearest_points(dataset)) {
-    DARB_CHECK(photos.size() == dataset.views.size(), "{} photos, {} views", photos.size(),
-               dataset.views.size());
+    if (photos.size() != dataset.views.size())
+        throw Error("training photos",
+                    fmt::format("{} for {} views", photos.size(), dataset.views.size()),
+                    kFromLoadPhotos);
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
         view_cameras_.push_back(view.camera);
@@ -24,7 +34,12 @@ TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
         if (view.is_test) continue;
         views_.push_back(static_cast<int>(i));
         const std::uint64_t count = std::uint64_t(view.camera.width) * view.camera.height;
-        DARB_CHECK(photos[i].channels == 4 && photos[i].data.size() == count * 4, "{}", view.name);
+        if (photos[i].channels != 4 || photos[i].data.size() != count * 4)
+            throw Error(
+                view.name,
+                fmt::format("is {}x{}x{} for a camera of {}x{}", photos[i].width, photos[i].height,
+                            photos[i].channels, view.camera.width, view.camera.height),
+                kFromLoadPhotos);
         whole_.photos.back() = Buffer(device, "photo " + view.name, count * 4);
         whole_.photos.back().upload(std::as_bytes(std::span(photos[i].data)));
         pixels_ = std::max(pixels_, count);

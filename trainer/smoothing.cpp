@@ -1,9 +1,11 @@
 #include "trainer/smoothing.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "shaders/shared/effect_args.h"
 
@@ -51,7 +53,10 @@ void TrainedSmoothing::update(GpuSplats& splats) {
 }
 
 SplatModel bake_smoothing(const SplatModel& model, const std::vector<float>& filter) {
-    DARB_CHECK(filter.size() >= model.size(), "{} filters, {} splats", filter.size(), model.size());
+    if (filter.size() < model.size())
+        throw Error("smoothing",
+                    fmt::format("{} filters for {} splats", filter.size(), model.size()),
+                    "Give one a splat.");
     SplatModel baked = model;
     for (std::size_t i = 0; i < model.size(); ++i) {
         double kept = 1;

@@ -296,7 +296,9 @@ Trainer::State Trainer::state() {
 }
 
 void Trainer::restore(const State& s) {
+    check_state(s);
     drain();
+    if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
     splats_ = GpuSplats();  // first, so that there are never two
     splats_ = GpuSplats(*device_, s.model, true, schedule_.rest_every > 1);
     probe_.set_next(s.next_probe);
@@ -304,7 +306,6 @@ void Trainer::restore(const State& s) {
         smoothing_->update(splats_);
         if (!s.smoothing.empty()) splats_.smoothing().upload(s.smoothing);
     }
-    if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
     for (int a = 0; a < kAttributeCount; ++a)
         if (!s.moments[a].empty()) splats_.moments(a).upload(s.moments[a]);
     if (!s.rest_sum.empty()) splats_.rest_sum().upload(s.rest_sum);

@@ -1,10 +1,37 @@
 #include "trainer/trainer_state.h"
 
-#include <algorithm>
+#include <fmt/format.h>
 
-#include "engine/raster/gpu_splats.h"
+#include <algorithm>
+#include <string>
+
+#include "engine/core/error.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb {
+
+void check_state(const TrainerState& state) {
+    const SplatModel& model = state.model;
+    check_splat_shapes(model);
+    const auto check = [](const std::string& what, std::size_t held, std::size_t wanted,
+                          bool may_lack) {
+        if (held != wanted && !(may_lack && held == 0))
+            throw Error("training state",
+                        fmt::format("{}: {} values instead of {}", what, held, wanted),
+                        "Restore what state() gave.");
+    };
+    check("lists of moments", state.moments.size(), kAttributeCount, false);
+    check("lists of the mean", state.mean.size(), kAttributeCount, true);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::size_t values = attribute_values(model, a).size();
+        const std::string name = attribute_name(a);
+        check("moments of " + name, state.moments[a].size(), 2 * values, true);
+        if (!state.mean.empty()) check("mean of " + name, state.mean[a].size(), values, false);
+    }
+    check("smoothing", state.smoothing.size(), model.size(), true);
+    check("sum of sh_rest", state.rest_sum.size(), model.sh_rest.size(), true);
+    check("sum of gradients", state.gradient_sum.size(), 2 * model.size(), true);
+}
 
 void set_degree(TrainerState& state, int degree) {
     SplatModel& model = state.model;

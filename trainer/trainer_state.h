@@ -38,6 +38,9 @@ struct TrainerState {
     TrainCounters counters;
 };
 
+/// Throws Error where the lengths of the arrays do not fit together.
+void check_state(const TrainerState& state);
+
 /// Another degree of colour: parameters and moments of new bands are 0, the mean begins anew.
 void set_degree(TrainerState& state, int degree);
 

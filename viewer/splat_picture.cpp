@@ -87,10 +87,10 @@ void SplatPicture::clear() {
 void SplatPicture::set_removed(const std::vector<std::uint8_t>& removed) {
     if (!own_) return;
     removed_ = removed;
-    std::vector<float> opacity = model_->opacity_logit;
+    std::vector<float> opacity_logit = model_->opacity_logit;
     for (size_t i = 0; i < removed_.size(); ++i)
-        if (removed_[i] != 0) opacity[i] = kRemovedLogit;
-    if (!opacity.empty()) own_->parameters(kOpacityLogit).upload(opacity);
+        if (removed_[i] != 0) opacity_logit[i] = kRemovedLogit;
+    if (!opacity_logit.empty()) own_->parameters(kOpacityLogit).upload(opacity_logit);
     styled_.reset();
     some_.reset();
 }

@@ -1,11 +1,13 @@
 // Image<T>: row-major, interleaved channels, top row first. data[(y * width + x) * channels + c].
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 
@@ -26,9 +28,16 @@ struct Image {
     T& at(int x, int y, int c) { return data[index(x, y, c)]; }
     const T& at(int x, int y, int c) const { return data[index(x, y, c)]; }
     size_t index(int x, int y, int c) const {
-        DARB_CHECK(x >= 0 && x < width && y >= 0 && y < height && c >= 0 && c < channels,
-                   "({}, {}, {}) in {}x{}x{}", x, y, c, width, height, channels);
+        if (x < 0 || x >= width || y < 0 || y >= height || c < 0 || c >= channels) [[unlikely]]
+            throw_outside(x, y, c);
         return (static_cast<size_t>(y) * width + x) * channels + c;
+    }
+
+  private:
+    [[noreturn, gnu::cold, gnu::noinline]] void throw_outside(int x, int y, int c) const {
+        throw Error("image",
+                    fmt::format("({}, {}, {}) in {}x{}x{}", x, y, c, width, height, channels),
+                    "Columns, rows and channels count from 0.");
     }
 };
 

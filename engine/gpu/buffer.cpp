@@ -6,7 +6,6 @@
 #include <cstring>
 #include <utility>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
@@ -20,6 +19,12 @@ constexpr std::uint64_t kStagingBytes = 32 << 20;  // long copies go in pieces o
 
 std::string describe(const std::string& name, std::uint64_t bytes) {
     return fmt::format("buffer \"{}\" ({:.1f} MiB)", name, static_cast<double>(bytes) / (1 << 20));
+}
+
+[[noreturn]] void throw_outside(const std::string& name, std::uint64_t offset, std::uint64_t bytes,
+                                std::uint64_t whole) {
+    throw Error(name, fmt::format("bytes {} + {} of {} are asked for", offset, bytes, whole),
+                "Stay within the buffer.");
 }
 
 VkBuffer create_handle(const Device::State& state, std::uint64_t bytes, const std::string& what) {
@@ -124,8 +129,8 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
 }
 
 void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
-    DARB_CHECK(offset + source.size() <= bytes_, "{}: {} + {} of {}", name_, offset, source.size(),
-               bytes_);
+    if (source.size() > bytes_ || offset > bytes_ - source.size())
+        throw_outside(name_, offset, source.size(), bytes_);
     if (source.empty()) return;
     Device::State& state = device_->state();
     check_vulkan(state.wait_idle(), "upload to " + describe(name_, source.size()));
@@ -142,8 +147,8 @@ void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
 }
 
 void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
-    DARB_CHECK(offset + target.size() <= bytes_, "{}: {} + {} of {}", name_, offset, target.size(),
-               bytes_);
+    if (target.size() > bytes_ || offset > bytes_ - target.size())
+        throw_outside(name_, offset, target.size(), bytes_);
     if (target.empty()) return;
     Device::State& state = device_->state();
     check_vulkan(state.wait_idle(), "download of " + describe(name_, target.size()));

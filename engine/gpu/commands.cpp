@@ -43,6 +43,22 @@ std::uint64_t bytes_of(const DeviceImage& image) {
     return std::uint64_t(image.width()) * std::uint64_t(image.height()) * 4;
 }
 
+bool is_within(std::uint64_t offset, std::uint64_t bytes, std::uint64_t whole) {
+    return bytes <= whole && offset <= whole - bytes;
+}
+
+void check_recording(bool recording) {
+    if (!recording) throw Error("commands", "nothing is being recorded", "Call begin() first.");
+}
+
+void check_holds(const Buffer& buffer, const DeviceImage& image) {
+    if (buffer.bytes() >= bytes_of(image)) return;
+    throw Error(buffer.name(),
+                fmt::format("{} bytes for an image of {} x {}", buffer.bytes(), image.width(),
+                            image.height()),
+                "The buffer holds four bytes a pixel.");
+}
+
 }  // namespace
 
 struct Commands::State {
@@ -134,7 +150,7 @@ void Commands::State::bind(const Pipeline& pipeline, std::span<const std::byte> 
                            std::span<const BufferRange> buffers) {
     const std::size_t count = pipeline.bindings().size();
     const std::uint32_t push_bytes = pipeline.push_constant_bytes();
-    DARB_CHECK(recording, "{}: begin() first", pipeline.name());
+    check_recording(recording);
     DARB_CHECK(buffers.size() == count, "{} binds {} buffers, declares {}", pipeline.name(),
                buffers.size(), count);
     DARB_CHECK(args.size() == push_bytes || (push_bytes == 0 && args.size() == 1),
@@ -214,7 +230,8 @@ Commands& Commands::operator=(Commands&&) noexcept = default;
 
 void Commands::begin() {
     State& s = *state_;
-    DARB_CHECK(!s.in_flight, "wait() before begin()");
+    if (s.in_flight)
+        throw Error("commands", "begin() while they are under way", "Call wait() first.");
     check_vulkan(vkResetCommandPool(s.device.handle(), s.pool, 0), "command pool");
     for (VkDescriptorPool pool : s.descriptor_pools)
         vkResetDescriptorPool(s.device.handle(), pool, 0);
@@ -232,7 +249,7 @@ void Commands::begin() {
 
 void Commands::pass(std::string_view name) {
     State& s = *state_;
-    DARB_CHECK(s.recording, "pass {}: begin() first", name);
+    check_recording(s.recording);
     if (s.timed && s.passes.empty()) s.timestamps.write(s.commands);
     s.finish_pass();
     s.passes.emplace_back(name);
@@ -274,9 +291,11 @@ void Commands::fill(const BufferRange& range, std::uint32_t word) {
     State& s = *state_;
     const std::uint64_t bytes = range.buffer->bytes();
     const std::uint64_t size = range.size != 0 ? range.size : (bytes - range.offset) / 4 * 4;
-    DARB_CHECK(
-        s.recording && range.offset % 4 == 0 && size % 4 == 0 && range.offset + size <= bytes,
-        "\"{}\": {} + {} of {}", range.buffer->name(), range.offset, size, bytes);
+    check_recording(s.recording);
+    if (range.offset % 4 != 0 || size % 4 != 0 || !is_within(range.offset, size, bytes))
+        throw Error(range.buffer->name(),
+                    fmt::format("bytes {} + {} of {} are to be filled", range.offset, size, bytes),
+                    "Fill whole words of the buffer.");
     if (size == 0) return;
     s.barriers.use({range.buffer->handle(), kTransfer, 0, VK_ACCESS_2_TRANSFER_WRITE_BIT});
     s.place_barriers();
@@ -285,9 +304,14 @@ void Commands::fill(const BufferRange& range, std::uint32_t word) {
 
 void Commands::copy(const BufferRange& from, const BufferRange& to, std::uint64_t bytes) {
     State& s = *state_;
-    DARB_CHECK(s.recording && from.offset + bytes <= from.buffer->bytes() &&
-                   to.offset + bytes <= to.buffer->bytes(),
-               "\"{}\" to \"{}\", {} bytes", from.buffer->name(), to.buffer->name(), bytes);
+    check_recording(s.recording);
+    if (!is_within(from.offset, bytes, from.buffer->bytes()) ||
+        !is_within(to.offset, bytes, to.buffer->bytes()))
+        throw Error(to.buffer->name(),
+                    fmt::format("{} bytes of \"{}\" are to be copied, from {} of {} to {} of {}",
+                                bytes, from.buffer->name(), from.offset, from.buffer->bytes(),
+                                to.offset, to.buffer->bytes()),
+                    "Copy what both buffers hold.");
     if (bytes == 0) return;
     s.barriers.use({from.buffer->handle(), kTransfer, VK_ACCESS_2_TRANSFER_READ_BIT, 0});
     s.barriers.use({to.buffer->handle(), kTransfer, 0, VK_ACCESS_2_TRANSFER_WRITE_BIT});
@@ -298,7 +322,7 @@ void Commands::copy(const BufferRange& from, const BufferRange& to, std::uint64_
 
 // All memory is ordered with it: buffers that it is copied from or to need no barrier of their own.
 void Commands::change_layout(DeviceImage& image, VkImageLayout layout) {
-    DARB_CHECK(state_->recording, "begin() first");
+    check_recording(state_->recording);
     const VkMemoryBarrier2 memory = full_barrier();
     VkImageMemoryBarrier2 barrier{};
     barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2;
@@ -333,8 +357,7 @@ void Commands::clear(DeviceImage& image, const std::array<float, 4>& colour) {
 
 void Commands::copy(const Buffer& from, DeviceImage& to) {
     State& s = *state_;
-    DARB_CHECK(from.bytes() >= bytes_of(to), "\"{}\", {} bytes to {} x {}", from.name(),
-               from.bytes(), to.width(), to.height());
+    check_holds(from, to);
     s.barriers.use({from.handle(), kTransfer, VK_ACCESS_2_TRANSFER_READ_BIT, 0});
     s.place_barriers();
     overwrite(to);
@@ -344,8 +367,7 @@ void Commands::copy(const Buffer& from, DeviceImage& to) {
 
 void Commands::copy(DeviceImage& from, const Buffer& to) {
     State& s = *state_;
-    DARB_CHECK(to.bytes() >= bytes_of(from), "{} x {} to \"{}\", {} bytes", from.width(),
-               from.height(), to.name(), to.bytes());
+    check_holds(to, from);
     s.barriers.use({to.handle(), kTransfer, 0, VK_ACCESS_2_TRANSFER_WRITE_BIT});
     s.place_barriers();
     change_layout(from, kSource);
@@ -372,13 +394,13 @@ void Commands::copy(DeviceImage& from, DeviceImage& to, VkFilter filter) {
 }
 
 VkCommandBuffer Commands::handle() const {
-    DARB_CHECK(state_->recording, "begin() first");
+    check_recording(state_->recording);
     return state_->commands;
 }
 
 void Commands::submit(VkSemaphore wait_for, VkSemaphore signal) {
     State& s = *state_;
-    DARB_CHECK(s.recording, "begin() first");
+    check_recording(s.recording);
     s.finish_pass();
     const std::vector<VkBufferMemoryBarrier2> to_host = s.barriers.to_host();
     if (!to_host.empty()) {
@@ -405,7 +427,9 @@ void Commands::wait() {
 
 std::vector<PassTime> Commands::pass_times() const {
     const State& s = *state_;
-    DARB_CHECK(!s.in_flight && !s.recording, "wait() first");
+    if (s.in_flight || s.recording)
+        throw Error("commands", "times are asked for before the work is done",
+                    "Call wait() first.");
     std::vector<PassTime> times;
     if (!s.timed) return times;
     const std::vector<std::uint64_t> ticks = s.timestamps.read();

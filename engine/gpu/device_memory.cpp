@@ -1,8 +1,10 @@
 #include "engine/gpu/device_memory.h"
 
+#include <fmt/format.h>
+
 #include <initializer_list>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 
@@ -34,7 +36,10 @@ int choose_memory_type(const Device::State& state, std::uint32_t allowed, Memory
 DeviceMemory allocate_memory(const Device::State& state, const VkMemoryRequirements& needs,
                              Memory kind, const std::string& what) {
     const int type = choose_memory_type(state, needs.memoryTypeBits, kind);
-    DARB_CHECK(type >= 0, "{}: no memory type in {:#x}", what, needs.memoryTypeBits);
+    if (type < 0)
+        throw Error(what,
+                    fmt::format("the driver has no memory for it, of {:#x}", needs.memoryTypeBits),
+                    "Choose another device with --device, or install another driver.");
     VkMemoryAllocateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
     info.allocationSize = needs.size;

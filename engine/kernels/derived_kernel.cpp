@@ -8,6 +8,9 @@
 #include <numbers>
 
 #include "engine/core/check.h"
+
+#include <fmt/format.h>
+#include "engine/core/error.h"
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/quadrature.h"
 
@@ -137,7 +140,9 @@ double DerivedKernel::radial_moment(double radius, int power) const {
 }
 
 void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) const {
-    DARB_CHECK(row_.form != KERNEL_FORM_RINGS, "{} has no exact footprint", row_.name);
+    if (row_.form == KERNEL_FORM_RINGS)
+        throw Error("kernel", fmt::format("{} has no exact footprint", row_.name),
+                    "Kernels of several pulses take the footprint psi.");
     u = (row_.support - q) / row_.support;
     footprint_.evaluate(u, p, dp);
 }
@@ -193,7 +198,8 @@ double DerivedKernel::equal_area_scale(Footprint footprint) const {
 }
 
 double DerivedKernel::radius_quantile(double u) const {
-    DARB_CHECK(u >= 0 && u < 1, "u = {}", u);
+    if (!(u >= 0 && u < 1))
+        throw Error("kernel", fmt::format("{} is no quantile", u), "It is 0 or more, below 1.");
     const double target = u * radial_mass_;
     double low = 0, high = radius_, r = radius_ * std::cbrt(u) / 2;
     // Newton, kept inside the bracket; the density r^2 w is positive inside the ball.

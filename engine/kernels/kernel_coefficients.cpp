@@ -1,5 +1,7 @@
 #include "engine/kernels/kernel_coefficients.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 #include <map>
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/kernels/minimax.h"
 
 namespace darb {
@@ -195,7 +198,9 @@ KernelCoefficients fit_plain(const DerivedKernel& kernel, Footprint footprint) {
 }
 
 KernelCoefficients fit_coefficients(const DerivedKernel& kernel, Footprint footprint, int degree) {
-    DARB_CHECK(degree >= kLeastDegree && degree <= kFullDegree, "degree = {}", degree);
+    if (degree < kLeastDegree || degree > kFullDegree)
+        throw Error("kernel", fmt::format("a polynomial of degree {}", degree),
+                    fmt::format("Degrees are {} to {}.", kLeastDegree, kFullDegree));
     if (kernel.row().given && kernel.row().form == KERNEL_FORM_COMPACT)
         return fit_given(kernel, footprint, degree);
     const bool full = degree == kFullDegree;

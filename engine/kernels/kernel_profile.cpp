@@ -1,11 +1,13 @@
 #include "engine/kernels/kernel_profile.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 namespace {
@@ -85,7 +87,10 @@ const std::array<KernelProfile, KERNEL_ROWS> kRows{{
 }  // namespace
 
 const KernelProfile& listed_profile(int kernel) {
-    DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
+    if (kernel < 0 || kernel >= KERNEL_ROWS)
+        throw Error(
+            "kernel", fmt::format("{} is the number of none", kernel),
+            fmt::format("Kernels are 0 to {}: shaders/shared/kernel_list.h.", KERNEL_ROWS - 1));
     return kRows[static_cast<std::size_t>(kernel)];
 }
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <mutex>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/kernels/kernel_coefficients.h"
 
 namespace darb {
@@ -62,7 +62,7 @@ const DerivedKernel& derived_kernel(int kernel) {
         return all;
     }();
     if (const Registered* entry = registered(kernel)) return entry->derived;
-    DARB_CHECK(kernel >= 0 && kernel < KERNEL_ROWS, "kernel = {}", kernel);
+    static_cast<void>(listed_profile(kernel));  // throws for what is none
     return kernels[static_cast<std::size_t>(kernel)];
 }
 

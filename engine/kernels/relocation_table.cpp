@@ -1,15 +1,18 @@
 #include "engine/kernels/relocation_table.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/kernels/quadrature.h"
 
 namespace darb {
 
 double relocation_opacity(double opacity, int count) {
-    DARB_CHECK(opacity >= 0 && opacity <= 1 && count >= 1, "opacity = {}, count = {}", opacity,
-               count);
+    if (!(opacity >= 0 && opacity <= 1) || count < 1)
+        throw Error("relocation", fmt::format("{} splats of opacity {}", count, opacity),
+                    "It wants at least one, of an opacity between 0 and 1.");
     return -std::expm1(std::log1p(-opacity) / count);
 }
 
@@ -31,7 +34,9 @@ double relocation_scale(int kernel, Footprint footprint, double opacity, int cou
 }
 
 std::vector<float> relocation_table(int kernel, Footprint footprint, int opacities, int max_count) {
-    DARB_CHECK(opacities > 0 && max_count > 0, "{} x {}", opacities, max_count);
+    if (opacities < 1 || max_count < 1)
+        throw Error("relocation", fmt::format("a table of {} x {}", max_count, opacities),
+                    "It wants at least one row and one column.");
     std::vector<float> table;
     for (int count = 1; count <= max_count; ++count)
         for (int k = 0; k < opacities; ++k)

@@ -1,9 +1,11 @@
 #include "engine/reference/adam.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb::reference {
 
@@ -11,10 +13,12 @@ template <class T>
 void adam_step(std::span<T> parameter, std::span<const T> gradient, std::span<T> moment1,
                std::span<T> moment2, double learning_rate, int step, const AdamSettings& settings) {
     const size_t n = parameter.size();
-    DARB_CHECK(step >= 1, "step = {}", step);
-    DARB_CHECK(gradient.size() == n && moment1.size() == n && moment2.size() == n,
-               "{} parameters, {} gradients, moments {} and {}", n, gradient.size(), moment1.size(),
-               moment2.size());
+    if (step < 1) throw Error("Adam", fmt::format("step {}", step), "Steps count from 1.");
+    if (gradient.size() != n || moment1.size() != n || moment2.size() != n)
+        throw Error("Adam",
+                    fmt::format("{} parameters, {} gradients, moments {} and {}", n,
+                                gradient.size(), moment1.size(), moment2.size()),
+                    "All are of one length.");
     const double bias1 = 1 - std::pow(settings.beta1, step);
     const double bias2 = 1 - std::pow(settings.beta2, step);
     for (size_t i = 0; i < n; ++i) {

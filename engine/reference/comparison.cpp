@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb::reference {
 namespace {
@@ -42,7 +42,9 @@ double error_ratio(double expected, double got, const Tolerance& tolerance) {
 
 ComparisonStats comparison_stats(std::span<const double> expected, std::span<const double> got,
                                  const Tolerance& tolerance) {
-    DARB_CHECK(expected.size() == got.size(), "{} and {}", expected.size(), got.size());
+    if (expected.size() != got.size())
+        throw Error("comparison", fmt::format("{} values and {}", expected.size(), got.size()),
+                    "Give as many of both.");
     ComparisonStats stats;
     stats.count = expected.size();
     double signed_sum = 0, size_sum = 0;

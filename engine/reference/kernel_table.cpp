@@ -1,5 +1,7 @@
 #include "engine/reference/kernel_table.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,7 +11,7 @@
 #include <numbers>
 #include <tuple>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb::reference {
 namespace {
@@ -141,9 +143,10 @@ double KernelTable::reach(double opacity, double cutoff) const {
 }
 
 const KernelTable& kernel_table(int kernel, Footprint footprint, int polynomial_degree) {
-    DARB_CHECK(kernel >= 0, "kernel = {}", kernel);
-    DARB_CHECK(polynomial_degree >= 0 && polynomial_degree <= kFullDegree, "degree = {}",
-               polynomial_degree);
+    static_cast<void>(kernel_profile(kernel));  // throws for what is none
+    if (polynomial_degree < 0 || polynomial_degree > kFullDegree)
+        throw Error("kernel", fmt::format("a polynomial of degree {}", polynomial_degree),
+                    fmt::format("Degrees are 0, for none, to {}.", kFullDegree));
     struct Slot {
         std::once_flag once;
         std::unique_ptr<const KernelTable> table;

@@ -1,9 +1,11 @@
 #include "engine/reference/projection.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/reference/projection_terms.h"
 #include "engine/reference/reference_lens.h"
 #include "engine/reference/sh.h"
@@ -242,7 +244,9 @@ void set_shape(const Camera& camera, const RenderSettings& settings,
 template <class T>
 ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& camera,
                           const RenderSettings& settings, const KernelTable& kernel) {
-    DARB_CHECK(index < splats.size(), "index = {}, N = {}", index, splats.size());
+    if (index >= splats.size())
+        throw Error("reference", fmt::format("splat {} of {}", index, splats.size()),
+                    "Splats count from 0.");
     ProjectedSplat<T> p;
     const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
     if (!(mean.z > T(settings.near_z)) || !std::isfinite(mean.x + mean.y + mean.z)) {

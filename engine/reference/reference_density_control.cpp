@@ -1,9 +1,11 @@
 #include "engine/reference/reference_density_control.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/reference/projection_terms.h"
 #include "engine/scene/splat_model.h"
 
@@ -45,12 +47,14 @@ void limit_growth(std::span<const double> gradient, std::size_t max_splats,
 std::vector<DensityAction> density_actions(std::span<const double> gradient_sum,
                                            std::span<const std::uint32_t> seen,
                                            std::span<const float> log_scale,
-                                           std::span<const float> opacity,
+                                           std::span<const float> opacity_logit,
                                            const DensitySettings& settings) {
-    const std::size_t n = opacity.size();
-    DARB_CHECK(gradient_sum.size() == n && seen.size() == n && log_scale.size() == n * 3,
-               "N = {}: {} gradients, {} counts, {} scales", n, gradient_sum.size(), seen.size(),
-               log_scale.size());
+    const std::size_t n = opacity_logit.size();
+    if (gradient_sum.size() != n || seen.size() != n || log_scale.size() != n * 3)
+        throw Error("density control",
+                    fmt::format("{} splats, {} gradients, {} counts, {} scales", n,
+                                gradient_sum.size(), seen.size(), log_scale.size()),
+                    "Give one gradient, one count and three scales a splat.");
     std::vector<DensityAction> actions(n, DensityAction::keep);
     std::vector<double> gradient(n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -64,7 +68,7 @@ std::vector<DensityAction> density_actions(std::span<const double> gradient_sum,
         }
         const bool too_wide =
             settings.prune_wide && scale_after > settings.max_scale_share * settings.scene_extent;
-        if (too_wide || sigmoid(static_cast<double>(opacity[i])) < settings.min_opacity) {
+        if (too_wide || sigmoid(static_cast<double>(opacity_logit[i])) < settings.min_opacity) {
             actions[i] = DensityAction::remove;
         }
     }

@@ -32,13 +32,13 @@ constexpr int kSplitChildren = 2;
 constexpr double kResetOpacity = 0.01;
 
 /// One action a splat. gradient_sum [N]: norms of the mean's gradient in NDC units, summed over the
-/// steps that saw the splat; seen [N]: how many did. log_scale [N][3], opacity [N] (logit). Growth
+/// steps that saw the splat; seen [N]: how many did. log_scale [N][3], opacity_logit [N]. Growth
 /// is decided first, then removal on the outcome, as 3DGS orders it: a splat to split is removed
 /// for its width only where its children would be.
 std::vector<DensityAction> density_actions(std::span<const double> gradient_sum,
                                            std::span<const std::uint32_t> seen,
                                            std::span<const float> log_scale,
-                                           std::span<const float> opacity,
+                                           std::span<const float> opacity_logit,
                                            const DensitySettings& settings);
 
 /// Splats after the actions.

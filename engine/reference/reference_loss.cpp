@@ -1,7 +1,11 @@
 #include "engine/reference/reference_loss.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
+
+#include "engine/core/error.h"
 
 namespace darb::reference {
 namespace {
@@ -124,11 +128,15 @@ void add_ssim(const Image<T>& image, const Image<T>& truth, const LossSettings& 
 template <class T>
 LossResult<T> loss(const Image<T>& image, const Image<T>& truth, const LossSettings& settings,
                    const Image<T>& weight) {
-    DARB_CHECK(image.channels == 3 && truth.channels == 3 && image.width == truth.width &&
-                   image.height == truth.height && !image.data.empty(),
-               "{}x{}x{} and {}x{}x{}", image.width, image.height, image.channels, truth.width,
-               truth.height, truth.channels);
-    DARB_CHECK(weight.data.empty() || weight.data.size() * 3 == image.data.size());
+    if (image.channels != 3 || truth.channels != 3 || image.width != truth.width ||
+        image.height != truth.height || image.data.empty())
+        throw Error("loss",
+                    fmt::format("{}x{}x{} and {}x{}x{}", image.width, image.height, image.channels,
+                                truth.width, truth.height, truth.channels),
+                    "Compare RGB pictures of one size.");
+    if (!weight.data.empty() && weight.data.size() * 3 != image.data.size())
+        throw Error("loss", fmt::format("{} weights", weight.data.size()),
+                    "Give one a pixel, or none.");
     LossResult<T> result;
     result.d_image = Image<T>(image.width, image.height, 3);
     const double count = static_cast<double>(image.data.size());

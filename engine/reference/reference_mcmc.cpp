@@ -1,10 +1,12 @@
 #include "engine/reference/reference_mcmc.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/kernels/relocation_table.h"
 #include "engine/reference/projection_terms.h"
 #include "engine/scene/splat_model.h"
@@ -33,10 +35,10 @@ double random_uniform(std::uint32_t& state) {
     return (state >> 8) / 16777216.0;
 }
 
-std::vector<std::uint32_t> relocation_weights(std::span<const float> opacity, double dead_opacity,
-                                              double scale) {
+std::vector<std::uint32_t> relocation_weights(std::span<const float> opacity_logit,
+                                              double dead_opacity, double scale) {
     std::vector<std::uint32_t> weights;
-    for (const float logit : opacity) {
+    for (const float logit : opacity_logit) {
         const double o = sigmoid(static_cast<double>(logit));
         const bool lives = o > dead_opacity;
         weights.push_back(lives ? std::max(static_cast<std::uint32_t>(o * scale), 1u) : 0u);
@@ -49,8 +51,9 @@ RelocationPlan relocation_plan(std::span<const std::uint32_t> weights, std::uint
     std::vector<std::uint64_t> ends(weights.size());  // inclusive sums
     std::inclusive_scan(weights.begin(), weights.end(), ends.begin(), std::plus<>(),
                         std::uint64_t{0});
-    DARB_CHECK(!ends.empty() && ends.back() > 0 && ends.back() < 1ull << 32, "{} weights",
-               weights.size());
+    if (ends.empty() || ends.back() == 0 || ends.back() >= 1ull << 32)
+        throw Error("relocation", fmt::format("{} weights", weights.size()),
+                    "Their sum is positive and fits 32 bits.");
     const auto dead = static_cast<std::uint32_t>(std::count(weights.begin(), weights.end(), 0u));
     RelocationPlan plan;
     plan.copies.assign(weights.size(), 0);
@@ -70,15 +73,15 @@ RelocationPlan relocation_plan(std::span<const std::uint32_t> weights, std::uint
     return plan;
 }
 
-Relocated relocated(int kernel, Footprint footprint, float opacity, std::uint32_t count) {
-    const double before = std::min(sigmoid(static_cast<double>(opacity)), double{ALPHA_MAX});
+Relocated relocated(int kernel, Footprint footprint, float opacity_logit, std::uint32_t count) {
+    const double before = std::min(sigmoid(static_cast<double>(opacity_logit)), double{ALPHA_MAX});
     const int n = static_cast<int>(std::min<std::uint32_t>(count, RELOCATION_COUNTS));
     const double after = relocation_opacity(before, n);
     return {std::log(after) - std::log1p(-after),
             std::log(relocation_scale(kernel, footprint, before, n))};
 }
 
-glm::dvec3 position_noise(const float* rotation, const float* log_scale, float opacity,
+glm::dvec3 position_noise(const float* rotation, const float* log_scale, float opacity_logit,
                           double dead_opacity, double rate, std::uint32_t seed,
                           std::uint32_t index) {
     std::uint32_t state = random_seed(seed, index);
@@ -90,7 +93,7 @@ glm::dvec3 position_noise(const float* rotation, const float* log_scale, float o
         normal[2 * pair + 1] = radius * std::sin(angle);
     }
     const double gate =
-        sigmoid(-kGateSlope * (sigmoid(static_cast<double>(opacity)) - dead_opacity));
+        sigmoid(-kGateSlope * (sigmoid(static_cast<double>(opacity_logit)) - dead_opacity));
     const double q[4] = {rotation[0], rotation[1], rotation[2], rotation[3]};
     const glm::dmat3 axes = rotation_terms(q).matrix;
     glm::dvec3 local = glm::transpose(axes) * glm::dvec3(normal[0], normal[1], normal[2]);

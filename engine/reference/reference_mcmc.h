@@ -18,9 +18,9 @@ std::uint32_t random_seed(std::uint32_t seed, std::uint32_t index);
 double random_uniform(std::uint32_t& state);  // in [0, 1), 24 bits
 
 /// Integer weights [N]: opacity times scale rounded down, at least 1; 0 for the dead, whose opacity
-/// is not above dead_opacity. opacity: [N] logits.
-std::vector<std::uint32_t> relocation_weights(std::span<const float> opacity, double dead_opacity,
-                                              double scale);
+/// is not above dead_opacity. opacity_logit: [N].
+std::vector<std::uint32_t> relocation_weights(std::span<const float> opacity_logit,
+                                              double dead_opacity, double scale);
 
 struct RelocationPlan {
     std::vector<std::uint32_t> drawn;   // [draws] the splat of each
@@ -40,13 +40,13 @@ RelocationPlan relocation_plan(std::span<const std::uint32_t> weights, std::uint
 /// What each of count splats in the place of one gets: its logit, and what is added to its
 /// log_scale. Opacities above ALPHA_MAX count as that; counts above RELOCATION_COUNTS likewise.
 struct Relocated {
-    double opacity = 0;  // logit
+    double opacity_logit = 0;
     double log_factor = 0;
 };
-Relocated relocated(int kernel, Footprint footprint, float opacity, std::uint32_t count);
+Relocated relocated(int kernel, Footprint footprint, float opacity_logit, std::uint32_t count);
 
-/// rate * gate * covariance * normal, world units; rotation [4], log_scale [3], opacity a logit.
-glm::dvec3 position_noise(const float* rotation, const float* log_scale, float opacity,
+/// rate * gate * covariance * normal, world units; rotation [4], log_scale [3], opacity_logit.
+glm::dvec3 position_noise(const float* rotation, const float* log_scale, float opacity_logit,
                           double dead_opacity, double rate, std::uint32_t seed,
                           std::uint32_t index);
 

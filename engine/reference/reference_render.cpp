@@ -1,8 +1,10 @@
 #include "engine/reference/reference_render.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/reference/parallel.h"
 
 namespace darb::reference {
@@ -26,11 +28,14 @@ void check_shapes(const Splats<T>& splats, const Camera& camera) {
     const size_t n = splats.size();
     for (int a = 0; a < kAttributeCount; ++a) {
         const size_t held = attribute_values(splats, a).size();
-        DARB_CHECK(held == n * attribute_floats(a, splats.sh_degree) ||
-                       (held == 0 && kSplatAttributes[static_cast<size_t>(a)].optional),
-                   "{}: {} values, N = {}", attribute_name(a), held, n);
+        if (held != n * attribute_floats(a, splats.sh_degree) &&
+            (held != 0 || !kSplatAttributes[static_cast<size_t>(a)].optional))
+            throw Error("splats", fmt::format("{}: {} values for {}", attribute_name(a), held, n),
+                        "Each array holds the values of all, as splat_attributes.h says.");
     }
-    DARB_CHECK(camera.width > 0 && camera.height > 0, "{}x{}", camera.width, camera.height);
+    if (camera.width < 1 || camera.height < 1)
+        throw Error("camera", fmt::format("{} x {} pixels", camera.width, camera.height),
+                    "Give it at least one each way.");
 }
 
 template <class T>
@@ -74,12 +79,16 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
                            const RenderSettings& settings, const BasicRenderResult<T>& result,
                            const Image<T>& d_image, const Image<T>& d_alpha) {
     check_shapes(splats, camera);
-    DARB_CHECK(d_image.width == camera.width && d_image.height == camera.height &&
-                   d_image.channels == 3 && result.projected.size() == splats.size(),
-               "{}x{}x{}", d_image.width, d_image.height, d_image.channels);
-    DARB_CHECK(
-        d_alpha.data.empty() || (d_alpha.width == camera.width && d_alpha.height == camera.height),
-        "{}x{}", d_alpha.width, d_alpha.height);
+    if (d_image.width != camera.width || d_image.height != camera.height || d_image.channels != 3 ||
+        result.projected.size() != splats.size())
+        throw Error("reference",
+                    fmt::format("a gradient of {}x{}x{} for {}x{}, {} splats for {}", d_image.width,
+                                d_image.height, d_image.channels, camera.width, camera.height,
+                                result.projected.size(), splats.size()),
+                    "Walk back what render() made of the same splats and camera.");
+    if (!d_alpha.data.empty() && (d_alpha.width != camera.width || d_alpha.height != camera.height))
+        throw Error("reference", fmt::format("a gradient of {}x{}", d_alpha.width, d_alpha.height),
+                    "It is of the camera's size, or empty.");
     const KernelTable& kernel =
         kernel_table(splats.kernel, splats.footprint, settings.polynomial_degree);
     const TileLists& tiles = result.tiles;

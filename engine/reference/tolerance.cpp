@@ -1,6 +1,8 @@
 #include "engine/reference/tolerance.h"
 
-#include "engine/core/check.h"
+#include <fmt/format.h>
+
+#include "engine/core/error.h"
 
 namespace darb::reference {
 namespace {
@@ -72,8 +74,8 @@ const Tolerance& tolerance(std::string_view name) {
             return row;
         }
     }
-    DARB_CHECK(false, "no tolerance named {}", name);
-    return kTable[0];
+    throw Error("tolerance", fmt::format("none is named {}", name),
+                "The names stand in engine/reference/tolerance.cpp.");
 }
 
 }  // namespace darb::reference

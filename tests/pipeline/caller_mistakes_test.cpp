@@ -6,17 +6,28 @@
 #include "engine/data/lens_model.h"
 #include "engine/data/metrics.h"
 #include "engine/data/resample.h"
+#include "engine/kernels/kernel_coefficients.h"
+#include "engine/kernels/relocation_table.h"
 #include "engine/plan/accuracy.h"
 #include "engine/primitives/radix_sort.h"
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/loss.h"
+#include "engine/reference/comparison.h"
+#include "engine/reference/reference_loss.h"
+#include "engine/reference/reference_mcmc.h"
+#include "engine/reference/reference_render.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
+#include "tests/support/tiny_training.h"
+#include "trainer/exposure.h"
+#include "trainer/iterate_average.h"
+#include "trainer/option_table.h"
+#include "trainer/smoothing.h"
 
 namespace darb::test {
 namespace {
@@ -131,6 +142,105 @@ TEST(CallerMistakes, pictures_and_scenes_that_cannot_be_worked_on) {
               std::string::npos);
     EXPECT_NE(refusal([&] { encode_splats(SplatFormat::sog, model, "a.sog"); }).find("a.sog"),
               std::string::npos);
+}
+
+TEST(CallerMistakes, kernels_and_their_tables) {
+    EXPECT_NE(refusal([] { static_cast<void>(kernel_name(KERNEL_ROWS)); }), "");
+    EXPECT_NE(refusal([] { static_cast<void>(derived_kernel(-1)); }), "");
+    const DerivedKernel& rings = derived_kernel(*kernel_with_pulses(KERNEL_SINC, 2));
+    EXPECT_NE(refusal([&] { static_cast<void>(rings.value(Footprint::exact, 1)); }), "");
+    EXPECT_NE(refusal([&] { static_cast<void>(rings.radius_quantile(1)); }), "");
+    EXPECT_NE(refusal([] { kernel_coefficients(KERNEL_SINC, Footprint::psi, 99); }), "");
+    EXPECT_NE(refusal([] { relocation_opacity(2, 1); }), "");
+    EXPECT_NE(refusal([] { relocation_opacity(0.5, 0); }), "");
+    EXPECT_NE(refusal([] { relocation_table(KERNEL_SINC, Footprint::psi, 0, 1); }), "");
+
+    SplatModel model = random_scene({.count = 3}).model;
+    model.kernel = KERNEL_ROWS;
+    EXPECT_NE(refusal([&] { Renderer(shared_device(), model); }).find("kernel"), std::string::npos);
+    model.kernel = KERNEL_GAUSSIAN;
+    model.rotation.pop_back();
+    EXPECT_NE(refusal([&] { GpuSplats(shared_device(), model, true); }).find("rotation"),
+              std::string::npos);
+}
+
+TEST(CallerMistakes, the_reference) {
+    namespace r = reference;
+    const TestScene s = random_scene({.count = 3, .width = 16, .height = 8});
+    auto splats = r::make_splats<double>(s.model);
+    const auto drawn = r::render(splats, s.camera, {});
+    EXPECT_NE(refusal([&] { r::backward(splats, s.camera, {}, drawn, Image<double>(8, 8, 3)); }),
+              "");
+    Camera none = s.camera;
+    none.width = 0;
+    EXPECT_NE(refusal([&] { r::render(splats, none, {}); }), "");
+    splats.sh_dc.pop_back();
+    EXPECT_NE(refusal([&] { r::render(splats, s.camera, {}); }).find("sh_dc"), std::string::npos);
+    const Image<double> picture(4, 3, 3), grey(4, 3, 1);
+    EXPECT_NE(refusal([&] { r::loss(picture, grey, {}); }), "");
+    EXPECT_NE(refusal([&] { r::kernel_table(KERNEL_ROWS, Footprint::psi, 0); }), "");
+    EXPECT_NE(refusal([&] { r::kernel_table(0, Footprint::psi, -1); }), "");
+    EXPECT_NE(refusal([] { r::tolerance("none of these"); }).find("none of these"),
+              std::string::npos);
+    std::vector<double> three(3), two(2);
+    EXPECT_NE(refusal([&] { r::comparison_stats(three, two, r::tolerance("gradient_float32")); }),
+              "");
+    const std::vector<std::uint32_t> no_weights;
+    EXPECT_NE(refusal([&] { r::relocation_plan(no_weights, 1, 0); }), "");
+}
+
+TEST(CallerMistakes, photos_and_states_that_do_not_fit_the_run) {
+    TinyTraining t = tiny_training();
+    t.options.exposure = true;
+    Trainer trainer = t.trainer();
+    trainer.step();
+    const TrainerState whole = trainer.state();
+    const auto refused = [&](auto&& spoil) {
+        TrainerState state = whole;
+        spoil(state);
+        return refusal([&] { trainer.restore(state); });
+    };
+    EXPECT_NE(refused([](TrainerState& s) { s.moments.pop_back(); }).find("moments"),
+              std::string::npos);
+    EXPECT_NE(refused([](TrainerState& s) { s.moments[kRotation].pop_back(); }).find("rotation"),
+              std::string::npos);
+    EXPECT_NE(refused([](TrainerState& s) { s.model.position.pop_back(); }).find("position"),
+              std::string::npos);
+    EXPECT_NE(refused([](TrainerState& s) { s.exposure.pop_back(); }).find("exposure"),
+              std::string::npos);
+    EXPECT_NE(refused([](TrainerState& s) { s.gradient_sum.pop_back(); }), "");
+    EXPECT_NE(refused([](TrainerState& s) { s.mean.resize(1); }), "");
+    EXPECT_NE(refused([](TrainerState& s) { s.smoothing.resize(1); }), "");
+    trainer.restore(whole);
+    trainer.step();
+    trainer.drain();
+
+    std::vector<ImageU8> photos = t.photos;
+    photos.pop_back();
+    const auto train = [&] { Trainer(shared_device(), t.dataset, photos, t.start(), t.options); };
+    EXPECT_NE(refusal(train).find("5 for 6"), std::string::npos);
+    photos = t.photos;
+    photos[1] = ImageU8(7, 5, 4);
+    EXPECT_NE(refusal(train).find("7x5x4"), std::string::npos);
+
+    Exposure exposure(shared_device(), 2, 64);
+    EXPECT_NE(refusal([&] { exposure.restore({1, 2, 3}); }).find("3 values"), std::string::npos);
+    EXPECT_NE(refusal([&] { bake_smoothing(whole.model, {}); }), "");
+    EXPECT_NE(refusal([] { static_cast<void>(option_row("--no-such")); }).find("--no-such"),
+              std::string::npos);
+}
+
+TEST(CallerMistakes, a_mean_of_other_splats) {
+    Device& device = shared_device();
+    IterateAverage average(device);
+    const GpuSplats three(device, random_scene({.count = 3}).model, false),
+        four(device, random_scene({.count = 4}).model, false);
+    average.add(three);
+    EXPECT_NE(refusal([&] { average.add(four); }).find("mean of position"), std::string::npos);
+    average.add(three);
+    EXPECT_EQ(average.count(), 2U);
+    average.clear();
+    average.add(four);
 }
 
 }  // namespace

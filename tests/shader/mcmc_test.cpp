@@ -139,7 +139,9 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
             }
             const auto expected =
                 reference::relocated(kernel, Footprint::psi, model.opacity_logit[i], copies[i] + 1);
-            ASSERT_NEAR(logit[i], expected.opacity, 3e-5 + 1e-5 * std::abs(expected.opacity)) << i;
+            ASSERT_NEAR(logit[i], expected.opacity_logit,
+                        3e-5 + 1e-5 * std::abs(expected.opacity_logit))
+                << i;
             for (size_t c = 0; c < 3; ++c)  // between the table's columns: up to 0.3 %
                 ASSERT_NEAR(log_scale[3 * i + c] - model.log_scale[3 * i + c], expected.log_factor,
                             4e-3)
@@ -252,7 +254,7 @@ TEST(Relocation, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_cha
         }
         const auto expected = reference::relocated(
             model.kernel, model.footprint, model.opacity_logit[from], plan.copies[from] + 1);
-        ASSERT_NEAR(round.model.opacity_logit[i], changed ? expected.opacity : 0, 1e-4) << i;
+        ASSERT_NEAR(round.model.opacity_logit[i], changed ? expected.opacity_logit : 0, 1e-4) << i;
         ASSERT_NEAR(round.model.log_scale[3 * i] - model.log_scale[3 * from],
                     changed ? expected.log_factor : 0, 4e-3);
         for (int a = 0; a < kAttributeCount; ++a)

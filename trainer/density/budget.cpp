@@ -1,8 +1,11 @@
 // Strategy budget: grow to a fixed count where the photos' error is, let opacities decay. Sources:
 // see error_score.h.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cfloat>
 
+#include "engine/core/error.h"
 #include "trainer/density/density_strategy.h"
 #include "trainer/density/error_score.h"
 
@@ -52,7 +55,12 @@ class Budget : public DensityStrategy {
 
     void restore(std::uint32_t splats, const std::vector<float>& state) override {
         score_.reset(splats);
-        if (!state.empty()) score_.restore(state);
+        if (state.empty()) return;
+        if (state.size() != std::size_t{splats} * 2)
+            throw Error("budget",
+                        fmt::format("{} error shares for {} splats", state.size(), splats),
+                        "Restore what state() gave.");
+        score_.restore(state);
     }
 
   private:

@@ -264,13 +264,38 @@ TEST(Commands, images_are_copied_scaled_and_cleared_in_order) {
     EXPECT_EQ(mapped[3], 0xFF00FF00U);
 }
 
-TEST(Commands, a_buffer_smaller_than_the_image_is_a_check_failure) {
+TEST(Commands, a_buffer_smaller_than_the_image_is_an_error) {
     Device device;
     const Buffer buffer(device, "short", 12);
     DeviceImage image(device, "image", 2, 2, VK_FORMAT_B8G8R8A8_UNORM);
     Commands commands(device);
     commands.begin();
-    EXPECT_DEATH(commands.copy(buffer, image), "short");
+    EXPECT_THROW(commands.copy(buffer, image), Error);
+    EXPECT_THROW(commands.copy(image, buffer), Error);
+}
+
+TEST(Commands, calls_out_of_order_and_out_of_bounds_are_errors_and_work_goes_on) {
+    Device device;
+    Buffer words(device, "words", 16);
+    const Buffer few(device, "few", 8);
+    Commands commands(device);
+    EXPECT_THROW(commands.pass("too early"), Error);
+    EXPECT_THROW(commands.submit(), Error);
+    EXPECT_THROW(commands.fill(words, 1), Error);
+    commands.begin();
+    EXPECT_THROW(commands.fill({words, 8, 12}, 1), Error);
+    EXPECT_THROW(commands.fill({words, 2, 4}, 1), Error);
+    EXPECT_THROW(commands.copy(few, words, 12), Error);
+    EXPECT_THROW(commands.copy({words, 8}, few, ~std::uint64_t{0}), Error);
+    EXPECT_THROW(static_cast<void>(commands.pass_times()), Error);
+    commands.fill(words, 7);
+    commands.submit();
+    EXPECT_THROW(commands.begin(), Error);
+    EXPECT_THROW(static_cast<void>(commands.pass_times()), Error);
+    commands.wait();
+    EXPECT_EQ(words.download<std::uint32_t>(4), std::vector<std::uint32_t>(4, 7));
+    EXPECT_THROW(words.download<std::uint32_t>(5), Error);
+    EXPECT_THROW(words.upload(std::vector<std::uint32_t>(5)), Error);
 }
 
 }  // namespace
