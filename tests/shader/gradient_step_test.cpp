@@ -1,11 +1,17 @@
 // The two ways of a step of the optimiser, from one view: within project_backward.comp, and as
 // gradients in buffers with adam_update.comp behind them. For every kernel, each effect that
 // training has and each rule beside Adam.
+#include "engine/core/rng.h"
 #include "engine/raster/adam_update.h"
+#include "engine/raster/backward.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
+#include "engine/raster/loss.h"
 #include "tests/support/backward_pass.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/test_lenses.h"
 #include "tests/support/test_scene.h"
+#include "trainer/exposure.h"
 
 namespace darb::test {
 namespace {
@@ -154,6 +160,125 @@ TEST(GradientStep, both_ways_agree_with_each_effect) {
                                  effects.off_centre, effects.antialias, effects.smoothing,
                                  effects.near_care));
         compare_ways(scene, 1, rates_with_all_rules(), 2, effects, filters);
+    }
+}
+
+TEST(GradientStep, both_ways_agree_with_every_lens) {
+    for (const auto& [name, lens] : test_lenses()) {
+        SCOPED_TRACE(name);
+        TestScene scene = random_scene({.count = kSplats, .sh_degree = 1, .seed = 79});
+        scene.camera.lens = lens;
+        compare_ways(scene, 1, rates_with_all_rules(), 1, {.lens = true});
+    }
+}
+
+/// Splats, their step in either way and a map of colours for their one photo, on the device.
+struct ExposedStep {
+    ExposedStep(const TestScene& scene, const ForwardOptions& options, bool apart_)
+        : apart(apart_),
+          camera(scene.camera),
+          buffers(shared_device(), options),
+          forward(shared_device(), options),
+          backward(shared_device(), options),
+          loss(shared_device(), camera.width, camera.height),
+          exposure(shared_device(), 1, pixels()),
+          update(shared_device()),
+          splats(shared_device(), scene.model, true),
+          gradients(shared_device(), splats),
+          cameras(upload_cameras(shared_device(), {camera_data(camera, scene.model.origin)})),
+          photo(shared_device(), "photo", pixels() * 4),
+          d_image(shared_device(), "d_image", pixels() * 12),
+          result(shared_device(), "loss", sizeof(gpu::LossResult)),
+          view{camera_data(camera, scene.model.origin), &cameras, 0, 1, glm::vec3(0)} {
+        Pcg32 random(5, 6);
+        std::vector<std::uint32_t> values(pixels());
+        for (std::uint32_t& value : values) value = random.next() | 0xFF000000u;
+        photo.upload(values);
+        buffers.reserve(splats.count(), 20'000, camera.width, camera.height);
+        backward.reserve(splats.count(), buffers.size().intersections,
+                         buffers.frame().checkpoint_records());
+    }
+    std::uint32_t pixels() const {
+        return static_cast<std::uint32_t>(camera.width) * static_cast<std::uint32_t>(camera.height);
+    }
+
+    void run(int t) {
+        const AdamStep step = adam_step(rates_with_all_rules(), t);
+        Frame& frame = buffers.frame();
+        const Buffer& status = frame.counters.status;
+        Commands commands(shared_device());
+        commands.begin();
+        forward.record(commands, splats, view, frame);
+        exposure.record(commands, frame.images.image, 0, pixels());
+        loss.record(commands, {exposure.mapped(), photo, d_image, result}, camera.width,
+                    camera.height, view.background);
+        exposure.record_backward(commands, frame.images.image, d_image, status,
+                                 {0, pixels(), 0.01f, t});
+        if (apart) {
+            backward.record_gradients(commands, view, frame, splats, d_image, gradients, false);
+            update.record(commands, splats, gradients, status, 1, step);
+            update.record_fading(commands, splats, gradients, status, view, step.clearance);
+            update.record_sums(commands, gradients, status, backward.gradient_sum());
+        } else {
+            backward.record(commands, view, frame, splats, d_image, step);
+        }
+        commands.submit_and_wait();
+        ASSERT_EQ(frame.read_status().overflow, 0U);
+    }
+    PassState state() {
+        PassState s;
+        const SplatModel model = splats.download();
+        for (int a = 0; a < kAttributeCount; ++a) {
+            s.parameters[a] = attribute_values(model, a);
+            s.moments[a] = splats.moments(a).download<float>(2 * s.parameters[a].size());
+        }
+        s.gradient_sum = backward.gradient_sum().download<glm::vec2>(splats.count());
+        s.status = buffers.frame().read_status();
+        return s;
+    }
+    void copy_from(ExposedStep& other) {
+        const PassState s = other.state();
+        for (int a = 0; a < kAttributeCount; ++a) {
+            splats.parameters(a).upload(s.parameters[a]);
+            splats.moments(a).upload(s.moments[a]);
+        }
+        backward.gradient_sum().upload(s.gradient_sum);
+        exposure.restore(other.exposure.state());
+    }
+
+    bool apart;
+    Camera camera;
+    FrameBuffers buffers;
+    Forward forward;
+    Backward backward;
+    Loss loss;
+    Exposure exposure;
+    AdamUpdate update;
+    GpuSplats splats;
+    GradientBuffers gradients;
+    Buffer cameras, photo, d_image, result;
+    FrameView view;
+};
+
+// The map's own step comes between the loss and the gradients of splats, before either way.
+TEST(GradientStep, both_ways_agree_with_exposure_and_a_lens) {
+    TestScene scene = random_scene({.count = kSplats, .sh_degree = 1, .seed = 80});
+    scene.camera.lens = test_lenses().front().second;
+    ForwardOptions options;
+    options.store_for_backward = true;
+    options.effects.lens = true;
+    ExposedStep fused(scene, options, false), apart(scene, options, true);
+    const std::vector<float> untouched = fused.exposure.state();
+    for (int t = 1; t <= 3; ++t) {
+        SCOPED_TRACE(fmt::format("step {}", t));
+        const PassState before = fused.state();
+        apart.copy_from(fused);
+        fused.run(t);
+        apart.run(t);
+        expect_same(before, fused.state(), apart.state(), adam_step(rates_with_all_rules(), t));
+        EXPECT_NE(fused.state().parameters, before.parameters);
+        EXPECT_EQ(fused.exposure.state(), apart.exposure.state());
+        EXPECT_NE(fused.exposure.state(), untouched);
     }
 }
 
