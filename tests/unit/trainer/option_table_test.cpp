@@ -1,16 +1,13 @@
-// The table of training options: every row is used, takes its values and no others, and is in the
-// settings that a resumed run must repeat.
+// The table of training options: every row takes its values and no others, and is in the settings
+// that a resumed run must repeat. That each does something: option_effect_test.
 #include "trainer/option_table.h"
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <regex>
 #include <set>
 
 #include "engine/core/error.h"
-#include "engine/core/files.h"
 #include "trainer/strategy.h"
 
 namespace darb::test {
@@ -88,28 +85,6 @@ TEST(OptionTable, flags_and_settings_are_each_of_one_row) {
         EXPECT_NE(std::string(row.help), "") << row.flags;
         EXPECT_NE(default_text(row), "") << row.flags;
     }
-}
-
-// A member is used where something other than the table reads it.
-TEST(OptionTable, every_member_that_it_sets_is_used) {
-    namespace fs = std::filesystem;
-    const fs::path source = DARB_SOURCE_DIR;
-    std::string users;
-    for (const char* folder : {"trainer", "trainer/density"})
-        if (fs::exists(source / folder))
-            for (const auto& file : fs::directory_iterator(source / folder))
-                if (file.path().extension() == ".cpp" &&
-                    !file.path().filename().string().starts_with("option_"))
-                    users += read_text_file(file.path());
-    const std::string rows = read_text_file(source / "trainer/option_rows.cpp");
-    const std::regex member("&Opt::(\\w+)");
-    std::size_t members = 0;
-    for (std::sregex_iterator at(rows.begin(), rows.end(), member), end; at != end; ++at) {
-        const std::string name = (*at)[1];
-        EXPECT_NE(users.find("." + name), std::string::npos) << name;
-        ++members;
-    }
-    EXPECT_GT(members, 40U);
 }
 
 TEST(OptionTable, refusals_name_option_value_reason_and_remedy) {

@@ -1,0 +1,144 @@
+// Every option of the table does something: a short run with another value of it ends in another
+// state. An option that is read and ignored fails here.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "engine/core/error.h"
+#include "tests/support/tiny_training.h"
+#include "trainer/option_table.h"
+#include "trainer/strategy.h"
+
+namespace darb::test {
+namespace {
+
+/// Another value than the run's, under which 20 iterations differ.
+const std::map<std::string, std::string> kOtherValues{
+    {"/iterations", "12"},
+    {"/seed", "6"},
+    {"/max_splats", "40"},
+    {"max_memory", "2MB"},
+    {"/sh_degree", "0"},
+    {"/effects/exposure_lr/0", "0.3"},
+    {"/effects/exposure_lr/1", "0.3"},
+    {"/lambda_dssim", "0.5"},
+    {"/position_lr/0", "0.01"},
+    {"/position_lr/1", "0.0001"},
+    {"/scale_lr", "0.02"},
+    {"/rotation_lr", "0.02"},
+    {"/opacity_lr", "0.01"},
+    {"/sh_lr/0", "0.01"},
+    {"/sh_rest_every", "3"},
+    {"/position_lr_falls", "0.5"},
+    {"/final_lr_share", "0.5"},
+    {"/average_begin", "1"},
+    {"/sh_interval", "3"},
+    {"/densify_from", "9"},
+    {"/densify_until", "9"},
+    {"/densify_interval", "3"},
+    {"/densify_grad_threshold", "0.75"},
+    {"/clone_split_extent", "7"},
+    {"/prune_opacity", "0.5"},
+    {"/prune_extent", "0.001"},
+    {"/opacity_reset/0", "5"},
+    {"/noise_lr", "1"},
+    {"/opacity_decay", "0.5"},
+    {"/regularisers/0", "0.5"},
+    {"/regularisers/1", "0.5"},
+    {"/largest_scale", "0.01"},
+    {"/clearance", "0"},
+    {"/random_points", "30"},
+    {"/initial_opacity", "0.6"},
+    {"/initial_scale", "0.5"},
+};
+
+std::string key_of(const OptionRow& row) {
+    return *row.setting != '\0'                                       ? row.setting
+           : std::holds_alternative<bool TrainOptions::*>(row.member) ? "speed_up_short_runs"
+                                                                      : "max_memory";
+}
+
+/// A run in which all of training takes part: growth, resets, transparent pixels, a splat beside a
+/// camera.
+TinyTraining run_for(const OptionRow& row) {
+    const std::string key = key_of(row);
+    TinyTraining t = tiny_training(key == "/resolution_ramp"
+                                       ? TinyOptions{.views = 3, .width = 220, .height = 16}
+                                       : TinyOptions{.views = 4, .width = 32, .height = 24});
+    for (ImageU8& photo : t.photos)
+        for (std::size_t i = 3; i < photo.data.size() / 2; i += 4) photo.data[i] = 100;
+    TrainOptions& o = t.options;
+    o.iterations = 20;
+    o.sh_interval = 2;
+    o.densify_from = 3;
+    o.densify_until = 18;
+    o.densify_interval = 4;
+    o.opacity_reset_interval = 7;
+    o.clearance = 0.9f;
+    o.exposure = key.starts_with("/effects/exposure_lr");
+    const std::string strategies = row.strategies;
+    if (strategies == "mcmc") o.strategy = Strategy::mcmc;
+    if (strategies == "budget") o.strategy = Strategy::budget;
+    if (!strategies.empty() && !strategies.starts_with("adc")) o.max_splats = 80;
+    if (key == "/random_points") t.dataset.points = {};
+    return t;
+}
+
+void set_other(const OptionRow& row, TrainOptions& o) {
+    if (const auto* const flag = std::get_if<bool TrainOptions::*>(&row.member)) {
+        o.*(*flag) = !(o.*(*flag));
+        return;
+    }
+    const auto value = kOtherValues.find(key_of(row));
+    ASSERT_NE(value, kOtherValues.end()) << "a value for " << key_of(row);
+    set_option(row, value->second, o);
+}
+
+/// After the last iteration; nothing where the device's budget does not hold the run.
+std::optional<TrainerState> trained(const TinyTraining& t) try {
+    std::optional<Device> own;
+    if (t.options.max_memory_bytes) own.emplace(device_options());  // the other is in use
+    Device& device = own ? *own : shared_device();
+    SplatModel start = t.start();
+    const glm::dvec3 beside = t.dataset.views[1].camera.centre() * 0.9;  // points are around 0
+    for (int c = 0; c < 3; ++c) start.position[c] = static_cast<float>(beside[c]);
+    Trainer trainer(device, t.dataset, t.photos, start, t.options);
+    while (trainer.iteration() < t.options.iterations) trainer.step();
+    return trainer.state();
+} catch (const Error&) {
+    return std::nullopt;
+}
+
+bool same(const TrainerState& a, const TrainerState& b) {
+    for (int i = 0; i < kAttributeCount; ++i)
+        if (attribute_values(a.model, i) != attribute_values(b.model, i)) return false;
+    return a.moments == b.moments && a.exposure == b.exposure && a.smoothing == b.smoothing;
+}
+
+TEST(OptionEffect, another_value_of_each_option_trains_another_scene) {
+    std::size_t rows = 0;
+    std::map<std::string, std::optional<TrainerState>> usual_of;  // by what run_for goes by
+    for (const OptionRow& row : option_rows()) {
+        if (std::holds_alternative<std::monostate>(row.member)) continue;
+        SCOPED_TRACE(key_of(row));
+        TinyTraining t = run_for(row);
+        const std::string key = key_of(row);
+        const bool special = key == "/resolution_ramp" || key == "/random_points";
+        const std::string run = strategy_name(t.options.strategy).data() + std::string(" ") +
+                                (special ? key : "") + (t.options.exposure ? "exposure" : "");
+        if (!usual_of.contains(run)) usual_of[run] = trained(t);
+        const std::optional<TrainerState>& usual = usual_of[run];
+        ASSERT_TRUE(usual);
+        set_other(row, t.options);
+        const std::optional<TrainerState> other = trained(t);
+        EXPECT_TRUE(!other || !same(*usual, *other)) << "it changes nothing";
+        EXPECT_EQ(!other, key == "max_memory");
+        ++rows;
+    }
+    EXPECT_GT(rows, 40U);
+}
+
+}  // namespace
+}  // namespace darb::test
