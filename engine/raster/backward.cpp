@@ -34,11 +34,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     const std::array<int, 4> key{sh_degree, sh_stored, update, rest};
     const auto found = project_.find(key);
     if (found != project_.end()) return found->second;
-    SpecConstants constants = kernel_constants(options_);
-    constants["THREADS"] = SPLAT_GROUP;
-    constants["SH_DEGREE"] = sh_degree;
-    constants["SH_STORED"] = sh_stored;
-    add_constants(options_.effects, constants);
+    SpecConstants constants = projection_constants(options_, sh_degree, sh_stored);
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(blend_.window_intersections());
     constants["UPDATE"] = update;
     constants["REST"] = rest;

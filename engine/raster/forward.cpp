@@ -30,6 +30,15 @@ SpecConstants kernel_constants(const ForwardOptions& options) {
     return constants;
 }
 
+SpecConstants projection_constants(const ForwardOptions& options, int sh_degree, int sh_stored) {
+    SpecConstants constants = kernel_constants(options);
+    constants["THREADS"] = SPLAT_GROUP;
+    constants["SH_DEGREE"] = sh_degree;
+    constants["SH_STORED"] = sh_stored;
+    add_constants(options.effects, constants);
+    return constants;
+}
+
 std::uint32_t blend_subgroup(const Device& device) {
     return std::clamp(device.info().subgroup_size, 4u, 64u);
 }
@@ -47,7 +56,7 @@ std::uint32_t add_block_constants(const Device& device, SpecConstants& constants
 }
 
 Forward::Forward(Device& device, const ForwardOptions& options)
-    : device_(&device), options_(options) {
+    : device_(&device), options_(options), blend_threads_(device.tuning().blend_threads) {
     if (options.store_for_backward && options.depth_order == DEPTH_ORDER_PIXEL)
         throw Error("frame", "a resorted pixel cannot be walked back",
                     "Use another depth order, or do not store for a backward pass.");
@@ -66,13 +75,10 @@ Forward::Forward(Device& device, const ForwardOptions& options)
 Pipeline& Forward::project_pipeline(int sh_degree, int sh_stored) {
     const auto found = project_.find({sh_degree, sh_stored});
     if (found != project_.end()) return found->second;
-    SpecConstants constants = kernel_constants(options_);
-    constants["THREADS"] = SPLAT_GROUP;
-    constants["SH_DEGREE"] = sh_degree;
-    constants["SH_STORED"] = sh_stored;
-    add_constants(options_.effects, constants);
     return project_
-        .emplace(std::pair(sh_degree, sh_stored), Pipeline(*device_, "project", constants))
+        .emplace(
+            std::pair(sh_degree, sh_stored),
+            Pipeline(*device_, "project", projection_constants(options_, sh_degree, sh_stored)))
         .first->second;
 }
 
@@ -81,13 +87,12 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
     const bool parts = frame.size.list_segments > 1;
     Pipeline& pipeline = blend_[parts ? 1 : 0];
     if (pipeline) return pipeline;
-    const std::uint32_t threads = device_->tuning().blend_threads;
     SpecConstants blend = kernel_constants(options_);
     blend["MIN_TRANSMITTANCE"] = least_transmittance(options_.transmittance_stop);
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
-    blend["THREADS"] = static_cast<std::int32_t>(threads);
-    blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / threads);
+    blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);
+    blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / blend_threads_);
     blend["CHECKPOINTS"] = frame.size.bucket > 0 ? 1 : 0;
     if (frame.size.bucket > 0) blend["BUCKET"] = static_cast<std::int32_t>(frame.size.bucket);
     blend["SEGMENT"] = parts ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;

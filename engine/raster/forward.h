@@ -60,6 +60,7 @@ class Forward {
 
     Device* device_;
     ForwardOptions options_;
+    std::uint32_t blend_threads_;  // of a tile's workgroup, by the device's tuning
     std::map<std::pair<int, int>, Pipeline> project_;  // by SH degree in use and in the buffers
     Pipeline compact_, gather_counts_, groups_visible_, groups_intersections_, emit_, tile_ranges_,
         list_lengths_;

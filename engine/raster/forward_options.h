@@ -27,6 +27,9 @@ struct ForwardOptions {
 
 /// The constants of these options that several passes share: kernel, storage and depth order.
 SpecConstants kernel_constants(const ForwardOptions& options);
+/// Those of the projection, forward and back: the kernel's, the effects', the degree in use and
+/// that of the buffers.
+SpecConstants projection_constants(const ForwardOptions& options, int sh_degree, int sh_stored);
 
 /// What the transmittance of a pixel stays at or above: the stop less its slack for rounding.
 constexpr float least_transmittance(float stop) {
