@@ -106,7 +106,7 @@ Row scan_row(Device& device, std::uint32_t n) {
                        out.download<std::uint32_t>(n), "exact");
 }
 
-Row sort_row(Device& device, std::uint32_t n, RadixSort::Strategy strategy, const char* name) {
+Row sort_row(Device& device, std::uint32_t n, SortScatter scatter) {
     Pcg32 rng(n + 1);
     std::vector<std::uint32_t> keys(n), order(n);
     for (std::uint32_t& k : keys) k = rng.next() & 0xFF00FFu;  // many are equal
@@ -115,15 +115,17 @@ Row sort_row(Device& device, std::uint32_t n, RadixSort::Strategy strategy, cons
     key.upload(keys);
     value.upload(order);
     count.upload(std::vector<std::uint32_t>{n});
-    RadixSort sort(device, n, strategy);
+    RadixSort sort(device, n, scatter);
     Commands commands(device);
     commands.begin();
     sort.record(commands, key, value, count, 0, 32);
     commands.submit_and_wait();
     std::stable_sort(order.begin(), order.end(),
                      [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
-    return compare_row("scan and sort", fmt::format("stable sort of {}, {}", n, name), order,
-                       value.download<std::uint32_t>(n), "exact");
+    return compare_row(
+        "scan and sort",
+        fmt::format("stable sort of {}, {}", n, kSortScatters[static_cast<std::size_t>(scatter)]),
+        order, value.download<std::uint32_t>(n), "exact");
 }
 
 }  // namespace
@@ -148,8 +150,8 @@ std::vector<Row> check_scan_and_sort(Device& device) {
     std::vector<Row> rows;
     for (const std::uint32_t n : {1u, 257u, 100'003u}) rows.push_back(scan_row(device, n));
     for (const std::uint32_t n : {1u, 4097u, 100'003u}) {
-        rows.push_back(sort_row(device, n, RadixSort::Strategy::columns, "columns"));
-        rows.push_back(sort_row(device, n, RadixSort::Strategy::ballot, "ballot"));
+        for (std::size_t s = std::size(kSortScatters); s-- > 0;)
+            rows.push_back(sort_row(device, n, static_cast<SortScatter>(s)));
     }
     return rows;
 }

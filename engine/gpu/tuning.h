@@ -14,10 +14,15 @@ enum class BackwardBlend {
     buckets,   // a thread owns an intersection, from checkpoints: blend_backward_buckets.comp
 };
 
+/// How the scatter pass of the radix sort ranks keys, shaders/sort/radix_scatter_*; in the order of
+/// their names.
+enum class SortScatter { ballot, columns };
+inline constexpr const char* kSortScatters[] = {"ballot", "columns"};
+
 /// Each a specialization constant or a shader.
 struct Tuning {
-    bool scan_by_thread = false;      // Scan::Strategy::team_is_thread
-    bool scatter_by_columns = false;  // RadixSort::Strategy::columns, else ballot
+    bool scan_by_thread = false;  // Scan::Strategy::team_is_thread
+    SortScatter scatter = SortScatter::ballot;
     std::uint32_t blend_threads = 0;  // of the forward blend's workgroup, which has a tile
     BackwardBlend backward = BackwardBlend::subgroup;
     bool operator==(const Tuning&) const = default;

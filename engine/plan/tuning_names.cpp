@@ -62,6 +62,13 @@ void check_names(const DeviceInfo& info, const TuningNames& names, const std::st
     }
 }
 
+std::vector<std::string> usual_first(const std::string& usual) {
+    std::vector<std::string> names{usual};
+    for (const char* name : kSortScatters)
+        if (name != usual) names.emplace_back(name);
+    return names;
+}
+
 }  // namespace
 
 bool is_known_device(const DeviceInfo& info) {
@@ -75,7 +82,7 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
              lavapipe ? Names{"thread", "subgroup"} : Names{"subgroup", "thread"},
              {"compact", "depth sort", "emit", "tile sort"}},
             {"scatter",
-             lavapipe ? Names{"columns", "ballot"} : Names{"ballot", "columns"},
+             usual_first(kSortScatters[static_cast<std::size_t>(usual_tuning(info).scatter)]),
              {"depth sort", "tile sort"}},
             {"blend", blend_shapes(info), {"blend"}},
             {"backward", {"subgroup", "buckets"}, {"blend", "blend backward"}, true}};
@@ -106,7 +113,7 @@ std::string names_text(const TuningNames& names) {
 
 TuningNames tuning_names(const Tuning& tuning) {
     return {{"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
-            {"scatter", tuning.scatter_by_columns ? "columns" : "ballot"},
+            {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
             {"blend", shape_name(tuning.blend_threads)},
             {"backward", tuning.backward == BackwardBlend::buckets ? "buckets" : "subgroup"}};
 }
@@ -114,7 +121,10 @@ TuningNames tuning_names(const Tuning& tuning) {
 Tuning with_names(Tuning tuning, const TuningNames& names) {
     for (const auto& [name, choice] : names) {
         if (name == "scan") tuning.scan_by_thread = choice == "thread";
-        if (name == "scatter") tuning.scatter_by_columns = choice == "columns";
+        if (name == "scatter")
+            tuning.scatter = static_cast<SortScatter>(
+                std::find(std::begin(kSortScatters), std::end(kSortScatters), choice) -
+                std::begin(kSortScatters));
         if (name == "blend")
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_threads);
         if (name == "backward")

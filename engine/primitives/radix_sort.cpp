@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <string>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -20,12 +21,6 @@ constexpr std::uint32_t kRowBytes = RADIX_MAX_DIGITS * 4;  // counters of a subg
 constexpr std::uint32_t kColumnItems = 1024;
 constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
 
-RadixSort::Strategy resolve(const Device& device, RadixSort::Strategy strategy) {
-    if (strategy != RadixSort::Strategy::automatic) return strategy;
-    return device.tuning().scatter_by_columns ? RadixSort::Strategy::columns
-                                              : RadixSort::Strategy::ballot;
-}
-
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,
                         bool iota) {
     return {{"THREADS", static_cast<std::int32_t>(threads)},
@@ -34,31 +29,30 @@ SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_
             {"IOTA", iota ? 1 : 0}};
 }
 
-const char* histogram_name(RadixSort::Strategy strategy) {
-    return strategy == RadixSort::Strategy::columns ? "radix_histogram_columns" : "radix_histogram";
+const char* histogram_name(SortScatter scatter) {
+    return scatter == SortScatter::columns ? "radix_histogram_columns" : "radix_histogram";
 }
 
-const char* scatter_name(RadixSort::Strategy strategy) {
-    return strategy == RadixSort::Strategy::columns ? "radix_scatter_columns"
-                                                    : "radix_scatter_ballot";
+std::string scatter_name(SortScatter scatter) {
+    return std::string("radix_scatter_") + kSortScatters[static_cast<std::size_t>(scatter)];
 }
 
 }  // namespace
 
-RadixSort::Shape RadixSort::choose_shape(const Device& device, Strategy strategy,
+RadixSort::Shape RadixSort::choose_shape(const Device& device, SortScatter scatter,
                                          std::uint32_t subgroup_size) {
     const std::uint32_t lanes = subgroup_size != 0 ? subgroup_size : device.info().subgroup_size;
-    if (strategy == Strategy::columns) return {lanes, kColumnItems, 1};
+    if (scatter == SortScatter::columns) return {lanes, kColumnItems, 1};
     const std::uint32_t rows = std::bit_floor(device.info().shared_memory_bytes / kRowBytes);
     const std::uint32_t threads = std::max(std::min(kBallotThreads, rows * lanes), lanes);
     return {threads, kBallotItems, threads / lanes};
 }
 
-RadixSort::RadixSort(Device& device, std::uint32_t capacity, Strategy strategy,
+RadixSort::RadixSort(Device& device, std::uint32_t capacity, std::optional<SortScatter> scatter,
                      std::uint32_t subgroup_size)
     : capacity_(capacity),
-      strategy_(resolve(device, strategy)),
-      shape_(choose_shape(device, strategy_, subgroup_size)) {
+      scatter_(scatter.value_or(device.tuning().scatter)),
+      shape_(choose_shape(device, scatter_, subgroup_size)) {
     if (capacity == 0) throw Error("sort", "of no pairs", "Make it for at least one.");
     const std::uint64_t blocks = (std::uint64_t{capacity} + block() - 1) / block();
     if (blocks > device.info().max_groups_x)
@@ -69,9 +63,9 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, Strategy strategy,
     const SpecConstants plain = constants(threads, items, subgroups, false);
     const SpecConstants iota = constants(threads, items, subgroups, true);
     prepare_ = Pipeline(device, "radix_prepare");
-    histogram_ = Pipeline(device, histogram_name(strategy_), plain, true, subgroup_size);
-    scatter_ = Pipeline(device, scatter_name(strategy_), plain, true, subgroup_size);
-    scatter_iota_ = Pipeline(device, scatter_name(strategy_), iota, true, subgroup_size);
+    histogram_ = Pipeline(device, histogram_name(scatter_), plain, true, subgroup_size);
+    rank_ = Pipeline(device, scatter_name(scatter_), plain, true, subgroup_size);
+    rank_iota_ = Pipeline(device, scatter_name(scatter_), iota, true, subgroup_size);
 
     make_buffers(device, *this, buffers(capacity, shape_), "sort");
     scan_.emplace(device, static_cast<std::uint32_t>(counters(capacity, shape_)));
@@ -82,7 +76,7 @@ std::uint64_t RadixSort::max_capacity(const Device& device) {
     const std::uint64_t counters = Scan::max_capacity(device, Scan::best_strategy(device));
     const std::uint64_t blocks =
         std::min<std::uint64_t>(device.info().max_groups_x, counters / RADIX_MAX_DIGITS);
-    return blocks * choose_shape(device, resolve(device, Strategy::automatic), 0).block();
+    return blocks * choose_shape(device, device.tuning().scatter, 0).block();
 }
 
 std::uint64_t RadixSort::counters(std::uint32_t capacity, const Shape& shape) {
@@ -99,7 +93,7 @@ BufferList<RadixSort> RadixSort::buffers(std::uint32_t capacity, const Shape& sh
 }
 
 std::uint64_t RadixSort::device_bytes(const Device& device, std::uint32_t capacity) {
-    const Shape shape = choose_shape(device, resolve(device, Strategy::automatic), 0);
+    const Shape shape = choose_shape(device, device.tuning().scatter, 0);
     return charged_bytes(buffers(capacity, shape)) +
            Scan::device_bytes(static_cast<std::uint32_t>(counters(capacity, shape)));
 }
@@ -143,7 +137,7 @@ void RadixSort::record_pass(Commands& commands, std::uint32_t shift, std::uint32
     const gpu::RadixPassArgs args{shift, digits};
     commands.dispatch_indirect(histogram_, args, {plan_, *from.keys, histograms_}, plan_, 0);
     scan_->run(commands, histograms_, histograms_, total_);
-    commands.dispatch_indirect(iota ? scatter_iota_ : scatter_, args,
+    commands.dispatch_indirect(iota ? rank_iota_ : rank_, args,
                                {plan_, histograms_, *from.keys, *from.values, *to.keys, *to.values},
                                plan_, 0);
 }

@@ -9,22 +9,17 @@
 #include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
+#include "engine/gpu/tuning.h"
 #include "engine/primitives/scan.h"
 
 namespace darb {
 
 class RadixSort {
   public:
-    /// How the scatter pass ranks keys. Same result, other cost: see shaders/sort/radix_scatter_*.
-    enum class Strategy {
-        automatic,  // as the device is tuned: engine/gpu/tuning.h
-        ballot,
-        columns,
-    };
-
     /// capacity: the most pairs, > 0. Owns 8 bytes of scratch a pair and a kilobyte a block.
-    /// subgroup_size: 0 = the device's own.
-    RadixSort(Device& device, std::uint32_t capacity, Strategy strategy = Strategy::automatic,
+    /// scatter: same result, other cost; absent: as the device is tuned. subgroup_size: 0 = the
+    /// device's own.
+    RadixSort(Device& device, std::uint32_t capacity, std::optional<SortScatter> scatter = {},
               std::uint32_t subgroup_size = 0);
 
     std::uint32_t capacity() const { return capacity_; }
@@ -32,7 +27,7 @@ class RadixSort {
     static std::uint64_t max_capacity(const Device& device);
     /// Device memory of an automatic sort of this capacity.
     static std::uint64_t device_bytes(const Device& device, std::uint32_t capacity);
-    Strategy strategy() const { return strategy_; }
+    SortScatter scatter() const { return scatter_; }
     /// Pairs of one workgroup.
     std::uint32_t block() const { return shape_.block(); }
 
@@ -50,12 +45,13 @@ class RadixSort {
     struct Shape {
         std::uint32_t threads = 0;
         std::uint32_t items = 0;      // keys of one thread
-        std::uint32_t subgroups = 0;  // of one workgroup, ballot only
+        std::uint32_t subgroups = 0;  // of one workgroup, where each ranks by itself
         std::uint32_t block() const { return threads * items; }
     };
     static BufferList<RadixSort> buffers(std::uint32_t capacity, const Shape& shape);
     static std::uint64_t counters(std::uint32_t capacity, const Shape& shape);
-    static Shape choose_shape(const Device& device, Strategy strategy, std::uint32_t subgroup_size);
+    static Shape choose_shape(const Device& device, SortScatter scatter,
+                              std::uint32_t subgroup_size);
     struct KeyValues {
         const Buffer *keys, *values;
     };
@@ -63,9 +59,9 @@ class RadixSort {
                      const KeyValues& from, const KeyValues& to);
 
     std::uint32_t capacity_;
-    Strategy strategy_;
+    SortScatter scatter_;
     Shape shape_;
-    Pipeline prepare_, histogram_, scatter_, scatter_iota_;
+    Pipeline prepare_, histogram_, rank_, rank_iota_;
     Buffer plan_, histograms_, total_, keys_temp_, values_temp_;
     std::optional<Scan> scan_;
 };

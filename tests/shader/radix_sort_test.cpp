@@ -46,7 +46,7 @@ struct SortRun {
     RadixSort sort;
     Buffer keys, values, count;
 
-    SortRun(std::uint32_t capacity, RadixSort::Strategy strategy, std::uint32_t subgroup_size = 0)
+    SortRun(std::uint32_t capacity, SortScatter strategy, std::uint32_t subgroup_size = 0)
         : sort(device, capacity, strategy, subgroup_size),
           keys(device, "keys", (capacity + kGuardWords) * 4),
           values(device, "values", (capacity + kGuardWords) * 4),
@@ -98,7 +98,7 @@ void expect_sorted(SortRun& run, const Words& keys, std::uint32_t n, int key_bit
     }
 }
 
-class RadixStrategies : public ::testing::TestWithParam<RadixSort::Strategy> {};
+class RadixStrategies : public ::testing::TestWithParam<SortScatter> {};
 
 TEST_P(RadixStrategies, sizes_around_every_boundary_match) {
     SortRun run(70'000, GetParam());
@@ -172,17 +172,15 @@ TEST_P(RadixStrategies, every_subgroup_size_of_the_device_matches) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, RadixStrategies,
-                         ::testing::Values(RadixSort::Strategy::ballot,
-                                           RadixSort::Strategy::columns),
+                         ::testing::Values(SortScatter::ballot, SortScatter::columns),
                          [](const auto& param) {
-                             return param.param == RadixSort::Strategy::ballot ? "ballot"
-                                                                               : "columns";
+                             return param.param == SortScatter::ballot ? "ballot" : "columns";
                          });
 
 TEST(RadixSort, automatic_is_columns_on_lavapipe_only) {
     Device device{test::device_options()};
     const RadixSort sort(device, 100);
-    EXPECT_EQ(sort.strategy() == RadixSort::Strategy::columns, device.is_lavapipe());
+    EXPECT_EQ(sort.scatter() == SortScatter::columns, device.is_lavapipe());
 }
 
 TEST(RadixSort, validation_is_silent) {
@@ -194,7 +192,7 @@ TEST(RadixSort, validation_is_silent) {
     } catch (const std::exception& error) {
         GTEST_SKIP() << error.what();
     }
-    for (const auto strategy : {RadixSort::Strategy::ballot, RadixSort::Strategy::columns}) {
+    for (const auto strategy : {SortScatter::ballot, SortScatter::columns}) {
         RadixSort sort(*device, 9000, strategy);
         Buffer keys(*device, "keys", 36'000), count(*device, "count", 4);
         const Buffer values(*device, "values", 36'000);

@@ -11,19 +11,33 @@ namespace darb {
 /// The chosen subcommand's body; returns the exit code.
 using Action = std::function<int()>;
 
+/// `darb train` looks at the words as they were typed, too.
 void add_train(CLI::App& app, Action& action, const std::vector<std::string>& arguments);
-void add_eval(CLI::App& app, Action& action);
-void add_render(CLI::App& app, Action& action);
-void add_view(CLI::App& app, Action& action);
-void add_cost(CLI::App& app, Action& action);
-void add_bench(CLI::App& app, Action& action);
-void add_plan(CLI::App& app, Action& action);
-void add_info(CLI::App& app, Action& action);
-void add_convert(CLI::App& app, Action& action);
-void add_devices(CLI::App& app, Action& action);
-void add_psi(CLI::App& app, Action& action);
-void add_sim1d(CLI::App& app, Action& action);
-void add_compare(CLI::App& app, Action& action);
-void add_check(CLI::App& app, Action& action);
+
+#ifdef DARB_HAS_VIEWER
+#define DARB_VIEW_COMMAND(ROW) ROW(view, "Scenes")
+#else
+#define DARB_VIEW_COMMAND(ROW)
+#endif
+
+/// The others: the name, which is that of the file, and the heading of `darb --help`.
+#define DARB_COMMANDS(ROW)  \
+    ROW(eval, "Scenes")     \
+    ROW(render, "Scenes")   \
+    DARB_VIEW_COMMAND(ROW)  \
+    ROW(convert, "Scenes")  \
+    ROW(info, "Insight")    \
+    ROW(plan, "Insight")    \
+    ROW(devices, "Insight") \
+    ROW(cost, "Insight")    \
+    ROW(bench, "Insight")   \
+    ROW(check, "Insight")   \
+    ROW(compare, "Paper")   \
+    ROW(psi, "Paper")       \
+    ROW(sim1d, "Paper")
+
+#define DARB_COMMAND_ADDED(name, heading) void add_##name(CLI::App& app, Action& action);
+DARB_COMMANDS(DARB_COMMAND_ADDED)
+#undef DARB_COMMAND_ADDED
 
 }  // namespace darb

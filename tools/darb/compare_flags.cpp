@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
 #include "tools/darb/kernel_flags.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -52,7 +53,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     forward(command, flags, "-i,--images", "--images", "as in darb train");
     forward(command, flags, "--effects", "--effects", "as in darb train");
     forward(command, flags, "--footprint", "--footprint", "psi or exact");
-    forward(command, flags, "--strategy", "--strategy", "adc, mcmc or budget");
+    forward(command, flags, "--strategy", "--strategy", strategy_names());
     command.add_option("--train-options", flags.train_options,
                        "more options of darb train, as one word in quotes");
     command

@@ -24,10 +24,8 @@ std::vector<int> kernels_from_list(const std::string& option, const std::string&
     std::istringstream names(list);
     for (std::string name; std::getline(names, name, ',');) {
         const auto kernel = kernel_from_name(name);
-        std::string known;
-        for (int k = 0; k < KERNEL_COUNT; ++k)
-            known += (k == 0 ? "" : ", ") + std::string(kernel_name(k));
-        if (!kernel) throw Error(option + " " + name, "no such kernel", "There are " + known + ".");
+        if (!kernel)
+            throw Error(option + " " + name, "no such kernel", "There are " + kernel_names() + ".");
         if (*kernel >= KERNEL_COUNT)
             throw Error(option + " " + name, "has more than one pulse",
                         fmt::format("Write {}: darb train and compare have --pulses, and darb psi "
@@ -37,6 +35,13 @@ std::vector<int> kernels_from_list(const std::string& option, const std::string&
     }
     if (kernels.empty()) throw Error(option, "names no kernel", "Write all, or names with commas.");
     return kernels;
+}
+
+std::string kernel_names() {
+    std::string names;
+    for (int k = 0; k < KERNEL_COUNT; ++k)
+        names += (k == 0 ? "" : ", ") + std::string(kernel_name(k));
+    return names;
 }
 
 }  // namespace darb

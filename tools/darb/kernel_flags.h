@@ -11,4 +11,7 @@ namespace darb {
 /// of a row with more than one pulse.
 std::vector<int> kernels_from_list(const std::string& option, const std::string& list);
 
+/// The names of the family, with commas.
+std::string kernel_names();
+
 }  // namespace darb

@@ -47,17 +47,14 @@ void join_effects(std::vector<std::string>& arguments) {
     }
 }
 
-// The headings of `darb --help`.
-void group_commands(CLI::App& app) {
-    for (CLI::App* one : app.get_subcommands({})) {
-        const std::string name = one->get_name();
-        const auto in = [&](std::initializer_list<const char*> names) {
-            return std::find(names.begin(), names.end(), name) != names.end();
-        };
-        one->group(in({"train", "eval", "render", "view", "convert"})          ? "Scenes"
-                   : in({"info", "plan", "devices", "cost", "bench", "check"}) ? "Insight"
-                                                                               : "Paper");
-    }
+void add_commands(CLI::App& app, darb::Action& action, const std::vector<std::string>& arguments) {
+    darb::add_train(app, action, arguments);
+    app.get_subcommand("train")->group("Scenes");
+#define DARB_ADD_COMMAND(name, heading) \
+    darb::add_##name(app, action);      \
+    app.get_subcommand(#name)->group(heading);
+    DARB_COMMANDS(DARB_ADD_COMMAND)
+#undef DARB_ADD_COMMAND
 }
 
 int run(int argc, char** argv) {
@@ -74,23 +71,7 @@ int run(int argc, char** argv) {
     app.set_help_flag("-h,--help", "this, without the options of few users");
     app.set_help_all_flag("--help-all", "with every option");
     darb::Action action;
-    darb::add_train(app, action, arguments);
-    darb::add_eval(app, action);
-    darb::add_render(app, action);
-#ifdef DARB_HAS_VIEWER
-    darb::add_view(app, action);
-#endif
-    darb::add_convert(app, action);
-    darb::add_info(app, action);
-    darb::add_plan(app, action);
-    darb::add_devices(app, action);
-    darb::add_cost(app, action);
-    darb::add_bench(app, action);
-    darb::add_check(app, action);
-    darb::add_compare(app, action);
-    darb::add_psi(app, action);
-    darb::add_sim1d(app, action);
-    group_commands(app);
+    add_commands(app, action, arguments);
     if (!arguments.empty() && !arguments[0].starts_with('-') &&
         app.get_subcommands([&](CLI::App* one) { return one->check_name(arguments[0]); }).empty())
         throw darb::unknown_command(app, arguments[0]);

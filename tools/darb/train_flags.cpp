@@ -1,7 +1,10 @@
 #include "tools/darb/train_flags.h"
 
+#include <fmt/format.h>
+
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/help.h"
+#include "tools/darb/kernel_flags.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -56,18 +59,14 @@ void add_data_flags(CLI::App& command, TrainFlags& f) {
 }
 
 void add_scene_flags(CLI::App& command, TrainFlags& f) {
-    command
-        .add_option(
-            "--kernel", f.kernel,
-            "gaussian, raised_cosine, half_cosine_squared, sinc, inverse_quadratic, cosine, "
-            "squared_raised_cosine, inverse_multiquadric, parabolic")
+    command.add_option("--kernel", f.kernel, kernel_names())
         ->capture_default_str()
         ->group(option_group::kScene);
-    command
-        .add_option("--strategy", f.strategy,
-                    "how the splats grow: adc (by the screen gradient, as 3DGS), mcmc (dead splats "
-                    "move onto live ones, with noise) or budget (to a fixed count, where the error "
-                    "is)")
+    std::string strategies;
+    for (const Strategy strategy : all_strategies())
+        strategies += fmt::format("{}{} ({})", strategies.empty() ? "" : "; ",
+                                  strategy_name(strategy), strategy_row(strategy).summary);
+    command.add_option("--strategy", f.strategy, "how the splats grow: " + strategies)
         ->capture_default_str()
         ->group(option_group::kScene);
     add_effects_flag(command, f.effects);

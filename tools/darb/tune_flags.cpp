@@ -13,7 +13,7 @@ namespace darb {
 void add_tune_flags(CLI::App& command, TuneFlags& flags) {
     command
         .add_option("--tune", flags.choice,
-                    "run passes in these ways, such as scatter=ballot,backward=buckets; an "
+                    "run passes in these ways, such as blend=128x2,backward=buckets; an "
                     "unknown name lists those of the device")
         ->group(help_group::kDevice);
     command

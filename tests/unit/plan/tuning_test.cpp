@@ -109,10 +109,10 @@ TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
     Device& device = shared_device();
     EXPECT_EQ(device.tuning(), usual_tuning(device.info()));
     const ScopedVariants some(device, "scatter=ballot,backward=buckets");
-    EXPECT_EQ(device.tuning().scatter_by_columns, false);
+    EXPECT_EQ(device.tuning().scatter, SortScatter::ballot);
     EXPECT_EQ(device.tuning().backward, BackwardBlend::buckets);
     EXPECT_EQ(result_tuning(device), "backward=buckets");
-    EXPECT_EQ(RadixSort(device, 100).strategy(), RadixSort::Strategy::ballot);
+    EXPECT_EQ(RadixSort(device, 100).scatter(), SortScatter::ballot);
 }
 
 TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_intersections) {
@@ -216,7 +216,7 @@ TEST_F(Tuner, the_nearest_word_wins) {
     write_tuning(device.info(), folder_, record);
     tune(device, {"backward=subgroup", "scatter=columns,backward=buckets", false, {}});
     EXPECT_EQ(tuning_names(device.tuning()).at("scan"), record.choice["scan"]);
-    EXPECT_TRUE(device.tuning().scatter_by_columns);
+    EXPECT_EQ(device.tuning().scatter, SortScatter::columns);
     EXPECT_EQ(device.tuning().backward, BackwardBlend::subgroup);
     EXPECT_THROW(tune(device, {"", "no_such=1", false, {}}), Error);
 }
