@@ -16,6 +16,8 @@ failed=0
 python3 "$here/check_includes.py" . || failed=1
 python3 "$here/prose.py" --check --root . || failed=1
 [[ ! -f tools/guards.py ]] || python3 tools/guards.py check || failed=1
+[[ ! -f tools/price_of_determinism.py ]] || python3 tools/price_of_determinism.py --check || failed=1
+[[ ! -f tools/new_attribute.py ]] || python3 tools/new_attribute.py --check || failed=1
 
 folders=()
 for folder in engine trainer viewer tools tests shaders; do

@@ -4,6 +4,7 @@ summed in order. Builds, in a copy of the sources (build-atomics), the other way
 trains both in turn on the shipped scene, and prints the milliseconds of the two passes that differ.
 
     tools/price_of_determinism.py [OUT.json] [ROUNDS]      default 5 rounds of 300 iterations, median of the rounds
+    tools/price_of_determinism.py --check                  only whether the changes still fit the sources
 """
 
 import json
@@ -20,21 +21,30 @@ PASSES = ("blend backward", "project backward")
 
 # file, text, with atomics
 CHANGES = [
-    ("shaders/lib/reduce.glsl", "partials[slot * PARTIALS + gl_SubgroupInvocationID] += mine;",
-     "atomicAdd(partials[slot * PARTIALS + gl_SubgroupInvocationID], mine);"),
-    ("shaders/lib/reduce.glsl", "partials[slot * PARTIALS + i] += total;",
-     "atomicAdd(partials[slot * PARTIALS + i], total);"),
+    ("shaders/lib/partials.glsl", "partials0[at] += value;", "atomicAdd(partials0[at], value);"),
     ("shaders/lib/reduce.glsl", "partial_rest[slot] += rest;", "atomicAdd(partial_rest[slot], rest);"),
     ("shaders/backward/blend_backward.comp", "#extension GL_KHR_shader_subgroup_arithmetic : require",
      "#extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_shader_atomic_float : require"),
     ("shaders/backward/blend_backward.comp", "slot = intersection_from_sorted[number - 1u];", "slot = splat;"),
-    ("shaders/backward/project_backward.comp",
-     "const uint begin = first_intersection[i], end = begin + intersection_count[i];", "const uint begin = i, end = i + 1u;"),
-    ("engine/raster/backward.cpp", "if (intersections > intersection_capacity_ || intersection_capacity_ == 0) {",
-     "if (splats > intersection_capacity_ || (intersection_capacity_ == 0 && intersections + 1 > 0)) {"),
-    ("engine/raster/backward.cpp", "intersection_capacity_ = std::max(intersections, 1024u);",
-     "intersection_capacity_ = std::max(splats, 1024u);"),
+    ("shaders/backward/project_backward.comp", "uint e = first_intersection[i];", "uint e = i;"),
+    ("shaders/backward/project_backward.comp", "const uint end = e + intersection_count[i];",
+     "const uint end = e + min(intersection_count[i], 1u);"),
+    ("engine/raster/backward.cpp", "blend_.reserve(intersections, records);",
+     "blend_.reserve(std::max(splats, intersections), records);"),
 ]
+
+
+def changed_texts():
+    """The text of each file with its changes; ends where one does not fit the sources any more."""
+    texts = {}
+    for path, held, other in CHANGES:
+        if path not in texts:
+            with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+                texts[path] = file.read()
+        if texts[path].count(held) != 1:
+            sys.exit(f"tools/price_of_determinism.py: {path} holds '{held}' {texts[path].count(held)} times")
+        texts[path] = texts[path].replace(held, other)
+    return texts
 
 
 def build_atomics():
@@ -45,13 +55,9 @@ def build_atomics():
         if os.path.isfile(old):
             os.makedirs(os.path.dirname(new), exist_ok=True)
             shutil.copy2(old, new)
-    for path, held, other in CHANGES:
-        with open(os.path.join(COPY, path), encoding="utf-8") as file:
-            text = file.read()
-        if text.count(held) != 1:
-            sys.exit(f"{path} holds '{held}' {text.count(held)} times")
+    for path, text in changed_texts().items():
         with open(os.path.join(COPY, path), "w", encoding="utf-8") as file:
-            file.write(text.replace(held, other))
+            file.write(text)
     os.environ.update(CCACHE_BASEDIR=COPY, CCACHE_NOHASHDIR="1")
     build = os.path.join(COPY, "build")
     for command in (["cmake", "-G", "Ninja", "-S", COPY, "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
@@ -75,6 +81,9 @@ def train(darb, folder):
 def main():
     if {"-h", "--help"} & set(sys.argv[1:]):
         print(__doc__.strip())
+        return 0
+    if "--check" in sys.argv[1:]:
+        print(f"atomics: {len(changed_texts())} files, the changes fit")
         return 0
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     commands = {"deterministic": os.path.join(ROOT, "build/darb"), "atomics": build_atomics()}

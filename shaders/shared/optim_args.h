@@ -103,7 +103,7 @@ struct ResetOpacityArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ProjectBackwardArgs) == 68);
+static_assert(sizeof(ProjectBackwardArgs) == 44 + 4 * ATTRIBUTES);
 static_assert(sizeof(AdamUpdateArgs) == 56);
 }  // namespace darb::gpu
 #endif

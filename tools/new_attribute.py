@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""What the next attribute of splats takes: adds one, `glow`, a float that is added to all three channels of the colour,
+to a copy of the sources. It is trained, kept by density control, saved, resumed and compared with the reference in double.
+
+    tools/new_attribute.py --check      whether the changes fit the sources, and that they are in no more than 8 files
+    tools/new_attribute.py              builds the copy (build-attribute), runs `darb check` with it, trains the shipped
+                                        scene, and wants the attribute's gradients right, its column in the PLY changed by
+                                        training, and a resumed run bit-equal; minutes
+"""
+
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+COPY = os.path.join(ROOT, "build-attribute")
+MOST_FILES = 8
+
+# file, text, with the attribute
+CHANGES = [
+    ("shaders/shared/attribute_list.h", "#define ATTRIBUTES 6", "#define ATTRIBUTE_GLOW 6\n#define ATTRIBUTES 7"),
+    ("engine/scene/splat_attributes.h", "    kShRest = ATTRIBUTE_SH_REST,\n",
+     "    kShRest = ATTRIBUTE_SH_REST,\n    kGlow = ATTRIBUTE_GLOW,\n"),
+    ("engine/scene/splat_attributes.h", "    std::vector<T> sh_rest; ",
+     "    std::vector<T> glow;       // [N]\n    std::vector<T> sh_rest; "),
+    ("engine/scene/splat_attributes.h", "&Arrays::sh_rest};", "&Arrays::sh_rest, &Arrays::glow};"),
+    ("engine/scene/splat_attributes.h", "STEP_REST, nullptr},\n",
+     "STEP_REST, nullptr},\n    {\"glow\", \"glow\", 6, 1, false, false, true, STEP_PLAIN, nullptr},\n"),
+    ("shaders/forward/project.comp", "layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape {",
+     "layout(set = 0, binding = 1 + ATTRIBUTE_GLOW, scalar) readonly buffer Glow { float glow[]; };\n"
+     "layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape {"),
+    ("shaders/forward/project.comp", "vec3 colour = 0.5 + SH_C0 * sh_dc[i];", "vec3 colour = 0.5 + glow[i] + SH_C0 * sh_dc[i];"),
+    ("shaders/backward/project_gradient.glsl", "vec3 colour = 0.5 + SH_C0 * vec3(sh_dc",
+     "vec3 colour = 0.5 + glow[i] + SH_C0 * vec3(sh_dc"),
+    ("shaders/backward/project_backward.comp", "// Moments with UPDATE_ADAM, else gradients.\n",
+     "layout(set = 0, binding = 1 + ATTRIBUTE_GLOW, scalar) buffer Glow { float glow[]; };\n"
+     "layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_GLOW, scalar) buffer MGlow { vec2 m_glow[]; };\n"
+     "layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_GLOW, scalar) buffer DGlow { float d_glow[]; };\n"
+     "// Moments with UPDATE_ADAM, else gradients.\n"),
+    ("shaders/backward/project_backward.comp", "    if (UPDATE == UPDATE_ADAM && stands_near(",
+     "    UPDATE_FLOAT(glow[i], m_glow[i], d_glow[i], g.colour.r + g.colour.g + g.colour.b, args.rate[ATTRIBUTE_GLOW])\n"
+     "    if (UPDATE == UPDATE_ADAM && stands_near("),
+    ("engine/reference/projection.cpp", "Vec3<T> colour(T(0.5));", "Vec3<T> colour(T(0.5) + splats.glow[index]);"),
+    ("engine/reference/projection.cpp", "        out.sh_dc[index * 3 + c] = basis[0] * d_colour;\n",
+     "        out.sh_dc[index * 3 + c] = basis[0] * d_colour;\n        out.glow[index] += d_colour;\n"),
+    ("trainer/optimizer.cpp", "    step.rate[kShRest] = now.sh_rest;\n",
+     "    step.rate[kShRest] = now.sh_rest;\n    step.rate[kGlow] = now.sh_dc;\n"),
+]
+
+
+def changed_texts():
+    """The text of each file with its changes; ends where one does not fit the sources any more."""
+    texts = {}
+    for path, held, other in CHANGES:
+        if path not in texts:
+            with open(os.path.join(ROOT, path), encoding="utf-8") as file:
+                texts[path] = file.read()
+        if texts[path].count(held) != 1:
+            sys.exit(f"tools/new_attribute.py: {path} holds '{held}' {texts[path].count(held)} times")
+        texts[path] = texts[path].replace(held, other)
+    return texts
+
+
+def build():
+    files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True,
+                           capture_output=True, text=True).stdout
+    changed = changed_texts()
+    for name in files.splitlines():
+        old, new = os.path.join(ROOT, name), os.path.join(COPY, name)
+        if not os.path.isfile(old) or name.startswith(("docs/", "assets/")):
+            continue
+        os.makedirs(os.path.dirname(new), exist_ok=True)
+        if name in changed:
+            with open(new, "w", encoding="utf-8") as file:
+                file.write(changed[name])
+        elif not os.path.isfile(new) or os.path.getmtime(old) > os.path.getmtime(new):
+            shutil.copy2(old, new)
+    os.environ.update(CCACHE_BASEDIR=COPY, CCACHE_NOHASHDIR="1")
+    folder = os.path.join(COPY, "build")
+    for command in (["cmake", "-G", "Ninja", "-S", COPY, "-B", folder, "-DCMAKE_BUILD_TYPE=Release", "-DDARB_TESTS=OFF",
+                     "-DCMAKE_UNITY_BUILD=ON"], ["ninja", "-j2", "-C", folder, "darb"]):
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return os.path.join(folder, "darb")
+
+
+def column(ply, name):
+    """Of a binary PLY of floats."""
+    head, _, body = ply.partition(b"end_header\n")
+    names = [line.split()[2].decode() for line in head.splitlines() if line.startswith(b"property ")]
+    count = next(int(line.split()[2]) for line in head.splitlines() if line.startswith(b"element vertex "))
+    return [struct.unpack_from("<f", body, 4 * (i * len(names) + names.index(name)))[0] for i in range(count)]
+
+
+def trained(darb, folder, *options):
+    subprocess.run([darb, "train", os.path.join(ROOT, "assets/scene"), "-o", folder, "-q", "--no-report", "-r", "100",
+                    "--iterations", "160", *options], check=True, stdout=subprocess.DEVNULL)
+    with open(os.path.join(folder, "point_cloud/iteration_160/point_cloud.ply"), "rb") as file:
+        return file.read()
+
+
+def main():
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(__doc__.strip())
+        return 0
+    files = sorted(changed_texts())
+    print(f"a new attribute: {len(files)} files, at most {MOST_FILES}: {' '.join(files)}")
+    if len(files) > MOST_FILES or "--check" in sys.argv[1:]:
+        return 1 if len(files) > MOST_FILES else 0
+    darb = build()
+    subprocess.run([darb, "check"], check=True)
+    with tempfile.TemporaryDirectory() as folder:
+        scene = trained(darb, os.path.join(folder, "whole"), "--checkpoint-iterations", "80")
+        start = os.path.join(folder, "whole", "chkpnt80.darb")
+        resumed = trained(darb, os.path.join(folder, "resumed"), "--start-checkpoint", start)
+    glow = column(scene, "glow")
+    changed = sum(value != 0 for value in glow)
+    print(f"trained: {changed} of {len(glow)} splats glow, from {min(glow):.3f} to {max(glow):.3f}; resumed: "
+          f"{'the same scene' if resumed == scene else 'ANOTHER scene'}")
+    return 0 if changed > len(glow) / 2 and resumed == scene else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
