@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint64_t kPointBytes = 3 * (8 + 1);
 // Of a splat on the host while the model is made: its floats without the bands of colour, its
 // distance to its neighbours, and what the search tree holds of it.
-constexpr std::uint64_t kSplatBytes = 14 * 4 + 8 + 16;
+constexpr std::uint64_t kSplatBytes = splat_floats(0) * sizeof(float) + 8 + 16;
 
 // Of this process; the most there is where the system does not say.
 std::uint64_t address_space() {
