@@ -98,6 +98,16 @@ def changes(root, files):
     return found
 
 
+def same_names(files):
+    """Of headers, and of sources, in different folders; a program's main.cpp apart."""
+    folders = {}
+    for name in files:
+        path = pathlib.Path(name)
+        if path.suffix in (".h", ".cpp") and path.name != "main.cpp":
+            folders.setdefault(path.name, []).append(name)
+    return sorted(" ".join(names) for names in folders.values() if len(names) > 1)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="the same, with every place, as JSON")
@@ -110,12 +120,15 @@ def main():
              "signatures over 7 parameters": over(signatures, MOST_PARAMETERS),
              "classes over 25 members": over(members, MOST_MEMBERS)}
     if options.json:
-        print(json.dumps({**lists, "files of a change": touched}, indent=1))
+        print(json.dumps({**lists, "files of one name": same_names(files), "files of a change": touched}, indent=1))
         return
     for title, rows in lists.items():
         print(f"{title}: {len(rows)}")
         for value, name in rows[:12]:
             print(f"  {value:4}  {name}")
+    print(f"files of one name in different folders: {len(same_names(files))}")
+    for names in same_names(files):
+        print(f"        {names}")
     for name in ("Trainer", "Forward", "Viewer"):
         print(f"class {name}: {members.get(name, 0)} members, {methods.get(name, 0)} methods")
     print("files that name the last thing of a kind:")
