@@ -24,6 +24,7 @@ COPY = "build-guards"
 PROJECT = "shaders/forward/project.comp"
 CAMERA = "shaders/effects/camera_model.glsl"
 COVARIANCE = "shaders/lib/covariance.glsl"
+VALUES = "shaders/lib/splat_values.glsl"
 GRADIENT = "shaders/backward/project_gradient.glsl"
 BLEND = "shaders/forward/blend.comp"
 BLEND_BACK = "shaders/backward/blend_backward.comp"
@@ -58,8 +59,8 @@ GUARDS = [
     ("quaternion zero, tiny, huge, not normalised", "normalisation_gradient", GRADIENT,
      "(d_unit - unit * dot(unit, d_unit)) / norm", "d_unit",
      "project_backward_test", "ProjectBackward.quaternions_of_any_norm_match_double"),
-    ("log-scale of 50, opacity logit of 1e4", "scale_limit", PROJECT,
-     "exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT))", "exp(raw_scale)",
+    ("log-scale of 50, opacity logit of 1e4", "scale_limit", VALUES,
+     "exp(clamp(stored, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT))", "exp(stored)",
      "hard_case_test", "every/HardCase.matches_double/longest_needle_gaussian_psi"),
     ("log-scale of 50, opacity logit of 1e4", "scale_limit_gradient", GRADIENT,
      "outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT)", "d_log_scale",

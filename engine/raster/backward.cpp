@@ -6,6 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"
+#include "shaders/shared/lens.h"
 
 namespace darb {
 
@@ -36,6 +37,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     if (found != project_.end()) return found->second;
     SpecConstants constants = projection_constants(options_, sh_degree, sh_stored);
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(blend_.window_intersections());
+    constants["CAMERA_GRADIENT"] = options_.camera_gradient ? 1 : 0;
     constants["UPDATE"] = update;
     constants["REST"] = rest;
     return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;
@@ -81,6 +83,9 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
                       GpuSplats& splats, const Buffer& d_image, const AdamStep& step) {
     check_stored(options_);
     check_trainable(splats, step);
+    if (options_.linear_values || options_.direct_colour)
+        throw Error("backward pass", "a step of Adam is made of logits, logarithms and harmonics",
+                    "Leave linear_values and direct_colour off, or take record_gradients.");
     if (step.beta1 != 0.9 || step.beta2 != 0.999)
         throw Error("backward pass", fmt::format("betas {} and {}", step.beta1, step.beta2),
                     "Take AdamUpdate for others than 0.9 and 0.999.");
@@ -114,8 +119,12 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
 
 void Backward::record_gradients(Commands& commands, const FrameView& view, const Frame& frame,
                                 const GpuSplats& splats, const Buffer& d_image, GradientBuffers& to,
-                                bool add) {
+                                bool add, const Buffer* camera) {
     check_stored(options_);
+    if (options_.camera_gradient &&
+        (!camera || add || view.camera.lens_fold < static_cast<float>(LENS_FOLD_NONE)))
+        throw Error("backward pass", "no gradient of this camera can be left",
+                    "Give a buffer for it, add views up on the host, and take a pinhole.");
     if (to.count() != splats.count())
         throw Error("backward pass",
                     fmt::format("{} splats, gradients of {}", splats.count(), to.count()),
@@ -134,7 +143,9 @@ void Backward::record_gradients(Commands& commands, const FrameView& view, const
         args.first_splat = range.first;
         args.splat_end = range.first + range.count;
         // In place of a sum of harmonics, which is not touched.
-        const BufferRange rest = bound_rows(to.of(kShRest), kShRest, range, to.stride(kShRest));
+        const BufferRange rest =
+            camera ? BufferRange(*camera)
+                   : bound_rows(to.of(kShRest), kShRest, range, to.stride(kShRest));
         ProjectBuffers extra{{}, to.views(), rest};
         to.bind(range, extra.state);
         record_project(commands, view, frame, splats, pipeline, args, extra);

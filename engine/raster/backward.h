@@ -30,10 +30,12 @@ class Backward {
     void record(Commands& commands, const FrameView& view, const Frame& frame, GpuSplats& splats,
                 const Buffer& d_image, const AdamStep& step);
     /// The same into `to`, in place of what it holds or, with add, added to it; splats stay as they
-    /// are and need no moments.
+    /// are and need no moments. camera: float [N][kCameraFloats], where options.camera_gradient
+    /// asks for it, without add, of a pinhole: what shaders/backward/camera_gradient.glsl leaves.
     void record_gradients(Commands& commands, const FrameView& view, const Frame& frame,
                           const GpuSplats& splats, const Buffer& d_image, GradientBuffers& to,
-                          bool add);
+                          bool add, const Buffer* camera = nullptr);
+    static constexpr std::uint32_t kCameraFloats = 13;
 
     /// The backward blend alone: the intersections' sums of alpha T times the planes of `image`,
     /// float [3][H][W], where record() leaves those of dL/dcolour. Recorded between Forward::record

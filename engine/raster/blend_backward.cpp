@@ -59,6 +59,7 @@ void BlendBackward::make_pipelines(bool segmented) {
     SpecConstants constants = kernel_constants(options_);
     const std::uint32_t subgroup = add_block_constants(*device_, constants);
     constants["THREADS"] = static_cast<std::int32_t>(subgroup);
+    constants["ALPHA_GRADIENT"] = options_.alpha_gradient ? 1 : 0;
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);

@@ -27,6 +27,8 @@ SpecConstants kernel_constants(const ForwardOptions& options) {
                          options.polynomial_degree, options.alpha_cutoff);
     constants["STORAGE"] = options.storage;
     constants["DEPTH_ORDER"] = options.depth_order;
+    constants["LINEAR_VALUES"] = options.linear_values ? 1 : 0;
+    constants["DIRECT_COLOUR"] = options.direct_colour ? 1 : 0;
     return constants;
 }
 

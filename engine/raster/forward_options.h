@@ -23,6 +23,13 @@ struct ForwardOptions {
     bool store_for_backward = false;
     bool backward_follows = true;  // false: what is stored is looked at, without a backward pass
     HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;
+
+    // What the splats' floats stand for; shaders/lib/splat_values.glsl. Not for training steps.
+    bool linear_values = false;  // opacities and scales themselves, not logits and logarithms
+    bool direct_colour = false;  // sh_dc is the colour, of any sign; at degree 0
+    // What else the backward pass takes and leaves.
+    bool alpha_gradient = false;   // dL/d(image) has a fourth plane, dL/d(1 - transmittance)
+    bool camera_gradient = false;  // Backward::record_gradients leaves dL/d(camera), too
 };
 
 /// The constants of these options that several passes share: kernel, storage and depth order.

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "engine/core/error.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
+#include "engine/raster/frame_limit.h"
 #include "engine/render/frame_exchange.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/splat_shapes.h"
@@ -47,39 +49,68 @@ void check_camera(const Camera& camera, const glm::vec3& background) {
                     "A picture has pixels and positive focal lengths.");
 }
 
-std::vector<float> planes_of(const ImageF& d_image, const ImageF& image) {
-    if (d_image.width != image.width || d_image.height != image.height || d_image.channels != 3 ||
-        d_image.data.size() != size_t(image.width) * image.height * 3)
-        throw Error(
-            "dL/d(image)",
-            fmt::format("is {} x {} px of {} channels, the picture {} x {} of 3", d_image.width,
-                        d_image.height, d_image.channels, image.width, image.height),
-            "Give a value for each channel of each pixel.");
-    const size_t pixels = d_image.data.size() / 3;
-    std::vector<float> planes(d_image.data.size());
-    for (size_t i = 0; i < planes.size(); ++i) {
-        if (!std::isfinite(d_image.data[i]))
-            throw Error("dL/d(image)",
-                        fmt::format("is {} at pixel ({}, {}), channel {}", d_image.data[i],
-                                    i / 3 % static_cast<size_t>(image.width),
-                                    i / 3 / static_cast<size_t>(image.width), i % 3),
-                        "Check the loss.");
-        planes[i % 3 * pixels + i / 3] = d_image.data[i];
-    }
-    return planes;
-}
-
-ForwardOptions options_of(const SplatModel& model, bool lens) {
-    ForwardOptions options;
-    options.kernel = model.kernel;
-    options.footprint = model.footprint;
+ForwardOptions options_of(const SplatModel& model, const GradientOptions& asked, bool lens) {
+    if (asked.direct_colour && model.sh_degree > 0)
+        throw Error("splat model", fmt::format("harmonics of degree {}", model.sh_degree),
+                    "Colours of their own leave no room for harmonics: give either.");
+    if (asked.accuracy.value(kRenderScale) < 1)
+        throw Error("gradients", "of a picture that is half as large",
+                    "Render at the size that you want.");
+    ForwardOptions options = frame_accuracy(asked.accuracy, model).options;
     options.store_for_backward = true;
-    options.effects.antialias = model.antialias;
     options.effects.lens = lens;
+    options.linear_values = asked.linear_values;
+    options.direct_colour = asked.direct_colour;
+    options.alpha_gradient = true;
+    options.camera_gradient = asked.camera;
     return options;
 }
 
+// dL/d(background): the picture has it times the transmittance.
+glm::dvec3 background_gradient(const ImageF& d_image, const ImageF& transmittance) {
+    glm::dvec3 sum(0.0);
+    for (size_t i = 0; i < transmittance.data.size(); ++i)
+        for (int c = 0; c < 3; ++c)
+            sum[c] += double(transmittance.data[i]) *
+                      double(d_image.data[3 * i + static_cast<size_t>(c)]);
+    return sum;
+}
+
 }  // namespace
+
+std::vector<float> gradient_planes(const ImageF& d_image, const ImageF& d_alpha, int width,
+                                   int height) {
+    if (d_image.width != width || d_image.height != height || d_image.channels != 3 ||
+        d_image.data.size() != size_t(width) * height * 3)
+        throw Error("dL/d(image)",
+                    fmt::format("is {} x {} px of {} channels, the picture {} x {} of 3",
+                                d_image.width, d_image.height, d_image.channels, width, height),
+                    "Give a value for each channel of each pixel.");
+    const size_t pixels = d_image.data.size() / 3;
+    std::vector<float> planes(4 * pixels);
+    for (size_t i = 0; i < d_image.data.size(); ++i) {
+        if (!std::isfinite(d_image.data[i]))
+            throw Error("dL/d(image)",
+                        fmt::format("is {} at pixel ({}, {}), channel {}", d_image.data[i],
+                                    i / 3 % static_cast<size_t>(width),
+                                    i / 3 / static_cast<size_t>(width), i % 3),
+                        "Check the loss.");
+        planes[i % 3 * pixels + i / 3] = d_image.data[i];
+    }
+    if (d_alpha.data.empty()) return planes;
+    if (d_alpha.width != width || d_alpha.height != height || d_alpha.data.size() != pixels)
+        throw Error("dL/d(alpha)",
+                    fmt::format("is {} x {} px of {} channels, the picture {} x {}", d_alpha.width,
+                                d_alpha.height, d_alpha.channels, width, height),
+                    "Give a value for each pixel.");
+    for (size_t i = 0; i < pixels; ++i)
+        if (!std::isfinite(planes[3 * pixels + i] = d_alpha.data[i]))
+            throw Error("dL/d(alpha)",
+                        fmt::format("is {} at pixel ({}, {})", d_alpha.data[i],
+                                    i % static_cast<size_t>(width), i / static_cast<size_t>(width)),
+                        "Check the loss.");
+    return planes;
+}
 
 struct GradientRenderer::State {
     Device& device;
@@ -93,9 +124,12 @@ struct GradientRenderer::State {
     std::optional<FrameBuffers> buffers;
     std::optional<Forward> forward;
     std::optional<Backward> backward;
-    Buffer d_image;
+    Buffer d_image, camera_shares;
+    Camera camera;  // of the last picture
     FrameView view{};
     ImageF image;  // the last picture; no pixels before it
+    ImageF alpha, transmittance;
+    std::vector<PassTime> pass_times;
 
     State(Device& on, const SplatModel& model, const GradientOptions& asked)
         : device(on),
@@ -104,15 +138,37 @@ struct GradientRenderer::State {
           exchange(on),
           commands(on),
           gradients(on, splats) {
-        header.sh_degree = model.sh_degree;
+        options_of(model, asked, false);
         header.kernel = model.kernel;
         header.footprint = model.footprint;
         header.antialias = model.antialias;
+        note(model);
+    }
+    void note(const SplatModel& model) {
+        header.sh_degree = model.sh_degree;
         header.origin = model.origin;
+        image = {};
     }
     int degree() const {
-        const int asked = options.sh_degree;
-        return asked < 0 ? header.sh_degree : std::min(asked, header.sh_degree);
+        const int of_frame = frame_accuracy(options.accuracy, header).sh_degree;
+        return options.sh_degree < 0 ? of_frame : std::min(options.sh_degree, of_frame);
+    }
+    bool draws_as(const SplatModel& model) const {
+        return model.kernel == header.kernel && model.footprint == header.footprint &&
+               model.antialias == header.antialias;
+    }
+    bool holds_same(const SplatModel& model) const {
+        bool same = model.size() == splats.count() && model.sh_degree == header.sh_degree &&
+                    model.origin == header.origin;
+        for (int a = 0; a < kAttributeCount; ++a)
+            same = same && model.floats(a) == splats.stride(a);
+        return same;
+    }
+    void upload(const SplatModel& model) {
+        for (int a = 0; a < kAttributeCount; ++a)
+            if (const std::vector<float>& values = attribute_values(model, a); !values.empty())
+                splats.parameters(a).upload(values);
+        image = {};
     }
 };
 
@@ -126,27 +182,39 @@ GradientRenderer& GradientRenderer::operator=(GradientRenderer&&) noexcept = def
 void GradientRenderer::update(const SplatModel& model) {
     State& s = *state_;
     check_splat_shapes(model);
-    if (model.size() != s.splats.count() || model.sh_degree != s.header.sh_degree ||
-        model.kernel != s.header.kernel || model.footprint != s.header.footprint ||
-        model.antialias != s.header.antialias || model.origin != s.header.origin)
+    if (!s.draws_as(model) || !s.holds_same(model))
         throw Error("splat model", "is of other splats than the one on the device",
                     "Make another GradientRenderer for it.");
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const std::vector<float>& values = attribute_values(model, a);
-        if (values.size() != size_t{s.splats.count()} * s.splats.stride(a))
-            throw Error("splat model", fmt::format("{} came or went", attribute_name(a)),
-                        "Make another GradientRenderer for it.");
-        if (!values.empty()) s.splats.parameters(a).upload(values);
-    }
-    s.image = {};
+    s.upload(model);
 }
 
-ImageF GradientRenderer::render(const Camera& camera, const glm::vec3& background) {
+void GradientRenderer::replace(const SplatModel& model) {
+    State& s = *state_;
+    checked(s.device, model);
+    if (!s.draws_as(model))
+        throw Error("splat model", "is drawn in another way than the one on the device",
+                    "Make another GradientRenderer for it.");
+    options_of(model, s.options, false);
+    if (s.holds_same(model)) return s.upload(model);
+    s.image = {};
+    s.splats = GpuSplats(s.device, model, false);
+    s.gradients = GradientBuffers(s.device, s.splats);
+    s.note(model);
+}
+
+void GradientRenderer::set_view(int sh_degree, float near_plane) {
+    state_->options.sh_degree = sh_degree;
+    state_->options.near_plane = near_plane;
+}
+
+const ImageF& GradientRenderer::render(const Camera& camera, const glm::vec3& background) {
     State& s = *state_;
     check_camera(camera, background);
+    check_frame(s.device, camera.width, camera.height, "camera");
     s.image = {};
+    s.camera = camera;
     if (!s.drawn_with || s.drawn_with->effects.lens != camera.lens.active) {
-        s.drawn_with = options_of(s.header, camera.lens.active);
+        s.drawn_with = options_of(s.header, s.options, camera.lens.active);
         s.buffers.emplace(s.device, *s.drawn_with);
         s.forward.emplace(s.device, *s.drawn_with);
         s.backward.emplace(s.device, *s.drawn_with);
@@ -163,25 +231,61 @@ ImageF GradientRenderer::render(const Camera& camera, const glm::vec3& backgroun
         s.exchange.fetch(s.commands, frame.counters.status);
         s.commands.submit_and_wait();
     } while (s.buffers->make_room(s.exchange.status()));
-    const size_t floats = size_t(camera.width) * camera.height * 3;
-    s.image =
-        planes_to_image(frame.images.image.download<float>(floats), camera.width, camera.height);
+    s.pass_times = s.commands.pass_times();
+    const size_t pixels = size_t(camera.width) * camera.height;
+    s.image = planes_to_image(frame.images.image.download<float>(3 * pixels), camera.width,
+                              camera.height);
+    s.transmittance = s.alpha = ImageF(camera.width, camera.height, 1);
+    frame.images.final_transmittance.download(
+        std::as_writable_bytes(std::span(s.transmittance.data)));
+    for (size_t i = 0; i < pixels; ++i) s.alpha.data[i] = 1.0f - s.transmittance.data[i];
     return s.image;
 }
 
-ViewGradients GradientRenderer::backward(const ImageF& d_image) {
+const ImageF& GradientRenderer::alpha() const {
+    return state_->alpha;
+}
+gpu::FrameStatus GradientRenderer::status() const {
+    return state_->exchange.status();
+}
+const std::vector<PassTime>& GradientRenderer::pass_times() const {
+    return state_->pass_times;
+}
+std::uint32_t GradientRenderer::count() const {
+    return state_->splats.count();
+}
+
+ImageF GradientRenderer::depth() {
+    State& s = *state_;
+    if (s.image.width == 0)
+        throw Error("depth", "no picture was rendered of these splats", "Call render() first.");
+    const int width = s.image.width, height = s.image.height;
+    s.image = {};
+    s.commands.begin();
+    s.forward->record_depth(s.commands, s.splats.count(), s.view, s.buffers->frame());
+    s.commands.submit_and_wait();
+    const size_t floats = 2 * size_t(width) * size_t(height);
+    return depth_image(s.buffers->frame().images.image.download<float>(floats), width, height);
+}
+
+ViewGradients GradientRenderer::backward(const ImageF& d_image, const ImageF& d_alpha) {
     State& s = *state_;
     if (s.image.width == 0)
         throw Error("gradients", "no picture was rendered of these splats", "Call render() first.");
-    const std::vector<float> planes = planes_of(d_image, s.image);
+    const std::vector<float> planes =
+        gradient_planes(d_image, d_alpha, s.image.width, s.image.height);
     const std::uint64_t bytes = planes.size() * sizeof(float);
     if (s.d_image.bytes() < bytes) s.d_image = Buffer(s.device, "d_image", bytes);
     s.d_image.upload(planes);
     const Frame& frame = s.buffers->frame();
+    const std::uint64_t share_bytes =
+        std::uint64_t{s.splats.count()} * Backward::kCameraFloats * sizeof(float);
+    if (s.options.camera && s.camera_shares.bytes() < std::max<std::uint64_t>(share_bytes, 4))
+        s.camera_shares = Buffer(s.device, "camera shares", share_bytes);
     s.backward->reserve(s.splats.count(), frame.size.intersections, frame.checkpoint_records());
     s.commands.begin();
-    s.backward->record_gradients(s.commands, s.view, frame, s.splats, s.d_image, s.gradients,
-                                 false);
+    s.backward->record_gradients(s.commands, s.view, frame, s.splats, s.d_image, s.gradients, false,
+                                 s.options.camera ? &s.camera_shares : nullptr);
     s.exchange.fetch(s.commands, frame.counters.status);
     s.commands.submit_and_wait();
     ViewGradients view;
@@ -194,6 +298,13 @@ ViewGradients GradientRenderer::backward(const ImageF& d_image) {
         view.mean_gradient_ndc.push_back(shown[2 * i]);
         view.shown.push_back(shown[2 * i + 1] != 0 ? 1 : 0);
     }
+    view.d_background = background_gradient(d_image, s.transmittance);
+    if (s.options.camera)
+        view.d_camera =
+            camera_gradient(s.camera,
+                            n > 0 ? s.camera_shares.download<float>(n * Backward::kCameraFloats)
+                                  : std::vector<float>{},
+                            view.d.position);
     return view;
 }
 

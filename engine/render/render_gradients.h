@@ -6,10 +6,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "engine/core/image.h"
+#include "engine/gpu/commands.h"
 #include "engine/gpu/device.h"
+#include "engine/plan/accuracy.h"
+#include "engine/render/camera_gradient.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
@@ -25,11 +29,21 @@ struct ViewGradients {
     std::vector<float> mean_gradient_ndc;
     std::vector<std::uint8_t> shown;  // [N] 1 where a tile of the picture lists the splat
     gpu::FrameStatus status{};        // bad_gradients: splats whose gradients left float32; 0 in d
+    glm::dvec3 d_background{0.0};
+    std::optional<CameraGradient> d_camera;  // where GradientOptions ask for it
 };
 
 struct GradientOptions {
     int sh_degree = -1;                                   // harmonics in use; -1: all of the model
     float near_plane = static_cast<float>(NEAR_DEFAULT);  // world units along z
+    Accuracy accuracy{};  // but for resorted pixels and halved pictures, which have no gradients
+    /// The model's opacities and scales are these themselves, opacities in [0, 1], and so are their
+    /// gradients; not logits and logarithms.
+    bool linear_values = false;
+    /// The model's sh_dc is the colour, which may be negative: nothing is added and nothing
+    /// clamped.
+    bool direct_colour = false;
+    bool camera = false;  // d_camera; of pinholes
 };
 
 /// One model on a device for many views. Kernel, footprint and anti-aliasing are the model's.
@@ -44,18 +58,39 @@ class GradientRenderer {
     /// Other values for the same splats, after a step of the caller's. Throws Error where count,
     /// degree or origin are others.
     void update(const SplatModel& model);
+    /// Other splats, of any count, degree and origin; kernel, footprint and anti-aliasing are as
+    /// before. Pipelines and the frame's buffers stay.
+    void replace(const SplatModel& model);
+    /// From the next picture on, in place of what the options say.
+    void set_view(int sh_degree, float near_plane);
 
-    /// RGB, not clamped. Throws Error for a camera without pixels or with what is no number.
-    ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f));
-    /// Of the picture that render() last made, once for each; d_image [H][W][3] is dL/d(image).
-    /// Throws Error for another size, for values that are not finite, and where no picture was
-    /// made.
-    ViewGradients backward(const ImageF& d_image);
+    /// RGB, not clamped, there until the next call. Throws Error for a camera without pixels or
+    /// with what is no number.
+    const ImageF& render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f));
+    /// [H][W][1], of the same picture: 1 - transmittance.
+    const ImageF& alpha() const;
+    /// [H][W][2] of the same picture, as Renderer::render_depth; there are no gradients of it then.
+    ImageF depth();
+    /// Of the picture that render() last made, once for each; d_image [H][W][3] is dL/d(image),
+    /// d_alpha [H][W][1], or empty for none, dL/d(alpha). Throws Error for another size, for values
+    /// that are not finite, and where no picture was made.
+    ViewGradients backward(const ImageF& d_image, const ImageF& d_alpha = {});
+
+    /// Of the last render.
+    gpu::FrameStatus status() const;
+    const std::vector<PassTime>& pass_times() const;
+    std::uint32_t count() const;
 
   private:
     struct State;
     std::unique_ptr<State> state_;
 };
+
+/// [4][H][W] as the device takes them: dL/d(image) [H][W][3] and dL/d(alpha) [H][W][1], 0 where
+/// that is empty. Throws Error for another size than that of the picture and for what is not
+/// finite.
+std::vector<float> gradient_planes(const ImageF& d_image, const ImageF& d_alpha, int width,
+                                   int height);
 
 /// dL/d(image) [H][W][3] from the picture [H][W][3].
 using ImageGradient = std::function<ImageF(const ImageF& image)>;

@@ -36,6 +36,17 @@ ImageF planes_to_image(const std::vector<float>& planes, int width, int height) 
     return image;
 }
 
+ImageF depth_image(const std::vector<float>& planes, int width, int height) {
+    const size_t pixels = size_t(width) * height;
+    ImageF result(width, height, 2);
+    for (size_t p = 0; p < pixels; ++p) {
+        const float weight = planes[pixels + p];
+        result.data[2 * p] = weight >= 1.0f / 255 ? planes[p] / weight : 0.0f;
+        result.data[2 * p + 1] = weight;
+    }
+    return result;
+}
+
 Renderer::Renderer(Device& device, const SplatModel& model, const Accuracy& accuracy,
                    const ProjectionEffects& effects, HugeSplatPath huge_splat_path)
     : Renderer(device, model, frame_of(model, accuracy, effects, huge_splat_path)) {}
@@ -92,15 +103,8 @@ ImageF Renderer::render_depth() {
     forward_.record_depth(commands_, splats_.count(), view_, buffers_.frame());
     commands_.submit_and_wait();
     pass_times_ = commands_.pass_times();
-    const size_t pixels = size_t(width) * height;
-    const auto planes = buffers_.frame().images.image.download<float>(2 * pixels);
-    ImageF result(width, height, 2);
-    for (size_t p = 0; p < pixels; ++p) {
-        const float weight = planes[pixels + p];
-        result.data[2 * p] = weight >= 1.0f / 255 ? planes[p] / weight : 0.0f;
-        result.data[2 * p + 1] = weight;
-    }
-    return result;
+    const size_t floats = 2 * size_t(width) * size_t(height);
+    return depth_image(buffers_.frame().images.image.download<float>(floats), width, height);
 }
 
 }  // namespace darb

@@ -54,5 +54,7 @@ class Renderer {
 
 /// float [3][H][W] planes to an interleaved image.
 ImageF planes_to_image(const std::vector<float>& planes, int width, int height);
+/// [2][H][W] of Forward::record_depth, sums of w z and of w, to what Renderer::render_depth gives.
+ImageF depth_image(const std::vector<float>& planes, int width, int height);
 
 }  // namespace darb

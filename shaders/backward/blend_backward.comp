@@ -21,6 +21,7 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 8;  // SUBGROUP_SIZE
 layout(constant_id = 3) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
+layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // 1: d_image has a plane more, dL/d(1 - transmittance)
 
 #include "kernels/kernel.glsl"
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
@@ -61,6 +62,7 @@ uint load_pixels(uvec2 first, out Pixels px) {
     for (uint k = 0u; k < PIXELS; ++k) {
         const uvec2 at = first + slot_offset(k);
         px.d_colour[k] = vec3(0.0);
+        px.behind[k] = 0.0;
         px.transmittance[k] = 1.0;
         px.last[k] = 0u;
         if (at.x < args.width && at.y < args.height) {
@@ -68,8 +70,9 @@ uint load_pixels(uvec2 first, out Pixels px) {
             px.d_colour[k] = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
             px.transmittance[k] = final_transmittance[o];
             px.last[k] = last_intersection[o];
+            if (ALPHA_GRADIENT == 1) px.behind[k] = -d_image[3u * plane + o];
         }
-        px.behind[k] = dot(px.d_colour[k], background);
+        px.behind[k] += dot(px.d_colour[k], background);
         last = max(last, px.last[k]);
     }
     return last;

@@ -14,6 +14,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;  // BLOCK_PIXELS
 layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
+layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // as in blend_backward.comp
 
 layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
@@ -42,6 +43,7 @@ void main() {
 
     const vec3 d_colour = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
     float rest = dot(d_colour, vec3(args.background_r, args.background_g, args.background_b));
+    if (ALPHA_GRADIENT == 1) rest -= d_image[3u * plane + o];
     if (SEGMENT > 0u && last > range.y) rest = behind[o];
     const uint first = (range.x - whole.x) / BUCKET;
     uint bucket = (min(last, range.y) - 1u - whole.x) / BUCKET;

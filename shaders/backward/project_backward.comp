@@ -54,12 +54,14 @@ layout(set = 0, binding = FRAME_BINDING + 8, scalar) buffer GradientSum { vec2 g
 layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = FRAME_BINDING + 10, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world
 layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { float rest_sum[]; };  // as sh_rest, but with REST_EACH
+layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer CameraGradient { float camera_gradient[]; };  // [N][13] with CAMERA_GRADIENT
 
 const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
 const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 
 #define PARTIALS_BINDING (FRAME_BINDING + 2)
 #include "effects/constants.glsl"
+#include "lib/splat_values.glsl"
 #include "kernels/kernel.glsl"
 #include "lib/covariance.glsl"
 #include "effects/antialias.glsl"
@@ -69,6 +71,7 @@ const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 #include "lib/sh.glsl"
 #include "optim/adam.glsl"
 #include "optim/fading.glsl"
+#include "backward/camera_gradient.glsl"
 #include "backward/project_gradient.glsl"
 
 Partial sum_partials(uint i) {
@@ -133,7 +136,7 @@ void update_splat(uint i, SplatGradient g) {
         UPDATE_FLOAT(log_scale[at], m_log_scale[at], d_log_scale[at], g.log_scale[c],
                      args.rate[ATTRIBUTE_LOG_SCALE])
         if (UPDATE == UPDATE_ADAM && log_scale[at] > largest) log_scale[at] = largest;
-        UPDATE_FLOAT(sh_dc[at], m_sh_dc[at], d_sh_dc[at], SH_C0 * g.colour[c],
+        UPDATE_FLOAT(sh_dc[at], m_sh_dc[at], d_sh_dc[at], (DIRECT_COLOUR == 1 ? 1.0 : SH_C0) * g.colour[c],
                      args.rate[ATTRIBUTE_SH_DC])
     }
     for (uint c = 0u; c < 4u; ++c) {
@@ -175,6 +178,7 @@ void main() {
     if (i >= args.splat_end || status.overflow != 0u) return;
     SplatGradient g = no_gradient();
     vec2 shown = vec2(0.0);  // norm of the gradient of the mean, NDC; 1
+    if (CAMERA_GRADIENT == 1 && intersection_count[i] == 0u) clear_camera_gradient(i);
     if (intersection_count[i] > 0u) {
         const CameraData camera = cameras[args.camera_index];
         g = project_gradient(camera, i, sum_partials(i));
@@ -184,6 +188,7 @@ void main() {
             if (UPDATE == UPDATE_ADAM) return;
             g = no_gradient();
             shown = vec2(0.0, VIEWS_BAD);
+            if (CAMERA_GRADIENT == 1) clear_camera_gradient(i);
         }
     } else if (UPDATE == UPDATE_ADD) {
         return;

@@ -2,7 +2,7 @@
 // Source: docs/math.md, Gradients. Needs camera data, covariance.glsl, sh.glsl and the parameter buffers.
 
 struct SplatGradient {
-    vec3 position, log_scale;
+    vec3 position, log_scale;  // with LINEAR_VALUES of scale and, below, opacity
     vec4 rotation;
     float opacity_logit;
     vec3 colour;          // of the unclamped SH sum
@@ -68,7 +68,8 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
         from_centre(camera, vec3(position[3 * i], position[3 * i + 1], position[3 * i + 2]));
     const vec3 p = to_camera(camera, to_splat);
     const vec3 raw_scale = vec3(log_scale[3 * i], log_scale[3 * i + 1], log_scale[3 * i + 2]);
-    vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)), share = vec3(1.0);
+    vec3 s = scale_of(raw_scale), share = vec3(1.0);
+    const vec3 scale = s;
     float kept = 1.0;  // of the opacity, by the filters
     if (SMOOTHING == 1) kept = smooth_scale(s, smoothing[i], share);
     s *= sqrt(kernel_covariance_scale());
@@ -82,33 +83,44 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const vec3 r1 = (t0 * axes) * s, r2 = (t1 * axes) * s;
     vec3 d_r1, d_r2, d_log_scale;
     const float logit = opacity_logit[i];
-    const float o = 1.0 / (1.0 + exp(-logit)), rest = 1.0 / (1.0 + exp(logit));
+    const float o = LINEAR_VALUES == 1 ? logit : 1.0 / (1.0 + exp(-logit)), rest = 1.0 / (1.0 + exp(logit));
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
     factor_gradient(f, sums, r1, r2, o * kept, d_r1, d_r2, d_log_scale, g.mean);
     if (ANTIALIAS == 1) kept *= compensation(r1, r2, f);
     if (SMOOTHING == 1)
         d_log_scale = d_log_scale * share + sums.d_opacity * o * kept * (1.0 - share);
 
-    g.log_scale = outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT);
+    if (LINEAR_VALUES == 1)
+        g.log_scale = mix(vec3(0.0), d_log_scale / scale, equal(scale, raw_scale));
+    else
+        g.log_scale = outside_is_zero(d_log_scale, raw_scale, LOG_SCALE_LIMIT);
     const vec3 e1 = d_r1 * s, e2 = d_r2 * s;
     const mat3 d_axes = mat3(e1.x * t0 + e2.x * t1, e1.y * t0 + e2.y * t1, e1.z * t0 + e2.z * t1);
     const vec4 d_unit = quaternion_gradient(unit, d_axes);
     g.rotation = (d_unit - unit * dot(unit, d_unit)) / norm;
 
     const vec3 d_j0 = to_camera(camera, axes * e1), d_j1 = to_camera(camera, axes * e2);
-    g.position = to_world(camera, camera_point_gradient(camera, p, d_j0, d_j1, g.mean));
-    g.opacity_logit = abs(logit) <= OPACITY_LOGIT_LIMIT ? sums.d_opacity * kept * o * rest : 0.0;
+    const vec3 d_p = camera_point_gradient(camera, p, d_j0, d_j1, g.mean);
+    if (CAMERA_GRADIENT == 1)
+        store_camera_gradient(camera, i, p, to_splat, d_p, mat2x3(j0, j1), mat2x3(axes * e1, axes * e2),
+                              mat2x3(d_j0, d_j1), g.mean);
+    g.position = to_world(camera, d_p);
+    if (LINEAR_VALUES == 1)
+        g.opacity_logit = sums.d_opacity * kept;
+    else
+        g.opacity_logit = abs(logit) <= OPACITY_LOGIT_LIMIT ? sums.d_opacity * kept * o * rest : 0.0;
 
     const float range = length(to_splat);
     g.direction = to_splat / range;
-    vec3 colour = 0.5 + SH_C0 * vec3(sh_dc[3 * i], sh_dc[3 * i + 1], sh_dc[3 * i + 2]);
+    vec3 colour = first_band(vec3(sh_dc[3 * i], sh_dc[3 * i + 1], sh_dc[3 * i + 2]));
     float basis[SH_REST_MAX], along[SH_REST_MAX];
     sh_basis(g.direction, basis);
     for (int k = 0; k < SH_USED; ++k) {
         const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u;
         colour += basis[k] * vec3(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]);
     }
-    g.colour = mix(sums.d_colour, vec3(0.0), lessThan(colour, vec3(0.0)));
+    g.colour = sums.d_colour;
+    if (DIRECT_COLOUR == 0) g.colour = mix(g.colour, vec3(0.0), lessThan(colour, vec3(0.0)));
     if (SH_DEGREE > 0) {
         for (int k = 0; k < SH_USED; ++k) {
             const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u;

@@ -15,6 +15,7 @@ layout(constant_id = 1) const int SH_DEGREE = 0;   // degree in use
 layout(constant_id = 2) const int SH_STORED = 0;   // degree of the buffer's layout
 
 #include "effects/constants.glsl"
+#include "lib/splat_values.glsl"
 #include "kernels/kernel.glsl"
 #include "lib/linear_id.glsl"
 #include "lib/sh.glsl"
@@ -46,7 +47,7 @@ layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer Smoothing {
 
 // Not clamped: max may drop NaN.
 vec3 splat_colour(uint i, vec3 direction) {
-    vec3 colour = 0.5 + SH_C0 * sh_dc[i];
+    vec3 colour = first_band(sh_dc[i]);
     if (SH_DEGREE > 0) {
         float basis[SH_REST_MAX];
         sh_basis(direction, basis);
@@ -125,15 +126,14 @@ uint project(uint i, out int reason) {
 
     reason = CULL_OPACITY;
     const float logit = opacity_logit[i];
-    float opacity =
-        1.0 / (1.0 + exp(-clamp(logit, -OPACITY_LOGIT_LIMIT, OPACITY_LOGIT_LIMIT)));
+    float opacity = opacity_of(logit);
     if (STORAGE == STORAGE_FLOAT16 && !FILTERED) opacity = round_half(opacity);
     float reach = kernel_reach(opacity);
     if (!(reach > 0.0) || is_nan(logit)) return 0u;
 
     reason = CULL_COVARIANCE;
     const vec3 raw_scale = log_scale[i];
-    vec3 s = exp(clamp(raw_scale, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)), share;
+    vec3 s = scale_of(raw_scale), share;
     if (SMOOTHING == 1) opacity *= smooth_scale(s, smoothing[i], share);
     s *= sqrt(kernel_covariance_scale());
     vec3 j0, j1;
@@ -162,7 +162,7 @@ uint project(uint i, out int reason) {
     if (count == 0u) return 0u;
 
     reason = CULL_COLOUR;
-    const vec3 signed_colour = splat_colour(i, normalize(to_splat)), colour = max(signed_colour, 0.0);
+    const vec3 signed_colour = splat_colour(i, normalize(to_splat)), colour = shown_colour(signed_colour);
     if (any_nan(signed_colour) || !magnitude_below(colour, 1e30)) return 0u;
 
     float slope = 0.0;

@@ -1,0 +1,33 @@
+// dL/d(camera) of one splat, of the numbers that project.comp computes with, each free: the rotation's nine entries
+// by rows, the centre held, then fx, fy, cx, cy. With CAMERA_GRADIENT; the host adds the splats up, and has what
+// the centre does from dL/d(position). Needs camera_model.glsl; lenses are refused by the host.
+
+layout(constant_id = 30) const int CAMERA_GRADIENT = 0;
+
+// Of one row of the Jacobian, (f/z, ., -f ratio/z), whose last entry is free of f, but not of c, where the ratio is
+// held at the picture's margin: dL/df and dL/dc. d: gradients of the row's first and last entry.
+vec2 focal_gradient(vec2 d, float ratio, float free_ratio, float z, float d_pixel) {
+    const bool held = NEAR_CARE == 1 && ratio != free_ratio;
+    return vec2(d_pixel * free_ratio + (d.x - (held ? 0.0 : d.y * ratio)) / z,
+                d_pixel + (held ? d.y / z : 0.0));
+}
+
+void store_camera_gradient(CameraData camera, uint i, vec3 p, vec3 to_splat, vec3 d_p, mat2x3 j, mat2x3 d_t,
+                           mat2x3 d_j, vec2 d_mean) {
+    const uint at = 13u * i;
+    for (uint k = 0u; k < 3u; ++k) {
+        const vec3 row = d_p[k] * to_splat + j[0][k] * d_t[0] + j[1][k] * d_t[1];
+        for (uint c = 0u; c < 3u; ++c) camera_gradient[at + 3u * k + c] = row[c];
+    }
+    const vec2 free = p.xy / p.z, ratio = clamped_ratio(camera, free);
+    const vec2 of_x = focal_gradient(d_j[0].xz, ratio.x, free.x, p.z, d_mean.x);
+    const vec2 of_y = focal_gradient(d_j[1].yz, ratio.y, free.y, p.z, d_mean.y);
+    camera_gradient[at + 9u] = of_x.x;
+    camera_gradient[at + 10u] = of_y.x;
+    camera_gradient[at + 11u] = of_x.y;
+    camera_gradient[at + 12u] = of_y.y;
+}
+
+void clear_camera_gradient(uint i) {
+    for (uint c = 0u; c < 13u; ++c) camera_gradient[13u * i + c] = 0.0;
+}

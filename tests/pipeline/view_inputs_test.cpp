@@ -1,0 +1,272 @@
+// What a caller may give beside a model: opacities and scales themselves, colours, a loss of the
+// pixels' opacity; and what it may ask for: gradients of background and camera. Against the double
+// reference and its central differences.
+#include <cmath>
+
+#include "engine/core/error.h"
+#include "engine/core/rng.h"
+#include "engine/reference/reference_render.h"
+#include "engine/render/render_gradients.h"
+#include "tests/support/test_walk.h"
+
+namespace darb::test {
+namespace {
+
+ImageF random_image(const Camera& camera, int channels, std::uint64_t seed) {
+    Pcg32 rng(seed);
+    ImageF image(camera.width, camera.height, channels);
+    for (float& w : image.data) w = static_cast<float>(rng.uniform(-1, 1));
+    return image;
+}
+
+Image<double> widened(const ImageF& image) {
+    Image<double> wide(image.width, image.height, image.channels);
+    wide.data.assign(image.data.begin(), image.data.end());
+    return wide;
+}
+
+TestScene small_scene(int kernel = KERNEL_GAUSSIAN, std::uint64_t seed = 41) {
+    return random_scene({.count = 40, .width = 48, .height = 40, .kernel = kernel, .seed = seed});
+}
+
+const glm::vec3 kBackground(0.25f, 0.5f, 0.75f);
+
+reference::RenderSettings truth_settings() {
+    reference::RenderSettings settings;
+    settings.near_z = static_cast<float>(NEAR_DEFAULT);
+    for (int c = 0; c < 3; ++c) settings.background[c] = kBackground[c];
+    return settings;
+}
+
+/// sum of weights times picture and opacity, of the double reference.
+double loss(const SplatModel& model, const Camera& camera, const ImageF& weights,
+            const ImageF& alpha_weights) {
+    const reference::RenderResult r = reference::render(model, camera, truth_settings());
+    double sum = 0;
+    for (size_t i = 0; i < weights.data.size(); ++i)
+        sum += double(weights.data[i]) * r.images.colour.data[i];
+    for (size_t i = 0; i < alpha_weights.data.size(); ++i)
+        sum += double(alpha_weights.data[i]) * (1 - r.images.transmittance.data[i]);
+    return sum;
+}
+
+/// The same splats by opacities and scales.
+SplatModel linear_model(SplatModel model) {
+    for (float& o : model.opacity_logit) o = static_cast<float>(sigmoid(o));
+    for (float& s : model.log_scale) s = std::exp(s);
+    return model;
+}
+
+void expect_gradients(const reference::Gradients& truth, const ViewGradients& view) {
+    for (int a = 0; a < kAttributeCount; ++a)
+        EXPECT_TRUE(compare_scaled(std::string("d_") + attribute_name(a),
+                                   attribute_values(truth.splats, a), attribute_values(view.d, a),
+                                   tolerance("gradient_scaled_float32")));
+    EXPECT_TRUE(compare_scaled(
+        "d_background", std::vector{truth.background.x, truth.background.y, truth.background.z},
+        std::vector{view.d_background.x, view.d_background.y, view.d_background.z},
+        tolerance("gradient_scaled_float32")));
+}
+
+TEST(ViewInputs, a_loss_of_opacity_and_background_is_as_in_double) {
+    for (const BackwardBlend method : {BackwardBlend::subgroup, BackwardBlend::buckets}) {
+        Device& device = shared_device();
+        const Tuning before = device.tuning();
+        Tuning tuning = before;
+        tuning.backward = method;
+        device.set_tuning(tuning);
+        const TestScene scene = small_scene(KERNEL_RAISED_COSINE);
+        const ImageF weights = random_image(scene.camera, 3, 5);
+        const ImageF alpha_weights = random_image(scene.camera, 1, 6);
+        GradientRenderer renderer(device, scene.model);
+        renderer.render(scene.camera, kBackground);
+        const ImageF alpha = renderer.alpha();
+        const ViewGradients view = renderer.backward(weights, alpha_weights);
+        device.set_tuning(before);
+        const auto result = reference::render(scene.model, scene.camera, truth_settings());
+        std::vector<double> opacity;
+        for (const double t : result.images.transmittance.data) opacity.push_back(1 - t);
+        EXPECT_TRUE(compare_scaled("alpha", opacity, alpha.data, tolerance("image_float32")));
+        expect_gradients(reference::backward(scene.model, scene.camera, truth_settings(), result,
+                                             widened(weights), widened(alpha_weights)),
+                         view);
+    }
+}
+
+TEST(ViewInputs, opacities_and_scales_themselves_have_gradients_of_their_own) {
+    const TestScene scene = small_scene();
+    const ImageF weights = random_image(scene.camera, 3, 7);
+    const SplatModel linear = linear_model(scene.model);
+    GradientRenderer renderer(shared_device(), linear, {.linear_values = true});
+    const ImageF image = renderer.render(scene.camera, kBackground);
+    const ViewGradients view = renderer.backward(weights);
+    const auto result = reference::render(scene.model, scene.camera, truth_settings());
+    EXPECT_TRUE(
+        compare_scaled("image", result.images.colour.data, image.data, tolerance("image_float32")));
+    reference::Gradients truth =
+        reference::backward(scene.model, scene.camera, truth_settings(), result, widened(weights));
+    for (size_t i = 0; i < scene.model.size(); ++i) {
+        const double o = sigmoid(scene.model.opacity_logit[i]);
+        truth.splats.opacity_logit[i] /= o * (1 - o);
+    }
+    for (size_t i = 0; i < scene.model.log_scale.size(); ++i)
+        truth.splats.log_scale[i] /= std::exp(double(scene.model.log_scale[i]));
+    expect_gradients(truth, view);
+}
+
+TEST(ViewInputs, opacities_of_0_and_1_are_no_limits_of_the_gradient) {
+    TestScene scene = random_scene({.count = 1, .sh_degree = 0, .seed = 3});
+    scene.model.position = {0, 0, 0};
+    SplatModel linear = linear_model(scene.model);
+    const ImageF weights = random_image(scene.camera, 3, 8);
+    std::vector<double> d;
+    for (const float opacity : {0.5f, 1.0f}) {
+        linear.opacity_logit[0] = opacity;
+        GradientRenderer renderer(shared_device(), linear, {.linear_values = true});
+        renderer.render(scene.camera);
+        const ViewGradients view = renderer.backward(weights);
+        ASSERT_EQ(view.status.visible, 1u);
+        d.push_back(view.d.opacity_logit[0]);
+    }
+    EXPECT_NE(d[1], 0) << "at 1, where a logit has no slope";
+    linear.opacity_logit[0] = 0;
+    GradientRenderer renderer(shared_device(), linear, {.linear_values = true});
+    EXPECT_EQ(renderer.render(scene.camera).at(16, 12, 0), 0) << "a splat that is not there";
+}
+
+// A picture is linear in its colours, so that differences of any size are exact.
+TEST(ViewInputs, colours_of_their_own_may_be_negative) {
+    const TestScene scene = random_scene({.count = 30, .sh_degree = 0, .seed = 42});
+    SplatModel model = scene.model;
+    Pcg32 rng(9);
+    for (float& c : model.sh_dc) c = static_cast<float>(rng.uniform(-1, 1));
+    const GradientOptions options{.direct_colour = true};
+    GradientRenderer renderer(shared_device(), model, options);
+    const ImageF before = renderer.render(scene.camera);
+    const ImageF weights = random_image(scene.camera, 3, 10);
+    const ViewGradients view = renderer.backward(weights);
+    SplatModel moved = model;
+    double wanted = 0, got = 0;
+    for (size_t i = 0; i < model.sh_dc.size(); ++i) {
+        const auto step = static_cast<float>(rng.uniform(-1, 1));
+        moved.sh_dc[i] += step;
+        wanted += double(step) * view.d.sh_dc[i];
+    }
+    renderer.replace(moved);
+    const ImageF after = renderer.render(scene.camera);
+    for (size_t i = 0; i < before.data.size(); ++i)
+        got += double(weights.data[i]) * (after.data[i] - before.data[i]);
+    EXPECT_LT(*std::min_element(before.data.begin(), before.data.end()), -0.01f);
+    EXPECT_NEAR(got, wanted, 2e-4 * std::abs(wanted) + 1e-4);
+    EXPECT_THROW(GradientRenderer(shared_device(), small_scene().model, options), Error)
+        << "harmonics beside colours";
+}
+
+/// A camera moved along one of its ten degrees of freedom: turned about an axis of its own, moved,
+/// or with another number of the pinhole.
+Camera moved(Camera camera, int which, double h) {
+    if (which < 3) {
+        glm::dvec3 axis(0.0);
+        axis[which] = std::sin(h / 2);
+        const glm::dmat3 turn = reference::rotation_of(std::cos(h / 2), axis.x, axis.y, axis.z);
+        camera.rotation = turn * camera.rotation;
+        camera.translation = turn * camera.translation;
+    } else if (which < 6) {
+        camera.translation[which - 3] += h;
+    } else {
+        double* const numbers[] = {&camera.fx, &camera.fy, &camera.cx, &camera.cy};
+        *numbers[which - 6] += h;
+    }
+    return camera;
+}
+
+/// dL of that, by the gradient of the camera's numbers.
+double along(const CameraGradient& d, const Camera& camera, int which) {
+    if (which >= 6) return std::array{d.d_fx, d.d_fy, d.d_cx, d.d_cy}[size_t(which) - 6];
+    if (which >= 3) return d.d_translation[which - 3];
+    glm::dmat3 generator(0.0);  // of the rotation about that axis
+    const int j = (which + 1) % 3, k = (which + 2) % 3;
+    generator[j][k] = 1;
+    generator[k][j] = -1;
+    const glm::dmat3 d_rotation = generator * camera.rotation;
+    double sum = glm::dot(d.d_translation, generator * camera.translation);
+    for (int c = 0; c < 3; ++c) sum += glm::dot(d.d_rotation[c], d_rotation[c]);
+    return sum;
+}
+
+TEST(ViewInputs, gradients_of_the_camera_are_central_differences_of_the_reference) {
+    for (const bool wide : {false, true}) {
+        SCOPED_TRACE(wide);
+        TestScene scene = small_scene(KERNEL_GAUSSIAN, 43);
+        if (wide) {  // splats beside the picture that reach into it, where the Jacobian is held
+            scene.camera.fx *= 2.5;
+            scene.camera.fy *= 2.5;
+        }
+        const ImageF weights = random_image(scene.camera, 3, 11);
+        const ImageF alpha_weights = random_image(scene.camera, 1, 12);
+        GradientRenderer renderer(shared_device(), scene.model, {.camera = true});
+        renderer.render(scene.camera, kBackground);
+        const ViewGradients view = renderer.backward(weights, alpha_weights);
+        ASSERT_TRUE(view.d_camera.has_value());
+        ASSERT_GT(view.status.visible, 10u);
+        std::vector<double> truth, got;
+        for (int which = 0; which < 10; ++which) {
+            const double h = 1e-7;  // seldom across a cut-off, where the picture jumps
+            const double up =
+                loss(scene.model, moved(scene.camera, which, h), weights, alpha_weights);
+            const double down =
+                loss(scene.model, moved(scene.camera, which, -h), weights, alpha_weights);
+            const double difference = (up - down) / (2 * h);
+            const double mine = along(*view.d_camera, scene.camera, which);
+            EXPECT_NEAR(mine, difference, 2e-3 * std::abs(difference) + 0.02) << which;
+        }
+    }
+}
+
+TEST(ViewInputs, other_splats_take_the_place_of_those_on_the_device) {
+    const TestScene scene = small_scene();
+    const TestScene fewer = random_scene({.count = 7, .width = 48, .height = 40, .seed = 44});
+    GradientRenderer renderer(shared_device(), scene.model);
+    const ImageF first = renderer.render(scene.camera);
+    renderer.replace(fewer.model);
+    EXPECT_EQ(renderer.count(), 7u);
+    EXPECT_EQ(renderer.render(scene.camera).data,
+              GradientRenderer(shared_device(), fewer.model).render(scene.camera).data);
+    EXPECT_EQ(renderer.backward(first).d.opacity_logit.size(), 7u);
+    renderer.replace(scene.model);
+    EXPECT_EQ(renderer.render(scene.camera).data, first.data);
+    SplatModel cosine = scene.model;
+    cosine.kernel = KERNEL_RAISED_COSINE;
+    EXPECT_THROW(renderer.replace(cosine), Error);
+}
+
+TEST(ViewInputs, depths_are_those_of_the_renderer) {
+    const TestScene scene = small_scene();
+    GradientRenderer renderer(shared_device(), scene.model);
+    const ImageF weights = renderer.render(scene.camera);
+    Renderer other(shared_device(), scene.model);
+    other.render(scene.camera);
+    EXPECT_EQ(renderer.depth().data, other.render_depth().data);
+    EXPECT_THROW(renderer.backward(weights), Error) << "the picture is gone";
+}
+
+TEST(ViewInputs, mistakes_of_the_caller_are_errors) {
+    TestScene scene = small_scene();
+    GradientRenderer renderer(shared_device(), scene.model, {.camera = true});
+    const ImageF weights = renderer.render(scene.camera);
+    EXPECT_THROW(renderer.backward(weights, ImageF(3, 3, 1)), Error);
+    ImageF alpha = random_image(scene.camera, 1, 1);
+    alpha.data[5] = std::nanf("");
+    EXPECT_THROW(renderer.backward(weights, alpha), Error);
+    alpha.data[5] = 0;
+    EXPECT_NO_THROW(renderer.backward(weights, alpha));
+    scene.camera.lens.active = true;
+    renderer.render(scene.camera);
+    EXPECT_THROW(renderer.backward(weights), Error) << "no gradients of a lens";
+    GradientOptions halved;
+    halved.accuracy.choice[kRenderScale] = 1;
+    EXPECT_THROW(GradientRenderer(shared_device(), scene.model, halved), Error);
+}
+
+}  // namespace
+}  // namespace darb::test
