@@ -32,9 +32,9 @@ CHANGES = [
     ("shaders/forward/project.comp", "layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape {",
      "layout(set = 0, binding = 1 + ATTRIBUTE_GLOW, scalar) readonly buffer Glow { float glow[]; };\n"
      "layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape {"),
-    ("shaders/forward/project.comp", "vec3 colour = 0.5 + SH_C0 * sh_dc[i];", "vec3 colour = 0.5 + glow[i] + SH_C0 * sh_dc[i];"),
-    ("shaders/backward/project_gradient.glsl", "vec3 colour = 0.5 + SH_C0 * vec3(sh_dc",
-     "vec3 colour = 0.5 + glow[i] + SH_C0 * vec3(sh_dc"),
+    ("shaders/forward/project.comp", "vec3 colour = first_band(sh_dc[i]);", "vec3 colour = glow[i] + first_band(sh_dc[i]);"),
+    ("shaders/backward/project_gradient.glsl", "vec3 colour = first_band(vec3(sh_dc",
+     "vec3 colour = glow[i] + first_band(vec3(sh_dc"),
     ("shaders/backward/project_backward.comp", "// Moments with UPDATE_ADAM, else gradients.\n",
      "layout(set = 0, binding = 1 + ATTRIBUTE_GLOW, scalar) buffer Glow { float glow[]; };\n"
      "layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_GLOW, scalar) buffer MGlow { vec2 m_glow[]; };\n"

@@ -51,17 +51,11 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const std::filesystem::p
     return checkpoint;
 }
 
-// Where RunOptions does not bring the photos as they are to be trained and compared; without the
-// effect alpha every pixel is opaque.
+// Where RunOptions does not bring the photos as they are to be trained and compared.
 std::vector<ImageU8> own_photos(const Dataset& dataset, const TrainOptions& options,
                                 const RunOptions& run) {
     if (!run.photos.empty() && options.alpha) return {};
-    std::vector<ImageU8> photos = run.photos.empty() ? load_photos(dataset.views) : run.photos;
-    if (options.alpha) return photos;
-    for (ImageU8& photo : photos)
-        if (photo.channels == 4)
-            for (std::size_t a = 3; a < photo.data.size(); a += 4) photo.data[a] = 255;
-    return photos;
+    return photos_of_run(dataset, options, run.photos);
 }
 
 // One run: the loop and what it writes. The stopwatch counts training alone.
@@ -419,6 +413,16 @@ void Run::report_troubles() {
 }
 
 }  // namespace
+
+std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& options,
+                                   std::vector<ImageU8> loaded) {
+    std::vector<ImageU8> photos = loaded.empty() ? load_photos(dataset.views) : std::move(loaded);
+    if (options.alpha) return photos;
+    for (ImageU8& photo : photos)
+        if (photo.channels == 4)
+            for (std::size_t a = 3; a < photo.data.size(); a += 4) photo.data[a] = 255;
+    return photos;
+}
 
 RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
                         const RunOptions& run, const std::atomic<bool>* stop) {

@@ -69,6 +69,11 @@ struct RunSummary {
         passes;  // mean ms an iteration and share of the roofline, in their order
 };
 
+/// The photos as a run trains on them and compares with: without the effect alpha every pixel is
+/// opaque. loaded: as load_photos gives them, or none.
+std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& options,
+                                   std::vector<ImageU8> loaded = {});
+
 /// Trains until options.iterations or until *stop; saves, evaluates and logs as RunOptions says.
 /// Progress goes to stderr: a bar on a terminal, plain lines elsewhere. Throws Error; the last
 /// checkpoint is then intact, and where the device is not what failed, checkpoint and scene are

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "engine/core/check.h"
+#include "engine/render/render_gradients.h"
 #include "engine/render/renderer.h"
 
 namespace darb {
@@ -58,6 +59,7 @@ bool TrainingStep::make_room(const gpu::FrameStatus& status) {
 }
 
 void TrainingStep::run(const StepInput& input) {
+    if (picture_gradient) drain();
     Flight& flight = flights_[input.iteration & 1];
     launch(flight, input);
     complete(flights_[(input.iteration + 1) & 1]);
@@ -75,31 +77,76 @@ void TrainingStep::launch(Flight& flight, const StepInput& input) {
     reserve_backward();
     if (on_reserved) on_reserved();
     flight.input = input;
+    if (picture_gradient) ask_for_gradient(flight);
     flight.busy = true;
     flight.commands.begin();
-    record(flight.commands, input, flight.loss);
+    if (!picture_gradient) record_picture(flight.commands, input);
+    record_before_loss(flight.commands, input);
+    if (picture_gradient)
+        flight.commands.copy(given_d_image_, d_image_, std::uint64_t{input.view.size()} * 12);
+    else
+        record_loss(flight.commands, input, flight.loss);
+    record_update(flight.commands, input);
     flight.commands.copy(buffers_.frame().counters.status, flight.status, sizeof(gpu::FrameStatus));
     flight.commands.submit();
 }
 
-void TrainingStep::record(Commands& commands, const StepInput& input, const Buffer& loss) {
+StepFrame TrainingStep::step_frame(Commands& commands, const StepInput& input) {
+    Frame& frame = buffers_.frame();
+    const Buffer& compared = exposure_ ? exposure_->mapped() : frame.images.image;
+    return {commands, input.view.frame,   frame,    backward_,      *splats_,
+            compared, *input.view.pixels, d_image_, input.iteration};
+}
+
+void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
     const TrainingView& view = input.view;
     Frame& frame = buffers_.frame();
-    const Buffer& image = frame.images.image;
     forward_.record(commands, *splats_, view.frame, frame);
-    if (exposure_) exposure_->record(commands, image, view.photo, view.size());
-    const Buffer& compared = exposure_ ? exposure_->mapped() : image;
-    const StepFrame step{commands, view.frame,   frame,    backward_,      *splats_,
-                         compared, *view.pixels, d_image_, input.iteration};
-    if (input.strategy && input.measures) input.strategy->record_before_loss(step);
+    if (exposure_) exposure_->record(commands, frame.images.image, view.photo, view.size());
+}
+
+void TrainingStep::record_before_loss(Commands& commands, const StepInput& input) {
+    if (input.strategy && input.measures)
+        input.strategy->record_before_loss(step_frame(commands, input));
+}
+
+void TrainingStep::record_loss(Commands& commands, const StepInput& input, const Buffer& loss) {
+    const TrainingView& view = input.view;
+    const Buffer& compared = exposure_ ? exposure_->mapped() : buffers_.frame().images.image;
     loss_.record(commands, {compared, *view.pixels, d_image_, loss}, view.width(), view.height(),
                  view.frame.background, lambda_dssim_);
+}
+
+void TrainingStep::record_update(Commands& commands, const StepInput& input) {
+    const TrainingView& view = input.view;
+    Frame& frame = buffers_.frame();
     if (exposure_)
         exposure_->record_backward(
-            commands, image, d_image_, frame.counters.status,
+            commands, frame.images.image, d_image_, frame.counters.status,
             {view.photo, view.size(), input.exposure_rate, input.exposure_visits});
     backward_.record(commands, view.frame, frame, *splats_, d_image_, input.adam);
-    if (input.strategy) input.strategy->record_after_update(step);
+    if (input.strategy) input.strategy->record_after_update(step_frame(commands, input));
+}
+
+// A frame that did not fit is drawn again before anybody sees it: the step behind it then fits.
+void TrainingStep::ask_for_gradient(Flight& flight) {
+    const TrainingView& view = flight.input.view;
+    do {
+        flight.commands.begin();
+        record_picture(flight.commands, flight.input);
+        record_loss(flight.commands, flight.input, flight.loss);
+        flight.commands.submit_and_wait();
+    } while (make_room(buffers_.frame().read_status()));
+    const Buffer& compared = exposure_ ? exposure_->mapped() : buffers_.frame().images.image;
+    const size_t floats = 3 * size_t{view.size()};
+    const ImageF d_picture = picture_gradient(
+        planes_to_image(compared.download<float>(floats), view.width(), view.height()),
+        flight.input);
+    std::vector<float> planes = gradient_planes(d_picture, {}, view.width(), view.height());
+    planes.resize(floats);
+    if (given_d_image_.bytes() < floats * sizeof(float))
+        given_d_image_ = Buffer(*device_, "d_image of the caller", floats * sizeof(float));
+    given_d_image_.upload(planes);
 }
 
 // Where the step overflowed it changed nothing and tells nothing.

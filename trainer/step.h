@@ -66,6 +66,11 @@ class TrainingStep {
     std::function<void(const StepOutcome&)> on_finished;
     /// Called when a step's buffers have the size that it takes.
     std::function<void()> on_reserved;
+    /// A loss of the caller's in place of the built-in one, which is still measured: from the
+    /// picture [H][W][3] as it is compared, not clamped, to dL/d(picture) of the same size. Steps
+    /// are then done one at a time. Where it throws, or returns what is no gradient, run() throws
+    /// and the step has changed nothing.
+    std::function<ImageF(const ImageF& picture, const StepInput& input)> picture_gradient;
 
     // The queue must be idle for all below.
 
@@ -97,7 +102,12 @@ class TrainingStep {
     };
     void reserve_backward();
     void launch(Flight& flight, const StepInput& input);
-    void record(Commands& commands, const StepInput& input, const Buffer& loss);
+    void record_picture(Commands& commands, const StepInput& input);
+    void record_before_loss(Commands& commands, const StepInput& input);
+    void record_loss(Commands& commands, const StepInput& input, const Buffer& loss);
+    void record_update(Commands& commands, const StepInput& input);
+    StepFrame step_frame(Commands& commands, const StepInput& input);
+    void ask_for_gradient(Flight& flight);
     gpu::FrameStatus finish(Flight& flight, StepOutcome& outcome);
     void complete(Flight& flight);
     gpu::FrameStatus redo(const StepInput& input, gpu::FrameStatus status);
@@ -112,6 +122,7 @@ class TrainingStep {
     float lambda_dssim_;
     std::optional<Exposure> exposure_;  // options.exposure
     Buffer d_image_;
+    Buffer given_d_image_;  // [3][H][W] of picture_gradient
     std::array<Flight, 2> flights_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -105,17 +106,37 @@ StepInput Trainer::input_for(int iteration, int view) const {
 // Density control opens the next iteration rather than closing its own, so that what is evaluated
 // and saved between them is what was trained, not what was just reset.
 void Trainer::step() {
-    if (iteration_ > 0) {
-        control_density(iteration_);
-        update_smoothing();
-        if (probe_.is_due(iteration_, splats_.sh_degree())) probe_degree();
-    }
+    if (opened_ != iteration_) open_iteration();
     set_resolution(iteration_ + 1);
+    const StepInput input = input_for(iteration_ + 1, order_.view(iteration_ + 1));
+    if (step_.picture_gradient) step_.run(input);
     ++iteration_;
-    step_.run(input_for(iteration_, order_.view(iteration_)));
+    if (!step_.picture_gradient) step_.run(input);
     if (smoothing_) smoothing_->advance(iteration_);
     update_smoothing();
     if (schedule_.averages_after(iteration_)) average();
+}
+
+void Trainer::open_iteration() {
+    const std::optional<DensityResult> round = control_density(iteration_);
+    update_smoothing();
+    if (probe_.is_due(iteration_, splats_.sh_degree())) probe_degree();
+    opened_ = iteration_;
+    if (round && on_round) on_round(iteration_, *round);
+}
+
+void Trainer::set_picture_gradient(std::function<ImageF(const TrainingPicture&)> gradient) {
+    drain();
+    step_.picture_gradient = nullptr;
+    if (!gradient) return;
+    step_.picture_gradient = [this, gradient = std::move(gradient)](const ImageF& picture,
+                                                                    const StepInput& input) {
+        const TrainingView& view = input.view;
+        ImageU8 photo(view.width(), view.height(), 4);
+        view.pixels->download(std::as_writable_bytes(std::span(photo.data)));
+        return gradient({picture, photo, photos_.name(photos_.views()[view.photo]), input.iteration,
+                         view.frame.background});
+    };
 }
 
 void Trainer::finish(const StepOutcome& outcome) {
@@ -128,14 +149,16 @@ void Trainer::finish(const StepOutcome& outcome) {
                static_cast<int>(splats_.stride(kShRest))});
 }
 
-void Trainer::control_density(int iteration) {
-    if (iteration >= schedule_.rounds.end) return;
+std::optional<DensityResult> Trainer::control_density(int iteration) {
+    if (iteration >= schedule_.rounds.end) return std::nullopt;
     const bool round = schedule_.refines_after(iteration);
     const bool reset = schedule_.resets_after(iteration);
-    if (!round && !reset) return;
+    if (!round && !reset) return std::nullopt;
     drain();
-    if (round) run_round(iteration);
+    std::optional<DensityResult> result;
+    if (round) result = run_round(iteration);
     if (reset) density_.reset_opacity(splats_, schedule_.resets.to);
+    return result;
 }
 
 gpu::DensifyArgs Trainer::round_args(int iteration) const {
@@ -151,7 +174,7 @@ gpu::DensifyArgs Trainer::round_args(int iteration) const {
     return args;
 }
 
-void Trainer::run_round(int iteration) {
+DensityResult Trainer::run_round(int iteration) {
     const std::uint32_t limit = memory_.growth_limit(held(), totals_.counters);
     const DensityResult result = strategy_->round(
         {splats_, density_, step_.gradient_sum(), round_args(iteration), iteration, limit});
@@ -164,6 +187,7 @@ void Trainer::run_round(int iteration) {
     }
     reorder();
     step_.clear_gradient_sum();
+    return result;
 }
 
 void Trainer::reorder() {
@@ -312,6 +336,7 @@ void Trainer::restore(const State& s) {
     step_.restore_gradient_sum(s.gradient_sum);
     average_.restore(s.mean, s.averaged);
     iteration_ = s.iteration;
+    opened_ = s.iteration > 0 ? -1 : 0;
     totals_.counters = s.counters;
     strategy_->restore(splats_.count(), s.error_shares);
     set_resolution(std::max(iteration_, 1));

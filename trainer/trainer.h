@@ -40,6 +40,15 @@ struct IterationResult {
     int rest_floats = 0;       // of a splat's harmonics, as buffers hold them
 };
 
+/// A picture in training, as a loss of the caller's sees it; valid during the call.
+struct TrainingPicture {
+    const ImageF& image;      // [H][W][3] as it is compared with the photo, not clamped
+    const ImageU8& photo;     // [H][W][4], at the size that photos have now
+    const std::string& name;  // of the view
+    int iteration = 0;        // that this is a step of, from 1
+    glm::vec3 background{0.0f};
+};
+
 class Trainer {
   public:
     using State = TrainerState;
@@ -56,6 +65,12 @@ class Trainer {
     void step();
     void drain() { step_.drain(); }
     std::function<void(const IterationResult&)> on_result;
+    /// After each round of density control, with the iteration that it followed. Where it throws,
+    /// step() does; it goes on where it stopped.
+    std::function<void(int iteration, const DensityResult& result)> on_round;
+    /// A loss of the caller's: TrainingStep::picture_gradient. Empty: the built-in one. Where it
+    /// throws, step() does, and the iteration is still to be done.
+    void set_picture_gradient(std::function<ImageF(const TrainingPicture&)> gradient);
 
     /// Iterations finished or under way.
     int iteration() const { return iteration_; }
@@ -100,8 +115,9 @@ class Trainer {
     glm::vec3 background_for(int iteration) const;
     StepInput input_for(int iteration, int view) const;
     void finish(const StepOutcome& outcome);
-    void control_density(int iteration);
-    void run_round(int iteration);
+    std::optional<DensityResult> control_density(int iteration);
+    DensityResult run_round(int iteration);
+    void open_iteration();
     gpu::DensifyArgs round_args(int iteration) const;
     void reorder();
     void set_resolution(int iteration);
@@ -129,6 +145,7 @@ class Trainer {
     DegreeProbe probe_;
     RunTotals totals_;
     int iteration_ = 0;
+    int opened_ = 0;     // the iteration after which density control and probes had their turn
     TrainingStep step_;  // last: it waits for the device before anything that it uses goes
 };
 
