@@ -12,6 +12,8 @@
 #include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_registry.h"
 #include "engine/raster/gpu_splats.h"
 #include "trainer/exposure.h"
 #include "trainer/option_table.h"
@@ -56,7 +58,7 @@ std::uint32_t checksum(std::span<const std::byte> bytes) {
 Json header_of(const Checkpoint& c) {
     const SplatModel& m = c.state.model;
     const TrainCounters& n = c.state.counters;
-    return Json{{"iteration", c.state.iteration},
+    Json header{{"iteration", c.state.iteration},
                 {"next_probe", c.state.next_probe},
                 {"smoothing", c.state.smoothing.size()},
                 {"exposure", c.state.exposure.size()},
@@ -79,6 +81,17 @@ Json header_of(const Checkpoint& c) {
                 {"longest_list", n.longest_list},
                 {"huge_splats", n.huge_splats},
                 {"most_pairs", n.most_intersections}};
+    if (const KernelDefinition* own = kernel_definition(m.kernel))
+        header["kernel_definition"] = definition_json(*own);
+    return header;
+}
+
+std::optional<int> kernel_of(const Json& h, const std::string& where) {
+    if (!h.contains("kernel_definition"))
+        return kernel_from_name(h.at("kernel").get<std::string>());
+    std::vector<std::string> notes;  // of another name, which check_resumable tells from the run's
+    return register_kernel_of_file(definition_from_json(h["kernel_definition"], where), where,
+                                   notes);
 }
 
 // The library converts 1e30 and "true" without a word.
@@ -100,7 +113,7 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
     c.state.iteration = whole_of<int>(h, "iteration", where);
     c.state.next_probe = whole_of<int>(h, "next_probe", where);
     m.sh_degree = whole_of<int>(h, "sh_degree", where);
-    const auto kernel = kernel_from_name(h.at("kernel").get<std::string>());
+    const auto kernel = kernel_of(h, where);
     const auto footprint = footprint_from_name(h.at("footprint").get<std::string>());
     const auto splats = whole_of<std::uint64_t>(h, "splats", where);
     if (!kernel || !footprint || m.sh_degree < 0 || m.sh_degree > 3 || splats > kMaxSplats ||

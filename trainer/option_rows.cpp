@@ -1,6 +1,8 @@
 // The rows of option_table.h, in the order of `darb train --help-all`.
 #include <nlohmann/json.hpp>
 
+#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_registry.h"
 #include "trainer/option_table.h"
 
 namespace darb {
@@ -42,6 +44,12 @@ const OptionRow kRows[] = {
     {.setting = "/kernel",
      .group = option_group::kScene,
      .resolved = [](const Opt& o, const Sched&) -> Json { return kernel_name(o.kernel); }},
+    {.setting = "/kernel_definition",
+     .group = option_group::kScene,
+     .resolved = [](const Opt& o, const Sched&) -> Json {
+         return definition_json(*kernel_definition(o.kernel));
+     },
+     .stands = [](const Opt& o, const Sched&) { return kernel_definition(o.kernel) != nullptr; }},
     {.setting = "/footprint",
      .group = option_group::kScene,
      .resolved = [](const Opt& o, const Sched&) -> Json { return footprint_name(o.footprint); }},

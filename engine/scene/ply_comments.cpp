@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
+#include "engine/kernels/kernel_coefficients.h"
+#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_registry.h"
 
 namespace darb {
 
@@ -26,6 +30,33 @@ std::string_view last_value(const PlyHeader& header, std::string_view key) {
     for (const std::string& comment : header.comments)
         if (const std::string_view one = value_of(comment, key); !one.empty()) value = one;
     return value;
+}
+
+int kernel_defined_by(std::string_view name, std::string_view function, const std::string& where,
+                      std::vector<std::string>& notes) {
+    const auto json = nlohmann::json::parse(function, nullptr, false);
+    if (!json.is_object())
+        throw Error(where, "its comment SplatKernelFunction is no JSON object", kCopyAgain);
+    return register_kernel_of_file(
+        definition_from_json({{"name", std::string(name)}, {"function", json}}, where), where,
+        notes);
+}
+
+/// Of a kernel of one's own: what makes it here, and what draws it in a program that has no fit.
+std::string function_comments(const SplatModel& model) {
+    const KernelDefinition* definition = kernel_definition(model.kernel);
+    if (definition == nullptr) return {};
+    std::string lines = fmt::format("comment SplatKernelFunction: {}\n",
+                                    definition_json(*definition)["function"].dump(
+                                        -1, ' ', true, nlohmann::json::error_handler_t::replace));
+    const KernelCoefficients& k = kernel_coefficients(model.kernel, model.footprint, kFullDegree);
+    if (k.form != KERNEL_FORM_COMPACT) return lines;
+    const std::string t = fmt::format("q / {}", k.support);
+    lines += fmt::format("comment SplatKernelPolynomial: w = (1 - x)^{} P(x), x = {}, P",
+                         0.5 * k.half_power, k.squared ? "(" + t + ")^2" : t);
+    for (int i = 0; i <= k.degree; ++i)
+        lines += fmt::format(" {}", static_cast<float>(k.c[static_cast<std::size_t>(i)]));
+    return lines + "\n";
 }
 
 void read_render_mode(const PlyHeader& header, SplatModel& model, std::vector<std::string>& notes) {
@@ -47,10 +78,13 @@ void read_render_mode(const PlyHeader& header, SplatModel& model, std::vector<st
 void read_ply_comments(const PlyHeader& header, const std::string& where, SplatModel& model,
                        std::vector<std::string>& notes) {
     if (const std::string_view name = last_value(header, "SplatKernel"); !name.empty()) {
-        const std::optional<int> kernel = kernel_from_name(name);
+        const std::string_view function = last_value(header, "SplatKernelFunction");
+        const std::optional<int> kernel = function.empty()
+                                              ? kernel_from_name(name)
+                                              : kernel_defined_by(name, function, where, notes);
         if (!kernel)
             throw Error(where, fmt::format("names the unknown SplatKernel '{}'", name),
-                        "darb render --help lists the kernels; correct or remove the comment.");
+                        "darb train --help lists the kernels; correct or remove the comment.");
         model.kernel = *kernel;
     }
     if (const std::string_view name = last_value(header, "SplatFootprint"); !name.empty()) {
@@ -75,9 +109,9 @@ void read_ply_comments(const PlyHeader& header, const std::string& where, SplatM
 
 std::string ply_comments(const SplatModel& model) {
     return fmt::format(
-        "comment SplatKernel: {}\ncomment SplatFootprint: {}\ncomment SplatRenderMode: {}\n",
+        "comment SplatKernel: {}\ncomment SplatFootprint: {}\ncomment SplatRenderMode: {}\n{}",
         kernel_name(model.kernel), footprint_name(model.footprint),
-        model.antialias ? "mip" : "default");
+        model.antialias ? "mip" : "default", function_comments(model));
 }
 
 }  // namespace darb

@@ -1,6 +1,7 @@
 // The header comments of splat PLY files, plain and compressed: SplatKernel, SplatFootprint and
 // SplatRenderMode (default or mip; Postshot has "antialiased 0" or 1). The last of a kind counts;
-// keys and render modes are read in any case.
+// keys and render modes are read in any case. A kernel of one's own has SplatKernelFunction too,
+// the "function" of engine/kernels/kernel_file.h, and for other programs SplatKernelPolynomial.
 #pragma once
 
 #include <string>
@@ -11,8 +12,8 @@
 
 namespace darb {
 
-/// Throws Error for a kernel or footprint that is not known. notes: what comments ask for that is
-/// not done.
+/// Throws Error for a kernel or footprint that is not known; registers a kernel that is defined.
+/// notes: what comments ask for that is not done.
 void read_ply_comments(const PlyHeader& header, const std::string& where, SplatModel& model,
                        std::vector<std::string>& notes);
 /// Whole header lines.
