@@ -4,7 +4,7 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 add_library(darb_library INTERFACE)
-target_link_libraries(darb_library INTERFACE darb_trainer darb_check)
+target_link_libraries(darb_library INTERFACE darb_trainer darb_publish darb_check)
 set_target_properties(darb_library PROPERTIES EXPORT_NAME darb)
 add_library(darb::darb ALIAS darb_library)
 
@@ -13,7 +13,7 @@ set(headers ${CMAKE_INSTALL_INCLUDEDIR}/darb)  # of its own: the includes begin 
 target_include_directories(darb_options INTERFACE $<INSTALL_INTERFACE:${headers}>)
 install(TARGETS darb RUNTIME)
 install(TARGETS darb_library darb_options darb_shaders darb_core darb_kernels darb_scene darb_reference darb_data
-  darb_gpu darb_primitives darb_raster darb_plan darb_render darb_report darb_check darb_trainer EXPORT darb ARCHIVE)
+  darb_gpu darb_primitives darb_raster darb_plan darb_render darb_report darb_publish darb_check darb_trainer EXPORT darb ARCHIVE)
 install(EXPORT darb NAMESPACE darb:: FILE darb-targets.cmake DESTINATION ${package})
 install(DIRECTORY engine trainer DESTINATION ${headers} FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY shaders/shared DESTINATION ${headers}/shaders FILES_MATCHING PATTERN "*.h")

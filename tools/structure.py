@@ -25,7 +25,7 @@ LONGEST_FUNCTION, MOST_PARAMETERS, MOST_MEMBERS = 60, 7, 25  # lines, of a signa
 CHANGES = {
     "kernel": ("multiquadric", r'KERNEL_INVERSE_MULTIQUADRIC|"inverse_multiquadric", [0-9]|multiquadric, parabolic', 2),
     "effect": ("off-centre", r"\boff_centre\b|OFF_CENTRE", 6),
-    "format": ("SPZ", r"\bspz|Spz|SPZ", 2),
+    "format": (".ksplat", r"\bksplat|Ksplat", 2),
     "strategy": ("mcmc", r"\bmcmc|\bMcmc", 2),
     "command": ("psi", r"add_psi|ROW\(psi\b", 2),
     "sort": ("ballot", r'(?m)"ballot"|Strategy::ballot|^\s+ballot,|kBallot|radix_scatter_ballot|scatter=ballot', 3),

@@ -15,7 +15,6 @@ namespace darb {
 /// cut off before that.
 std::vector<std::byte> gunzip(std::span<const std::byte> stream, std::size_t most,
                               const std::string& where);
-/// For the tests of the readers.
 std::vector<std::byte> gzip(std::span<const std::byte> bytes);
 
 /// Exactly `size` bytes from one Zstandard frame. Throws Error(where, ...) where it is damaged or

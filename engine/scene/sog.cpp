@@ -215,10 +215,6 @@ namespace fs = std::filesystem;
 
 bool is_sog(const SplatSource& source) {
     const fs::path name = fs::path(source.where).filename();
-    if (name == "lod-meta.json")
-        throw Error(source.where,
-                    "describes a streamed SOG scene, in levels of detail, which is not read",
-                    "Name the folder of one of its parts, which has a meta.json.");
     return looks_like_zip(source.bytes) || (name == "meta.json" && !source.folder.empty());
 }
 
@@ -260,10 +256,11 @@ SplatModel read_sog_folder(const std::filesystem::path& folder, SogFacts* facts)
 
 const SplatFormatRow& sog_format() {
     static const SplatFormatRow row{.name = "SOG",
-                                    .endings = {".sog"},
+                                    .endings = {".sog", "meta.json"},
                                     .folder_file = "meta.json",
                                     .recognise = is_sog,
                                     .parse = load_sog,
+                                    .encode = encode_sog,
                                     .keeps = kKeepsRenderMode | kKeepsHarmonics};
     return row;
 }

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/scene/splat_file.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
@@ -35,5 +36,15 @@ SplatModel parse_sog(std::span<const std::byte> zip, const std::string& where,
 
 /// The folder of meta.json. Throws Error naming the file and the reason.
 SplatModel read_sog_folder(const std::filesystem::path& folder, SogFacts* facts = nullptr);
+
+/// A zip, or, where `where` is a meta.json, that and its pictures beside it; in Morton order. The
+/// error of ln(1 + |x|) of a position is half of 1/65,535 of its range, of opacity 1/510, of a
+/// quaternion's component 3e-3; scales and colours are the nearest of 256, harmonics those of the
+/// nearest of 1,024 to 65,536 palette entries. Kernel and footprint have no place.
+EncodedSplats encode_sog(const SplatModel& model, const std::string& where,
+                         const EncodeOptions& options);
+/// Without the Morton order: file is meta.json, its pictures are beside it.
+EncodedSplats encode_sog_parts(const SplatModel& model, const std::string& where,
+                               const AssignRows& assign);
 
 }  // namespace darb

@@ -15,6 +15,8 @@ namespace darb {
 
 namespace {
 
+constexpr time_t kZipTime = 315619200;  // 1980-01-02, so that bytes do not depend on the day
+
 struct CloseArchive {
     void operator()(zip_t* archive) const { zip_discard(archive); }
 };
@@ -104,6 +106,49 @@ SogPart open_sog_folder(const std::filesystem::path& folder) {
         check_part_name(name, (folder / "meta.json").string());
         return read_file(folder / name);
     };
+}
+
+std::vector<std::byte> make_sog_zip(
+    const std::vector<std::pair<std::string, std::vector<std::byte>>>& parts,
+    const std::string& where) {
+    zip_error_t error;
+    zip_error_init(&error);
+    zip_source_t* const source = zip_source_buffer_create(nullptr, 0, 0, &error);
+    zip_t* const archive = source ? zip_open_from_source(source, ZIP_TRUNCATE, &error) : nullptr;
+    const auto failed = [&](const char* reason) {
+        return Error(where, std::string("the zip cannot be made: ") + reason, "Free memory.");
+    };
+    if (!archive) {
+        zip_source_free(source);
+        throw failed("out of memory");
+    }
+    zip_source_keep(source);
+    for (const auto& [name, bytes] : parts) {
+        zip_source_t* const part = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
+        const zip_int64_t index = part ? zip_file_add(archive, name.c_str(), part, 0) : -1;
+        if (index < 0 ||
+            zip_set_file_compression(archive, static_cast<zip_uint64_t>(index), ZIP_CM_STORE, 0) !=
+                0 ||
+            zip_file_set_mtime(archive, static_cast<zip_uint64_t>(index), kZipTime, 0) != 0) {
+            zip_discard(archive);
+            zip_source_free(source);
+            throw failed("a part cannot be added");
+        }
+    }
+    std::vector<std::byte> file;
+    zip_stat_t stat;
+    zip_stat_init(&stat);
+    if (zip_close(archive) == 0 && zip_source_stat(source, &stat) == 0 &&
+        zip_source_open(source) == 0) {
+        file.resize(stat.size);
+        if (zip_source_read(source, file.data(), file.size()) !=
+            static_cast<zip_int64_t>(file.size()))
+            file.clear();
+        zip_source_close(source);
+    }
+    zip_source_free(source);
+    if (file.empty()) throw failed("its parts do not fit");
+    return file;
 }
 
 SogImage decode_webp(std::span<const std::byte> bytes, std::size_t most, const std::string& where) {

@@ -8,6 +8,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace darb {
@@ -19,6 +20,11 @@ using SogPart = std::function<std::vector<std::byte>(const std::string& name)>;
 SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where);
 /// Names with folders are refused.
 SogPart open_sog_folder(const std::filesystem::path& folder);
+
+/// Stored, not compressed again; the same parts give the same bytes.
+std::vector<std::byte> make_sog_zip(
+    const std::vector<std::pair<std::string, std::vector<std::byte>>>& parts,
+    const std::string& where);
 
 struct SogImage {
     std::size_t width = 0, height = 0;  // px

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/scene/cluster_rows.h"
 #include "engine/scene/ply_table.h"
 #include "engine/scene/splat_format_list.h"
 #include "engine/scene/splat_model.h"
@@ -43,7 +44,7 @@ SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& whe
                         SplatFile* file = nullptr, const ReadProgress& progress = {},
                         const std::filesystem::path& folder = {});
 
-/// The file that makes a folder a scene, the meta.json of SOG; nothing where there is none.
+/// The file that makes a folder a scene, as the meta.json of SOG; nothing where there is none.
 std::optional<std::filesystem::path> scene_file_in(const std::filesystem::path& folder);
 /// Whether a file of this name is the scene_file_in of its folder.
 bool names_scene_folder(const std::filesystem::path& path);
@@ -73,7 +74,11 @@ struct EncodedSplats {
     std::size_t bytes() const;                                                // of all
 };
 /// Choices of the formats that have some.
-struct EncodeOptions {};
+struct EncodeOptions {
+    int spz_version = 4;              // 3 or 4
+    AssignRows assign_rows;           // SOG's palette of harmonics; null: on the host
+    std::vector<SplatModel> coarser;  // streamed SOG: levels after the scene itself; empty: merged
+};
 /// After drop_unwritable. `where` stands for the file name in errors. Throws Error where the format
 /// is not written.
 EncodedSplats encode_scene(SplatFormat format, const SplatModel& model,

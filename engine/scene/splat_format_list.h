@@ -8,7 +8,10 @@
     ROW(ply)                    \
     ROW(compressed_ply)         \
     ROW(spz)                    \
+    ROW(gltf)                   \
+    ROW(streamed_sog)           \
     ROW(sog)                    \
+    ROW(ksplat)                 \
     ROW(dot_splat)
 
 namespace darb {

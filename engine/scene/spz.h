@@ -36,12 +36,14 @@ struct SpzFacts {
 SplatModel parse_spz(std::span<const std::byte> file, const std::string& where,
                      SpzFacts* facts = nullptr);
 
-/// Version 4. The error of a position is at most 2^-(b+1) with b = 12 fractional bits, more for
-/// scenes under 32 across, fewer for those above 2048; of a log scale 1/32 within [-10, 5.9]; of
-/// opacity 1/510; of dc 1/76.5 within [-3.33, 3.33]; of a quaternion's component 7e-4; of a
-/// harmonic 1/32 (degree 1) or 1/16 within [-1, 1]. Keeps the render mode; kernel and footprint
-/// have no place. Throws Error(where, ...) where positions do not fit 24 bits.
-std::vector<std::byte> encode_spz(const SplatModel& model, const std::string& where = "scene");
+/// version: 3, one gzip stream, which more programs read, or 4. The error of a position is at most
+/// 2^-(b+1) with b = 12 fractional bits, more for scenes under 32 across, fewer for those above
+/// 2048; of a log scale 1/32 within [-10, 5.9]; of opacity 1/510; of dc 1/76.5 within
+/// [-3.33, 3.33]; of a quaternion's component 7e-4; of a harmonic 1/32 (degree 1) or 1/16 within
+/// [-1, 1]. Keeps the render mode; kernel and footprint have no place. Throws Error(where, ...)
+/// where positions do not fit 24 bits.
+std::vector<std::byte> encode_spz(const SplatModel& model, const std::string& where = "scene",
+                                  int version = 4);
 /// What lies outside these ranges, and the step of positions where it is more than 2^-12; a
 /// sentence each. Throws as encode_spz does.
 std::vector<std::string> spz_losses(const SplatModel& model, const std::string& where = "scene");

@@ -6,6 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/half_float.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_format.h"
@@ -197,14 +198,6 @@ std::uint32_t read_extensions(Bytes records, int version, const std::string& whe
     return system;
 }
 
-float half_to_float(std::uint16_t bits) {
-    const int exponent = (bits >> 10) & 31, mantissa = bits & 1023;
-    const double sign = bits & 0x8000 ? -1 : 1;
-    if (exponent == 31) return static_cast<float>(mantissa ? NAN : sign * INFINITY);
-    return static_cast<float>(exponent ? sign * std::ldexp(1024 + mantissa, exponent - 25)
-                                       : sign * std::ldexp(mantissa, -24));
-}
-
 void read_positions(const Content& content, SplatModel& model) {
     const Bytes bytes = content.attributes[0];
     for (std::size_t i = 0; i < model.position.size(); ++i) {
@@ -316,8 +309,10 @@ const SplatFormatRow& spz_format() {
         .endings = {".spz"},
         .recognise = [](const SplatSource& source) { return looks_like_spz(source.bytes); },
         .parse = load_spz,
-        .encode = [](const SplatModel& model, const std::string& where,
-                     const EncodeOptions&) { return EncodedSplats{encode_spz(model, where)}; },
+        .encode =
+            [](const SplatModel& model, const std::string& where, const EncodeOptions& options) {
+                return EncodedSplats{encode_spz(model, where, options.spz_version)};
+            },
         // Positions are steps of their own, of which spz_losses says the size.
         .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions,
         .cuts = spz_losses};

@@ -129,32 +129,37 @@ std::vector<std::string> spz_losses(const SplatModel& model, const std::string& 
     return losses;
 }
 
-std::vector<std::byte> encode_spz(const SplatModel& scene, const std::string& where) {
+std::vector<std::byte> encode_spz(const SplatModel& scene, const std::string& where, int version) {
     check_splat_shapes(scene);
+    if (version != 3 && version != 4)
+        throw Error(where, fmt::format("SPZ version {} is not written", version), "Use 3 or 4.");
     SplatModel model = scene;
     transform_splats({1, kToRightUpBack, glm::dvec3(0.0)}, model);
     const int fractional_bits = choose_fractional_bits(model, where);
-    Stream toc, packed;
-    std::uint8_t streams = 0;
-    for (const Stream& stream : pack(model, fractional_bits)) {
-        if (stream.empty()) continue;
-        const Stream frame = zstd(stream);
-        append(frame.size(), 8, toc);
-        append(stream.size(), 8, toc);
-        packed.insert(packed.end(), frame.begin(), frame.end());
-        ++streams;
-    }
+    const std::array<Stream, 6> streams = pack(model, fractional_bits);
+    const auto filled = std::ranges::count_if(streams, [](const Stream& s) { return !s.empty(); });
     Stream file;
     append(spz::kMagic, 4, file);
-    append(4, 4, file);  // version
+    append(static_cast<std::uint64_t>(version), 4, file);
     append(model.size(), 4, file);
     append(static_cast<std::uint64_t>(model.sh_degree), 1, file);
     append(static_cast<std::uint64_t>(fractional_bits), 1, file);
     append(model.antialias ? spz::kFlagAntialias : 0, 1, file);
-    append(streams, 1, file);
+    append(version == 4 ? static_cast<std::uint64_t>(filled) : 0, 1, file);
+    if (version == 3) {
+        for (const Stream& stream : streams) file.insert(file.end(), stream.begin(), stream.end());
+        return gzip(file);
+    }
     append(spz::kHeader, 4, file);  // where the table begins
     file.resize(spz::kHeader);
-    file.insert(file.end(), toc.begin(), toc.end());
+    Stream packed;
+    for (const Stream& stream : streams) {
+        if (stream.empty()) continue;
+        const Stream frame = zstd(stream);
+        append(frame.size(), 8, file);
+        append(stream.size(), 8, file);
+        packed.insert(packed.end(), frame.begin(), frame.end());
+    }
     file.insert(file.end(), packed.begin(), packed.end());
     return file;
 }

@@ -19,6 +19,7 @@
 #include "engine/scene/inflate.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/spz_layout.h"
+#include "tests/support/ksplat_file.h"
 #include "tests/support/photo_files.h"
 #include "tests/support/test_scene.h"
 #include "trainer/checkpoint.h"
@@ -140,6 +141,37 @@ FileBytes sog(const fs::path& scratch, bool harmonics) {
     return file;
 }
 
+/// Two nodes with one splat, whose values are four zeros of bytes each.
+std::string gltf_text() {
+    json accessors = json::array(), attributes;
+    const std::pair<const char*, std::pair<int, const char*>> rows[] = {
+        {"POSITION", {5126, "VEC3"}},
+        {"KHR_gaussian_splatting:SCALE", {5126, "VEC3"}},
+        {"KHR_gaussian_splatting:ROTATION", {5120, "VEC4"}},
+        {"KHR_gaussian_splatting:OPACITY", {5121, "SCALAR"}},
+        {"COLOR_0", {5121, "VEC4"}}};
+    for (const auto& row : rows) {
+        attributes[row.first] = accessors.size();
+        accessors.push_back({{"bufferView", 0},
+                             {"componentType", row.second.first},
+                             {"type", row.second.second},
+                             {"normalized", row.second.first != 5126},
+                             {"count", 1}});
+    }
+    const json primitive = {{"attributes", attributes},
+                            {"mode", 0},
+                            {"extensions", {{"KHR_gaussian_splatting", json::object()}}}};
+    return json{{"asset", {{"version", "2.0"}}},
+                {"nodes",
+                 {{{"children", {1}}, {"scale", {2, 2, 2}}},
+                  {{"mesh", 0}, {"rotation", {1, 0, 0, 0}}, {"translation", {1, 2, 3}}}}},
+                {"meshes", {{{"primitives", {primitive}}}}},
+                {"accessors", accessors},
+                {"bufferViews", {{{"buffer", 0}, {"byteLength", 12}}}},
+                {"buffers", {{{"byteLength", 12}, {"uri", "data:;base64,AAAAAAAAAAAAAAAA"}}}}}
+        .dump();
+}
+
 void make_scenes(const fs::path& corpus) {
     for (const int degree : {0, 1, 3}) {
         const SplatModel model = sample_model(degree);
@@ -148,6 +180,8 @@ void make_scenes(const fs::path& corpus) {
         add_scene(corpus, "compressed_ply", name,
                   encode_splats(SplatFormat::compressed_ply, model));
         add_scene(corpus, "spz", name + "_version_4", encode_splats(SplatFormat::spz, model));
+        add_scene(corpus, "gltf", name, encode_splats(SplatFormat::gltf, model));
+        add_scene(corpus, "sog", name + "_written", encode_splats(SplatFormat::sog, model));
         for (const std::uint32_t version : {1u, 2u, 3u}) {
             const FileBytes plain = old_spz(version, degree);
             const std::string old = fmt::format("{}_version_{}", name, version);
@@ -159,6 +193,14 @@ void make_scenes(const fs::path& corpus) {
     add_scene(corpus, "ply", "dialects", bytes_of(dialects_ply()));
     add_scene(corpus, "dot_splat", "scene.splat",
               encode_splats(SplatFormat::dot_splat, sample_model(0)));
+    SplatModel radial = sample_model(1);
+    radial.kernel = KERNEL_RAISED_COSINE;
+    add_scene(corpus, "gltf", "radial", encode_splats(SplatFormat::gltf, radial));
+    add_scene(corpus, "gltf", "data_uri.gltf", bytes_of(gltf_text()));
+    write_file_atomic(corpus / "streamed_sog" / "one_file",
+                      encode_scene(SplatFormat::streamed_sog, sample_model(0)).file);
+    for (const int level : {0, 1, 2})
+        add_scene(corpus, "ksplat", fmt::format("level_{}.ksplat", level), ksplat_file(level, 2));
     for (const bool harmonics : {false, true})
         add_scene(corpus, "sog", harmonics ? "degree_1" : "degree_0",
                   sog(corpus / "scratch.zip", harmonics));

@@ -40,10 +40,10 @@ std::string out(const std::string& name) {
 
 TEST(Convert, every_format_to_every_other) {
     const std::string ply = scene_file("all.ply", sample_model(2, 300));
-    const std::map<std::string, std::string> names = {{"all.ply", "PLY"},
-                                                      {"all.compressed.ply", "compressed PLY"},
-                                                      {"all.spz", "SPZ"},
-                                                      {"all.splat", ".splat"}};
+    const std::map<std::string, std::string> names = {
+        {"all.ply", "PLY"}, {"all.compressed.ply", "compressed PLY"},
+        {"all.spz", "SPZ"}, {"all.glb", "glTF"},
+        {"all.sog", "SOG"}, {"all.splat", ".splat"}};
     for (const auto& [from, from_name] : names) {
         ASSERT_EQ(darb("convert " + ply + " " + out("to_" + from)).code, 0) << from;
         for (const auto& [to, to_name] : names) {
@@ -147,7 +147,9 @@ TEST(Convert, kernels_become_gaussians_with_the_error_printed) {
 TEST(Convert, bad_options_are_refused) {
     const std::string ply = scene_file("bad.ply", sample_model(0, 3)), to = " " + out("x.ply ");
     expect_refused({{"convert " + ply, "output"},
-                    {"convert " + ply + " " + out("x.sog"), "no format that can be written"},
+                    {"convert " + ply + " " + out("x.ksplat"), "no format that can be written"},
+                    {"convert " + ply + to + "--spz-version 3", "--spz-version"},
+                    {"convert " + ply + " " + out("x.spz") + " --spz-version 2", "--spz-version"},
                     {"convert " + out("none.ply") + to, "none.ply"},
                     {"convert " + ply + to + "--up w", "no axis"},
                     {"convert " + ply + to + "--crop 1,2,3", "not 6 numbers"},
@@ -211,10 +213,35 @@ TEST(Convert, a_pipe_takes_the_scene_and_stderr_what_is_said) {
     EXPECT_GT(parse_splats(got, "pipe").size(), 0u);
 }
 
-TEST(Convert, a_streamed_sog_is_named_as_one) {
-    write_file_atomic(out("lod-meta.json"), R"({"lodLevels": 2})");
-    for (const char* command : {"info ", "render -o none --cameras none "})
-        expect_refused({{command + out("lod-meta.json"), "streamed SOG"}});
+TEST(Convert, several_files_are_written_and_none_that_is_read) {
+    const std::string ply = scene_file("many.ply", sample_model(1, 40));
+    for (const char* name : {"many/meta.json", "streamed/lod-meta.json", "gltf/a b.gltf"}) {
+        const Outcome o = darb("convert " + ply + " '" + out(name) + "' --compare");
+        ASSERT_EQ(o.code, 0) << o.err;
+        EXPECT_NE(o.out.find("the file against the scene: "), std::string::npos) << o.out;
+        const json info = json::parse(darb("info --json - '" + out(name) + "'").out);
+        EXPECT_EQ(info["splats"], 40);
+        EXPECT_GT(info["bytes"], fs::file_size(out(name)));
+    }
+    fs::copy_file(out("gltf/a b.bin"), out("gltf/c.bin"));
+    fs::copy_file(out("many/meta.json"), out("many/kept.json"));
+    for (const std::string& command :
+         {"convert " + out("many") + " " + out("many/meta.json"),
+          "convert '" + out("gltf/a b.gltf") + "' " + out("gltf/c.gltf")})
+        expect_refused({{command, "is what is read"}});
+    EXPECT_EQ(read_file(out("many/meta.json")), read_file(out("many/kept.json")));
+}
+
+TEST(Convert, spz_is_written_in_both_versions) {
+    const std::string ply = scene_file("versions.ply", sample_model(2, 60));
+    ASSERT_EQ(darb("convert " + ply + " " + out("v3.spz") + " --spz-version 3").code, 0);
+    ASSERT_EQ(darb("convert " + ply + " " + out("v4.spz")).code, 0);
+    SplatFile three, four;
+    const SplatModel old = load_splats(out("v3.spz"), &three),
+                     now = load_splats(out("v4.spz"), &four);
+    EXPECT_EQ(three.version, 3);
+    EXPECT_EQ(four.version, 4);
+    EXPECT_TRUE(same_splats(old, now));
 }
 
 TEST(Convert, info_writes_a_file_and_names_the_format) {

@@ -14,6 +14,7 @@
 #include "tools/darb/compare_scenes.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/palette_device.h"
 #include "tools/darb/scene_edits.h"
 #include "tools/darb/scene_file.h"
 
@@ -25,6 +26,7 @@ struct ConvertFlags {
     std::filesystem::path input, output, cameras;
     std::string kernel, device;
     SceneEdits edits;
+    EncodeOptions encode;
     bool compare = false;
 };
 
@@ -70,6 +72,8 @@ int convert(const ConvertFlags& flags) {
     if (!format)
         throw Error(flags.output.string(), "names no format that can be written",
                     "Let it end in " + endings_to_write() + ".");
+    if (flags.encode.spz_version != EncodeOptions{}.spz_version && *format != SplatFormat::spz)
+        throw Error("--spz-version", "is for files that end in .spz", "Leave it out.");
     SplatModel model = load_scene(flags.input);
     std::FILE* const say = stream_beside(flags.output);
     edit_scene(flags.edits, model, say);
@@ -86,7 +90,10 @@ int convert(const ConvertFlags& flags) {
     for (const std::string& loss : losses_of(*format, model, flags.output.string()))
         darb::say("warning: {}: {}\n", flags.output.string(), loss);
     drop_unwritable(*format, model);
-    const EncodedSplats encoded = encode_scene(*format, model, flags.output.string());
+    PaletteDevice palettes(flags.device);
+    EncodeOptions options = flags.encode;
+    options.assign_rows = palettes.assign_rows();
+    const EncodedSplats encoded = encode_scene(*format, model, flags.output.string(), options);
     refuse_to_overwrite_inputs(outputs_of(flags.output, encoded), inputs);
     write_encoded(flags.output, encoded);
     fmt::print(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
@@ -114,6 +121,11 @@ void add_convert(CLI::App& app, Action& action) {
                      "renders of both differ")
         ->check(CLI::IsMember({"gaussian"}));
     add_edit_options(*command, flags->edits);
+    command
+        ->add_option("--spz-version", flags->encode.spz_version,
+                     "3: one gzip stream, which more programs read")
+        ->check(CLI::IsMember({3, 4}))
+        ->capture_default_str();
     command->add_flag(
         "--compare", flags->compare,
         "read what was written and print how far its renders differ from the scene's");

@@ -25,8 +25,7 @@ struct InfoFlags {
 bool is_dataset(const std::filesystem::path& path) {
     if (scene_file_in(path)) return false;
     if (std::filesystem::is_directory(path)) return !std::filesystem::exists(path / "point_cloud");
-    return has_extension(path, ".json") && !names_scene_folder(path) &&
-           path.filename() != "lod-meta.json";
+    return has_extension(path, ".json") && !names_scene_folder(path);
 }
 
 int info(const InfoFlags& flags) {

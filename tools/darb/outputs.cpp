@@ -67,8 +67,15 @@ Paths files_of(const fs::path& input) {
         if (const fs::path scene = scene_of_run(input); !scene.empty()) files.push_back(scene);
     }
     if ((folder || names_scene_folder(input)) && scene_file_in(beside))
-        for (const fs::directory_entry& entry : fs::directory_iterator(beside, none))
+        for (const fs::directory_entry& entry : fs::directory_iterator(beside, none)) {
             if (has_extension(entry.path(), ".webp")) files.push_back(entry.path());
+            for (const fs::directory_entry& part : fs::directory_iterator(entry.path(), none))
+                files.push_back(part.path());  // of a streamed scene
+        }
+    if (has_extension(input, ".gltf"))
+        for (const fs::directory_entry& entry :
+             fs::directory_iterator(beside.empty() ? fs::path(".") : beside, none))
+            if (has_extension(entry.path(), ".bin")) files.push_back(entry.path());
     return files;
 }
 

@@ -19,8 +19,9 @@ namespace fs = std::filesystem;
 
 TEST(SplatFile, formats_are_told_apart_by_content) {
     const SplatModel model = sample_model(0, 40);
-    for (const SplatFormat format : {SplatFormat::ply, SplatFormat::compressed_ply,
-                                     SplatFormat::dot_splat, SplatFormat::spz}) {
+    for (const SplatFormat format :
+         {SplatFormat::ply, SplatFormat::compressed_ply, SplatFormat::dot_splat, SplatFormat::spz,
+          SplatFormat::gltf, SplatFormat::sog}) {
         SplatFile file;
         EXPECT_EQ(parse_splats(encode_splats(format, model), "no name", &file).size(), 40u);
         EXPECT_EQ(file.format, format);
@@ -44,7 +45,7 @@ TEST(SplatFile, other_content_is_refused_by_name) {
               std::string::npos);
 }
 
-TEST(SplatFile, streamed_sog_is_refused_by_name) {
+TEST(SplatFile, streamed_sog_without_its_files_is_refused_by_name) {
     FileBytes bytes;
     append_text(R"({"lodLevels": 2, "filenames": ["0_0/meta.json"]})", bytes);
     EXPECT_NE(error_of([&] { parse_splats(bytes, "x/lod-meta.json"); }).find("streamed SOG"),
@@ -107,7 +108,11 @@ TEST(SplatFile, names_choose_what_is_written) {
     EXPECT_EQ(format_to_write("b.Compressed.PLY"), SplatFormat::compressed_ply);
     EXPECT_EQ(format_to_write("b.splat"), SplatFormat::dot_splat);
     EXPECT_EQ(format_to_write("b.SPZ"), SplatFormat::spz);
-    EXPECT_FALSE(format_to_write("b.sog"));
+    EXPECT_EQ(format_to_write("b.GLB"), SplatFormat::gltf);
+    EXPECT_EQ(format_to_write("b.sog"), SplatFormat::sog);
+    EXPECT_EQ(format_to_write("b/meta.json"), SplatFormat::sog);
+    EXPECT_EQ(format_to_write("b/lod-meta.json"), SplatFormat::streamed_sog);
+    EXPECT_FALSE(format_to_write("b/other-meta.json"));
     EXPECT_FALSE(format_to_write("ply"));
 }
 
@@ -203,7 +208,7 @@ TEST(SplatFile, positions_beyond_spz_name_the_file) {
 }
 
 constexpr SplatFormat kQuantised[] = {SplatFormat::compressed_ply, SplatFormat::dot_splat,
-                                      SplatFormat::spz};
+                                      SplatFormat::spz, SplatFormat::sog, SplatFormat::gltf};
 
 TEST(SplatFile, splats_without_a_rotation_are_left_out_where_they_would_get_one) {
     SplatModel model = sample_model(0, 4);

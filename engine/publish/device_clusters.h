@@ -1,0 +1,33 @@
+// The nearest centres of cluster_rows (engine/scene/cluster_rows.h) on a device.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "engine/gpu/commands.h"
+#include "engine/gpu/device.h"
+#include "engine/gpu/pipeline.h"
+#include "engine/scene/cluster_rows.h"
+
+namespace darb {
+
+class DeviceClusters {
+  public:
+    /// The device has to outlive it.
+    explicit DeviceClusters(Device& device) : device_(device), commands_(device) {}
+
+    /// As AssignRows has it; rows go to the device in parts. The same device gives the same labels;
+    /// another one, and the host, may tell centres of nearly one distance apart otherwise.
+    void assign(const std::vector<float>& rows, std::size_t dims, const std::vector<float>& centres,
+                const std::vector<ClusterBatch>& batches, std::vector<std::uint32_t>& labels);
+
+  private:
+    const Pipeline& pipeline_for(std::size_t quads);
+
+    Device& device_;
+    Commands commands_;
+    std::map<std::size_t, Pipeline> pipelines_;  // by the quads of a row
+};
+
+}  // namespace darb

@@ -1,0 +1,270 @@
+#include "engine/scene/cluster_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace darb {
+
+namespace {
+
+// At most; the work is rows of a leaf times k. For 23,261 rows of 45 and 2,300 centres, errors are
+// 0.26 dB above those of one leaf, and 0.54 dB with 2,048.
+constexpr std::size_t kLeafRows = 8192;
+constexpr int kRounds = 10;          // of k-means
+constexpr double kErrorPower = 0.8;  // centres of a leaf: its error to this power
+constexpr std::size_t kLanes = 16;   // centres at a time
+constexpr int kCodebookRounds = 30;
+constexpr std::size_t kHistogram = 512;
+
+using RowOrder = std::vector<std::uint32_t>;
+
+struct RowTable {
+    const std::vector<float>& values;
+    std::size_t dims;
+    const float* row(std::size_t i) const { return values.data() + i * dims; }
+};
+
+struct Leaf {
+    std::size_t begin = 0, end = 0;  // in the order
+    double error = 0;                // squared distance to the mean, summed
+    std::size_t centres = 0;
+};
+
+/// Sums and sums of squares of each column.
+void moments_of(const RowTable& table, std::span<const std::uint32_t> rows,
+                std::vector<double>& sum, std::vector<double>& square) {
+    sum.assign(table.dims, 0);
+    square.assign(table.dims, 0);
+    for (const std::uint32_t i : rows)
+        for (std::size_t d = 0; d < table.dims; ++d) {
+            const double v = table.row(i)[d];
+            sum[d] += v;
+            square[d] += v * v;
+        }
+}
+
+/// Halves by the median of the widest column until leaves are small; equal values by row.
+void cut_into_leaves(const RowTable& table, std::size_t most_rows, std::span<std::uint32_t> order,
+                     std::size_t first, std::vector<Leaf>& leaves) {
+    std::vector<double> sum, square;
+    moments_of(table, order, sum, square);
+    const auto count = static_cast<double>(order.size());
+    Leaf leaf{first, first + order.size(), 0, 0};
+    std::size_t widest = 0;
+    double most = -1;
+    for (std::size_t d = 0; d < table.dims; ++d) {
+        const double spread = std::max(0.0, square[d] - sum[d] * sum[d] / count);
+        leaf.error += spread;
+        if (spread > most) {
+            most = spread;
+            widest = d;
+        }
+    }
+    if (order.size() <= most_rows) {
+        leaves.push_back(leaf);
+        return;
+    }
+    const std::size_t half = order.size() / 2;
+    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                         const float va = table.row(a)[widest], vb = table.row(b)[widest];
+                         return va != vb ? va < vb : a < b;
+                     });
+    cut_into_leaves(table, most_rows, order.first(half), first, leaves);
+    cut_into_leaves(table, most_rows, order.subspan(half), first + half, leaves);
+}
+
+/// Each leaf one, the rest by error; none more than it has rows.
+void share_centres(std::size_t k, std::vector<Leaf>& leaves) {
+    for (Leaf& leaf : leaves) leaf.centres = 1;
+    std::size_t left = k > leaves.size() ? k - leaves.size() : 0;
+    while (left > 0) {  // again where leaves are full
+        double weight = 0;
+        for (const Leaf& leaf : leaves)
+            if (leaf.centres < leaf.end - leaf.begin) weight += std::pow(leaf.error, kErrorPower);
+        if (!(weight > 0)) return;
+        std::size_t given = 0;
+        for (Leaf& leaf : leaves) {
+            const std::size_t room = leaf.end - leaf.begin - leaf.centres;
+            const double share =
+                std::pow(leaf.error, kErrorPower) / weight * static_cast<double>(left);
+            const std::size_t more =
+                std::min({room, static_cast<std::size_t>(share), left - given});
+            leaf.centres += more;
+            given += more;
+        }
+        if (given == 0)  // less than one each: to the first that has room
+            for (Leaf& leaf : leaves)
+                if (given < left && leaf.error > 0 && leaf.centres < leaf.end - leaf.begin) {
+                    ++leaf.centres;
+                    ++given;
+                }
+        if (given == 0) return;
+        left -= given;
+    }
+}
+
+/// Means of the rows of each centre, in order; a centre without any stays.
+void move_centres(const std::vector<float>& rows, std::size_t dims,
+                  const std::vector<std::uint32_t>& labels, std::vector<float>& centres) {
+    std::vector<double> sum(centres.size(), 0);
+    std::vector<std::uint32_t> count(centres.size() / dims, 0);
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+        ++count[labels[i]];
+        for (std::size_t d = 0; d < dims; ++d) sum[labels[i] * dims + d] += rows[i * dims + d];
+    }
+    for (std::size_t c = 0; c < count.size(); ++c)
+        if (count[c] > 0)
+            for (std::size_t d = 0; d < dims; ++d)
+                centres[c * dims + d] = static_cast<float>(sum[c * dims + d] / count[c]);
+}
+
+/// |c|^2 - 2 x c of kLanes centres, whose columns lie side by side: [dims][kLanes].
+void add_products(const float* row, std::size_t dims, const float* block, float* distance) {
+    for (std::size_t d = 0; d < dims; ++d) {
+        const float twice = -2 * row[d];
+        for (std::size_t j = 0; j < kLanes; ++j) distance[j] += twice * block[d * kLanes + j];
+    }
+}
+
+/// [blocks][dims][kLanes], and |c|^2 [blocks][kLanes]; infinite where there is no centre.
+void lay_out(const float* centres, std::size_t count, std::size_t dims, std::vector<float>& blocks,
+             std::vector<float>& squares) {
+    const std::size_t padded = (count + kLanes - 1) / kLanes * kLanes;
+    blocks.assign(padded * dims, 0);
+    squares.assign(padded, std::numeric_limits<float>::infinity());
+    for (std::size_t c = 0; c < count; ++c) {
+        float square = 0;
+        for (std::size_t d = 0; d < dims; ++d) {
+            const float v = centres[c * dims + d];
+            blocks[(c / kLanes * dims + d) * kLanes + c % kLanes] = v;
+            square += v * v;
+        }
+        squares[c] = square;
+    }
+}
+
+std::array<float, 256> first_codebook(const std::vector<float>& sorted) {
+    // Density to the power of 1/3 is where many levels go best (Panter and Dite 1951).
+    const double low = sorted.front(), width = double{sorted.back()} - low;
+    std::vector<double> dense(kHistogram, 0);
+    for (const float value : sorted) {
+        const double cell = width > 0 ? (value - low) / width * kHistogram : 0;
+        ++dense[std::min(static_cast<std::size_t>(cell), kHistogram - 1)];
+    }
+    for (double& cell : dense) cell = std::cbrt(cell);
+    const double all = std::accumulate(dense.begin(), dense.end(), 0.0);
+    std::array<float, 256> book{};
+    double sum = 0;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < book.size(); ++i) {
+        const double want = (static_cast<double>(i) + 0.5) / 256 * all;
+        while (at + 1 < kHistogram && sum + dense[at] < want) sum += dense[at++];
+        const double within = dense[at] > 0 ? std::clamp((want - sum) / dense[at], 0.0, 1.0) : 0;
+        book[i] = static_cast<float>(low + width * (static_cast<double>(at) + within) / kHistogram);
+    }
+    return book;
+}
+
+}  // namespace
+
+void assign_rows(const std::vector<float>& rows, std::size_t dims,
+                 const std::vector<float>& centres, const std::vector<ClusterBatch>& batches,
+                 std::vector<std::uint32_t>& labels) {
+    labels.resize(rows.size() / dims);
+    std::vector<float> blocks, squares;
+    for (const ClusterBatch& batch : batches) {
+        lay_out(&centres[batch.first_centre * dims], batch.centres, dims, blocks, squares);
+        for (std::uint32_t i = batch.first_row; i < batch.first_row + batch.rows; ++i) {
+            float best = std::numeric_limits<float>::infinity();
+            std::uint32_t nearest = 0;
+            for (std::size_t first = 0; first < squares.size(); first += kLanes) {
+                float distance[kLanes];
+                std::copy_n(&squares[first], kLanes, distance);
+                add_products(&rows[i * dims], dims, &blocks[first * dims], distance);
+                for (std::size_t j = 0; j < kLanes; ++j)
+                    if (distance[j] < best) {
+                        best = distance[j];
+                        nearest = static_cast<std::uint32_t>(first + j);
+                    }
+            }
+            labels[i] = batch.first_centre + nearest;
+        }
+    }
+}
+
+Clusters cluster_rows(const std::vector<float>& rows, std::size_t dims, std::size_t k,
+                      const AssignRows& assign) {
+    const std::size_t count = rows.size() / dims;
+    if (count == 0) return {};
+    const RowTable table{rows, dims};
+    RowOrder order(count);
+    std::iota(order.begin(), order.end(), 0u);
+    std::vector<Leaf> leaves;
+    cut_into_leaves(table, std::max(kLeafRows, 2 * count / k + 1), order, 0, leaves);
+    share_centres(k, leaves);
+    std::vector<float> sorted(rows.size()), centres;
+    for (std::size_t i = 0; i < count; ++i)
+        std::copy_n(table.row(order[i]), dims, &sorted[i * dims]);
+    std::vector<ClusterBatch> batches;
+    for (const Leaf& leaf : leaves) {
+        const std::size_t size = leaf.end - leaf.begin, first = centres.size() / dims;
+        for (std::size_t c = 0; c < leaf.centres; ++c) {  // evenly from its rows
+            const auto from = sorted.begin() + static_cast<std::ptrdiff_t>(
+                                                   (leaf.begin + c * size / leaf.centres) * dims);
+            centres.insert(centres.end(), from, from + static_cast<std::ptrdiff_t>(dims));
+        }
+        batches.push_back({static_cast<std::uint32_t>(leaf.begin), static_cast<std::uint32_t>(size),
+                           static_cast<std::uint32_t>(first),
+                           static_cast<std::uint32_t>(leaf.centres)});
+    }
+    std::vector<std::uint32_t> labels;
+    for (int round = 0; round < kRounds; ++round) {
+        assign(sorted, dims, centres, batches, labels);
+        move_centres(sorted, dims, labels, centres);
+    }
+    assign(sorted, dims, centres, batches, labels);
+    Clusters result{std::move(centres), std::vector<std::uint32_t>(count)};
+    for (std::size_t i = 0; i < count; ++i) result.label[order[i]] = labels[i];
+    return result;
+}
+
+Codebook256 codebook_of(std::span<const float> values) {
+    Codebook256 book{};
+    if (values.empty()) return book;
+    std::vector<float> sorted(values.begin(), values.end());
+    std::ranges::sort(sorted);
+    std::vector<double> sums(sorted.size() + 1, 0);
+    for (std::size_t i = 0; i < sorted.size(); ++i) sums[i + 1] = sums[i] + double{sorted[i]};
+    book = first_codebook(sorted);
+    for (int round = 0; round < kCodebookRounds; ++round) {
+        std::size_t begin = 0;
+        for (std::size_t i = 0; i < book.size(); ++i) {
+            std::size_t end = sorted.size();
+            if (i + 1 < book.size()) {
+                const float between = book[i] + (book[i + 1] - book[i]) / 2;
+                end = static_cast<std::size_t>(std::ranges::upper_bound(sorted, between) -
+                                               sorted.begin());
+                end = std::max(end, begin);
+            }
+            if (end > begin)
+                book[i] = static_cast<float>((sums[end] - sums[begin]) /
+                                             static_cast<double>(end - begin));
+            begin = end;
+        }
+        std::ranges::sort(book);
+    }
+    return book;
+}
+
+std::uint8_t nearest_entry(const Codebook256& book, float value) {
+    const auto above = std::ranges::lower_bound(book, value);
+    if (above == book.begin()) return 0;
+    if (above == book.end()) return 255;
+    const bool lower = value - *(above - 1) <= *above - value;
+    return static_cast<std::uint8_t>(above - book.begin() - (lower ? 1 : 0));
+}
+
+}  // namespace darb

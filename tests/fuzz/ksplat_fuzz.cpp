@@ -1,0 +1,17 @@
+// Any bytes as .ksplat: a model or an Error, never a crash.
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "engine/core/error.h"
+#include "engine/scene/splat_file.h"
+#include "engine/scene/splat_shapes.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    try {
+        darb::check_splat_shapes(
+            darb::parse_splats(std::as_bytes(std::span(data, size)), "fuzz.ksplat"));
+    } catch (const darb::Error&) {
+    }
+    return 0;
+}

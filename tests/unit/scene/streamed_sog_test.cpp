@@ -1,0 +1,122 @@
+// Streamed SOG: levels in files, and a tree that says where their splats are.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "engine/core/files.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/merge_splats.h"
+#include "engine/scene/splat_file.h"
+#include "tests/support/splat_files.h"
+
+namespace darb::test {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+class StreamedSog : public testing::Test {
+  protected:
+    void SetUp() override { fs::remove_all(folder_); }
+    void TearDown() override { fs::remove_all(folder_); }
+
+    json meta() const { return json::parse(read_text_file(folder_ / "lod-meta.json")); }
+    /// What reading says after a change of lod-meta.json.
+    std::string error_after(const std::string& pointer, const json& value) const {
+        json changed = meta();
+        changed[json::json_pointer(pointer)] = value;
+        const fs::path other = folder_ / "other";
+        fs::create_directories(other);
+        for (const char* part : {"0_0", "1_0"})
+            if (fs::exists(folder_ / part) && !fs::exists(other / part))
+                fs::copy(folder_ / part, other / part);
+        write_file_atomic(other / "lod-meta.json", changed.dump());
+        return error_of([&] { load_splats(other); });
+    }
+
+    fs::path folder_ = fs::path(testing::TempDir()) / fmt::format("streamed_{}", ::getpid());
+};
+
+/// Leaves under a node; every range lies in its file, every bound in its parent's.
+void check_node(const json& node, std::vector<size_t>& counts) {
+    for (int axis = 0; axis < 3; ++axis)
+        EXPECT_LE(node["bound"]["min"][axis], node["bound"]["max"][axis]);
+    if (node.contains("children"))
+        for (const json& child : node["children"]) {
+            for (int axis = 0; axis < 3; ++axis) {
+                EXPECT_GE(child["bound"]["min"][axis], node["bound"]["min"][axis]);
+                EXPECT_LE(child["bound"]["max"][axis], node["bound"]["max"][axis]);
+            }
+            check_node(child, counts);
+        }
+    if (!node.contains("lods")) return;
+    for (const auto& [level, lod] : node["lods"].items())
+        counts[std::stoul(level)] += lod["count"].get<size_t>();
+}
+
+TEST_F(StreamedSog, levels_are_written_and_the_finest_is_read) {
+    const SplatModel model = sample_model(0, 40'000);
+    EncodeOptions options;
+    options.coarser = {merge_splats(model, 2000)};
+    write_encoded(folder_ / "lod-meta.json",
+                  encode_scene(SplatFormat::streamed_sog, model, "lod-meta.json", options));
+    const json said = meta();
+    EXPECT_EQ(said["version"], 1);
+    EXPECT_EQ(said["lodLevels"], 2);
+    EXPECT_EQ(said["counts"], json({40'000, 2000}));
+    EXPECT_EQ(said["count"], 42'000);
+    EXPECT_EQ(said["filenames"], json({"0_0/meta.json", "1_0/meta.json"}));
+    EXPECT_TRUE(said["tree"].contains("children"));
+    std::vector<size_t> counts(2);
+    check_node(said["tree"], counts);
+    EXPECT_EQ(counts, (std::vector<size_t>{40'000, 2000}));
+    EXPECT_EQ(load_splats(folder_ / "1_0").size(), 2000u);
+    SplatFile facts;
+    const SplatModel got = load_splats(folder_, &facts);
+    EXPECT_EQ(facts.format, SplatFormat::streamed_sog);
+    ASSERT_EQ(got.size(), model.size());
+    std::vector<float> before = model.position, after = got.position;
+    std::ranges::sort(before);
+    std::ranges::sort(after);
+    for (size_t i = 0; i < before.size(); ++i) ASSERT_NEAR(before[i], after[i], 2e-4);
+    EXPECT_EQ(facts.notes.size(), 1u);
+}
+
+TEST_F(StreamedSog, levels_are_merged_where_none_are_given) {
+    save_splats(folder_ / "lod-meta.json", SplatFormat::streamed_sog, sample_model(1, 4000));
+    EXPECT_EQ(meta()["counts"], json({4000, 1000}));
+}
+
+TEST_F(StreamedSog, hostile_trees_are_refused_by_name) {
+    save_splats(folder_ / "lod-meta.json", SplatFormat::streamed_sog, sample_model(0, 30));
+    EXPECT_EQ(error_after("/asset/generator", "x"), "no error");
+    for (const char* name : {"../0_0/meta.json", "/0_0/meta.json", "http://a/meta.json", "0_0/x",
+                             "0_0\\..\\meta.json", ""})
+        EXPECT_NE(error_after("/filenames/0", name).find("folder below"), std::string::npos)
+            << name;
+    EXPECT_NE(error_after("/version", 2).find("version 2"), std::string::npos);
+    EXPECT_NE(error_after("/tree/lods/0/file", 9).find("9"), std::string::npos);
+    EXPECT_NE(error_after("/tree/lods/0/count", 31).find("rows 0 to 31"), std::string::npos);
+    EXPECT_NE(error_after("/tree/lods/0/count", 1'000'000'000).find("declares"), std::string::npos);
+    EXPECT_NE(error_after("/tree/lods/0/offset", 0xffffffffffffffffu).find("rows"),
+              std::string::npos);
+    EXPECT_NE(error_after("/tree/lods/0/offset", -1).find("no whole number"), std::string::npos);
+    json deep = 1;
+    for (int i = 0; i < 300; ++i) deep = json::array({deep});
+    EXPECT_NE(error_after("/tree", deep).find("nested"), std::string::npos);
+}
+
+TEST_F(StreamedSog, files_cut_off_at_every_byte_are_refused) {
+    save_splats(folder_ / "lod-meta.json", SplatFormat::streamed_sog, sample_model(0, 30));
+    const FileBytes whole = read_file(folder_ / "lod-meta.json");
+    const std::string where = "test/lod-meta.json";
+    expect_truncation_is_refused(whole, [&](std::span<const std::byte> file) {
+        return parse_splats(file, where, nullptr, {}, folder_);
+    });
+}
+
+}  // namespace
+}  // namespace darb::test
