@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "engine/core/error.h"
 #include "engine/data/metrics.h"
 #include "engine/render/renderer.h"
+#include "tools/cost/views.h"
 #include "tools/darb/device_options.h"
 
 namespace darb {
@@ -13,6 +15,17 @@ namespace {
 constexpr double kEqualDb = 100;
 
 }  // namespace
+
+std::vector<View> views_around(const SplatModel& scene) {
+    if (scene.size() == 0) throw Error("scene", "there are no splats to look at", "Name another.");
+    const CostViews around = orbit_views(scene, 8, 480, 360);
+    std::vector<View> views(around.cameras.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].name = around.names[i];
+        views[i].camera = around.cameras[i];
+    }
+    return views;
+}
 
 SceneDifference compare_scenes(const SplatModel& scene, const SplatModel& other,
                                const std::vector<View>& views, const std::string& device) {

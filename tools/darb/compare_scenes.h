@@ -14,6 +14,9 @@ struct SceneDifference {
     std::string worst_view;
 };
 
+/// Eight views around the splats, 480 x 360. Throws Error where there are none.
+std::vector<View> views_around(const SplatModel& scene);
+
 /// Renders both on the device (select: number or part of a name) over black. Equal pictures count
 /// as 100 dB.
 SceneDifference compare_scenes(const SplatModel& scene, const SplatModel& other,

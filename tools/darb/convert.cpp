@@ -9,9 +9,9 @@
 #include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/scene/gaussian_scene.h"
-#include "tools/cost/views.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_scenes.h"
+#include "tools/darb/convert_levels.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/palette_device.h"
@@ -27,20 +27,9 @@ struct ConvertFlags {
     std::string kernel, device;
     SceneEdits edits;
     EncodeOptions encode;
+    LevelFlags levels;
     bool compare = false;
 };
-
-std::vector<View> views_around(const SplatModel& scene) {
-    if (scene.size() == 0)
-        throw Error("--compare", "there are no splats to look at", "Leave it out.");
-    const CostViews around = orbit_views(scene, 8, 480, 360);
-    std::vector<View> views(around.cameras.size());
-    for (std::size_t i = 0; i < views.size(); ++i) {
-        views[i].name = around.names[i];
-        views[i].camera = around.cameras[i];
-    }
-    return views;
-}
 
 /// Where the scene goes through a pipe, which may be stdout, all that is said goes to stderr.
 std::FILE* stream_beside(const std::filesystem::path& output) {
@@ -48,12 +37,17 @@ std::FILE* stream_beside(const std::filesystem::path& output) {
                                                                                         : stdout;
 }
 
-void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
-                      const SplatModel& other, const ConvertFlags& flags) {
-    const std::vector<View> views =
+std::vector<View> views_for(const SplatModel& scene, const ConvertFlags& flags) {
+    std::vector<View> views =
         flags.cameras.empty() ? views_around(scene) : open_cameras(flags.cameras);
     if (views.empty())
         throw Error(flags.cameras.string(), "holds no cameras", "Name another list or data set.");
+    return views;
+}
+
+void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
+                      const SplatModel& other, const ConvertFlags& flags) {
+    const std::vector<View> views = views_for(scene, flags);
     const SceneDifference d = compare_scenes(scene, other, views, flags.device);
     fmt::print(say, "{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what,
                d.mean_psnr_db, views.size(), d.worst_psnr_db, printable(d.worst_view));
@@ -65,8 +59,24 @@ Paths outputs_of(const std::filesystem::path& output, const EncodedSplats& encod
     return outputs;
 }
 
+EncodedSplats write_scene(const std::filesystem::path& output, SplatFormat format,
+                          SplatModel& model, const Paths& inputs, const ConvertFlags& flags) {
+    for (const std::string& loss : losses_of(format, model, output.string()))
+        darb::say("warning: {}: {}\n", output.string(), loss);
+    drop_unwritable(format, model);
+    PaletteDevice palettes(flags.device);
+    EncodeOptions options = flags.encode;
+    options.assign_rows = palettes.assign_rows();
+    EncodedSplats encoded = encode_scene(format, model, output.string(), options);
+    refuse_to_overwrite_inputs(outputs_of(output, encoded), inputs);
+    write_encoded(output, encoded);
+    return encoded;
+}
+
 int convert(const ConvertFlags& flags) {
-    const Paths inputs = together({files_of(flags.input), files_of(flags.cameras)});
+    check_level_options(flags.levels);
+    const Paths inputs =
+        together({files_of(flags.input), files_of(flags.cameras), files_of(flags.levels.refine)});
     refuse_to_overwrite_inputs({flags.output}, inputs);
     const std::optional<SplatFormat> format = format_to_write(flags.output);
     if (!format)
@@ -87,15 +97,15 @@ int convert(const ConvertFlags& flags) {
         print_difference(say, "renders of both kernels", model, gaussians, flags);
         model = gaussians;
     }
-    for (const std::string& loss : losses_of(*format, model, flags.output.string()))
-        darb::say("warning: {}: {}\n", flags.output.string(), loss);
-    drop_unwritable(*format, model);
-    PaletteDevice palettes(flags.device);
-    EncodeOptions options = flags.encode;
-    options.assign_rows = palettes.assign_rows();
-    const EncodedSplats encoded = encode_scene(*format, model, flags.output.string(), options);
-    refuse_to_overwrite_inputs(outputs_of(flags.output, encoded), inputs);
-    write_encoded(flags.output, encoded);
+    if (flags.levels.asked()) {
+        const auto write = [&](const std::filesystem::path& file, SplatModel& level) {
+            return write_scene(file, *format, level, inputs, flags).bytes();
+        };
+        write_levels(flags.levels, model,
+                     {flags.output, *format, views_for(model, flags), flags.device, say, write});
+        return 0;
+    }
+    const EncodedSplats encoded = write_scene(flags.output, *format, model, inputs, flags);
     fmt::print(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
                model.size(), encoded.bytes());
     if (flags.compare)
@@ -126,6 +136,7 @@ void add_convert(CLI::App& app, Action& action) {
                      "3: one gzip stream, which more programs read")
         ->check(CLI::IsMember({3, 4}))
         ->capture_default_str();
+    add_level_options(*command, flags->levels);
     command->add_flag(
         "--compare", flags->compare,
         "read what was written and print how far its renders differ from the scene's");

@@ -1,0 +1,50 @@
+// Fewer splats by merging, for `darb convert`: one file of a count, or several levels, each refined
+// against photos where they are given.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/scene/splat_file.h"
+
+namespace darb {
+
+struct LevelFlags {
+    std::size_t splats = 0;       // of the first level; 0: by share
+    std::optional<double> share;  // of each level of the one before
+    int levels = 0;               // 0: one file of the output's name
+    std::filesystem::path refine;
+    int iterations = 300;
+    DatasetOptions data;
+    bool asked() const { return splats > 0 || share || levels > 0; }
+};
+
+void add_level_options(CLI::App& app, LevelFlags& flags);
+/// Throws Error for options that say nothing together.
+void check_level_options(const LevelFlags& flags);
+
+/// Splats of the levels, falling, at least 1.
+std::vector<std::size_t> level_counts(const LevelFlags& flags, std::size_t splats);
+/// The name of level n, from 1: the number before what the format's name ends in.
+std::filesystem::path level_file(const std::filesystem::path& output, SplatFormat format, int n);
+
+/// Merges the scene and writes its levels; prints a row for each: splats, bytes, PSNR against the
+/// scene in `views` and, with --refine, against the held-out photos before and after. write: the
+/// model to a file, returns its bytes. Throws Error.
+struct LevelOutput {
+    std::filesystem::path output;
+    SplatFormat format = SplatFormat::ply;
+    std::vector<View> views;
+    std::string device;
+    std::FILE* say = stdout;
+    std::function<std::size_t(const std::filesystem::path&, SplatModel&)> write;
+};
+void write_levels(const LevelFlags& flags, const SplatModel& model, const LevelOutput& to);
+
+}  // namespace darb
