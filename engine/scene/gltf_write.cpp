@@ -7,6 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
+#include "engine/kernels/kernel_registry.h"
 #include "engine/scene/gaussian_scene.h"
 #include "engine/scene/gltf.h"
 #include "engine/scene/quantise.h"
@@ -188,12 +189,17 @@ std::string percent_encoded(const std::string& name) {
 std::vector<std::string> fallback_losses(const SplatModel& model, const std::string&) {
     if (model.kernel == KERNEL_GAUSSIAN) return {};
     const GaussianEquivalent fit = gaussian_equivalent(model.kernel, model.footprint, false);
-    return {
-        fmt::format("darb reads the kernel {} ({}) back as it is; other programs draw its "
-                    "nearest Gaussians, covariance x {:.4f}, opacity x {:.4f}, profile off by "
-                    "{:.2f} % (relative L2)",
-                    kernel_name(model.kernel), footprint_name(model.footprint), fit.covariance,
-                    fit.opacity, 100 * fit.error)};
+    const std::string name(kernel_name(model.kernel));
+    std::vector<std::string> losses;
+    if (kernel_definition(model.kernel))
+        losses.push_back(fmt::format(
+            "the kernel {} is one's own, of which glTF keeps the name alone: a PLY keeps all",
+            name));
+    losses.push_back(fmt::format(
+        "other programs than darb draw the nearest Gaussians of the kernel {} ({}), covariance x "
+        "{:.4f}, opacity x {:.4f}, profile off by {:.2f} % (relative L2)",
+        name, footprint_name(model.footprint), fit.covariance, fit.opacity, 100 * fit.error));
+    return losses;
 }
 
 EncodedSplats encode(const SplatModel& model, const std::string& where, const EncodeOptions&) {
