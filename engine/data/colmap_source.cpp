@@ -4,6 +4,7 @@
 #include <map>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
 #include "engine/data/source.h"
@@ -59,8 +60,10 @@ void note_siblings(const fs::path& model_folder, std::size_t photos, Dataset& da
 void check_photos(const std::vector<View>& views, const fs::path& model_folder) {
     std::size_t missing = 0;
     const View* first = nullptr;
-    for (const View& view : views)
+    for (const View& view : views) {
+        check_is_file(view.photo);  // where it is there
         if (!fs::is_regular_file(view.photo) && missing++ == 0) first = &view;
+    }
     if (first)
         throw Error(first->photo.string(),
                     fmt::format("the photo is missing, and with it {} of the {} that {} lists",
@@ -96,8 +99,6 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     if (model.dropped_points > 0)
         dataset.notes.push_back(fmt::format("{} with NaN or infinity were dropped.",
                                             counted(model.dropped_points, "point")));
-    if (dataset.points.size() == 0 && options.require_photos)
-        dataset.notes.push_back("There are no sparse points; training starts from random ones.");
     note_siblings(model_folder, dataset.views.size(), dataset);
     return dataset;
 }

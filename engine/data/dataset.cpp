@@ -13,6 +13,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/colmap.h"
+#include "engine/data/image_io.h"
 #include "engine/data/source.h"
 
 namespace darb {
@@ -108,15 +109,30 @@ Dataset load_nerfstudio(const fs::path& path, const fs::path& model, DatasetOpti
     return std::move(*transforms);
 }
 
-Dataset load_source(const fs::path& path, const DatasetOptions& options) {
+}  // namespace
+
+fs::path project_of_photos(const fs::path& folder) {
+    fs::path around = tidy_path(folder == "." ? fs::absolute(folder) : folder).parent_path();
+    if (around.empty()) around = ".";
+    if (!is_colmap_model(around / "sparse" / "0") && !is_colmap_model(around / "sparse")) return {};
+    std::error_code none;
+    for (const auto& entry : fs::recursive_directory_iterator(folder, none))
+        if (is_photo_name(entry.path().filename().string())) return around;
+    return {};
+}
+
+namespace {
+
+// options become those of what was read.
+Dataset load_source(const fs::path& path, DatasetOptions& options) {
     if (!fs::exists(path)) throw Error(path.string(), "does not exist", "Check the path.");
     if (!fs::is_directory(path)) {
         if (has_extension(path, ".json")) return load_transforms(path, options);
         throw Error(path.string(), "is neither a folder nor a .json file",
                     "Name a COLMAP project, a folder with transforms.json, or that file.");
     }
-    const bool transforms =
-        fs::exists(path / "transforms.json") || fs::exists(path / "transforms_train.json");
+    const bool transforms = std::ranges::any_of(
+        kTransformsFiles, [&](const char* name) { return fs::exists(path / name); });
     const fs::path nerfstudio = path / "colmap" / "sparse" / "0";
     for (const fs::path& model :
          {path / "sparse" / "0", path / "sparse", path, path / "0", nerfstudio}) {
@@ -131,6 +147,14 @@ Dataset load_source(const fs::path& path, const DatasetOptions& options) {
     if (transforms) return load_transforms(path, options);
     if (const fs::path opensfm = path / "reconstruction.json"; fs::exists(opensfm))
         return load_transforms(opensfm, options);  // says what it is
+    if (const fs::path project = project_of_photos(path); !project.empty()) {
+        options.images_folder =
+            (path == "." ? tidy_path(fs::absolute(path)) : path).filename().string();
+        Dataset dataset = load_source(project, options);
+        dataset.notes.push_back(fmt::format("{} was read, whose photos {} holds.",
+                                            dataset.root.string(), path.string()));
+        return dataset;
+    }
     throw Error(
         path.string(),
         "holds no cameras: neither a COLMAP model (sparse/0 with cameras and images, .bin or "

@@ -68,11 +68,15 @@ struct Dataset {
 };
 
 /// DATASET is a COLMAP project folder (sparse/0, sparse, 0, colmap/sparse/0, or the model files
-/// themselves), a folder with transforms.json or transforms_train.json, or a .json path. Where both
+/// themselves), the folder of its photos, a folder with transforms_train.json, transforms.json or
+/// transforms_test.json (which is all test), or a .json path. Where both
 /// are there, the COLMAP model is read, unless it cannot be, as where its photos are missing, or is
 /// that of nerfstudio and the file has masks, a split or a choice of photos that it lacks; a note
 /// says which. Throws Error naming file and record.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
+
+/// The COLMAP project beside whose sparse this folder of photos lies; empty where there is none.
+std::filesystem::path project_of_photos(const std::filesystem::path& folder);
 
 /// The photo, RGBA with straight alpha (255 where the file has none; a mask multiplies alpha),
 /// turned by view.orientation, undistorted, box filtered to view.camera's size. Thread-safe.

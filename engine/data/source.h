@@ -1,6 +1,7 @@
 // Between the readers of a source and load_dataset. Internal to engine/data.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -13,7 +14,10 @@ namespace darb {
 /// camera.translation; points; notes. Views come in any order.
 Dataset load_colmap(const std::filesystem::path& root, const std::filesystem::path& model_folder,
                     const DatasetOptions& options);
-/// path: a .json file, or a folder with transforms_train.json or transforms.json.
+/// Of which a folder's first is read; the last one's views are all test.
+inline constexpr std::array kTransformsFiles{"transforms_train.json", "transforms.json",
+                                             "transforms_test.json"};
+/// path: a .json file, or a folder with one of these.
 Dataset load_transforms(const std::filesystem::path& path, const DatasetOptions& options);
 
 /// Reads the head of every photo, decides on EXIF, scales declared lenses to the photos' sizes

@@ -95,6 +95,7 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
             view.photo = find_photo(root, frame.file_path);
         if (view.photo.empty()) {
             if (options.require_photos) {
+                check_is_file(wanted);  // what is there is of another kind
                 if (skipped.count++ == 0) skipped.first = wanted.string();
                 continue;
             }
@@ -121,12 +122,8 @@ void add_points(const fs::path& root, const std::string& ply, const DatasetOptio
     for (const char* name : kPointFiles)
         if (ply.empty() && !fs::is_regular_file(path)) path = root / name;
     if (!fs::is_regular_file(path)) {
-        if (!options.require_photos) return;  // only cameras are wanted
-        dataset.notes.push_back(
-            ply.empty() ? "There are no sparse points; training starts from random ones."
-                        : fmt::format("The point cloud {} is missing; training starts from random "
-                                      "points.",
-                                      path.string()));
+        if (options.require_photos && !ply.empty())  // else only cameras are wanted
+            dataset.notes.push_back(fmt::format("The point cloud {} is missing.", path.string()));
         return;
     }
     std::size_t dropped = 0;
@@ -148,12 +145,12 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
     Declared declared;
     dataset.root = fs::is_directory(path) ? path : path.parent_path();
     fs::path json = path;
-    if (fs::is_directory(path)) {
-        const bool split = fs::exists(path / "transforms_train.json");
-        json = path / (split ? "transforms_train.json" : "transforms.json");
-    }
+    if (fs::is_directory(path))
+        for (const char* name : kTransformsFiles)
+            if (json == path && fs::exists(path / name)) json = path / name;
     dataset.source = json.filename().string();
-    add_frames(json, false, options, dataset, skipped, declared);
+    const bool test = dataset.source == "transforms_test.json";
+    add_frames(json, test, options, dataset, skipped, declared);
     if (fs::is_directory(path) && json.filename() == "transforms_train.json") {
         const bool has_test = fs::exists(path / "transforms_test.json");
         const bool has_val = fs::exists(path / "transforms_val.json");

@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/data/colmap.h"
+#include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
 
 namespace darb {
@@ -33,6 +34,7 @@ bool names_cameras(const std::string& name) {
 
 bool has_cameras(const fs::path& folder) {
     if (fs::exists(folder / "colmap" / "sparse") || is_colmap_model(folder)) return true;
+    if (!project_of_photos(folder).empty()) return true;
     return std::any_of(fs::directory_iterator(folder), {}, [](const fs::directory_entry& entry) {
         return names_cameras(entry.path().filename().string());
     });

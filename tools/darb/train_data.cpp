@@ -93,6 +93,12 @@ Dataset load_training_data(const TrainFlags& flags, std::optional<RunLock>& lock
     const fs::path photos = photos_without_cameras(flags.dataset, flags.data.images_folder);
     Dataset dataset = photos.empty() ? load_dataset(flags.dataset, flags.data)
                                      : load_through_colmap(photos, flags, lock);
+    if (dataset.points.size() == 0)
+        dataset.notes.push_back("There are no sparse points; training starts from random ones.");
+    if (flags.train.random_points && dataset.points.size() > 0)
+        dataset.notes.push_back(
+            fmt::format("--random-points {} is for data sets without points; this one has {}.",
+                        *flags.train.random_points, dataset.points.size()));
     if (flags.data.hold_out) return dataset;
     size_t own_test = 0;
     for (View& view : dataset.views) own_test += std::exchange(view.is_test, false) ? 1 : 0;

@@ -1,6 +1,7 @@
 #include "engine/data/colmap.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -136,11 +137,29 @@ TEST(ColmapBinary, model_that_does_not_fit_together_is_an_error) {
     EXPECT_NE(missing.find("a.png"), std::string::npos);
     EXPECT_NE(missing.find("the photo is missing"), std::string::npos) << missing;
     EXPECT_NE(missing.find("colmap image_deleter"), std::string::npos) << missing;
+    ASSERT_EQ(::mkfifo((folder / "images/a.png").c_str(), 0600), 0);
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("a.png: is a pipe"), std::string::npos);
+    std::filesystem::remove(folder / "images/a.png");
     std::filesystem::remove(folder / "images");
     EXPECT_NE(error_of([&] { load_dataset(folder); }).find("images"), std::string::npos);
     EXPECT_NE(error_of([&] { load_dataset(folder / "nowhere"); }).find("exist"), std::string::npos);
     std::filesystem::remove_all(folder / "sparse");
     EXPECT_NE(error_of([&] { load_dataset(folder); }).find("no cameras"), std::string::npos);
+}
+
+TEST(ColmapBinary, the_folder_of_its_photos_names_a_project_too) {
+    const auto folder = write_project(camera_file(), image_file(), point_file());
+    std::filesystem::rename(folder / "images", folder / "photos");
+    for (const auto& named : {folder / "photos", folder / "photos/"}) {
+        const Dataset dataset = load_dataset(named);
+        EXPECT_EQ(dataset.views.size(), 1u);
+        EXPECT_EQ(dataset.root, folder);
+        EXPECT_EQ(dataset.options.images_folder, "photos");
+        EXPECT_EQ(dataset.views[0].photo, folder / "photos/a.png");
+    }
+    std::filesystem::create_directories(folder / "other");  // without photos
+    EXPECT_NE(error_of([&] { load_dataset(folder / "other"); }).find("no cameras"),
+              std::string::npos);
 }
 
 TEST(ColmapBinary, nan_points_are_dropped_with_a_note) {

@@ -412,5 +412,17 @@ TEST(TransformsSource, synthetic_folder_has_train_and_test_and_no_extensions) {
     EXPECT_TRUE(dataset.has_alpha);
 }
 
+TEST(TransformsSource, a_file_of_test_views_is_all_test) {
+    const auto folder = test_folder();
+    write_png(folder / "test/r_0.png", ImageU8(8, 8, 4));
+    const std::string head = R"("camera_angle_x": 1.5707963267948966, )";
+    write_file_atomic(folder / "transforms_test.json", file(head, frame("./test/r_0")));
+    for (const auto& named : {folder, folder / "transforms_test.json"}) {
+        const Dataset dataset = load_dataset(named);
+        ASSERT_EQ(dataset.views.size(), 1u) << named;
+        EXPECT_TRUE(dataset.views[0].is_test) << named;
+    }
+}
+
 }  // namespace
 }  // namespace darb
