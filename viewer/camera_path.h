@@ -17,6 +17,7 @@ struct KeyFrame {
     glm::dvec3 eye{0.0};
     glm::dquat orientation{1, 0, 0, 0};  // camera to world
     double fov_y = 0;                    // rad
+    bool operator==(const KeyFrame&) const = default;
 };
 
 struct CameraPath {

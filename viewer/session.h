@@ -24,6 +24,7 @@ namespace darb {
 
 struct PathState {
     CameraPath path;
+    std::vector<KeyFrame> saved;  // as a file has them
     std::filesystem::path file = "camera_path.json";
     std::filesystem::path folder = "frames";
     float seconds_per_key = 2;
@@ -31,6 +32,9 @@ struct PathState {
     bool playing = false;
     int fps = 30;
     int export_width = 1280, export_height = 720;
+
+    void mark_saved() { saved = path.keys; }
+    bool unsaved() const { return !path.keys.empty() && path.keys != saved; }
 };
 
 /// What a training run reports, iteration by iteration.

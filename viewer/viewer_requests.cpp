@@ -100,6 +100,7 @@ void Viewer::frame_all(int width, int height) {
 void Viewer::load_path() {
     PathState& p = session_.path;
     p.path = read_camera_path(p.file);
+    p.mark_saved();
     session_.note = fmt::format("{} key frames from {}", p.path.keys.size(), p.file.string());
 }
 
@@ -108,6 +109,7 @@ void Viewer::save_path() {
     saved_.check(p.file);
     write_camera_path(p.file, p.path);
     saved_.wrote(p.file);
+    p.mark_saved();
     session_.note = "path in " + p.file.string();
 }
 

@@ -8,6 +8,7 @@
 #include "engine/data/camera_list.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/viewer_fixture.h"
+#include "viewer/recovery.h"
 
 namespace darb::test {
 namespace {
@@ -180,6 +181,34 @@ TEST_F(ViewerWork, Unsaved_edits_are_asked_about_before_another_scene_and_the_en
     session().ask(request::Leave{});
     frame();
     EXPECT_TRUE(closes());
+}
+
+TEST_F(ViewerWork, What_is_not_saved_is_recovered_beside_the_scene_over_nothing) {
+    load(file_);
+    EXPECT_EQ(recover_unsaved(session()), "");
+    delete_something();
+    const size_t left = session().scene->model.size() - session().edit.removed_count();
+    const fs::path first = folder_ / "scene_recovered.ply",
+                   second = folder_ / "scene_recovered_2.ply";
+    fs::create_symlink(folder_ / "nowhere", first);
+    EXPECT_NE(recover_unsaved(session()).find(second.string()), std::string::npos);
+    EXPECT_EQ(load_splats(second).size(), left);
+    EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
+    session().save_file = folder_ / "edited.ply";
+    press(Key::save);
+    EXPECT_EQ(recover_unsaved(session()), "") << "it is saved";
+    make_path(2);
+    session().path.file = folder_ / "scene.ply" / "path.json";  // below a file: not there
+    const std::string said = recover_unsaved(session());
+    EXPECT_NE(said.find("The camera path that was not saved is in ./path_recovered.json"),
+              std::string::npos)
+        << said;
+    EXPECT_EQ(read_camera_path("path_recovered.json").keys, session().path.path.keys);
+    fs::remove("path_recovered.json");
+    session().path.file = folder_ / "path.json";
+    session().ask(request::SavePath{});
+    frame();
+    EXPECT_EQ(recover_unsaved(session()), "");
 }
 
 TEST_F(ViewerWork, A_save_says_what_the_format_loses_and_is_not_asked_about) {
