@@ -62,7 +62,14 @@ std::string Progress::text(const IterationResult& r, const Device& device) const
 }
 
 void Progress::note(const std::string& line) {
-    if (quiet_) return;
+    if (!quiet_) line_of_its_own(line);
+}
+
+void Progress::warn(const std::string& line) {
+    line_of_its_own("warning: " + line);
+}
+
+void Progress::line_of_its_own(const std::string& line) const {
     say_text(fmt::format(fmt::runtime(terminal_ ? "\r{}\033[K\n" : "{}\n"), printable(line)));
 }
 

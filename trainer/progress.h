@@ -17,6 +17,8 @@ class Progress {
     void update(const IterationResult& result, const Device& device);
     /// A line of its own (evaluation, saved file), leaving the bar intact.
     void note(const std::string& line);
+    /// The same with "warning: " before it, also of a quiet run.
+    void warn(const std::string& line);
     /// From this iteration on they take another time: rate and time left count from here.
     void restart_rate(int iteration);
     /// So many seconds were no training: a pause.
@@ -25,6 +27,7 @@ class Progress {
 
   private:
     using Clock = std::chrono::steady_clock;
+    void line_of_its_own(const std::string& line) const;
     std::string text(const IterationResult& result, const Device& device) const;
 
     int first_, last_;

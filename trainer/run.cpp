@@ -208,10 +208,10 @@ void Run::save_model(int iteration) {
     summary_.model = model_path(iteration);
     SplatModel model = trainer_.model();
     if (const std::size_t lost = drop_non_finite(model); lost > 0)
-        progress_.note(fmt::format("warning: {} splats with NaN or infinity are left out of {}",
-                                   lost, summary_.model.string()));
+        progress_.warn(fmt::format("{} splats with NaN or infinity are left out of {}", lost,
+                                   summary_.model.string()));
     if (model.size() == 0)
-        progress_.note("warning: no splat is left: " + summary_.model.string() + " is empty");
+        progress_.warn("no splat is left: " + summary_.model.string() + " is empty");
     while_doing(summary_.model.string(), [&] { write_ply(summary_.model, model); });
     if (const auto maps = trainer_.exposures(); !maps.empty())
         write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
