@@ -76,7 +76,7 @@ def cost_of(options, paths):
 
 
 def plan_of(options, paths, compare):
-    command = [options.darb, "plan", paths[0], "--json", "--no-price"]
+    command = [options.darb, "plan", paths[0], "--json", "-", "--no-price"]
     if len(paths) > 1:
         command += ["--cameras", paths[1]]
     plan = json.loads(run(options.prefix if compare else "", command + (["--compare"] if compare else [])))

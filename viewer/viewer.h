@@ -20,6 +20,7 @@ namespace darb {
 struct ViewerOptions {
     std::vector<View> views;  // cameras of a data set, may be none
     std::string up;           // x, -x, ...; "" = from the cameras, else -y
+    bool quiet = false;       // says nothing of what it has loaded
     float gui_scale = 0;      // size of the panels; 0: as the display wants it
     Accuracy accuracy;        // to start with
     EffectChoice effects;     // on top of what a scene calls for

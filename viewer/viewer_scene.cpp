@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "viewer/controls.h"
 #include "viewer/viewer.h"
 
@@ -82,9 +83,8 @@ void Viewer::show(LoadedScene loaded) {
     session_.save_file.replace_filename(s.file.stem().string() + "_edited.ply");
     session_.fly_speed = s.bounds.radius / 2;
     show_as_meant(s, first);
-    fmt::print("loaded {}: {} splats in {:.2f} s\neffects: {}\n", s.file.string(), s.model.size(),
-               s.load_s, plan_line(*session_.plan));
-    std::fflush(stdout);
+    tell(options_.quiet ? nullptr : stdout, "loaded {}: {} splats in {:.2f} s\neffects: {}\n",
+         s.file.string(), s.model.size(), s.load_s, plan_line(*session_.plan));
     if (first) session_.navigation.level();
     if (session_.photos.current < 0 && !of_run) session_.ask(request::FrameAll{});
     set_pivot(s.bounds);

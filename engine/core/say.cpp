@@ -1,11 +1,24 @@
 #include "engine/core/say.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <system_error>
 
 namespace darb {
+
+namespace {
+
+// An error of a disk is none of a terminal that is gone.
+bool nobody_reads(int error) {
+    struct stat facts {};
+    const bool file = ::fstat(STDOUT_FILENO, &facts) == 0 && S_ISREG(facts.st_mode);
+    return error == EPIPE || error == EBADF || (error == EIO && !file);
+}
+
+}  // namespace
 
 void say_text(std::string_view text) noexcept {
     if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size() || std::fflush(stderr) != 0)
@@ -16,13 +29,17 @@ bool write_or_let_go(std::string_view text) {
     errno = 0;
     if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0)
         return true;
-    if (errno != EPIPE && errno != EBADF && errno != EIO) return false;
+    if (!nobody_reads(errno)) return false;
     const int nothing = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
     if (nothing < 0) return false;
     ::dup2(nothing, STDOUT_FILENO);
     ::close(nothing);
     std::clearerr(stdout);
     return std::fflush(stdout) == 0;
+}
+
+void tell_text(std::string_view text) {
+    if (!write_or_let_go(text)) throw std::system_error(errno, std::generic_category());
 }
 
 void keep_standard_descriptors() {

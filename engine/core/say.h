@@ -1,5 +1,5 @@
-// What a program tells people while it works, on stderr: a closed or full stderr is no reason to
-// stop. What it was asked for goes to stdout, whose failures count.
+// What a program says while it works, on stderr: a closed or full stderr is no reason to stop. What
+// it was asked for it tells on stdout: a full disk there counts, a reader that is gone does not.
 #pragma once
 
 #include <fmt/format.h>
@@ -25,6 +25,15 @@ void say(fmt::format_string<T...> format, T&&... values);
 /// disk).
 bool write_or_let_go(std::string_view text);
 
+/// What the program was asked for, to stdout: formatted, and printable(). Throws std::system_error
+/// where write_or_let_go() fails.
+template <typename... T>
+void tell(fmt::format_string<T...> format, T&&... values);
+/// The same to stdout, or said on stderr; nothing where stream is null.
+template <typename... T>
+void tell(std::FILE* stream, fmt::format_string<T...> format, T&&... values);
+void tell_text(std::string_view text);  // as it is
+
 /// Opens /dev/null for those of stdin, stdout and stderr that are closed: else the next file that
 /// is opened takes their number, and what is printed goes into it. What is written to stdout fails.
 void keep_standard_descriptors();
@@ -32,6 +41,18 @@ void keep_standard_descriptors();
 template <typename... T>
 void say(fmt::format_string<T...> format, T&&... values) {
     say_text(printable(fmt::format(format, std::forward<T>(values)...), true));
+}
+
+template <typename... T>
+void tell(fmt::format_string<T...> format, T&&... values) {
+    tell_text(printable(fmt::format(format, std::forward<T>(values)...), true));
+}
+
+template <typename... T>
+void tell(std::FILE* stream, fmt::format_string<T...> format, T&&... values) {
+    if (stream == nullptr) return;
+    const std::string text = printable(fmt::format(format, std::forward<T>(values)...), true);
+    stream == stderr ? say_text(text) : tell_text(text);
 }
 
 }  // namespace darb

@@ -244,7 +244,7 @@ TEST(BenchCommand, Tuning_hasARowForEveryWayOfThisDevice) {
 
 TEST(BenchCommand, Growth_isATableFilesAndAPage_long) {
     const fs::path json = scratch() / "growth.json", html = scratch() / "growth.html";
-    const Outcome o = darb("bench --growth --most-splats 1000 --samples 1 --seconds 0 -q --json " +
+    const Outcome o = darb("bench --growth --most-splats 1000 --samples 1 --seconds 0 --json " +
                            json.string() + " --html " + html.string());
     ASSERT_EQ(o.code, 0) << o.err;
     EXPECT_NE(o.out.find("iteration by pixels"), std::string::npos) << o.out;

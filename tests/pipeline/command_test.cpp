@@ -114,6 +114,12 @@ TEST(Command, a_command_without_its_data_set_is_named) {
     write_file_atomic(run / "command.json", R"(["train","-o","out"])");
     expect_refused({{"train --resume -o " + run.string(),
                      (run / "command.json").string() + ": names no data set"}});
+    for (const char* wrong :
+         {R"("1e999")", R"("--iterations","x")", R"("--iterations")", R"("-q","--none")"}) {
+        write_file_atomic(run / "command.json",
+                          fmt::format(R"(["train","data","-o","out",{}])", wrong));
+        expect_refused({{"train --resume -o " + run.string(), (run / "command.json").string()}});
+    }
 }
 
 TEST(Command, features_that_are_not_there_say_so) {

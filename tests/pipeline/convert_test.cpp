@@ -161,6 +161,11 @@ TEST(Convert, bad_options_are_refused) {
                     {"convert " + ply + to + "--kernel sinc", "--kernel"},
                     {"convert " + ply + to + "--prune-opacity 2", "--prune-opacity"}});
     EXPECT_FALSE(fs::exists(out("x.ply")));
+    for (const std::string& edit : {"--crop 50,50,50,60,60,60", "--prune-opacity 1"}) {
+        expect_refused(
+            {{"convert " + ply + " " + out("none.ply") + " " + edit, edit + ": keeps none of "}});
+        EXPECT_FALSE(fs::exists(out("none.ply")));
+    }
 }
 
 TEST(Convert, what_is_read_is_not_written_over) {

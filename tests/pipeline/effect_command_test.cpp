@@ -26,7 +26,7 @@ TEST(EffectCommand, effects_begin_with_a_minus_or_a_base) {
         EXPECT_NE(o.out.find("near        off"), std::string::npos) << o.out;
         EXPECT_NE(o.out.find("alpha       off"), std::string::npos) << o.out;
     }
-    const Outcome o = darb("plan " + kScene + " --no-price --effects none,+lens --json");
+    const Outcome o = darb("plan " + kScene + " --no-price --effects none,+lens --json -");
     EXPECT_EQ(o.code, 0) << o.err;
     const json plan = json::parse(o.out);
     for (const json& row : plan["effects"])
@@ -84,7 +84,7 @@ TEST(EffectCommand, without_the_lens_effect_a_wide_fisheye_is_straightened_as_by
 
 TEST(EffectCommand, the_plan_prices_the_lens_where_photos_are_distorted_long) {
     const auto lens_row = [](const fs::path& dataset) {
-        const Outcome o = darb("plan " + dataset.string() + " -r 8 --json");
+        const Outcome o = darb("plan " + dataset.string() + " -r 8 --json -");
         EXPECT_EQ(o.code, 0) << o.err;
         const json plan = json::parse(o.out);
         for (const json& row : plan["effects"])

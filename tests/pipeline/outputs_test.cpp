@@ -1,6 +1,9 @@
 // No command writes over what it reads, by whatever name; a full disk behind stdout is an error.
+#include <sys/stat.h>
+
 #include <map>
 
+#include "tests/support/child.h"
 #include "tests/support/run_command.h"
 
 namespace darb::test {
@@ -133,6 +136,153 @@ TEST_F(Outputs, a_full_disk_behind_stdout_is_an_error) {
             << command << read_text_file(err);
     }
     EXPECT_TRUE(fs::exists(folder_ / "out" / "metrics.json")) << "the run itself is complete";
+}
+
+// What was asked for besides is written all the same.
+TEST_F(Outputs, a_reader_that_is_gone_ends_no_command) {
+    const std::string data = data_.string(), s = ply().string(), out = folder_.string() + "/out";
+    const std::vector<std::vector<std::string>> commands{
+        {"--help"},
+        {"train", "--help-all"},
+        {"devices"},
+        {"info", s},
+        {"info", s, "--json", "-"},
+        {"plan", s, "--no-price", "--json", out + ".plan"},
+        {"psi", "--samples", "1", "--cells", "8", "--json", out + ".psi"},
+        {"convert", s, out + ".splat"},
+        {"eval", s, data, "-r", "8", "--json", out + ".eval"},
+        {"render", s, "--cameras", data, "-r", "8", "-o", out}};
+    for (const auto& words : commands) {
+        Child child(words, folder_, [] { write_to_nobody({STDOUT_FILENO}); });
+        EXPECT_EQ(child.wait(), 0) << words[0] << ": " << child.err();
+        EXPECT_EQ(child.err().find("rror"), std::string::npos) << words[0] << ": " << child.err();
+        Child mute(words, folder_, [] { write_to_nobody({STDOUT_FILENO, STDERR_FILENO}); });
+        EXPECT_EQ(mute.wait(), 0) << words[0];
+    }
+    for (const char* name : {"out.plan", "out.psi", "out.splat", "out.eval", "out/view_11.png"})
+        EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+    Child bad({"info", "nothing"}, folder_, [] { write_to_nobody({STDERR_FILENO}); });
+    EXPECT_EQ(bad.wait(), 2);
+}
+
+TEST_F(Outputs, quiet_commands_print_paths_alone) {
+    const std::string data = data_.string(), s = ply().string(), out = folder_.string() + "/o";
+    const std::vector<std::pair<std::string, std::string>> commands{
+        {"info " + s + " --json " + out, out},
+        {"info " + s, ""},
+        {"plan " + s + " --no-price --json " + out, out},
+        {"devices", ""},
+        {"convert " + s + " " + out + ".spz", out + ".spz"},
+        {"eval " + s + " " + data + " -r 8 --json " + out, out},
+        {"render " + s + " --cameras " + data + " -r 8 -o " + out + "_frames", out + "_frames"},
+        {"psi --kernels sinc --samples 1 --cells 8 --json " + out + " --html " + out + ".html",
+         out + "\n" + out + ".html"},
+        {"sim1d --signals square --kernels sinc -N 1 --seeds 1 --steps 2 --json " + out, out},
+        {"cost " + s + " --quick --size 32x32 --json " + out, out},
+#ifdef DARB_HAS_VIEWER
+        {"view " + s + " --size 32x32 --screenshot " + out + ".png", out + ".png"},
+#endif
+        {"train " + data + " -o " + out + "_run -r 8 --iterations 1 --no-report",
+         out + "_run/point_cloud/iteration_1/point_cloud.ply"}};
+    for (const auto& [command, paths] : commands) {
+        const Outcome o = darb(command + " -q");
+        EXPECT_EQ(o.code, 0) << command;
+        EXPECT_EQ(o.out, paths.empty() ? "" : paths + "\n") << command;
+        EXPECT_EQ(o.err, "") << command;
+    }
+}
+
+TEST_F(Outputs, a_pipe_that_nobody_reads_any_more_is_an_error_of_its_name) {
+    const fs::path pipe = folder_ / "pipe.ply";
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"convert", ply().string(), pipe.string()},
+          {"info", ply().string(), "--json", pipe.string()}}) {
+        const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+        const int full = ::open(pipe.c_str(), O_WRONLY | O_NONBLOCK);  // so that the command waits
+        while (::write(full, "x", 1) == 1) continue;
+        Child child(words, folder_);
+        while (child.running() && !child.holds(pipe)) ::usleep(1'000);  // it waits for room there
+        ::close(full);
+        ::close(reader);
+        EXPECT_EQ(child.wait(), 2) << child.err();
+        EXPECT_NE(child.err().find("pipe.ply: cannot be written: Broken pipe"), std::string::npos)
+            << words[0] << ": " << child.err();
+    }
+}
+
+TEST_F(Outputs, names_of_files_do_not_steer_the_terminal) {
+    const fs::path odd = folder_ /
+                         "a\x1b]0;b\x07\x7f\xc2\x9b\xe2\x80\xae"
+                         "c";
+    fs::create_directories(odd);
+    const std::string s = odd / "s.ply", data = odd / "data", run = odd / "run", json = odd / "j";
+    fs::copy(ply(), s);
+    fs::copy(run_, run, fs::copy_options::recursive);
+    fs::copy(data_, data, fs::copy_options::recursive);
+    std::vector<std::vector<std::string>> commands{
+        {"info", s},
+        {"info", data, "--json", "-", "-r", "8"},
+        {"info", odd},
+        {"plan", s, "--no-price", "--json", "-"},
+        {"plan", run, "--no-price", "--json", json},
+        {"convert", s, odd / "o.spz"},
+        {"convert", s, odd / "o.none"},
+        {"convert", s, odd / "no" / "\x1b[m.ply"},
+        {"eval", s, data, "-r", "8", "--json", json},
+        {"eval", s, odd},
+        {"render", s, "--cameras", data, "-r", "8", "-o", odd / "frames"},
+        {"render", s, "--cameras", s, "-o", odd / "frames"},
+        {"cost", s, "--device", odd},
+        {"cost", data},
+        {"check", "--scene", s, "--cameras", data, "--dump", odd / "dump"},
+        {"train", data, "-o", odd / "out", "-r", "8", "--iterations", "1", "--no-report"},
+        {"train", odd, "-o", odd / "out"},
+        {"train", "--resume", "-o", odd},
+        {"compare", odd, "-o", odd / "out"},
+        {"bench", odd},
+        {"devices", "--device", odd},
+        {odd},
+        {"info", s, odd},
+        {"info", s, "-" + odd.filename().string()},
+        {"psi", "--samples", odd},
+        {"psi", "--kernel", odd},
+        {"sim1d", "--signals", odd},
+        {"train", data, "--strategy", odd}};
+#ifdef DARB_HAS_VIEWER
+    commands.push_back({"view", s, "--screenshot", odd / "s.png", "--size", "64x48"});
+    commands.push_back({"view", odd, "--screenshot", odd / "s.png"});
+    commands.push_back({"view", s, "--screenshot", odd / "s.odd"});
+    commands.push_back({"view", s, "--show", odd});
+#endif
+    for (const auto& words : commands) {
+        Child child(words, folder_);
+        EXPECT_GE(child.wait(), 0);
+        for (const std::string& text : {child.out(), child.err()})
+            for (const std::string& steers :
+                 {std::string("\x1b"), std::string("\x07"), std::string("\x7f"),
+                  std::string("\xc2\x9b"), std::string("\xe2\x80\xae")})
+                EXPECT_EQ(text.find(steers), std::string::npos) << words[0] << ": " << text;
+    }
+}
+
+// Neither what was named by its whole path nor what a message says of it.
+TEST_F(Outputs, numbers_name_no_folder_of_the_machine) {
+    const fs::path far = folder_ / "far", json = far / "n.json";
+    fs::create_directories(far);
+    const std::string data = data_.string(), s = ply().string(), of_far = scratch().string();
+    write_file_atomic(data_ / "transforms.json", "{}");  // a note names what is read instead
+    for (const std::string& command :
+         {"info " + s, "info " + data + " -r 8", "info " + run_.string(),
+          "plan " + s + " --no-price", "plan " + data + " --no-price -r 8",
+          "cost " + s + " --quick --size 32x32 -q"}) {
+        const Outcome o = darb(command + " --json " + json.string());
+        EXPECT_EQ(o.code, 0) << command << o.err;
+        const std::string text = read_text_file(json);
+        EXPECT_EQ(text.find(of_far), std::string::npos) << command << text;
+    }
+    const std::string shown = darb("info " + s + " --json -").out;
+    EXPECT_EQ(shown.find(fs::current_path().string() + "/"), std::string::npos) << shown;
 }
 
 }  // namespace

@@ -22,7 +22,13 @@ TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
     const Outcome first = darb(command);
     ASSERT_EQ(first.code, 0) << first.err;
     EXPECT_NE(first.out.find("missing.safetensors does not exist"), std::string::npos) << first.out;
+    for (const char* name : {"compare.json", "compare.html"}) {  // to be shared
+        const std::string text = read_text_file(out / name);
+        for (const std::string& folder : {scratch().string(), std::string(DARB_SOURCE_DIR) + "/"})
+            EXPECT_EQ(text.find(folder), std::string::npos) << name;
+    }
     const nlohmann::json a = read_json(out / "compare.json");
+    EXPECT_EQ(a["datasets"][0]["runs"][0]["folder"], "scene/gaussian/seed0");
     const auto& medians = a["datasets"][0]["medians"];
     ASSERT_EQ(medians.size(), 4u);
     for (const auto& row : medians) {

@@ -204,6 +204,23 @@ TEST_F(RunFolder, the_plan_knows_the_kernel_slow) {
     EXPECT_TRUE(antialias("--kernel sinc --schedule 3dgs --effects all"));
 }
 
+// Of a quiet run, too.
+TEST_F(RunFolder, splats_that_are_lost_are_said) {
+    const Outcome none = train(
+        "--iterations 40 -q --no-report --prune-opacity 0.99 --densify-from-iter 1 "
+        "--densification-interval 5");
+    EXPECT_EQ(none.code, 0);
+    EXPECT_NE(none.err.find("warning: no splat is left: "), std::string::npos) << none.err;
+    const Outcome infinite = train("--iterations 4 -q --no-report --rotation-lr 1e38");
+    EXPECT_EQ(infinite.code, 0);
+    EXPECT_NE(infinite.err.find("splats with NaN or infinity are left out of "), std::string::npos)
+        << infinite.err;
+    const Outcome points = train("--iterations 1 --no-report --random-points 50");
+    EXPECT_NE(points.err.find("--random-points 50 is for data sets without points"),
+              std::string::npos)
+        << points.err;
+}
+
 TEST_F(RunFolder, an_opacity_reset_leaves_what_can_be_seen) {
     ASSERT_EQ(train("--iterations 1 -q --prune-opacity 0").code, 0);
     EXPECT_NEAR(settings()["opacity_reset"][1].get<double>(), 0.01, 1e-6);

@@ -8,62 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "tests/support/child.h"
 #include "tests/support/run_command.h"
 
 namespace darb::test {
 namespace {
 
 const fs::path kStoppedScene = fs::path(DARB_SOURCE_DIR) / "assets" / "scene";
-
-// A child with stdout and stderr in files; prepare runs in it before the command does.
-class Child {
-  public:
-    Child(std::vector<std::string> words, const fs::path& folder,
-          const std::function<void()>& prepare = {})
-        : out_(folder / "child.out"), err_(folder / "child.err") {
-        words.insert(words.begin(), DARB_COMMAND);
-        std::vector<char*> argv;
-        for (std::string& word : words) argv.push_back(word.data());
-        argv.push_back(nullptr);
-        pid_ = ::fork();
-        if (pid_ != 0) return;
-        redirect(out_, STDOUT_FILENO);
-        redirect(err_, STDERR_FILENO);
-        if (prepare) prepare();
-        ::execv(argv[0], argv.data());
-        ::_exit(127);
-    }
-    ~Child() {
-        if (!running()) return;
-        ::kill(pid_, SIGKILL);
-        wait();
-    }
-    Child(const Child&) = delete;
-    Child& operator=(const Child&) = delete;
-
-    pid_t pid() const { return pid_; }
-    bool running() {
-        if (pid_ > 0 && ::waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = 0;
-        return pid_ > 0;
-    }
-    void send(int signal) const { ::kill(pid_, signal); }
-    // Exit code, or minus the signal that ended it.
-    int wait() {
-        if (pid_ > 0) ::waitpid(pid_, &status_, 0);
-        pid_ = 0;
-        return WIFEXITED(status_) ? WEXITSTATUS(status_) : -WTERMSIG(status_);
-    }
-    std::string out() const { return read_text_file(out_); }
-    std::string err() const { return read_text_file(err_); }
-
-  private:
-    static void redirect(const fs::path& file, int fd) {
-        ::dup2(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600), fd);
-    }
-    fs::path out_, err_;
-    pid_t pid_ = 0;
-    int status_ = 0;
-};
 
 class StoppedRun : public testing::Test {
   protected:
@@ -132,21 +83,15 @@ TEST_F(StoppedRun, a_hangup_that_nohup_keeps_away_does_not_count) {
 
 // Readers that are gone, descriptors that are closed: the run goes on to its end.
 TEST_F(StoppedRun, lost_stdout_and_stderr_are_no_reason_to_stop) {
-    const auto to_nobody = [](std::initializer_list<int> descriptors) {
-        int ends[2];
-        if (::pipe(ends) != 0) ::_exit(126);
-        for (const int fd : descriptors) ::dup2(ends[1], fd);
-        ::close(ends[0]);
-        ::close(ends[1]);
-    };
-    const std::vector<std::function<void()>> losses{[&] {
-                                                        to_nobody({STDOUT_FILENO, STDERR_FILENO});
-                                                    },
-                                                    [&] { to_nobody({STDERR_FILENO}); },
-                                                    [] {
-                                                        ::close(STDOUT_FILENO);
-                                                        ::close(STDERR_FILENO);
-                                                    }};
+    const std::vector<std::function<void()>> losses{
+        [&] {
+            write_to_nobody({STDOUT_FILENO, STDERR_FILENO});
+        },
+        [&] { write_to_nobody({STDERR_FILENO}); },
+        [] {
+            ::close(STDOUT_FILENO);
+            ::close(STDERR_FILENO);
+        }};
     for (const auto& loss : losses) {
         fs::remove_all(run_);
         Child child(training(40), folder_, loss);

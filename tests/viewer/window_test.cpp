@@ -118,6 +118,43 @@ TEST_F(WindowTest, A_dropped_pipe_is_refused_and_the_window_closes_slow) {
     EXPECT_EQ(program_->wait(), 0) << log("view.log");
 }
 
+// Edited by the keys of a user: a path of one key, which nobody saved.
+TEST_F(WindowTest, What_was_not_saved_is_kept_when_the_display_ends_or_a_signal_comes_slow) {
+    const fs::path kept = "camera_path_recovered.json";
+    for (const bool display_ends : {false, true}) {
+        SCOPED_TRACE(display_ends);
+        fs::remove(folder_ / kept);
+        fs::remove(folder_ / "view.log");
+        ::setenv("DARB_TEST_FOLDER", folder_.c_str(), 1);
+        program_.emplace(Words{"sh", "-c",
+                               "cd \"$DARB_TEST_FOLDER\" && exec \"$0\" view scene.ply --no-panels "
+                               "--size 640x480",
+                               DARB_COMMAND},
+                         folder_ / "view.log");
+        ASSERT_TRUE(eventually([&] { return log("view.log").find("loaded") != std::string::npos; }))
+            << log("view.log");
+        settled();
+        xdo({"mousemove", "300", "200", "key", "k"});
+        settled();
+        ASSERT_TRUE(program_->running()) << log("view.log");
+        if (display_ends)
+            display_->terminate();
+        else
+            program_->terminate();
+        EXPECT_TRUE(eventually([&] { return !program_->running(); }));
+        EXPECT_EQ(program_->wait(), display_ends ? 2 : 128 + SIGTERM) << log("view.log");
+        EXPECT_NE(log("view.log")
+                      .find(display_ends ? "error: window: the display is gone"
+                                         : "interrupted by SIGTERM"),
+                  std::string::npos)
+            << log("view.log");
+        EXPECT_NE(log("view.log").find("The camera path that was not saved is in " + kept.string()),
+                  std::string::npos)
+            << log("view.log");
+        EXPECT_TRUE(fs::exists(folder_ / kept));
+    }
+}
+
 TEST_F(WindowTest, Mouse_and_keys_move_the_camera_slow) {
     const ImageU8 wanted = headless();
     start();

@@ -15,10 +15,10 @@
 #include "tools/bench/scenes.h"
 #include "tools/darb/bench_growth.h"
 #include "tools/darb/command_list.h"
-#include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 
@@ -70,18 +70,19 @@ void run_cases(Device& device, const DeviceRates& rates, const std::vector<Bench
     for (const BenchCase& one : cases) {
         BenchResult result = one.run(device, rates, flags.options);
         result.name = one.name;
-        fmt::print("{}", result_text(result, rates, !flags.brief));
-        std::fflush(stdout);
+        tell(stream_beside_json(flags.json, flags.quiet), "{}",
+             result_text(result, rates, !flags.brief));
         json["benchmarks"].push_back(result_json(result, rates));
-        write_json(flags.json, json);  // what is there, should a later case end the run
+        if (flags.json != "-") write_json(flags.json, json);  // should a later case end the run
     }
+    if (flags.json == "-") write_json(flags.json, json);
 }
 
 int bench(BenchFlags flags) {
     check_growth(flags.growth, flags.filter);
     std::vector<BenchCase> cases = chosen_cases(flags);
     for (const BenchCase& one : cases)
-        if (flags.list) fmt::print("{}\n", one.name);
+        if (flags.list) tell("{}\n", one.name);
     if (flags.list) return 0;
     BenchOptions& options = flags.options;
     options.data = bench_data_folder(flags.data);
@@ -108,11 +109,12 @@ int bench(BenchFlags flags) {
     require_timestamps(device);
     const DeviceRates rates = measure_rates(device);
     const nlohmann::json context = context_json(device, rates, flags.note);
-    fmt::print("{}", context_text(context));
+    tell(stream_beside_json(flags.json, flags.quiet), "{}", context_text(context));
     if (flags.growth.on)
-        bench_growth(device, flags.growth, context, flags.json, options.progress);
+        bench_growth(device, flags.growth, context, flags.json, flags.quiet, options.progress);
     else
         run_cases(device, rates, cases, flags, context);
+    tell_paths(flags.quiet, {flags.json, flags.growth.html});
     return 0;
 }
 
@@ -127,7 +129,7 @@ void add_bench(CLI::App& app, Action& action) {
     command->add_option("--data", flags->data,
                         "folder of the data sets and of splats/; default: $DARB_TEST_DATA, else "
                         "../shared/data");
-    command->add_option("--json", flags->json, "write every number to this file");
+    add_json_option(*command, flags->json);
     command->add_option("--note", flags->note, "about the machine, kept in the file");
     command->add_flag("--full", flags->options.full,
                       "the long set-up: fox_800 after 7,000 iterations, not 1,000");
@@ -139,7 +141,7 @@ void add_bench(CLI::App& app, Action& action) {
         ->check(CLI::Range(1, 200));
     add_growth_flags(*command, flags->growth);
     command->add_flag("--brief", flags->brief, "a line a case, no passes");
-    command->add_flag("-q,--quiet", flags->quiet, "no progress");
+    add_quiet_flag(*command, flags->quiet);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     command->callback([flags, &action] { action = [flags] { return bench(*flags); }; });

@@ -4,7 +4,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "tools/darb/cost_flags.h"
+#include "engine/core/say.h"
+#include "tools/darb/json_output.h"
 
 namespace darb {
 
@@ -27,12 +28,12 @@ void check_growth(const GrowthFlags& flags, const std::string& filter) {
 }
 
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
-                  const std::filesystem::path& json,
+                  const std::filesystem::path& json, bool quiet,
                   const std::function<void(const std::string&)>& progress) {
     const std::vector<GrowthCurve> curves = measure_growth(device, flags.plan, progress);
-    fmt::print("{}", growth_table(curves));
     write_json(json, {{"context", context}, {"growth", growth_json(curves)}});
     if (!flags.html.empty()) write_file_atomic(flags.html, growth_html(curves, context));
+    tell(stream_beside_json(json, quiet), "{}", growth_table(curves));
 }
 
 }  // namespace darb

@@ -25,7 +25,7 @@ void add_growth_flags(CLI::App& command, GrowthFlags& flags);
 void check_growth(const GrowthFlags& flags, const std::string& filter);
 
 void bench_growth(Device& device, const GrowthFlags& flags, const nlohmann::json& context,
-                  const std::filesystem::path& json,
+                  const std::filesystem::path& json, bool quiet,
                   const std::function<void(const std::string&)>& progress);
 
 }  // namespace darb

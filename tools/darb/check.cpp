@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -10,9 +11,11 @@
 #include "engine/check/run_checks.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
@@ -26,7 +29,7 @@ struct CheckFlags {
     std::string device;
     std::filesystem::path json, scene, cameras, dump;
     int view = 0;
-    bool reference = false;
+    bool reference = false, quiet = false;
     TuneFlags tune;
     DatasetOptions data;
     check::CheckOptions checks;
@@ -42,45 +45,39 @@ nlohmann::json row_json(const check::Row& row) {
     return json;
 }
 
-void print_row(const check::Row& row, std::string& group) {
-    if (row.group != group) fmt::print("\n{}\n", group = row.group);
+void print_row(std::FILE* out, const check::Row& row, std::string& group) {
+    if (row.group != group) tell(out, "\n{}\n", group = row.group);
     const std::string outside =
         row.outside > 0 || row.band > 0
             ? fmt::format("{} of {} outside, {} may be", row.outside, row.count, row.band)
             : "";
-    fmt::print("  {:<44} {:>9.2e} {:>9.2e}  {}  {}{}\n", row.name, row.error, row.allowed,
-               row.pass ? "pass" : "FAIL", outside, row.detail);
-    std::fflush(stdout);
+    tell(out, "  {:<44} {:>9.2e} {:>9.2e}  {}  {}{}\n", row.name, row.error, row.allowed,
+         row.pass ? "pass" : "FAIL", outside, row.detail);
 }
 
 int check_device(Device& device, const CheckFlags& flags) {
     const DeviceInfo& info = device.info();
-    fmt::print("darb {}\ndevice   {}\ndriver   {}\nsubgroup {} lanes\n", DARB_VERSION, info.name,
-               info.driver, info.subgroup_size);
-    fmt::print("  {:<44} {:>9} {:>9}\n", "", "error", "allowed");
+    std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
+    tell(out, "darb {}\ndevice   {}\ndriver   {}\nsubgroup {} lanes\n{:<46} {:>9} {:>9}\n",
+         DARB_VERSION, info.name, info.driver, info.subgroup_size, "", "error", "allowed");
     const auto start = std::chrono::steady_clock::now();
     std::string group;
     const std::vector<check::Row> rows = check::run_checks(
-        device, flags.checks, [&](const check::Row& row) { print_row(row, group); });
+        device, flags.checks, [&](const check::Row& row) { print_row(out, row, group); });
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    size_t failed = 0;
     nlohmann::json list = nlohmann::json::array();
-    for (const check::Row& row : rows) {
-        failed += row.pass ? 0 : 1;
-        list.push_back(row_json(row));
-    }
-    fmt::print("\n{} checks in {:.1f} s, {} failed: {}\n", rows.size(), seconds.count(), failed,
-               failed == 0 ? "PASS" : "FAIL");
-    if (!flags.json.empty())
-        write_file_atomic(flags.json, nlohmann::json{{"version", DARB_VERSION},
-                                                     {"device", info.name},
-                                                     {"driver", info.driver},
-                                                     {"subgroup_size", info.subgroup_size},
-                                                     {"seconds", seconds.count()},
-                                                     {"failed", failed},
-                                                     {"checks", list}}
-                                              .dump(2) +
-                                          "\n");
+    for (const check::Row& row : rows) list.push_back(row_json(row));
+    const auto failed = std::ranges::count(rows, false, &check::Row::pass);
+    tell(out, "\n{} checks in {:.1f} s, {} failed: {}\n", rows.size(), seconds.count(), failed,
+         failed == 0 ? "PASS" : "FAIL");
+    write_json(flags.json, nlohmann::json{{"version", DARB_VERSION},
+                                          {"device", info.name},
+                                          {"driver", info.driver},
+                                          {"subgroup_size", info.subgroup_size},
+                                          {"seconds", seconds.count()},
+                                          {"failed", failed},
+                                          {"checks", list}});
+    tell_paths(flags.quiet, {flags.json});
     return failed == 0 ? 0 : 1;
 }
 
@@ -108,9 +105,11 @@ int dump_view(const CheckFlags& flags) {
         check::dump_from_device(device, model, view.camera, flags.dump);
         from = device.info().name;
     }
-    fmt::print("{}: image and gradients of view {} ({}), {} splats, {} x {} px, from {}\n",
-               flags.dump.string(), flags.view, printable(view.name), model.size(),
-               view.camera.width, view.camera.height, from);
+    tell_paths(flags.quiet, {flags.dump});
+    tell(flags.quiet ? nullptr : stdout,
+         "{}: image and gradients of view {} ({}), {} splats, {} x {} px, from {}\n",
+         flags.dump.string(), flags.view, printable(view.name), model.size(), view.camera.width,
+         view.camera.height, from);
     return 0;
 }
 
@@ -132,7 +131,7 @@ void add_check(CLI::App& app, Action& action) {
     auto flags = std::make_shared<CheckFlags>();
     CLI::App* command = app.add_subcommand(
         "check", "Check a device and its driver against double precision; exit code 1: failed");
-    command->add_option("--json", flags->json, "write every row to this file too");
+    add_json_option(*command, flags->json);
     command->add_flag("--every-kernel", flags->checks.every_kernel,
                       "walks and hard cases in every kernel and footprint: minutes, not seconds");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
@@ -144,6 +143,7 @@ void add_check(CLI::App& app, Action& action) {
                         "write image and gradients of sum(image * linspace(0, 1)) to this folder");
     command->add_flag("--reference", flags->reference,
                       "--dump from the double-precision reference, not from the device");
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return check_command(*flags); }; });
 }
 

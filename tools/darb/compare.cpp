@@ -16,9 +16,11 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/train_run.h"
+#include "trainer/portable_path.h"
 #include "trainer/run_folder.h"
 
 namespace darb {
@@ -56,8 +58,11 @@ std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
     note = "LPIPS was left out: no weights were given (--lpips FILE).";
     for (const auto& file : flags.lpips)
         if (!std::filesystem::exists(file)) {
-            note = "LPIPS was left out: " + file.string() + " does not exist.";
-            say("warning: {}\n", note);
+            const auto left_out = [](const std::filesystem::path& name) {
+                return "LPIPS was left out: " + name.string() + " does not exist.";
+            };
+            note = left_out(file.filename());
+            say("warning: {}\n", left_out(file));
             return std::nullopt;
         }
     if (flags.lpips.empty()) return std::nullopt;
@@ -68,16 +73,21 @@ std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
     return lpips;
 }
 
-std::string settings_of(const CompareFlags& flags) {
-    std::string words;
-    for (const std::string& word : flags.forwarded) words += " " + word;
-    return fmt::format(
-        "{}Options of training:{}{}{}.",
-        flags.max_splats > 0
-            ? fmt::format("Growth stops at {} splats. ", flags.max_splats)
-            : "Equal densification threshold, so each kernel has its own number of splats. ",
-        words, flags.train_options.empty() ? "" : " " + flags.train_options,
-        words.empty() && flags.train_options.empty() ? " the defaults" : "");
+// What runs say names their data set and the output, and no folder around these.
+void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags) {
+    const std::string path = dataset_path(dataset.path.string());
+    for (ComparedRun& run : dataset.runs)
+        for (std::string* text : {&run.failure, &run.notes})
+            *text = without_folders(without_folders(*text, path), flags.output);
+}
+
+// Paths as the file sees them.
+nlohmann::json shared_json(Comparison comparison, const std::filesystem::path& file) {
+    for (ComparedDataset& dataset : comparison.datasets) {
+        dataset.path = name_in_json(file, dataset.path);
+        for (ComparedRun& run : dataset.runs) run.folder = name_in_json(file, run.folder);
+    }
+    return comparison_json(comparison);
 }
 
 int compare(CompareFlags flags) {
@@ -97,26 +107,28 @@ int compare(CompareFlags flags) {
         comparison.device = device.info().name + ", " + device.info().driver;
     }
     const RunLock lock(flags.output);
-    go_on_without_readers();
     const std::atomic<bool>& stop = stop_on_signals();
     int exit_code = 0;
     for (const std::string& dataset : flags.datasets) {
         if (stop) break;
         comparison.datasets.push_back(
             compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, stop));
+        leave_folders_out(comparison.datasets.back(), flags);
         for (const ComparedRun& run : comparison.datasets.back().runs)
             if (exit_code != 1 && run.exit_code != 0) exit_code = run.exit_code;
-        write_file_atomic(flags.json,
-                          comparison_json(comparison)
-                                  .dump(1, ' ', false, nlohmann::json::error_handler_t::replace) +
-                              "\n");
+        if (flags.json != "-") write_json(flags.json, shared_json(comparison, flags.json));
         write_file_atomic(flags.html, comparison_html(comparison));
     }
+    if (flags.json == "-") write_json(flags.json, shared_json(comparison, flags.json));
     const std::string shown = fmt::format(
-        "{}{}\nreport   {}\n{}", comparison_table(comparison), comparison.lpips_note,
+        "{}{}\n{}",
+        flags.quiet ? "" : comparison_table(comparison) + comparison.lpips_note + "\nreport   ",
         flags.html.string(),
         stop ? fmt::format("interrupted by {}; the same command goes on\n", stop_name()) : "");
-    if (!write_or_let_go(printable(shown, true)))
+    const std::string text = printable(shown, true);
+    if (flags.json == "-")
+        say_text(text);
+    else if (!write_or_let_go(text))
         throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
                     "The runs are complete: " + flags.html.string() + " shows them.");
     return stop ? stop_exit_code() : exit_code;

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/outputs.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -67,9 +68,9 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
     command.add_option("--html", flags.html, "default OUT/compare.html");
-    command.add_option("--json", flags.json, "default OUT/compare.json");
+    command.add_option("--json", flags.json, "default OUT/compare.json; - is stdout");
     command.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
-    command.add_flag("-q,--quiet", flags.quiet, "no progress");
+    add_quiet_flag(command, flags.quiet);
 }
 
 std::vector<int> kernels_of(const CompareFlags& flags) {
@@ -115,6 +116,18 @@ TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset,
     TrainFlags f = parse_train_flags(std::move(words), flags.train_options, "darb compare");
     f.run.quiet = flags.quiet;
     return f;
+}
+
+std::string settings_of(const CompareFlags& flags) {
+    std::string words;
+    for (const std::string& word : flags.forwarded) words += " " + word;
+    return fmt::format(
+        "{}Options of training:{}{}{}.",
+        flags.max_splats > 0
+            ? fmt::format("Growth stops at {} splats. ", flags.max_splats)
+            : "Equal densification threshold, so each kernel has its own number of splats. ",
+        words, flags.train_options.empty() ? "" : " " + flags.train_options,
+        words.empty() && flags.train_options.empty() ? " the defaults" : "");
 }
 
 }  // namespace darb

@@ -45,6 +45,9 @@ std::string dataset_name(const std::string& dataset);
 TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset, int kernel,
                           std::uint64_t seed);
 
+/// What the runs have in common, as sentences.
+std::string settings_of(const CompareFlags& flags);
+
 /// Trains what is not there yet and reads and measures everything, one data set; ends early, with
 /// what there is, when *stop is set. lpips may be null.
 ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,

@@ -28,7 +28,7 @@ struct ConvertFlags {
     SceneEdits edits;
     EncodeOptions encode;
     LevelFlags levels;
-    bool compare = false;
+    bool compare = false, quiet = false;
 };
 
 /// Where the scene goes through a pipe, which may be stdout, all that is said goes to stderr.
@@ -49,8 +49,8 @@ void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
                       const SplatModel& other, const ConvertFlags& flags) {
     const std::vector<View> views = views_for(scene, flags);
     const SceneDifference d = compare_scenes(scene, other, views, flags.device);
-    fmt::print(say, "{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what,
-               d.mean_psnr_db, views.size(), d.worst_psnr_db, printable(d.worst_view));
+    tell(say, "{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what, d.mean_psnr_db,
+         views.size(), d.worst_psnr_db, printable(d.worst_view));
 }
 
 Paths outputs_of(const std::filesystem::path& output, const EncodedSplats& encoded) {
@@ -85,15 +85,15 @@ int convert(const ConvertFlags& flags) {
     if (flags.encode.spz_version != EncodeOptions{}.spz_version && *format != SplatFormat::spz)
         throw Error("--spz-version", "is for files that end in .spz", "Leave it out.");
     SplatModel model = load_scene(flags.input);
-    std::FILE* const say = stream_beside(flags.output);
+    std::FILE* const say = flags.quiet ? nullptr : stream_beside(flags.output);
     edit_scene(flags.edits, model, say);
     if (flags.kernel == "gaussian" && model.kernel != KERNEL_GAUSSIAN) {
         GaussianEquivalent fit{};
         const SplatModel gaussians = as_gaussians(model, false, &fit);
-        fmt::print(say,
-                   "kernel {} to gaussian: covariance x {:.4f}, opacity x {:.4f}, profile off by "
-                   "{:.2f} % (relative L2)\n",
-                   kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
+        tell(say,
+             "kernel {} to gaussian: covariance x {:.4f}, opacity x {:.4f}, profile off by "
+             "{:.2f} % (relative L2)\n",
+             kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
         print_difference(say, "renders of both kernels", model, gaussians, flags);
         model = gaussians;
     }
@@ -106,13 +106,15 @@ int convert(const ConvertFlags& flags) {
         return 0;
     }
     const EncodedSplats encoded = write_scene(flags.output, *format, model, inputs, flags);
-    fmt::print(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
-               model.size(), encoded.bytes());
+    tell(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
+         model.size(), encoded.bytes());
     if (flags.compare)
         print_difference(say, "the file against the scene", model,
                          encoded.beside.empty() ? parse_splats(encoded.file, flags.output.string())
                                                 : load_splats(flags.output),
                          flags);
+    if (std::filesystem::is_regular_file(flags.output))  // else stdout may be what was written
+        tell_paths(flags.quiet, outputs_of(flags.output, encoded));
     return 0;
 }
 
@@ -144,6 +146,7 @@ void add_convert(CLI::App& app, Action& action) {
                         "cameras of the comparisons, as darb render takes them (default: 8 around "
                         "the scene)");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return convert(*flags); }; });
 }
 

@@ -39,18 +39,18 @@ std::vector<SplatModel> merged(const SplatModel& model, const std::vector<std::s
 
 void print_table(const std::vector<Row>& rows, std::size_t views, double photos_db, bool refined,
                  std::FILE* to) {
-    fmt::print(to, "{:>9}  {:>11}  {:>8}  {:>8}{}  file\n", "splats", "bytes", "PSNR dB",
-               "at worst", refined ? "  to photos   refined" : "");
+    tell(to, "{:>9}  {:>11}  {:>8}  {:>8}{}  file\n", "splats", "bytes", "PSNR dB", "at worst",
+         refined ? "  to photos   refined" : "");
     for (const Row& r : rows) {
         const std::string photos =
             refined ? fmt::format("  {:>9.2f}  {:>8.2f}", r.photos_db, r.refined_db) : "";
-        fmt::print(to, "{:>9}  {:>11}  {:>8.2f}  {:>8.2f}{}  {}\n", r.splats, r.bytes,
-                   r.difference.mean_psnr_db, r.difference.worst_psnr_db, photos,
-                   printable(r.file.string()));
+        tell(to, "{:>9}  {:>11}  {:>8.2f}  {:>8.2f}{}  {}\n", r.splats, r.bytes,
+             r.difference.mean_psnr_db, r.difference.worst_psnr_db, photos,
+             printable(r.file.string()));
     }
-    fmt::print(to, "PSNR of renders against those of the scene, {} views", views);
-    if (refined) fmt::print(to, "; photos: held-out ones, {:.2f} dB with all splats", photos_db);
-    fmt::print(to, "\n");
+    tell(to, "PSNR of renders against those of the scene, {} views", views);
+    if (refined) tell(to, "; photos: held-out ones, {:.2f} dB with all splats", photos_db);
+    tell(to, "\n");
 }
 
 }  // namespace

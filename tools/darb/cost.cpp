@@ -13,6 +13,7 @@
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/pixel_size.h"
@@ -69,14 +70,16 @@ int cost(const CostFlags& flags) {
                      extent.plan, [&](const std::string& line) {
                          if (!flags.quiet) say("{}\n", line);
                      });
-    fmt::print("{}: {} splats, {}; {} views of {}\n\n{}", flags.scene, model.size(), result.device,
-               views.cameras.size(), flags.dataset.empty() ? "an orbit" : flags.dataset,
-               cost_table(result));
     nlohmann::json json = cost_json(result);
-    json["scene"] = flags.scene;
-    json["dataset"] = flags.dataset;
+    json["scene"] = name_in_json(flags.json, flags.scene);
+    json["dataset"] = flags.dataset.empty() ? "" : name_in_json(flags.json, flags.dataset);
     write_json(flags.json, json);
-    if (!flags.html.empty()) write_file_atomic(flags.html, cost_html(result, flags.scene));
+    if (!flags.html.empty())
+        write_file_atomic(flags.html, cost_html(result, name_in_json(flags.html, flags.scene)));
+    tell(stream_beside_json(flags.json, flags.quiet), "{}: {} splats, {}; {} views of {}\n\n{}",
+         flags.scene, model.size(), result.device, views.cameras.size(),
+         flags.dataset.empty() ? "an orbit" : flags.dataset, cost_table(result));
+    tell_paths(flags.quiet, {flags.json, flags.html});
     return 0;
 }
 
@@ -101,7 +104,7 @@ void add_cost(CLI::App& app, Action& action) {
     command->add_option("--iterations", flags->iterations, "of a run with --train (default 1,500)")
         ->check(CLI::Range(20, 1'000'000))
         ->needs(train);
-    command->add_option("--json", flags->json, "write every number to this file");
+    add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
     auto* quick = command->add_flag("--quick", flags->quick,
                                     "seconds: fewer views, repeats and combinations");
@@ -116,7 +119,7 @@ void add_cost(CLI::App& app, Action& action) {
     command->add_option("-r,--resolution", flags->data.resolution,
                         "as in training: 1, 2, 4, 8 or a width in px");
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
-    command->add_flag("-q,--quiet", flags->quiet, "no progress");
+    add_quiet_flag(*command, flags->quiet);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     command->callback([flags, &action] { action = [flags] { return cost(*flags); }; });

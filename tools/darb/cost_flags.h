@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "engine/data/dataset.h"
@@ -19,9 +18,6 @@ struct CostFlags {
     TuneFlags tune;
     std::string size = "640x480";
 };
-
-/// To a file; nothing where the path is empty.
-void write_json(const std::filesystem::path& path, const nlohmann::json& json);
 
 /// darb cost --train DATASET
 int train_cost(const CostFlags& flags);

@@ -8,17 +8,12 @@
 #include "tools/cost/train_cost.h"
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/train_run.h"
 
 namespace darb {
-
-void write_json(const std::filesystem::path& path, const nlohmann::json& json) {
-    if (path.empty()) return;
-    write_file_atomic(path,
-                      json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-}
 
 int train_cost(const CostFlags& flags) {
     if (!flags.scene.empty())
@@ -50,14 +45,17 @@ int train_cost(const CostFlags& flags) {
     plan_effects(dataset, run);
     plan_strategy(dataset, run);
     if (!flags.quiet) say("effects: {}\n", run.run.effects);
-    const TrainCostResult result =
+    TrainCostResult result =
         measure_train_cost(device, dataset, run.train, plan, [&](const std::string& line) {
             if (!flags.quiet) say("{}\n", line);
         });
-    fmt::print("{}: iterations {}, seeds {}, {}\n\n{}", flags.train, result.iterations,
-               result.seeds, result.device, train_cost_table(result));
+    result.dataset = name_in_json(flags.json, flags.train);
     write_json(flags.json, train_cost_json(result));
+    result.dataset = name_in_json(flags.html, flags.train);
     if (!flags.html.empty()) write_file_atomic(flags.html, train_cost_html(result));
+    tell(stream_beside_json(flags.json, flags.quiet), "{}: iterations {}, seeds {}, {}\n\n{}",
+         flags.train, result.iterations, result.seeds, result.device, train_cost_table(result));
+    tell_paths(flags.quiet, {flags.json, flags.html});
     return 0;
 }
 

@@ -5,8 +5,10 @@
 #include <memory>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/gpu/device.h"
 #include "tools/darb/command_list.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 
 namespace darb {
@@ -27,9 +29,9 @@ std::string subgroups(const DeviceInfo& info) {
 }
 
 void print_device(std::FILE* out, const DeviceInfo& info, bool chosen) {
-    fmt::print(out, "{} {}  {}\n", chosen ? '*' : ' ', info.index, info.name);
+    tell(out, "{} {}  {}\n", chosen ? '*' : ' ', info.index, info.name);
     const auto row = [&](const char* label, const std::string& value) {
-        fmt::print(out, "       {:<19}{}\n", label, value);
+        tell(out, "       {:<19}{}\n", label, value);
     };
     row("type", info.type + (info.unified_memory ? ", memory shared with the host" : ""));
     row("driver",
@@ -65,17 +67,19 @@ void print_devices(std::FILE* out, const std::string& select) {
                           ? "the best usable one: discrete before integrated before "
                             "virtual before cpu, then the largest memory"
                           : "the only one";
-    fmt::print(out, "\nchosen: {} {} ({})\n", devices[chosen].index, devices[chosen].name, why);
+    tell(out, "\nchosen: {} {} ({})\n", devices[chosen].index, devices[chosen].name, why);
 }
 
 void add_devices(CLI::App& app, Action& action) {
     auto select = std::make_shared<std::string>();
+    auto quiet = std::make_shared<bool>(false);
     CLI::App* command = app.add_subcommand("devices", "List the Vulkan devices and their limits");
     command->add_option("--device", *select,
                         "show what this number or part of a name would choose");
-    command->callback([select, &action] {
-        action = [select] {
-            print_devices(stdout, *select);
+    add_quiet_flag(*command, *quiet);
+    command->callback([select, quiet, &action] {
+        action = [select, quiet] {
+            print_devices(*quiet ? nullptr : stdout, *select);
             return 0;
         };
     });

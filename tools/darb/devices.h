@@ -10,7 +10,8 @@ namespace darb {
 class Device;
 
 /// All devices, best first, the one that select (as --device) means marked with a star.
-/// Throws Error as Device does where select means no usable device.
+/// Nothing is printed where out is null. Throws Error as Device does where select means no usable
+/// device.
 void print_devices(std::FILE* out, const std::string& select = {});
 
 /// Throws Error where the device cannot tell what a pass takes.

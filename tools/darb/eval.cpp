@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
-#include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/dataset.h"
 #include "engine/raster/frame_limit.h"
@@ -16,6 +16,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
@@ -30,7 +31,7 @@ namespace {
 struct EvalFlags {
     std::filesystem::path scene, dataset, json;
     std::string split = "test", device, effects = "auto";
-    bool eval_exposure = false;
+    bool eval_exposure = false, quiet = false;
     bool white_background = false;
     DatasetOptions data;
     AccuracyFlags accuracy;
@@ -56,14 +57,14 @@ nlohmann::json to_json(const Evaluation& evaluation) {
             {"views", views}};
 }
 
-void print_table(const Evaluation& evaluation) {
+void print_table(std::FILE* out, const Evaluation& evaluation) {
     const std::string mean = fmt::format("mean of {}", evaluation.views.size());
     size_t width = mean.size();
     for (const ViewMetrics& v : evaluation.views) width = std::max(width, printable(v.name).size());
     const auto row = [&](const std::string& name, double psnr_db, double ssim) {
-        fmt::print("{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
+        tell(out, "{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
     };
-    fmt::print("{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
+    tell(out, "{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
     for (const ViewMetrics& v : evaluation.views) row(printable(v.name), v.psnr_db, v.ssim);
     row(mean, evaluation.psnr_db, evaluation.ssim);
 }
@@ -76,7 +77,7 @@ int eval(EvalFlags flags) {
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::measuring, flags.data);
     SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
-    print_notes(dataset.notes);
+    if (!flags.quiet) print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
     std::vector<View> views = views_of(dataset, flags);
     DeviceOptions device_options = command_device(flags.device);
@@ -100,12 +101,9 @@ int eval(EvalFlags flags) {
             compare_view(view.name, image, photo, background, dataset.alpha_is_mask));
     }
     take_means(evaluation);
-    print_table(evaluation);
-    if (!flags.json.empty())
-        write_file_atomic(
-            flags.json,
-            to_json(evaluation).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) +
-                "\n");
+    write_json(flags.json, to_json(evaluation));
+    print_table(stream_beside_json(flags.json, flags.quiet), evaluation);
+    tell_paths(flags.quiet, {flags.json});
     return 0;
 }
 
@@ -124,7 +122,7 @@ void add_eval(CLI::App& app, Action& action) {
                      "others; all")
         ->capture_default_str()
         ->check(CLI::IsMember({"test", "train", "all"}));
-    command->add_option("--json", flags->json, "write the numbers to this file too");
+    add_json_option(*command, flags->json);
     command
         ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
         ->capture_default_str();
@@ -138,6 +136,7 @@ void add_eval(CLI::App& app, Action& action) {
     command->add_flag("--eval-exposure", flags->eval_exposure,
                       "fit each picture's colours to its photo by an affine map before measuring");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return eval(*flags); }; });
 }
 

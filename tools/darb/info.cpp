@@ -5,10 +5,12 @@
 #include <memory>
 
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/dataset_info.h"
 #include "tools/darb/info_text.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/scene_info.h"
@@ -19,6 +21,7 @@ namespace {
 
 struct InfoFlags {
     std::filesystem::path path, json;
+    bool quiet = false;
     DatasetOptions data;
 };
 
@@ -35,15 +38,16 @@ int info(const InfoFlags& flags) {
         refuse_to_overwrite_inputs({flags.json}, files_of(load_cameras(flags.path, flags.data)));
     const nlohmann::json facts =
         dataset ? dataset_info(flags.path, flags.data) : scene_info(find_scene(flags.path));
-    // Names may hold any bytes.
-    const std::string text =
-        facts.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
-    if (flags.json == "-") {
-        fmt::print("{}", text);
-        return 0;
+    if (!flags.json.empty()) {
+        nlohmann::json shared = facts;
+        for (const char* texts : {"notes", "warnings"})
+            if (shared.contains(texts)) leave_folders_out(shared[texts], flags.path);
+        shared["path"] = name_in_json(flags.json, facts["path"].get<std::string>());
+        write_json(flags.json, shared);
     }
-    dataset ? print_dataset_info(facts) : print_scene_info(facts);
-    if (!flags.json.empty()) write_file_atomic(flags.json, text);
+    tell_paths(flags.quiet, {flags.json});
+    if (flags.json != "-" && !flags.quiet)
+        dataset ? print_dataset_info(facts) : print_scene_info(facts);
     return 0;
 }
 
@@ -56,13 +60,13 @@ void add_info(CLI::App& app, Action& action) {
         ->add_option("path", flags->path,
                      "splat file, output folder of darb train, data set, or cameras.json")
         ->required();
-    command->add_option("--json", flags->json,
-                        "write the facts to this file too; - prints them, and nothing else");
+    add_json_option(*command, flags->json);
     command
         ->add_option("-i,--images", flags->data.images_folder, "photo folder of a COLMAP project")
         ->capture_default_str();
     command->add_option("-r,--resolution", flags->data.resolution,
                         "sizes as in training: 1, 2, 4, 8 or a width in px");
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return info(*flags); }; });
 }
 

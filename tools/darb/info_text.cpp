@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "trainer/progress.h"
 
@@ -14,7 +15,7 @@ namespace {
 using nlohmann::json;
 
 void row(const char* label, const std::string& value) {
-    fmt::print("{:<13}{}\n", label, printable(value));
+    tell("{:<13}{}\n", label, printable(value));
 }
 
 std::string vector_text(const json& v) {

@@ -57,6 +57,14 @@ void add_commands(CLI::App& app, darb::Action& action, const std::vector<std::st
 #undef DARB_ADD_COMMAND
 }
 
+// Or the version.
+int show_help(const CLI::App& app, const CLI::ParseError& asked) {
+    std::ostringstream text;
+    const int code = app.exit(asked, text, text);
+    darb::tell_text(text.str());
+    return code;
+}
+
 int run(int argc, char** argv) {
     std::vector<std::string> arguments = with_dashes(argc, argv);
     join_effects(arguments);
@@ -78,7 +86,7 @@ int run(int argc, char** argv) {
     try {
         app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     } catch (const CLI::ParseError& e) {
-        if (e.get_exit_code() == 0) return app.exit(e);  // help and version
+        if (e.get_exit_code() == 0) return show_help(app, e);
         throw darb::usage_error(app, e);
     }
     return action();
@@ -98,10 +106,11 @@ int report(const std::system_error& e) {
 int main(int argc, char** argv) {
     darb::keep_standard_descriptors();
     darb::fail_at_the_file_limit();
+    darb::go_on_without_readers();
     try {
         const int code = run(argc, argv);
-        if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-        throw std::system_error(errno, std::generic_category());
+        darb::tell_text("");  // what is left in the buffer
+        return code;
     } catch (const darb::Error& e) {
         darb::say("error: {}\n", e.what());
         return 2;

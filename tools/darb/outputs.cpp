@@ -9,6 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "engine/scene/splat_file.h"
 #include "tools/darb/scene_file.h"
 
@@ -104,6 +105,15 @@ void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs) {
         if (identify(input, identity))
             if (const auto at = there.find(identity); at != there.end())
                 throw Error(at->second.string(), "is what is read", "Name another file to write.");
+}
+
+void add_quiet_flag(CLI::App& command, bool& quiet) {
+    command.add_flag("-q,--quiet", quiet, "print paths, warnings and errors only");
+}
+
+void tell_paths(bool quiet, const Paths& written) {
+    for (const fs::path& path : written)
+        if (quiet && !path.empty() && path != "-") tell("{}\n", path.string());
 }
 
 Paths together(std::initializer_list<Paths> lists) {

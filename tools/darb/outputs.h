@@ -1,6 +1,7 @@
 // The one rule for every file that a command writes: never one that it reads.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <vector>
 
@@ -21,6 +22,12 @@ Paths files_of(const std::vector<View>& views);
 /// or not, or where two outputs are one file. Empty paths and "-" do not count. Pipes and devices
 /// may be named twice.
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs);
+
+/// -q, the same in every command: paths of what was written, warnings and errors are printed.
+void add_quiet_flag(CLI::App& command, bool& quiet);
+/// A line with each on stdout where quiet; who is not finds them in the text. Empty paths and "-"
+/// do not count.
+void tell_paths(bool quiet, const Paths& written);
 
 /// All of them in one list.
 Paths together(std::initializer_list<Paths> lists);

@@ -5,8 +5,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "engine/core/say.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/json_output.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/plan_subject.h"
 #include "tools/darb/scene_file.h"
 
@@ -23,18 +26,20 @@ json compare_choices(const PlanSubject& s, const PlanFlags& flags) {
         const Measured m = measure_subject(s, flags, plan_of(s, flags, parse_effects(name)));
         list.push_back(
             {{"effects", name}, {"ms", m.ms}, {"spread_ms", m.spread_ms}, {"peak_bytes", m.bytes}});
-        if (flags.as_json) continue;
-        fmt::print("{:<5} {:>9.2f} ms (spread {:.2f})  {:>9.2f} MB at the peak\n", name, m.ms,
-                   m.spread_ms, static_cast<double>(m.bytes) / 1e6);
+        tell(stream_beside_json(flags.json, flags.quiet),
+             "{:<5} {:>9.2f} ms (spread {:.2f})  {:>9.2f} MB at the peak\n", name, m.ms,
+             m.spread_ms, static_cast<double>(m.bytes) / 1e6);
     }
     return list;
 }
 
 int run_plan(PlanFlags flags) {
+    refuse_to_overwrite_inputs({flags.json}, files_of(flags.what));
     const bool scene = is_scene(flags.what);
     const EffectChoice choice = choose_effects(
         flags.effects, scene ? EffectUse::pictures : EffectUse::training, flags.data);
     const PlanSubject s = open_subject(flags);
+    refuse_to_overwrite_inputs({flags.json}, files_of(s.training ? s.dataset.views : s.views));
     EffectPlan plan = plan_of(s, flags, choice);
     const bool empty = !s.training && s.model.size() == 0;
     EffectPrices prices;
@@ -46,13 +51,14 @@ int run_plan(PlanFlags flags) {
                 price_effects(plan, base, switchable_effects(s, flags), degree_of(s, flags),
                               [&](const EffectPlan& p) { return measure_subject(s, flags, p); });
     }
-    if (!flags.as_json) print_priced(plan, prices, s.training);
+    print_priced(stream_beside_json(flags.json, flags.quiet), plan, prices, s.training);
     const char* kind = s.training ? "data set" : "scene";
-    json result{
-        {"path", flags.what.string()}, {"kind", kind}, {"effects", priced_json(plan, prices)}};
+    json result{{"path", name_in_json(flags.json, flags.what)},
+                {"kind", kind},
+                {"effects", priced_json(plan, prices)}};
     if (flags.compare && !empty) result["compared"] = compare_choices(s, flags);
-    if (flags.as_json)
-        fmt::print("{}\n", result.dump(2, ' ', false, json::error_handler_t::replace));
+    write_json(flags.json, result);
+    tell_paths(flags.quiet, {flags.json});
     return 0;
 }
 
@@ -80,8 +86,9 @@ void add_plan(CLI::App& app, Action& action) {
     add_lens_flag(*command, flags->data);
     command->add_flag("--no-price", flags->no_price, "measure no times");
     command->add_flag("--compare", flags->compare, "time and memory of none, auto and all");
-    command->add_flag("--json", flags->as_json, "as JSON, on standard output");
+    add_json_option(*command, flags->json);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return run_plan(*flags); }; });
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "engine/core/say.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/tune_flags.h"
@@ -121,9 +122,10 @@ nlohmann::json priced_json(const EffectPlan& plan, const EffectPrices& prices) {
     return rows;
 }
 
-void print_priced(const EffectPlan& plan, const EffectPrices& prices, bool training) {
+void print_priced(std::FILE* out, const EffectPlan& plan, const EffectPrices& prices,
+                  bool training) {
     const char* ms_of = training ? "ms/iter" : "ms/frame";
-    fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  reason\n", "effect", "", ms_of, "MB");
+    tell(out, "{:<10}  {:<3}  {:>9}  {:>9}  reason\n", "effect", "", ms_of, "MB");
     for (int e = 0; e < EFFECT_COUNT; ++e) {
         const EffectRow& row = plan.row(e);
         std::string ms = "-", mb = "-";
@@ -132,7 +134,7 @@ void print_priced(const EffectPlan& plan, const EffectPrices& prices, bool train
             mb = fmt::format("{:+.2f}", static_cast<double>(prices[at]->bytes) / 1e6);
         }
         const char* state = row.on ? "on" : "off";
-        fmt::print("{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), state, ms, mb, row.reason);
+        tell(out, "{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), state, ms, mb, row.reason);
     }
 }
 

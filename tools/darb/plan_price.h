@@ -1,6 +1,7 @@
 // What each effect of a plan costs on this device: the same work with it and without it.
 #pragma once
 
+#include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -38,7 +39,8 @@ EffectPrices price_effects(const EffectPlan& plan, const Measured& base,
                            const std::function<Measured(const EffectPlan&)>& with);
 
 /// A row an effect, with its price where there is one.
-void print_priced(const EffectPlan& plan, const EffectPrices& prices, bool training);
+void print_priced(std::FILE* out, const EffectPlan& plan, const EffectPrices& prices,
+                  bool training);
 nlohmann::json priced_json(const EffectPlan& plan, const EffectPrices& prices);
 
 }  // namespace darb

@@ -15,9 +15,9 @@
 namespace darb {
 
 struct PlanFlags {
-    std::filesystem::path what, cameras;
+    std::filesystem::path what, cameras, json;
     std::string device, effects = "auto";
-    bool as_json = false, no_price = false, compare = false, depth = false;
+    bool quiet = false, no_price = false, compare = false, depth = false;
     std::optional<int> sh_degree;
     std::optional<std::string> kernel;
     DatasetOptions data;

@@ -7,7 +7,9 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 #include "tools/darb/command_list.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/paper/psi_report.h"
@@ -20,6 +22,7 @@ struct PsiFlags {
     std::string kernels = "all";
     PsiGridOptions grid;
     std::filesystem::path json, html;
+    bool quiet = false;
 };
 
 int psi(const PsiFlags& flags) {
@@ -30,10 +33,10 @@ int psi(const PsiFlags& flags) {
         kernels.push_back(&derived_kernel(k));
         results.push_back(measure_psi(*kernels.back(), flags.grid));
     }
-    fmt::print("{}", psi_table(results));
-    if (!flags.json.empty())
-        write_file_atomic(flags.json, psi_json(results, flags.grid).dump(2) + "\n");
+    write_json(flags.json, psi_json(results, flags.grid));
     if (!flags.html.empty()) write_file_atomic(flags.html, psi_html(results, kernels, flags.grid));
+    tell(stream_beside_json(flags.json, flags.quiet), "{}", psi_table(results));
+    tell_paths(flags.quiet, {flags.json, flags.html});
     return 0;
 }
 
@@ -52,8 +55,9 @@ void add_psi(CLI::App& app, Action& action) {
         ->capture_default_str()
         ->check(CLI::Range(8, 1024));
     command->add_option("--seed", flags->grid.seed)->capture_default_str();
-    command->add_option("--json", flags->json, "write every number to this file");
+    add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return psi(*flags); }; });
 }
 

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/data/image_io.h"
 #include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
@@ -30,7 +31,7 @@ namespace {
 struct RenderFlags {
     std::filesystem::path scene, cameras, output;
     std::string device;
-    bool white_background = false;
+    bool white_background = false, quiet = false;
     float near_plane = static_cast<float>(NEAR_DEFAULT);
     std::string effects = "auto";
     DepthFlags depth;
@@ -100,9 +101,11 @@ int render(RenderFlags flags) {
         if (plan.on(EFFECT_DEPTH)) depths.write(file, renderer.render_depth());
     }
     depths.print_clipped();
-    fmt::print("effects: {}\n", plan_line(plan));
-    fmt::print("{} frames in {}, median {:.2f} ms a frame on {}\n", views.size(),
-               flags.output.string(), median(frame_ms), device.info().name);
+    std::FILE* const out = flags.quiet ? nullptr : stdout;
+    tell(out, "effects: {}\n", plan_line(plan));
+    tell_paths(flags.quiet, {flags.output});
+    tell(out, "{} frames in {}, median {:.2f} ms a frame on {}\n", views.size(),
+         flags.output.string(), median(frame_ms), device.info().name);
     return 0;
 }
 
@@ -139,6 +142,7 @@ void add_render(CLI::App& app, Action& action) {
         ->check(CLI::PositiveNumber);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return render(*flags); }; });
 }
 

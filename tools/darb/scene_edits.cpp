@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/scene/edit_splats.h"
 
 namespace darb {
@@ -47,8 +48,12 @@ Similarity similarity_of(const SceneEdits& edits) {
     return similarity;
 }
 
-void report_dropped(std::FILE* say, const char* option, size_t count) {
-    if (count > 0) fmt::print(say, "{}: {} splats left out\n", option, count);
+// Whoever leaves out everything meant something else.
+void report_dropped(std::FILE* say, const std::string& option, size_t count, size_t left) {
+    if (count > 0 && left == 0)
+        throw Error(option, fmt::format("keeps none of {} splats", count),
+                    "`darb info` prints where the splats are and how opaque.");
+    if (count > 0) tell(say, "{}: {} splats left out\n", option, count);
 }
 
 }  // namespace
@@ -60,10 +65,14 @@ void edit_scene(const SceneEdits& edits, SplatModel& model, std::FILE* say) {
         transform_splats(similarity, model);
     if (!edits.crop.empty()) {
         const std::vector<double> v = numbers("--crop", edits.crop, 6);
-        report_dropped(say, "--crop", crop_splats({v[0], v[1], v[2]}, {v[3], v[4], v[5]}, model));
+        const size_t lost = crop_splats({v[0], v[1], v[2]}, {v[3], v[4], v[5]}, model);
+        report_dropped(say, "--crop " + edits.crop, lost, model.size());
     }
-    if (edits.prune_opacity > 0)
-        report_dropped(say, "--prune-opacity", prune_opacity(edits.prune_opacity, model));
+    if (edits.prune_opacity > 0) {
+        const size_t lost = prune_opacity(edits.prune_opacity, model);
+        report_dropped(say, fmt::format("--prune-opacity {}", edits.prune_opacity), lost,
+                       model.size());
+    }
     limit_sh_degree(edits.max_sh, model);
 }
 

@@ -10,6 +10,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "tools/darb/command_list.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/paper/study1d.h"
@@ -62,9 +63,10 @@ int sim1d(Sim1dFlags flags) {
         if (shown && (done % 20 == 0 || done == all))
             say_text(fmt::format("\r{} of {} runs{}", done, all, done == all ? "\n" : ""));
     });
-    fmt::print("{}", study_1d_table(result));
-    if (!flags.json.empty()) write_file_atomic(flags.json, study_1d_json(result).dump() + "\n");
+    write_json(flags.json, study_1d_json(result));
     if (!flags.html.empty()) write_file_atomic(flags.html, study_1d_html(result));
+    tell(stream_beside_json(flags.json, flags.quiet), "{}", study_1d_table(result));
+    tell_paths(flags.quiet, {flags.json, flags.html});
     return 0;
 }
 
@@ -105,9 +107,9 @@ void add_sim1d(CLI::App& app, Action& action) {
     command->add_option("--threads", study.threads, "0: one per core")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
-    command->add_option("--json", flags->json, "write every number to this file");
+    add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
-    command->add_flag("-q,--quiet", flags->quiet, "no progress");
+    add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return sim1d(*flags); }; });
 }
 

@@ -45,19 +45,25 @@ std::string passes_text(std::vector<ReportPass> passes) {
     return text;
 }
 
+// Of a quiet run the paths, and what goes on with one that was interrupted.
 std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
-    std::string text =
-        fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
-    if (!summary.evaluations.empty()) {
+    const bool quiet = flags.run.quiet;
+    std::string text;
+    if (!quiet)
+        text = fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
+    if (!quiet && !summary.evaluations.empty()) {
         const Evaluation& e = summary.evaluations.back();
         text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
                             e.splats);
     }
-    text += passes_text(summary.passes);
-    if (!summary.model.empty()) text += fmt::format("scene    {}\n", summary.model.string());
-    if (!summary.pictures.empty())
-        text += fmt::format("picture  {}\n", summary.pictures.front().file.string());
-    if (!summary.report.empty()) text += fmt::format("report   {}\n", summary.report.string());
+    if (!quiet) text += passes_text(summary.passes);
+    const auto written = [&](const char* what, const std::filesystem::path& path) {
+        if (path.empty()) return;
+        text += (quiet ? "" : fmt::format("{:<9}", what)) + path.string() + "\n";
+    };
+    written("scene", summary.model);
+    if (!summary.pictures.empty()) written("picture", summary.pictures.front().file);
+    written("report", summary.report);
     if (summary.interrupted)
         text += fmt::format("interrupted{}{}; go on with: darb train --resume -o '{}'\n",
                             stop_exit_code() == 0 ? "" : " by ", stop_name(),
@@ -66,7 +72,6 @@ std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
 }
 
 int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
-    go_on_without_readers();
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
     if (recalled) recall_arguments(arguments, flags, tune);
     finish_train_flags(flags);

@@ -89,7 +89,8 @@ void add_run_flags(CLI::App& command, TrainFlags& f) {
         ->group(option_group::kRun);
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training")
         ->group(option_group::kRun);
-    command.add_flag("-q,--quiet", f.run.quiet, "no progress")->group(option_group::kRun);
+    command.add_flag("-q,--quiet", f.run.quiet, "print paths, warnings and errors only")
+        ->group(option_group::kRun);
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`")
         ->group(option_group::kRun);
     command.add_flag("--deterministic", f.deterministic)->group("");

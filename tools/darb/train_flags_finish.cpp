@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/train_flags.h"
 #include "trainer/strategy.h"
@@ -66,8 +67,8 @@ void note_iterations_beyond(const TrainFlags& f) {
     for (const auto& [name, list] : lists)
         for (const int iteration : list)
             if (iteration > f.train.iterations && !f.run.quiet)
-                fmt::print(stderr, "note: {} {} is beyond the end at {}: it never comes\n", name,
-                           iteration, f.train.iterations);
+                say("note: {} {} is beyond the end at {}: it never comes\n", name, iteration,
+                    f.train.iterations);
 }
 
 }  // namespace

@@ -109,7 +109,6 @@ void recall_arguments(const std::vector<std::string>& typed, TrainFlags& flags, 
     check_typed(typed);
     const std::filesystem::path path = flags.run.output / "command.json";
     const std::vector<std::string> arguments = saved_arguments(path);
-    refuse_no_numbers(arguments);
     TrainFlags recalled;
     TuneFlags recalled_tune;
     CLI::App app;
@@ -117,8 +116,9 @@ void recall_arguments(const std::vector<std::string>& typed, TrainFlags& flags, 
     add_train_flags(*command, recalled);
     add_tune_flags(*command, recalled_tune);
     try {
+        refuse_no_numbers(arguments);
         app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-    } catch (const CLI::ParseError& e) {
+    } catch (const std::runtime_error& e) {  // of the parser, or Error
         throw Error(path.string(), e.what(), kRemedy);
     }
     if (recalled.dataset.empty()) throw Error(path.string(), "names no data set", kRemedy);

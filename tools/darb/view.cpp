@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <limits>
 #include <memory>
 
 #include "engine/core/error.h"
@@ -16,8 +15,7 @@
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
-#include "tools/darb/view_times.h"
-#include "viewer/window.h"
+#include "tools/darb/view_window.h"
 
 namespace darb {
 
@@ -59,11 +57,12 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
         viewer.compose();
         viewer.canvas().submit_and_wait();
         write_screenshot(flags.screenshot, viewer.canvas().read_back());
-        fmt::print("{}\n", flags.screenshot.string());
+        tell("{}\n", flags.screenshot.string());
     }
     if (!flags.frames.empty()) {
         viewer.export_path_now();
-        fmt::print("{}\n", printable(viewer.session().note, true));
+        tell(flags.quiet ? nullptr : stdout, "{}\n", viewer.session().note);
+        tell_paths(flags.quiet, {flags.frames});
     }
     return 0;
 }
@@ -83,6 +82,7 @@ int view(ViewFlags flags) {
     ViewerOptions options;
     options.up = flags.up;
     options.gui_scale = flags.gui_scale;
+    options.quiet = flags.quiet;
     options.accuracy = chosen_accuracy(flags.accuracy);
     options.effects = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
@@ -99,25 +99,7 @@ int view(ViewFlags flags) {
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())
         return without_window(flags, options, size, note);
-    const WindowSystem windows;
-    DeviceOptions device_options = command_device(flags.device);
-    windows.require(device_options);
-    Device device(device_options);
-    settle_tuning(device, flags.tune);
-    ViewerWindow window(device, options, size.width, size.height);
-    apply_flags(window.viewer(), flags, size);
-    window.viewer().session().note = note;
-    if (!flags.scene.empty()) {
-        window.viewer().open(flags.scene);
-        window.set_title(flags.scene.filename().string() + " - darb");
-    }
-    if (!flags.times.empty()) {
-        write_view_times(window, device, flags.times);
-        return 0;
-    }
-    while (window.pump(std::numeric_limits<double>::infinity())) {
-    }
-    return 0;
+    return view_in_window(flags, options, size, note);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "engine/data/camera_list.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 
 namespace darb {
 
@@ -53,6 +54,7 @@ void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) 
     if (!flags.path.empty()) {
         s.path.file = flags.path;
         s.path.path = read_camera_path(flags.path);
+        s.path.mark_saved();
     }
     if (flags.camera >= 0) viewer.choose_camera(flags.camera);
     if (flags.show == "error" && s.photos.current < 0)
@@ -95,6 +97,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     c.add_option("--gui-scale", flags.gui_scale, "size of the panels (default: the display's)")
         ->check(CLI::Range(0.5, 4.0));
     c.add_flag("-w,--white-background", flags.white_background, "white, not black");
+    add_quiet_flag(c, flags.quiet);
     add_accuracy_flags(c, flags.accuracy);
     add_effects_flag(c, flags.effects);
     add_lens_flag(c, flags.data);

@@ -18,7 +18,7 @@ struct ViewFlags {
     std::string device, up, size = "1280x720", show = "picture", style = "splats";
     int camera = -1, fps = 30;
     float gui_scale = 0;  // of the panels; 0: the display's
-    bool white_background = false, compare = false, no_panels = false;
+    bool white_background = false, compare = false, no_panels = false, quiet = false;
     AccuracyFlags accuracy;
     std::string effects = "auto";
     DatasetOptions data;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <glm/gtc/constants.hpp>
@@ -12,6 +13,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/say.h"
 
 namespace darb {
 
@@ -32,7 +34,15 @@ double quantile(std::vector<double> values, double share) {
     return values[static_cast<size_t>(share * double(values.size() - 1) + 0.5)];
 }
 
-void pump(ViewerWindow& window, double patience_s) {
+/// The window that is measured, and whether its display is gone.
+struct Measured {
+    ViewerWindow& window;
+    const std::atomic<bool>& lost;
+};
+
+void pump(const Measured& m, double patience_s) {
+    ViewerWindow& window = m.window;
+    if (m.lost) throw Error("window", "the display is gone", "Try again.");
     if (!window.pump(patience_s)) throw Error("--times", "the window was closed", "Try again.");
     const std::string& error = window.viewer().session().error;
     if (!error.empty()) throw Error("darb view", error);
@@ -43,14 +53,14 @@ struct Rest {
 };
 
 // Until the picture is whole.
-Rest rest(ViewerWindow& window) {
+Rest rest(const Measured& m) {
     const auto start = Clock::now();
     Rest times;
     do {
-        pump(window, 0.01);
-        if (times.refined_s == 0 && window.viewer().refined())
+        pump(m, 0.01);
+        if (times.refined_s == 0 && m.window.viewer().refined())
             times.refined_s = seconds_since(start);
-    } while (!window.viewer().at_rest());
+    } while (!m.window.viewer().at_rest());
     times.whole_s = seconds_since(start);
     return times;
 }
@@ -70,18 +80,19 @@ double peak_memory_bytes() {
 
 }  // namespace
 
-void write_view_times(ViewerWindow& window, const Device& device,
+void write_view_times(ViewerWindow& window, const Device& device, const std::atomic<bool>& lost,
                       const std::filesystem::path& file) {
+    const Measured measured{window, lost};
     const auto start = Clock::now();
     const Session& s = window.viewer().session();
-    rest(window);
+    rest(measured);
     const double to_first_rest_s = seconds_since(start);
     std::vector<double> moving_ms;
     const auto motion = Clock::now();
     for (auto last = motion; seconds_since(motion) < kMotion_s;) {
         turn(window, seconds_since(last));
         last = Clock::now();
-        pump(window, 0);
+        pump(measured, 0);
         moving_ms.push_back(s.times.frame_ms);
     }
     const double frames_per_s = double(moving_ms.size()) / seconds_since(motion);
@@ -89,7 +100,7 @@ void write_view_times(ViewerWindow& window, const Device& device,
     std::vector<double> refined_s, whole_s, rest_ms;
     for (int i = 0; i < kRests; ++i) {
         if (i > 0) turn(window, 0.05);
-        const Rest times = rest(window);
+        const Rest times = rest(measured);
         refined_s.push_back(times.refined_s);
         whole_s.push_back(times.whole_s);
         rest_ms.push_back(s.times.full_ms);
@@ -123,9 +134,9 @@ void write_view_times(ViewerWindow& window, const Device& device,
                                          {"device_memory_bytes", device.allocated_bytes()}};
     write_file_atomic(file,
                       json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-    fmt::print("{}: {:.1f} frames/s in motion ({:.1f} ms, first {:.1f} ms), at rest {:.1f} ms\n",
-               s.scene->file.filename().string(), frames_per_s, quantile(moving_ms, 0.5),
-               moving_ms.front(), quantile(rest_ms, 0.5));
+    tell("{}: {:.1f} frames/s in motion ({:.1f} ms, first {:.1f} ms), at rest {:.1f} ms\n",
+         s.scene->file.filename().string(), frames_per_s, quantile(moving_ms, 0.5),
+         moving_ms.front(), quantile(rest_ms, 0.5));
 }
 
 }  // namespace darb
