@@ -48,13 +48,6 @@ class Child {
         pid_ = 0;
         return WIFEXITED(status_) ? WEXITSTATUS(status_) : -WTERMSIG(status_);
     }
-    // Whether it has opened the file.
-    bool holds(const fs::path& file) const {
-        std::error_code none;
-        for (const auto& fd : fs::directory_iterator(fmt::format("/proc/{}/fd", pid_), none))
-            if (fs::read_symlink(fd, none) == file) return true;
-        return false;
-    }
     std::string out() const { return read_text_file(out_); }
     std::string err() const { return read_text_file(err_); }
 

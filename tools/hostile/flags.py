@@ -63,7 +63,7 @@ class Option:
     def __init__(self, names, kind, text):
         self.names, self.kind = names, kind
         self.choices = re.findall(r"\{([^}]*)\}", kind)
-        self.listed = re.findall(r"\[([^\]]*,[^\]]*)\]\s*$", text) if kind.startswith("TEXT") else []
+        self.default = re.findall(r"\[([^\]\s]+)\]\s*$", text)
         ends = re.search(r"in \[(\S+) - (\S+)\]", kind)
         self.ends = ends.groups() if ends else None
 
@@ -89,10 +89,13 @@ class Option:
             return rng.choice(known)
         if self.choices and roll < 0.85:
             return rng.choice(self.choices[0].split(","))
-        if self.listed and roll < 0.85:
-            return rng.choice(self.listed[0].split(",")).strip()
-        if re.match("INT|UINT|FLOAT", self.kind):
+        number = self.default and re.fullmatch(r"[-+0-9.e]+", self.default[0])
+        if re.match("INT|UINT|FLOAT", self.kind) or number and roll < 0.9:
             return self.number(rng)
+        if roll < 0.5 and not known:
+            return self.number(rng)
+        if self.default and roll < 0.7:
+            return rng.choice(self.default)
         return rng.choice(mutate.HOSTILE_TEXT + mutate.HOSTILE_NUMBERS) if main else None
 
     def number(self, rng):
@@ -106,20 +109,24 @@ class Option:
 
 
 def options_of(day, command):
-    """As the help of the command lists them."""
-    if ("options", command) not in day.store:
-        texts = [subprocess.run([day.darb, command, word], capture_output=True, text=True, check=False)
-                 for word in ("--help-all", "--help")]
-        text = next(done.stdout for done in texts if done.returncode == 0)
-        found = []
-        for match in re.finditer(r"^  (-\S*)(.*)((?:\n {10,}.*)*)", text, re.MULTILINE):
-            names, kind, more = match.groups()
-            names = [re.sub(r"\{.*", "", name) for name in names.split(",") if name.startswith("-")]
-            if not LEFT_OUT.intersection(names) and "--help" not in names and "--help-all" not in names:
-                typed = re.match(r"\s(TEXT|INT|UINT|FLOAT|PATH|FILE|[A-Z]{3,})\S*( in \[[^\]]*\])?", kind)
-                found.append(Option(names, typed.group(0).strip() if typed else "", more))
-        day.store[("options", command)] = found
-    return day.store[("options", command)]
+    """As the help of the command lists them; what each takes, as the command says of one without its value."""
+    if ("options", command) in day.store:
+        return day.store[("options", command)]
+
+    def said(*words):
+        done = subprocess.run([day.darb, command, *words], capture_output=True, text=True, check=False)
+        return done.stdout + done.stderr
+    found = []
+    for match in re.finditer(r"^  (-[^\s,]+(?:, -[^\s,]+)*)(.*(?:\n {10,}.*)*)", said("--help-all"), re.MULTILINE):
+        names = match.group(1).split(", ")
+        if LEFT_OUT.intersection(names) or "--help" in names or "--help-all" in names:
+            continue
+        typed = re.search(r"\d required (\S+( in \[[^\]]*\])?) missing", said("--no-such-option", names[-1]))
+        found.append(Option(names, typed.group(1) if typed else "", match.group(2)))
+    if not found or command in ("train", "view") and not any(option.kind for option in found):
+        raise RuntimeError(f"the options of {command} were not understood")
+    day.store[("options", command)] = found
+    return found
 
 
 def one(case):

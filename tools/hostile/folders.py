@@ -39,6 +39,8 @@ def onto_inputs(case):
         "view in/scenes/scene.ply --screenshot in/scenes/scene.ply --size 64x48",
         "info in/scenes/scene.ply --json in/scenes/scene.ply", "info in/cameras.json --json in/cameras.json",
         "info in/colmap --json in/colmap/sparse/0/cameras.bin", "info in/frames --json in/frames/transforms.json",
+        f"plan in/colmap --no-price --json {photo}", "plan in/scenes/scene.ply --no-price --json in/scenes/scene.ply",
+        "cost in/scenes/scene.ply --quick --size 32x32 -q --json in/scenes/scene.ply",
         f"train in/colmap -o in/colmap {TRAIN}", f"train in/frames -o in/frames/images {TRAIN}",
         f"train in/colmap -o {photo} {TRAIN}", "render in/run --cameras in/colmap -o in/colmap/images",
         "render in/run --cameras in/colmap -o in/colmap/masks --depth npy",
@@ -83,7 +85,7 @@ def into_links(case):
 
 
 def one_output(path):
-    return [["convert", "in/scenes/scene.ply", path + ".ply"], ["train", "in/colmap", "-o", path, *samples.TRAIN],
+    return [["convert", "in/scenes/scene.ply", path + ".ply" if path else ""], ["train", "in/colmap", "-o", path, *samples.TRAIN],
             ["render", "in/run", "--cameras", "in/cameras.json", "-o", path],
             ["view", "in/run", "--screenshot", path, "--size", "64x48"],
             ["view", "in/run", "--path", "in/path.json", "--export", path, "--size", "32x32"],
