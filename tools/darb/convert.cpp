@@ -113,8 +113,7 @@ int convert(const ConvertFlags& flags) {
                          encoded.beside.empty() ? parse_splats(encoded.file, flags.output.string())
                                                 : load_splats(flags.output),
                          flags);
-    if (std::filesystem::is_regular_file(flags.output))  // else stdout may be what was written
-        tell_paths(flags.quiet, outputs_of(flags.output, encoded));
+    tell_paths(say == nullptr && stream_beside(flags.output) == stdout, {flags.output});
     return 0;
 }
 
@@ -139,9 +138,7 @@ void add_convert(CLI::App& app, Action& action) {
         ->check(CLI::IsMember({3, 4}))
         ->capture_default_str();
     add_level_options(*command, flags->levels);
-    command->add_flag(
-        "--compare", flags->compare,
-        "read what was written and print how far its renders differ from the scene's");
+    command->add_flag("--compare", flags->compare, "print how far renders of the file differ");
     command->add_option("--cameras", flags->cameras,
                         "cameras of the comparisons, as darb render takes them (default: 8 around "
                         "the scene)");
