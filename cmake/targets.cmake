@@ -1,3 +1,13 @@
+# darb_linked_anywhere(TARGETS...): static libraries that a shared one may take in, as the Python module does.
+# Nothing of them can be put in the place of, so that functions are called as in a program. Without the
+# module they are compiled as for programs.
+function(darb_linked_anywhere)
+  if(DARB_PYTHON)
+    set_target_properties(${ARGN} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
+      VISIBILITY_INLINES_HIDDEN ON)
+  endif()
+endfunction()
+
 # darb_library(NAME DEPENDS...): static library darb_NAME from engine/NAME/*.cpp. A folder that has
 # only headers so far still becomes a library, so that the arrows in CMakeLists.txt hold.
 function(darb_library name)
@@ -10,6 +20,7 @@ function(darb_library name)
   add_library(darb_${name} STATIC ${sources})
   target_link_libraries(darb_${name} PUBLIC darb_options ${depends})
   target_precompile_headers(darb_${name} REUSE_FROM darb_precompiled)
+  darb_linked_anywhere(darb_${name})
 endfunction()
 
 # What most files parse and is slow to parse, parsed once. The clang preset does without, so that a
@@ -20,3 +31,4 @@ file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/generated/precompiled.cpp CONTENT ""
 add_library(darb_precompiled STATIC ${PROJECT_BINARY_DIR}/generated/precompiled.cpp)
 target_link_libraries(darb_precompiled PRIVATE darb_options nlohmann_json::nlohmann_json)
 target_precompile_headers(darb_precompiled PRIVATE ${darb_slow_headers})
+darb_linked_anywhere(darb_precompiled)
