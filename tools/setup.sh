@@ -8,7 +8,8 @@ usage() {
 usage: tools/setup.sh [options]
   --dry-run             only say what would be installed
   --no-tests            leave out what only the tests and the quality checks need
-  --with-torch          PyTorch too, for the test of LPIPS: 0.6 GB on disk
+  --with-python         what the Python module is built and used with: -DDARB_PYTHON=ON
+  --with-torch          PyTorch too, for the tests of LPIPS and of darb.torch: 0.6 GB on disk
   --with-colmap         COLMAP too: training from photos without cameras runs it
   --with-mesa-backport  Debian 12: Mesa 25 from bookworm-backports; on the CPU it blends 1.5-1.7
                         times as fast as Mesa 22.3
@@ -53,7 +54,10 @@ tests    universal-ctags      sizes of functions and classes, tools/structure.py
 tests    ffmpeg               the video of a camera path
 pages    chromium             opens the reports; Debian alone: that of Ubuntu is no package
 pages    fonts-dejavu-core    their letters
-torch    python3-torch        the truth of the LPIPS test, which skips without it; optional
+python   python3-dev          the Python module; optional
+python   pybind11-dev         the Python module; optional
+python   python3-numpy        its arrays; optional
+torch    python3-torch        tests of LPIPS and of darb.torch, which skip without it; optional
 colmap   colmap               cameras from photos; optional
 '
 
@@ -62,6 +66,7 @@ for option in "$@"; do
     case $option in
         --dry-run) dry_run=1 ;;
         --no-tests) groups=${groups/tests/} ;;
+        --with-python) groups+=" python" ;;
         --with-torch) groups+=" torch" ;;
         --with-colmap) groups+=" colmap" ;;
         --with-mesa-backport) backport=1 ;;

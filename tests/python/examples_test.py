@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""The examples in tiny form: each ends, prints figures and writes a picture."""
+
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import support
+
+try:
+    import numpy as np
+
+    import darb
+except ImportError as error:
+    support.skip(f"the module is not here: {error}")
+
+EXAMPLES = support.SOURCE / "tools" / "python" / "examples"
+
+
+class Examples(unittest.TestCase):
+    def run_example(self, name, *words):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, str(EXAMPLES / f"{name}.py"), "-o", folder, *words],
+                                  text=True, capture_output=True, timeout=300, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            picture = (pathlib.Path(folder) / f"{name}.png").read_bytes()
+            self.assertGreater(len(picture), 1000)
+            return done.stdout
+
+    def test_fit_picture(self):
+        said = self.run_example("fit_picture", "--splats", "40", "--steps", "25", "--size", "48")
+        figures = [float(line.split()[-9]) for line in said.splitlines() if " dB " in line]
+        self.assertEqual(len(figures), 3, said)
+        self.assertGreater(min(figures), 14)
+
+    def test_compare_gradients(self):
+        said = self.run_example("compare_gradients", "--size", "48", "--points", "17")
+        self.assertEqual(said.count("off the loss by"), 5, said)
+
+    @unittest.skipUnless(support.SHIPPED.exists(), "the shipped scene is not in the tree")
+    def test_train_own_loss(self):
+        said = self.run_example("train_own_loss", "--iterations", "20", "--resolution", "32")
+        self.assertIn("charbonnier: ", said)
+
+    def test_what_the_stubs_name_is_there(self):
+        import ast
+        tree = ast.parse((pathlib.Path(darb.__file__).parent / "__init__.pyi").read_text())
+        names = [node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))]
+        for name in names:
+            if name == "Info":
+                continue
+            self.assertTrue(hasattr(darb, name), name)
+            self.assertTrue(getattr(darb, name).__doc__, f"{name} has no docstring")
+        self.assertEqual(sorted(set(darb.__all__) - {"__version__"}), sorted(set(names) - {"Info"}))
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef):
+                import inspect
+                mine = list(inspect.signature(getattr(darb, node.name)).parameters)
+                theirs = [a.arg for a in node.args.args + node.args.kwonlyargs]
+                self.assertEqual(mine, theirs, node.name)
+            elif node.name not in ("Error", "Info"):
+                for part in node.body:
+                    if isinstance(part, ast.FunctionDef):
+                        self.assertTrue(hasattr(getattr(darb, node.name), part.name),
+                                        f"{node.name}.{part.name}")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=1)

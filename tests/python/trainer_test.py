@@ -1,0 +1,188 @@
+#!/usr/bin/env python3
+"""darb.Trainer: the bits of `darb train`, a loss of one's own, checkpoints; studies and plans."""
+
+import os
+import pathlib
+import signal
+import subprocess
+import tempfile
+import threading
+import unittest
+
+import support
+
+try:
+    import numpy as np
+
+    import darb
+except ImportError as error:
+    support.skip(f"the module is not here: {error}")
+
+SCENE = support.SHIPPED
+OPTIONS = {"resolution": 32, "iterations": 24, "sh_degree": 1, "densify_from_iter": 5,
+           "densification_interval": 5, "max_splats": 3000, "effects": "+exposure", "seed": 3}
+
+
+def words(options):
+    return [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
+
+
+@unittest.skipUnless(SCENE.exists(), "the shipped scene is not in the tree")
+class Training(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = pathlib.Path(self.folder.name)
+
+    def trained(self, **options):
+        trainer = darb.Trainer(SCENE, **{**OPTIONS, **options})
+        return trainer
+
+    def bytes_of(self, trainer, name="mine.ply"):
+        trainer.scene().write(self.path / name)
+        return (self.path / name).read_bytes()
+
+    @unittest.skipUnless(os.path.exists(support.COMMAND), "the command is not built")
+    def test_a_run_has_the_bytes_of_darb_train_and_resumes_bit_by_bit(self):
+        subprocess.run([support.COMMAND, "train", str(SCENE), "-o", str(self.path / "run"), "-q",
+                        "--eval", "--no-report", "--kernel=raised_cosine",
+                        *words(OPTIONS)], check=True, capture_output=True)
+        want = (self.path / "run/point_cloud/iteration_24/point_cloud.ply").read_bytes()
+        rounds = []
+        trainer = self.trained(eval=True, kernel="raised_cosine")
+        trainer.on_round = rounds.append
+        trainer.step(10)
+        trainer.checkpoint(self.path / "ten.darb")
+        last = trainer.step(100)
+        self.assertTrue(last["done"])
+        self.assertEqual(last["iteration"], 24)
+        self.assertEqual(self.bytes_of(trainer), want)
+        self.assertTrue(rounds and rounds[0]["after"] == rounds[0]["before"] +
+                        rounds[0]["grown"] - rounds[0]["pruned"], rounds)
+        measured = trainer.evaluate()
+        self.assertGreater(measured["psnr"], 8)
+        self.assertGreater(len(measured["views"]), 1)
+        resumed = self.trained(eval=True, kernel="raised_cosine",
+                               start_checkpoint=self.path / "ten.darb")
+        self.assertEqual(resumed.iteration, 10)
+        resumed.step(100)
+        self.assertEqual(self.bytes_of(resumed), want)
+
+    def test_a_loss_of_ones_own_takes_the_place_of_the_built_in_one(self):
+        data = darb.Dataset.read(SCENE, resolution=32)
+        options = {name: value for name, value in OPTIONS.items() if name != "resolution"}
+        trainer = darb.Trainer(data, **options)
+        seen = []
+
+        def loss(image, view):
+            photo = np.float32(view["photo"][..., :3]) / 255
+            self.assertEqual(image.shape, photo.shape)
+            seen.append((view["iteration"], float(np.square(image - photo).mean())))
+            return 2 / image.size * (image - photo)
+
+        trainer.step(24, loss=loss)
+        steps = [i for i, _ in seen]
+        self.assertEqual(sorted(set(steps)), list(range(1, 25)))
+        self.assertLess(np.mean([m for _, m in seen[-5:]]), np.mean([m for _, m in seen[:5]]))
+        trainer = darb.Trainer(data, **options)
+        trainer.step(3)
+        before = self.bytes_of(trainer)
+
+        def fail(image, view):
+            raise KeyError("mine")
+
+        with self.assertRaisesRegex(KeyError, "mine"):
+            trainer.step(1, loss=fail)
+        self.assertEqual(trainer.iteration, 3)
+        self.assertEqual(self.bytes_of(trainer), before)
+        with self.assertRaisesRegex(darb.Error, "the loss's gradient: has the shape"):
+            trainer.step(1, loss=lambda image, view: image[:3])
+        with self.assertRaisesRegex(darb.Error, "a step is under way"):
+            trainer.step(1, loss=lambda image, view: trainer.scene())
+        trainer.step(1, loss=lambda image, view: np.zeros_like(image))
+        self.assertEqual(trainer.iteration, 4)
+
+    def test_a_kernel_of_ones_own_trains(self):
+        cubic = darb.Kernel(lambda q: (1 - q / 9) ** 3, support=9, name="trained_cubic")
+        trainer = self.trained(kernel=cubic)
+        first = trainer.step(1)["loss"]
+        last = trainer.step(23)
+        self.assertTrue(np.isfinite([first, last["loss"]]).all())
+        self.assertEqual(trainer.scene().kernel, "trained_cubic")
+
+    def test_ctrl_c_ends_a_step_between_two_iterations(self):
+        trainer = self.trained(iterations=30000)
+        trainer.step(2)
+        threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        with self.assertRaises(KeyboardInterrupt):
+            trainer.step(29000)
+        at = trainer.iteration
+        self.assertTrue(2 < at < 29000)
+        self.assertEqual(trainer.step(1)["iteration"], at + 1)
+
+    def test_mistakes_are_errors_of_the_command(self):
+        for text, options in (("--kernel foo: no such kernel", {"kernel": "foo"}),
+                              ("--iterations", {"iterations": -5}),
+                              ("(?s)shape_lr|arguments", {"shape_lr": 1}),
+                              ("output: is an option of the command alone", {"output": "x"}),
+                              ("strategy", {"strategy": "none"}),
+                              ("noise.lr.*means nothing", {"noise_lr": 3.0}),
+                              ("lambda_dssim: is of the type object", {"lambda_dssim": object()})):
+            with self.subTest(text), self.assertRaisesRegex(darb.Error, text):
+                self.trained(**options)
+        with self.assertRaisesRegex(darb.Error, "nowhere"):
+            darb.Trainer("nowhere")
+        data = darb.Dataset.read(SCENE, resolution=32)
+        with self.assertRaisesRegex(darb.Error, "resolution: is given beside a Dataset"):
+            darb.Trainer(data, resolution=4)
+        with self.assertRaisesRegex(darb.Error, "no view is held out"):
+            darb.Trainer(data, iterations=5).evaluate()
+
+
+@unittest.skipUnless(SCENE.exists(), "the shipped scene is not in the tree")
+class Data(unittest.TestCase):
+    def test_a_data_set_has_cameras_photos_and_points(self):
+        data = darb.Dataset.read(SCENE, resolution=64, eval=True)
+        self.assertEqual(data.viewmats.shape, (len(data), 4, 4))
+        self.assertEqual(data.Ks.shape, (len(data), 3, 3))
+        view, photo = data.view(0), data.photo(0)
+        self.assertEqual(photo.shape, (view["height"], view["width"], 4))
+        self.assertEqual(photo.dtype, np.uint8)
+        self.assertEqual(data.points.shape, data.point_colors.shape)
+        self.assertGreater(sum(data.view(i)["is_test"] for i in range(len(data))), 1)
+        np.testing.assert_array_equal(data.view(-1)["viewmat"], data.viewmats[-1])
+        with self.assertRaisesRegex(darb.Error, "view: is 1000"):
+            data.photo(1000)
+
+    def test_a_plan_says_which_effects_are_called_for(self):
+        rows = darb.plan(SCENE, resolution=32)
+        self.assertTrue(any(row["on"] for row in rows))
+        self.assertTrue(all(row["reason"] for row in rows))
+        with self.assertRaisesRegex(darb.Error, "fog"):
+            darb.plan(SCENE, effects="+fog")
+
+
+class Studies(unittest.TestCase):
+    def test_psi_is_the_ratio_of_moments(self):
+        result = darb.psi(["gaussian", "raised_cosine"], samples=2, cells=16)
+        self.assertAlmostEqual(result["kernels"][0]["exact"], 1, places=9)
+        self.assertLess(result["kernels"][1]["exact"], 1)
+        with self.assertRaisesRegex(darb.Error, "kernels foo"):
+            darb.psi("foo")
+
+    def test_sim1d_fits_signals(self):
+        result = darb.sim1d(signals="gaussian", kernels=["gaussian", "generalised_exponential"],
+                            primitives=[1, 2], seeds=2, steps=200, samples=64)
+        self.assertEqual([r["primitives"] for r in result["rows"]], [1, 2, 1, 2])
+        self.assertLess(result["rows"][0]["loss"]["median"], 0.05)
+        with self.assertRaisesRegex(darb.Error, "seeds: is 0"):
+            darb.sim1d(seeds=0)
+
+    def test_devices_are_listed(self):
+        devices = darb.devices()
+        self.assertTrue(any(d["usable"] for d in devices))
+        self.assertIn(darb.device().name, [d["name"] for d in devices])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=1)

@@ -1,0 +1,73 @@
+// What Python gives a function, taken with care: each wrong type, shape, order, device and number
+// is an Error that names the argument and says what it takes. Arrays are views: the floats stay
+// where they are, and are read while the holder lives.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <algorithm>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+
+namespace darb::python {
+
+namespace py = pybind11;
+
+constexpr py::ssize_t kAny = -1;  // a length that is free
+
+/// float32 in C order, aligned, in memory of the host.
+struct Floats {
+    py::array holder;
+    const float* data = nullptr;
+    std::vector<py::ssize_t> shape;
+
+    std::size_t size() const { return static_cast<std::size_t>(holder.size()); }
+    std::vector<float> copy() const { return {data, data + size()}; }
+};
+
+/// Any array: of numpy, or what has DLPack or the buffer protocol, on the host.
+py::array take_array(const py::object& value, const char* name);
+/// shape: lengths, kAny for any. A numpy array, or what has DLPack or the buffer protocol.
+Floats take_floats(const py::object& value, const char* name,
+                   std::initializer_list<py::ssize_t> shape);
+/// The same in float64, of float32 or float64: small arrays, of cameras.
+std::vector<double> take_doubles(const py::object& value, const char* name,
+                                 std::initializer_list<py::ssize_t> shape,
+                                 std::vector<py::ssize_t>* lengths = nullptr);
+/// Throws Error with the place of the first that is NaN or infinite, below least or above most.
+void check_values(const Floats& values, const char* name, float least, float most,
+                  const char* hint);
+
+long long take_integer(const py::object& value, const char* name, long long least, long long most);
+double take_number(const py::object& value, const char* name, double least, double most);
+bool take_flag(const py::object& value, const char* name);
+std::string take_text(const py::object& value, const char* name);
+/// str or os.PathLike.
+std::string take_path(const py::object& value, const char* name);
+py::object take_callable(const py::object& value, const char* name);
+
+/// "(10, 4)".
+std::string shape_text(const std::vector<py::ssize_t>& shape);
+/// "is a list": for messages.
+std::string type_text(const py::object& value);
+
+/// Calls the handlers of Python's signals, as Ctrl-C has one: throws what they raise. With the GIL
+/// or without.
+void check_signals();
+
+/// A new array with a copy of the values.
+template <class T>
+py::array_t<T> to_array(const std::vector<T>& values, std::vector<py::ssize_t> shape) {
+    py::array_t<T> array(std::move(shape));
+    DARB_CHECK(static_cast<std::size_t>(array.size()) == values.size(), "{} values for {}",
+               values.size(), array.size());
+    std::copy(values.begin(), values.end(), array.mutable_data());
+    return array;
+}
+
+}  // namespace darb::python

@@ -1,0 +1,348 @@
+"""darb: 3D splats with a choice of kernel, on any Vulkan device.
+
+Arrays in, arrays out: numpy arrays of float32, or whatever has DLPack or the buffer protocol and
+lies on the host. darb.torch has the same with gradients for PyTorch.
+
+    rasterize           splats and cameras to pictures
+    rasterize_backward  what a loss of the pictures says of every input
+    Scene, Dataset      splat files; photos with their cameras
+    Trainer             `darb train`, step by step
+    Kernel              a reconstruction kernel of one's own
+    psi, sim1d          a kernel's correction factor; signals as sums of kernels
+    plan, devices       the effects that a scene calls for; the Vulkan devices
+    Error               what was wrong, where, and what to do
+
+Every mistake is a darb.Error, which is a ValueError. Long calls let other threads run and end with
+Ctrl-C. A Device is used by one call at a time; others wait.
+"""
+
+import atexit as _atexit
+
+from . import _darb
+
+_darb.check_interpreter()
+
+import numpy as _np  # noqa: E402
+
+from ._darb import Dataset, Device, Error, Kernel, Scene, __version__
+
+__all__ = [
+    "Dataset",
+    "Device",
+    "Error",
+    "Kernel",
+    "Scene",
+    "Trainer",
+    "__version__",
+    "cameras",
+    "device",
+    "devices",
+    "kernel_names",
+    "plan",
+    "psi",
+    "rasterize",
+    "rasterize_backward",
+    "sim1d",
+    "write_png",
+]
+
+_devices = {}
+
+
+def device(select=""):
+    """The device of that number or of which that is a part of the name, opened once.
+
+    "" is the best usable one, as `darb devices` lists them. A darb.Device is given back as it is.
+    """
+    if isinstance(select, Device):
+        return select
+    if select not in _devices:
+        _devices[select] = Device(select)
+    return _devices[select]
+
+
+def _close():
+    """Lets go of the devices before the interpreter ends: they keep their pipeline caches."""
+    _devices.clear()
+
+
+def _options(means, quats, scales, opacities, colors, sh, viewmats, Ks, width, height, kernel,
+             footprint, background, sh_degree, antialiased, near, accuracy, depth):
+    return {
+        "means": means, "quats": quats, "scales": scales, "opacities": opacities,
+        "colors": colors, "sh": sh, "viewmats": viewmats, "Ks": Ks, "width": width,
+        "height": height, "kernel": kernel, "footprint": footprint, "background": background,
+        "sh_degree": sh_degree, "antialiased": antialiased, "near": near, "accuracy": accuracy,
+        "depth": depth,
+    }
+
+
+def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh=None, viewmats,
+              Ks, width, height, kernel=None, footprint=None, background=None, sh_degree=None,
+              antialiased=None, near=0.2, accuracy="balanced", depth=False, device=""):
+    """Pictures of splats through C cameras -> (image, alpha, info).
+
+    Splats, N of them, float32 in C order:
+        means      [N, 3]  world units; or a Scene in place of all arrays of splats, whose splats
+                           stay on the device until they change
+        quats      [N, 4]  w x y z, of any norm
+        scales     [N, 3]  standard deviations, world units, not logarithms
+        opacities  [N]     0 to 1
+        colors     [N, 3]  RGB of any sign, as they are: nothing is added and nothing clamped
+        sh         [N, K, 3]  harmonics instead, K = 1, 4, 9 or 16, the first band first:
+                           colour = max(0, 0.5 + sum over k of sh[k] Y_k(direction)), as 3DGS has it
+    Cameras, float32 or float64:
+        viewmats   [C, 4, 4]  world to camera, rigid; x right, y down, z forward
+        Ks         [C, 3, 3]  pinholes, px; the centre of the top left pixel is (0.5, 0.5)
+        width, height         px
+    kernel: a name of kernel_names() or a Kernel ("gaussian"). footprint: "psi" or "exact".
+    background: [3] or [C, 3], black by default. sh_degree: the most that is used.
+    antialiased: opacities are compensated for the low-pass of 0.3 px^2, as Mip-Splatting does.
+    near: splats up to this z are left out. accuracy: "fast", "balanced" or "exact", a preset of
+    `darb render --accuracy`. depth: info["depth"], too. device: as darb.device takes it.
+
+    image  [C, H, W, 3] float32, not clamped.
+    alpha  [C, H, W]    float32, 1 - transmittance.
+    info   a dict: "visible" and "intersections" (of splats and tiles) [C]; "device_ms", the time
+           of the passes, and "frame_ms", that and the way to the host; "depth" [C, H, W], the expected z, 0 where nothing is seen.
+    """
+    return _darb.rasterize(
+        _device(device),
+        _options(means, quats, scales, opacities, colors, sh, viewmats, Ks, width, height, kernel,
+                 footprint, background, sh_degree, antialiased, near, accuracy, depth))
+
+
+def rasterize_backward(d_image, d_alpha=None, *, means, quats=None, scales=None, opacities=None,
+                       colors=None, sh=None, viewmats, Ks, width, height, kernel=None,
+                       footprint=None, background=None, sh_degree=None, antialiased=None, near=0.2,
+                       accuracy="balanced", device="", camera=False, picture=0):
+    """What a loss of rasterize's pictures says of its inputs: a dict of gradients.
+
+    d_image [C, H, W, 3] is dL/d(image), d_alpha [C, H, W] or None dL/d(alpha), float32. The other
+    arguments are those of rasterize. "means", "quats", "scales", "opacities", "colors" or "sh" are
+    of the shapes of the inputs and added over the cameras, "backgrounds" is [C, 3]. A Scene has
+    "log_scales" and "opacity_logits" instead of scales and opacities.
+
+    With camera "viewmats" [C, 4, 4] and "Ks" [C, 3, 3], too: their numbers are taken freely, as
+    gsplat does; of a rotation that counts which is along rotations.
+    "means_ndc_norm" [N] is |dL/d(projected mean)| in units of half the picture's sides, "shown" [N]
+    in how many pictures a splat is; density control goes by the two. "not_finite": splats whose
+    gradients left float32; they are 0. picture: info["picture"] of the call of rasterize with the
+    same arguments: of a single camera it need not be drawn again.
+    """
+    return _darb.rasterize_backward(
+        _device(device),
+        _options(means, quats, scales, opacities, colors, sh, viewmats, Ks, width, height, kernel,
+                 footprint, background, sh_degree, antialiased, near, accuracy, False),
+        d_image, d_alpha, picture, camera)
+
+
+_device = device  # the functions have an argument of that name
+_atexit.register(_close)
+
+
+def devices():
+    """Every Vulkan device, best first: a list of dicts with name, driver, type and limits."""
+    return _darb.devices()
+
+
+def kernel_names():
+    """The names of the kernels of the family, as on the command line."""
+    return _darb.kernel_names()
+
+
+def write_png(path, image):
+    """Writes [H, W, 3] as a PNG: float32 in [0, 1], clamped and rounded to 8 bits, or uint8."""
+    _darb.write_png(path, image)
+
+
+# --- Scene ---------------------------------------------------------------------------------------
+
+Scene.__doc__ = """A splat scene in memory.
+
+    scene = darb.Scene.read("scene.ply")    # any format that `darb` reads
+    image, alpha, info = scene.render(viewmats, Ks, 640, 480)
+    scene.write("copy.spz")                 # .ply, .compressed.ply, .splat, .spz
+
+Attributes are read-only looks at the scene's own float32; assign an array of the same shape to
+change one: means [N, 3], log_scales [N, 3], quats [N, 4] (w x y z), opacity_logits [N], sh_dc
+[N, 3], sh_rest [N, K - 1, 3]. kernel, footprint and antialiased say how it is drawn. The splats
+stay on the device between calls until one is assigned. A notebook shows a scene as a picture.
+"""
+
+
+def _scene_from_arrays(means, quats, scales, opacities, *, sh, kernel="gaussian", footprint="psi",
+                       antialiased=False):
+    """A Scene of arrays as darb.rasterize takes them: scales and opacities themselves.
+
+    Opacities are clamped to 1e-6 and 1 - 1e-6, scales to 1e-8 and more, as files hold logits and
+    logarithms.
+    """
+    opacity = _np.clip(_np.asarray(opacities, dtype=_np.float64), 1e-6, 1 - 1e-6)
+    length = _np.maximum(_np.asarray(scales, dtype=_np.float64), 1e-8)
+    return _scene_of_arrays({
+        "means": means, "quats": quats, "sh": sh, "kernel": kernel, "footprint": footprint,
+        "antialiased": antialiased, "log_scales": _np.log(length).astype(_np.float32),
+        "opacity_logits": _np.log(opacity / (1 - opacity)).astype(_np.float32)})
+
+
+def _scene_render(self, viewmats, Ks, width, height, **options):
+    """darb.rasterize of this scene -> (image, alpha, info)."""
+    return rasterize(self, viewmats=viewmats, Ks=Ks, width=width, height=height, **options)
+
+
+def _scene_picture(self, size=480):
+    """A look at the scene along z, [size, size, 3] float32."""
+    means = _np.asarray(self.means, dtype=_np.float64)
+    if len(means) == 0:
+        return _np.zeros((size, size, 3), _np.float32)
+    centre = _np.median(means, axis=0)
+    reach = max(float(_np.quantile(_np.abs(means - centre).max(axis=1), 0.9)), 1e-3)
+    viewmat = _np.eye(4)
+    viewmat[:3, 3] = -centre
+    viewmat[2, 3] += 3 * reach
+    K = _np.array([[size * 1.2, 0, size / 2], [0, size * 1.2, size / 2], [0, 0, 1.0]])
+    return self.render(viewmat[None], K[None], size, size, near=0.01 * reach)[0][0]
+
+
+def _scene_png(self):
+    return _darb.encode_png(_scene_picture(self))
+
+
+def _scene_repr(self):
+    return (f"<darb.Scene of {len(self)} splats, {self.kernel}, footprint {self.footprint}, "
+            f"harmonics of degree {self.sh_degree}>")
+
+
+_scene_of_arrays = Scene.from_arrays
+Scene.from_arrays = staticmethod(_scene_from_arrays)
+Scene.render = _scene_render
+Scene.picture = _scene_picture
+Scene._repr_png_ = _scene_png
+Scene.__repr__ = _scene_repr
+
+# --- Kernel --------------------------------------------------------------------------------------
+
+Kernel.__doc__ = """A reconstruction kernel of one's own, wherever a kernel's name may stand.
+
+    cubic = darb.Kernel(lambda q: (1 - q / 9) ** 3, support=9, name="cubic")
+    cubic = darb.Kernel("(1 - q/9)^3", support=9)        # an expression in q and d
+    image, alpha, info = darb.rasterize(..., kernel=cubic)
+
+profile: w(q) of q = d^2, d the Mahalanobis distance; falling from w(0), which becomes 1, to the
+edge at q = support, smooth in q. A polynomial of the shaders' degrees is fitted to it: error is
+its largest distance, notes say what was changed. psi is the ratio of the projected second moment
+to the 2x2 block of the covariance. kernel(q) is the fitted profile. Files that are written hold
+the kernel. Of a name there is one kernel a process.
+"""
+
+
+# --- Dataset -------------------------------------------------------------------------------------
+
+Dataset.__doc__ = """Photos with their cameras: a COLMAP project, transforms.json, and the like.
+
+    data = darb.Dataset.read("garden", resolution=4, eval=True)
+    data.viewmats [V, 4, 4], data.Ks [V, 3, 3]    float64; by name, as data.view(i)
+    data.photo(i)                                 uint8 [H, W, 4]; alpha 0 is masked or empty
+    data.points [P, 3] float64, data.point_colors [P, 3] uint8
+"""
+
+
+def _dataset_read(path, *, resolution=-1, eval=False, images="images", lens="auto"):
+    """Reads the cameras and points; the photos when they are asked for.
+
+    resolution: 1, 2, 4, 8 divide, above 8 a width in px, -1 as they are, at most 1,600 px wide.
+    eval: every 8th view is held out, or the source's own test views. images: the photo folder of
+    a COLMAP project. lens: "auto", "undistort" or "original", as `darb train --lens`.
+    """
+    return Dataset._read(path, {"resolution": resolution, "eval": eval, "images": images,
+                                "lens": lens})
+
+
+def cameras(path):
+    """The cameras of a cameras.json, a transforms.json or a data set; photos are not needed.
+
+    -> a dict of viewmats [V, 4, 4] and Ks [V, 3, 3] in float64, and lists of names, widths and
+    heights.
+    """
+    views = _darb.cameras(path)
+    each = [views.view(i) for i in range(len(views))]
+    return {"viewmats": views.viewmats, "Ks": views.Ks, "names": [v["name"] for v in each],
+            "widths": [v["width"] for v in each], "heights": [v["height"] for v in each]}
+
+
+Dataset.read = staticmethod(_dataset_read)
+Dataset.__repr__ = lambda self: f"<darb.Dataset of {len(self)} views, {self.source}>"
+
+
+# --- Trainer -------------------------------------------------------------------------------------
+
+class Trainer(_darb.Trainer):
+    """`darb train`, step by step, with the same options and the same bits.
+
+        trainer = darb.Trainer("garden", resolution=4, iterations=7000, eval=True)
+        while not trainer.step(100)["done"]:
+            print(trainer.iteration, trainer.evaluate()["psnr"])
+        trainer.scene().write("garden.ply")
+
+    dataset: a path, or a Dataset, which brings its own resolution, eval, images and lens. Options
+    have the names of `darb train --help-all` with underscores: kernel="raised_cosine",
+    max_splats=100_000, effects="-exposure", random_background=False for --no-random-background.
+    start_checkpoint=path goes on from a checkpoint, of this class or of the command.
+
+    step(n=1, loss=None) -> dict: iteration, loss, psnr (dB, of the training view), splats,
+        visible, intersections, done. With loss, dL/dimage = loss(image, view) takes the place of
+        the built-in loss: image [H, W, 3] float32 as it is compared, not clamped; view a dict of
+        name, iteration, photo (uint8 [H, W, 4], of the image's size) and background [3].
+        "loss" is then still that of the built-in one.
+    evaluate() -> dict: psnr, ssim, views, over the views held out.
+    scene() -> Scene: as a file of the run holds it.
+    on_round: a function of a dict (iteration, before, after, grown, pruned), called after each
+        round of density control, or None.
+    checkpoint(path): everything that is needed to go on bit by bit.
+    iteration, iterations, len(trainer): done, in all, and the splats of now.
+
+    Ctrl-C ends step() between two iterations, and the run goes on with the next call.
+    """
+
+    def __init__(self, dataset, *, device="", **options):
+        super().__init__(_device(device), dataset, options)
+
+    def __repr__(self):
+        return (f"<darb.Trainer at iteration {self.iteration} of {self.iterations}, "
+                f"{len(self)} splats>")
+
+
+# --- Kernels, plans ------------------------------------------------------------------------------
+
+def psi(kernels=None, *, samples=24, cells=64, seed=0):
+    """The correction factor psi of kernels three ways: what `darb psi --json` writes, as a dict.
+
+    kernels: names, or None for the family. samples: random covariances of the grid; cells: of it
+    along each axis. ["kernels"][i]["exact"] is the ratio of moments, "grid" the paper's
+    experiment, "least_squares" the best scale, "distance_from_projection" how far each is off.
+    """
+    return _darb.psi(kernels, samples, cells, seed)
+
+
+def sim1d(*, signals=None, kernels=None, primitives=(1, 5, 10), seeds=20, steps=10_000,
+          samples=1000, lr=0.01):
+    """Signals as sums of N kernels, fitted by Adam: what `darb sim1d --json` writes, as a dict.
+
+    signals, kernels: names, or None for all. ["rows"] has one for each signal, kernel and number
+    of primitives, with the median loss over the seeds.
+    """
+    return _darb.sim1d({"signals": signals, "kernels": kernels, "primitives": primitives,
+                        "seeds": seeds, "steps": steps, "samples": samples, "lr": lr})
+
+
+def plan(what, *, cameras=None, effects="auto", sh_degree=None, kernel=None, depth=False,
+         resolution=-1, price=False, device=""):
+    """Which effects a scene or a data set calls for, and why: the rows of `darb plan --json`.
+
+    what: a path. cameras: of a scene, those that it will be rendered through. price: measures what
+    each effect costs on the device, ms and bytes.
+    """
+    return _darb.plan({"what": what, "cameras": cameras, "effects": effects,
+                       "sh_degree": sh_degree, "kernel": kernel, "depth": depth,
+                       "resolution": resolution, "price": price, "device": device})

@@ -1,0 +1,10 @@
+// The double reference, for tests.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace darb::python {
+
+void bind_reference(pybind11::module_& module);
+
+}  // namespace darb::python

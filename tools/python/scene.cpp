@@ -1,0 +1,206 @@
+#include "tools/python/scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/scene/splat_file.h"
+#include "engine/scene/splat_shapes.h"
+#include "tools/python/kernel.h"
+#include "tools/python/splat_arrays.h"
+
+namespace darb::python {
+
+PyScene::PyScene(SplatModel model) : model_(std::move(model)) {
+    check_splat_shapes(model_);
+}
+
+void PyScene::set_values(int attribute, const Floats& values) {
+    change([&] {
+        std::copy_n(values.data, values.size(), attribute_values(model_, attribute).begin());
+        ++changes_;
+    });
+}
+
+void PyScene::set_drawing(int kernel, Footprint footprint, bool antialias) {
+    if (footprint == Footprint::exact && !has_exact_footprint(kernel))
+        throw Error("footprint exact",
+                    fmt::format("is not there for the kernel {}", kernel_name(kernel)),
+                    "Use psi, or a kernel of one pulse.");
+    change([&] {
+        model_.kernel = kernel;
+        model_.footprint = footprint;
+        model_.antialias = antialias;
+        ++changes_;
+    });
+}
+
+PyScene::~PyScene() {
+    if (!device_) return;
+    const py::gil_scoped_release free;
+    device_->let_go([this] { renderers_.clear(); }, [this] { renderers_.leak(); });
+}
+
+void PyScene::lie_on(const std::shared_ptr<PyDevice>& device) {
+    if (device_ && device_ != device)
+        throw Error("scene", "lies on " + device_->info().name + " already",
+                    "Read it once for each device.");
+    device_ = device;
+}
+
+void PyScene::change(const std::function<void()>& change) {
+    if (!device_) return change();
+    const py::gil_scoped_release free;
+    const auto lock = device_->lock();
+    change();
+}
+
+KeptRenderer& PyScene::renderer(const RendererKey& key) {
+    bool made = false;
+    KeptRenderer& kept = renderers_.of(device_->device(), key, model_, made);
+    for (auto& [drawn_as, changes] : uploaded_) {
+        if (drawn_as != key) continue;
+        if (changes != changes_ && !made) kept.renderer.replace(model_);
+        changes = changes_;
+        return kept;
+    }
+    uploaded_.emplace_back(key, changes_);
+    return kept;
+}
+
+namespace {
+
+// A look at the model's own floats, which live as long as the scene.
+py::array view_of(const py::object& scene, const std::vector<float>& values,
+                  std::vector<py::ssize_t> shape) {
+    py::array_t<float> array(std::move(shape), values.data(), scene);
+    array.attr("setflags")(py::arg("write") = false);
+    return array;
+}
+
+PyScene& scene_in(const py::object& self) {
+    return self.cast<PyScene&>();
+}
+
+template <int Attribute>
+void bind_attribute(py::class_<PyScene>& scene, const char* name, const char* doc) {
+    const auto shape = [](const SplatModel& model) {
+        const auto n = static_cast<py::ssize_t>(model.size());
+        const auto floats = static_cast<py::ssize_t>(model.floats(Attribute));
+        if constexpr (Attribute == ATTRIBUTE_OPACITY_LOGIT) return std::vector<py::ssize_t>{n};
+        if constexpr (Attribute == ATTRIBUTE_SH_REST)
+            return std::vector<py::ssize_t>{n, floats / 3, 3};
+        return std::vector<py::ssize_t>{n, floats};
+    };
+    scene.def_property(
+        name,
+        [shape](const py::object& self) {
+            const SplatModel& model = scene_in(self).model();
+            return view_of(self, attribute_values(model, Attribute), shape(model));
+        },
+        [shape, name](PyScene& self, const py::object& value) {
+            const std::vector<py::ssize_t> wanted = shape(self.model());
+            const Floats floats = wanted.size() == 1 ? take_floats(value, name, {wanted[0]})
+                                  : wanted.size() == 2
+                                      ? take_floats(value, name, {wanted[0], wanted[1]})
+                                      : take_floats(value, name, {wanted[0], wanted[1], wanted[2]});
+            constexpr float most = std::numeric_limits<float>::max();
+            check_values(floats, name, -most, most, "Check what it was computed from.");
+            self.set_values(Attribute, floats);
+        },
+        doc);
+}
+
+PyScene scene_of_arrays(const py::dict& options) {
+    SplatModel model;
+    const Floats means = take_floats(options["means"], "means", {kAny, 3});
+    const py::ssize_t n = means.shape[0];
+    const Floats scales = take_floats(options["log_scales"], "log_scales", {n, 3});
+    const Floats quats = take_floats(options["quats"], "quats", {n, 4});
+    const Floats logits = take_floats(options["opacity_logits"], "opacity_logits", {n});
+    const Floats sh = take_floats(options["sh"], "sh", {n, kAny, 3});
+    constexpr float most = std::numeric_limits<float>::max();
+    for (const auto& [values, name] : {std::pair(&means, "means"),
+                                       {&scales, "log_scales"},
+                                       {&quats, "quats"},
+                                       {&logits, "opacity_logits"},
+                                       {&sh, "sh"}})
+        check_values(*values, name, -most, most, "Check what it was computed from.");
+    model.sh_degree = degree_of_coefficients(sh.shape[1]);
+    model.position = means.copy();
+    model.log_scale = scales.copy();
+    model.rotation = quats.copy();
+    attribute_values(model, ATTRIBUTE_OPACITY_LOGIT) = logits.copy();
+    split_harmonics(sh, model);
+    model.kernel = take_kernel(options["kernel"], "kernel");
+    model.footprint = take_footprint(options["footprint"]);
+    model.antialias = take_flag(options["antialiased"], "antialiased");
+    PyScene scene(std::move(model));
+    scene.set_drawing(scene.model().kernel, scene.model().footprint, scene.model().antialias);
+    return scene;
+}
+
+PyScene read_scene(const py::object& value) {
+    const std::string path = take_path(value, "path");
+    const py::gil_scoped_release free;
+    return PyScene(load_splats(path));
+}
+
+void write_scene(const PyScene& scene, const py::object& value) {
+    const std::string path = take_path(value, "path");
+    const auto format = format_to_write(path);
+    if (!format)
+        throw Error(path, "has the name of no splat file that can be written",
+                    "End it in .ply, .compressed.ply, .splat or .spz.");
+    SplatModel model = scene.model();
+    const py::gil_scoped_release free;
+    drop_unwritable(*format, model);
+    save_splats(path, *format, model);
+}
+
+}  // namespace
+
+void bind_scene(py::module_& module) {
+    py::class_<PyScene> scene(module, "Scene", "A splat scene; see darb.Scene.");
+    scene.def_static("read", &read_scene, py::arg("path"))
+        .def_static("from_arrays", &scene_of_arrays)
+        .def("write", &write_scene, py::arg("path"))
+        .def("__len__", [](const PyScene& s) { return s.model().size(); })
+        .def_property_readonly("sh_degree", [](const PyScene& s) { return s.model().sh_degree; })
+        .def_property_readonly("origin",
+                               [](const PyScene& s) {
+                                   const glm::dvec3& o = s.model().origin;
+                                   return py::make_tuple(o.x, o.y, o.z);
+                               })
+        .def_property(
+            "kernel", [](const PyScene& s) { return std::string(kernel_name(s.model().kernel)); },
+            [](PyScene& s, const py::object& value) {
+                s.set_drawing(take_kernel(value, "kernel"), s.model().footprint,
+                              s.model().antialias);
+            })
+        .def_property(
+            "footprint",
+            [](const PyScene& s) { return std::string(footprint_name(s.model().footprint)); },
+            [](PyScene& s, const py::object& value) {
+                s.set_drawing(s.model().kernel, take_footprint(value), s.model().antialias);
+            })
+        .def_property(
+            "antialiased", [](const PyScene& s) { return s.model().antialias; },
+            [](PyScene& s, const py::object& value) {
+                s.set_drawing(s.model().kernel, s.model().footprint,
+                              take_flag(value, "antialiased"));
+            });
+    bind_attribute<ATTRIBUTE_POSITION>(scene, "means", "[N, 3] float32, world units.");
+    bind_attribute<ATTRIBUTE_LOG_SCALE>(scene, "log_scales",
+                                        "[N, 3] float32, natural logarithms of world units.");
+    bind_attribute<ATTRIBUTE_ROTATION>(scene, "quats", "[N, 4] float32, w x y z, of any norm.");
+    bind_attribute<ATTRIBUTE_OPACITY_LOGIT>(scene, "opacity_logits", "[N] float32.");
+    bind_attribute<ATTRIBUTE_SH_DC>(scene, "sh_dc",
+                                    "[N, 3] float32: colour = 0.5 + 0.2821 sh_dc + other bands.");
+    bind_attribute<ATTRIBUTE_SH_REST>(scene, "sh_rest",
+                                      "[N, K - 1, 3] float32, the bands above the first.");
+}
+
+}  // namespace darb::python

@@ -1,0 +1,261 @@
+#include "tools/python/trainer.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "engine/plan/tuning_names.h"
+#include "engine/raster/frame_limit.h"
+#include "engine/scene/edit_splats.h"
+#include "tools/darb/train_run.h"
+#include "tools/python/scene.h"
+#include "tools/python/train_options.h"
+#include "trainer/checkpoint.h"
+#include "trainer/evaluation.h"
+#include "trainer/initial_model.h"
+#include "trainer/start_memory.h"
+
+namespace darb::python {
+
+namespace {
+
+// Whose lens and size the data set was read with; the options say so only for a path.
+Dataset take_dataset(const py::object& given, const py::dict& options, const TrainFlags& flags) {
+    Dataset dataset;
+    if (py::isinstance<PyDataset>(given)) {
+        for (const char* name : {"resolution", "r", "eval", "images", "i", "lens"})
+            if (options.contains(name))
+                throw Error(name, "is given beside a Dataset, which was read with its own",
+                            "Give it to Dataset.read.");
+        dataset = given.cast<const PyDataset&>().data;
+    } else {
+        const std::string path = take_path(given, "dataset");
+        const py::gil_scoped_release free;
+        dataset = load_dataset(path, flags.data);
+    }
+    if (!dataset.options.hold_out)
+        for (View& view : dataset.views) view.is_test = false;
+    return dataset;
+}
+
+py::array picture_array(const ImageF& image) {
+    return to_array(image.data, {image.height, image.width, image.channels});
+}
+
+// What a loss of Python's returns: an array, as its picture is.
+ImageF ask_python(const py::object& loss, const TrainingPicture& picture) {
+    const py::gil_scoped_acquire gil;
+    py::dict view;
+    view["name"] = picture.name;
+    view["iteration"] = picture.iteration;
+    view["photo"] = to_array(picture.photo.data, {picture.photo.height, picture.photo.width, 4});
+    view["background"] = to_array(
+        std::vector<float>{picture.background.r, picture.background.g, picture.background.b}, {3});
+    const ImageF& image = picture.image;
+    const py::object answer = loss(picture_array(image), view);
+    const Floats d = take_floats(answer, "the loss's gradient", {image.height, image.width, 3});
+    ImageF result(image.width, image.height, 3);
+    std::copy_n(d.data, d.size(), result.data.begin());
+    return result;
+}
+
+// Marks the device while a step runs: its callbacks may draw, but not train.
+class Training {
+  public:
+    explicit Training(PyDevice& device) : device_(device) {
+        if (device_.training)
+            throw Error("darb.Trainer", "a step is under way on this device",
+                        "Train after the callback has returned.");
+        device_.training = true;
+    }
+    ~Training() { device_.training = false; }
+    Training(const Training&) = delete;
+    Training& operator=(const Training&) = delete;
+
+  private:
+    PyDevice& device_;
+};
+
+}  // namespace
+
+PyTrainer::PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset,
+                     const py::dict& options)
+    : device_(std::move(device)), flags_(take_train_options(options)) {
+    dataset_ = take_dataset(dataset, options, flags_);
+    const py::gil_scoped_release free;
+    const auto lock = device_->lock();
+    const Training training(*device_);
+    try {
+        make_trainer();
+    } catch (...) {
+        trainer_.reset();  // under the lock
+        throw;
+    }
+}
+
+void PyTrainer::make_trainer() {
+    Device& device = device_->device();
+    for (const View& view : dataset_.views)
+        check_frame(device, view.camera.width, view.camera.height, view.name);
+    plan_effects(dataset_, flags_);
+    plan_strategy(dataset_, flags_);
+    check_signals();
+    photos_ = photos_of_run(dataset_, flags_.train, std::move(flags_.run.photos));
+    check_signals();
+    std::optional<Checkpoint> start;
+    if (!flags_.run.resume_from.empty()) {
+        start = read_checkpoint(flags_.run.resume_from);
+        check_resumable(*start, flags_.run.resume_from, flags_.train, dataset_, fingerprint());
+        device.set_tuning(with_names(
+            device.tuning(),
+            parse_tuning(device.info(), start->tuning, flags_.run.resume_from.string())));
+    } else {
+        check_start_memory(device, dataset_, flags_.train);
+    }
+    trainer_ = std::make_unique<Trainer>(device, dataset_, photos_,
+                                         initial_model(dataset_, flags_.train), flags_.train);
+    trainer_->on_result = [this](const IterationResult& result) { latest_ = result; };
+    trainer_->on_round = [this](int iteration, const DensityResult& result) {
+        tell_round(iteration, result);
+    };
+    if (!start) return;
+    trainer_->restore(start->state);
+    seconds_ = start->seconds;
+}
+
+PyTrainer::~PyTrainer() {
+    const py::gil_scoped_release free;
+    device_->let_go(
+        [this] {
+            trainer_.reset();
+            if (flags_.train.max_memory_bytes) device_->device().set_memory_budget(0);
+        },
+        [this] { static_cast<void>(trainer_.release()); });
+}
+
+void PyTrainer::tell_round(int iteration, const DensityResult& result) {
+    const py::gil_scoped_acquire gil;
+    if (on_round.is_none()) return;
+    py::dict d;
+    d["iteration"] = iteration;
+    d["before"] = result.before;
+    d["after"] = result.after;
+    d["grown"] = result.grown;
+    d["pruned"] = result.pruned;
+    on_round(d);
+}
+
+py::dict PyTrainer::step(const py::object& n, const py::object& loss) {
+    const auto count = take_integer(n, "n", 0, 1'000'000'000);
+    take_callable(loss, "loss");
+    {
+        const py::gil_scoped_release free;
+        const auto lock = device_->lock();
+        const Training training(*device_);
+        if (!loss.is_none())
+            trainer_->set_picture_gradient(
+                [&loss](const TrainingPicture& picture) { return ask_python(loss, picture); });
+        const auto begin = std::chrono::steady_clock::now();
+        const auto end = [&] {
+            trainer_->drain();
+            trainer_->set_picture_gradient(nullptr);
+            seconds_ +=
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+        };
+        try {
+            for (long long i = 0; i < count && iteration() < iterations(); ++i) {
+                check_signals();
+                trainer_->step();
+            }
+        } catch (...) {
+            end();
+            throw;
+        }
+        end();
+    }
+    py::dict d;
+    d["iteration"] = iteration();
+    d["loss"] = latest_.loss;
+    d["psnr"] = latest_.psnr_db;
+    d["splats"] = splats();
+    d["visible"] = latest_.visible;
+    d["intersections"] = latest_.intersections;
+    d["done"] = iteration() >= iterations();
+    return d;
+}
+
+py::dict PyTrainer::evaluate() {
+    Evaluation evaluation;
+    {
+        const py::gil_scoped_release free;
+        const auto lock = device_->lock();
+        const Training training(*device_);
+        for (std::size_t i = 0; i < dataset_.views.size(); ++i) {
+            const View& view = dataset_.views[i];
+            if (!view.is_test) continue;
+            check_signals();
+            evaluation.views.push_back(compare_view(view.name, trainer_->render(view.camera),
+                                                    photos_[i], trainer_->background(),
+                                                    dataset_.alpha_is_mask));
+        }
+        if (evaluation.views.empty())
+            throw Error("darb.Trainer", "no view is held out",
+                        "Make it with eval=True, or read the Dataset so.");
+        take_means(evaluation);
+    }
+    py::list views;
+    for (const ViewMetrics& v : evaluation.views) {
+        py::dict one;
+        one["name"] = v.name;
+        one["psnr"] = v.psnr_db;
+        one["ssim"] = v.ssim;
+        views.append(one);
+    }
+    py::dict d;
+    d["iteration"] = iteration();
+    d["psnr"] = evaluation.psnr_db;
+    d["ssim"] = evaluation.ssim;
+    d["splats"] = splats();
+    d["views"] = views;
+    return d;
+}
+
+SplatModel PyTrainer::model() {
+    const py::gil_scoped_release free;
+    const auto lock = device_->lock();
+    const Training training(*device_);
+    SplatModel model = trainer_->model();
+    drop_non_finite(model);
+    return model;
+}
+
+const std::string& PyTrainer::fingerprint() {
+    if (fingerprint_.empty()) fingerprint_ = dataset_fingerprint(dataset_, photos_);
+    return fingerprint_;
+}
+
+void PyTrainer::checkpoint(const py::object& value) {
+    const std::string path = take_path(value, "path");
+    const py::gil_scoped_release free;
+    const auto lock = device_->lock();
+    const Training training(*device_);
+    write_checkpoint(path, {trainer_->state(), settings_text(flags_.train), fingerprint(), seconds_,
+                            result_tuning(device_->device())});
+}
+
+void bind_trainer(py::module_& module) {
+    py::class_<PyTrainer>(module, "Trainer", "`darb train` step by step; see darb.Trainer.")
+        .def(py::init<std::shared_ptr<PyDevice>, const py::object&, const py::dict&>())
+        .def("step", &PyTrainer::step, py::arg("n") = 1, py::arg("loss") = py::none())
+        .def("evaluate", &PyTrainer::evaluate)
+        .def("scene", [](PyTrainer& t) { return PyScene(t.model()); })
+        .def("checkpoint", &PyTrainer::checkpoint, py::arg("path"))
+        .def_property(
+            "on_round", [](const PyTrainer& t) { return t.on_round; },
+            [](PyTrainer& t, const py::object& f) { t.on_round = take_callable(f, "on_round"); })
+        .def_property_readonly("iteration", &PyTrainer::iteration)
+        .def_property_readonly("iterations", &PyTrainer::iterations)
+        .def("__len__", &PyTrainer::splats);
+}
+
+}  // namespace darb::python

@@ -1,0 +1,51 @@
+// darb.Trainer: `darb train` step by step, with the same options and the same bits.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "tools/darb/train_flags.h"
+#include "tools/python/dataset.h"
+#include "tools/python/device.h"
+#include "trainer/trainer.h"
+
+namespace darb::python {
+
+class PyTrainer {
+  public:
+    /// dataset: a PyDataset or a path. options: by the names of the command line.
+    PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset, const py::dict& options);
+    ~PyTrainer();
+    PyTrainer(const PyTrainer&) = delete;
+    PyTrainer& operator=(const PyTrainer&) = delete;
+
+    /// n iterations, fewer where the run ends; -> what the last one tells.
+    py::dict step(const py::object& n, const py::object& loss);
+    py::dict evaluate();
+    SplatModel model();
+    void checkpoint(const py::object& path);
+
+    int iteration() const { return trainer_->iteration(); }
+    int iterations() const { return flags_.train.iterations; }
+    std::uint32_t splats() const { return trainer_->splat_count(); }
+    py::object on_round = py::none();
+
+  private:
+    void make_trainer();
+    void tell_round(int iteration, const DensityResult& result);
+    const std::string& fingerprint();
+
+    std::shared_ptr<PyDevice> device_;
+    Dataset dataset_;
+    TrainFlags flags_;
+    std::vector<ImageU8> photos_;
+    std::string fingerprint_;
+    std::unique_ptr<Trainer> trainer_;
+    IterationResult latest_;
+    double seconds_ = 0;
+};
+
+void bind_trainer(py::module_& module);
+
+}  // namespace darb::python
