@@ -20,6 +20,7 @@ struct FollowPlan {};  // the effects as they are planned
 struct Measure {};     // accuracy settings and effects
 struct ShowEdits {};   // other splats are deleted now
 struct Save {};        // the edited scene
+struct SavePage {};    // the same as a web page
 struct LoadPath {};
 struct SavePath {};
 struct ExportPath {};
@@ -39,9 +40,9 @@ struct LeaveFullScreen {};
 using Request =
     std::variant<request::FrameAll, request::TakePicture, request::ChooseCamera,
                  request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowEdits,
-                 request::Save, request::LoadPath, request::SavePath, request::ExportPath,
-                 request::CancelLoad, request::CancelWork, request::Quit, request::SaveAndLeave,
-                 request::Leave, request::Stay, request::ToggleFullScreen,
+                 request::Save, request::SavePage, request::LoadPath, request::SavePath,
+                 request::ExportPath, request::CancelLoad, request::CancelWork, request::Quit,
+                 request::SaveAndLeave, request::Leave, request::Stay, request::ToggleFullScreen,
                  request::LeaveFullScreen>;
 using RequestQueue = std::vector<Request>;
 

@@ -100,6 +100,7 @@ class Viewer {
     void load_path();
     void save_path();
     void save_scene();
+    void save_page(int width, int height);
     void quit();
     void leave();
     void save_and_leave();

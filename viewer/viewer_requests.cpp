@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "engine/publish/web_page.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/controls.h"
 #include "viewer/viewer.h"
@@ -64,6 +66,7 @@ void Viewer::act_on_requests(int width, int height) {
             picture_.set_removed(s.edit.removed());
         },
         [&](request::Save) { save_scene(); },
+        [&](request::SavePage) { save_page(width, height); },
         [&](request::LoadPath) { load_path(); },
         [&](request::SavePath) { save_path(); },
         [&](request::ExportPath) { start_export(); },
@@ -127,6 +130,27 @@ void Viewer::save_scene() {
     s.edit.mark_saved();
     s.note = fmt::format("saved {} splats to {}", model.size(), s.save_file.string());
     for (const std::string& loss : losses_of(*format, model)) s.note += "\n" + loss;
+}
+
+// Opens at what the window shows; the cameras of the photos follow.
+void Viewer::save_page(int width, int height) {
+    Session& s = session_;
+    if (!s.scene) return;
+    fs::path file = s.save_file;
+    file.replace_extension(".html");
+    saved_.check(file);
+    WebPageOptions options;
+    options.title = s.scene->file.stem().string();
+    options.background = s.display.background;
+    options.views = s.photos.views;
+    View shown;
+    shown.name = "As it was saved";
+    shown.camera = camera_in_window(s.photos, s.navigation, width, height);
+    options.views.insert(options.views.begin(), shown);
+    WebPageFacts facts;
+    write_file_atomic(file, make_web_page(*device_, s.edit.apply(s.scene->model), options, &facts));
+    saved_.wrote(file);
+    s.note = fmt::format("web page in {}\n{}", file.string(), web_page_text(facts));
 }
 
 // Not with edits that are not saved, without a question.

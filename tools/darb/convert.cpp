@@ -14,6 +14,7 @@
 #include "tools/darb/convert_levels.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/page_output.h"
 #include "tools/darb/palette_device.h"
 #include "tools/darb/scene_edits.h"
 #include "tools/darb/scene_file.h"
@@ -28,21 +29,12 @@ struct ConvertFlags {
     SceneEdits edits;
     EncodeOptions encode;
     LevelFlags levels;
+    PageFlags page;
     bool compare = false, quiet = false;
 };
 
-/// Where the scene goes through a pipe, which may be stdout, all that is said goes to stderr.
-std::FILE* stream_beside(const std::filesystem::path& output) {
-    return std::filesystem::exists(output) && !std::filesystem::is_regular_file(output) ? stderr
-                                                                                        : stdout;
-}
-
 std::vector<View> views_for(const SplatModel& scene, const ConvertFlags& flags) {
-    std::vector<View> views =
-        flags.cameras.empty() ? views_around(scene) : open_cameras(flags.cameras);
-    if (views.empty())
-        throw Error(flags.cameras.string(), "holds no cameras", "Name another list or data set.");
-    return views;
+    return flags.cameras.empty() ? views_around(scene) : named_views(flags.cameras);
 }
 
 void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
@@ -79,10 +71,11 @@ int convert(const ConvertFlags& flags) {
         together({files_of(flags.input), files_of(flags.cameras), files_of(flags.levels.refine)});
     refuse_to_overwrite_inputs({flags.output}, inputs);
     const std::optional<SplatFormat> format = format_to_write(flags.output);
-    if (!format)
+    if (!format && !is_page(flags.output))
         throw Error(flags.output.string(), "names no format that can be written",
-                    "Let it end in " + endings_to_write() + ".");
-    if (flags.encode.spz_version != EncodeOptions{}.spz_version && *format != SplatFormat::spz)
+                    "Let it end in .html, " + endings_to_write() + ".");
+    check_page_options(flags.page, flags.output);
+    if (flags.encode.spz_version != EncodeOptions{}.spz_version && format != SplatFormat::spz)
         throw Error("--spz-version", "is for files that end in .spz", "Leave it out.");
     SplatModel model = load_scene(flags.input);
     std::FILE* const say = flags.quiet ? nullptr : stream_beside(flags.output);
@@ -96,6 +89,11 @@ int convert(const ConvertFlags& flags) {
              kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
         print_difference(say, "renders of both kernels", model, gaussians, flags);
         model = gaussians;
+    }
+    if (is_page(flags.output)) {
+        if (flags.levels.asked()) throw Error("web page", "has one level", "See --max-size.");
+        return convert_to_page(model, flags.page, flags.input, flags.cameras, flags.output,
+                               flags.device, say);
     }
     if (flags.levels.asked()) {
         const auto write = [&](const std::filesystem::path& file, SplatModel& level) {
@@ -125,7 +123,8 @@ void add_convert(CLI::App& app, Action& action) {
         "convert", "Write a scene in another format, frame, kernel, degree, or a part of it");
     command->add_option("input", flags->input, "splat file, or the output folder of darb train")
         ->required();
-    command->add_option("output", flags->output, "ends in " + endings_to_write())->required();
+    command->add_option("output", flags->output, "ends in .html, " + endings_to_write())
+        ->required();
     command
         ->add_option("--kernel", flags->kernel,
                      "gaussian: the nearest Gaussians of a scene of another kernel; prints how far "
@@ -138,10 +137,11 @@ void add_convert(CLI::App& app, Action& action) {
         ->check(CLI::IsMember({3, 4}))
         ->capture_default_str();
     add_level_options(*command, flags->levels);
+    add_page_options(*command, flags->page);
     command->add_flag("--compare", flags->compare, "print how far renders of the file differ");
     command->add_option("--cameras", flags->cameras,
-                        "cameras of the comparisons, as darb render takes them (default: 8 around "
-                        "the scene)");
+                        "cameras of the comparisons and of a web page, as darb render takes them "
+                        "(default: 8 around the scene)");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] { action = [flags] { return convert(*flags); }; });

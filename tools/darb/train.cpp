@@ -14,6 +14,8 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
+#include "tools/darb/page_output.h"
+#include "tools/darb/scene_file.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
@@ -71,6 +73,20 @@ std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
     return printable(text, true);
 }
 
+// The scene as a web page, with the photos' cameras as its bookmarks; of a run that was finished
+// before, where there is none yet.
+void leave_page(Device& device, const Dataset& dataset, const TrainFlags& flags,
+                const RunSummary& summary) {
+    const std::filesystem::path file = flags.run.output / "scene.html";
+    const bool trained = !summary.model.empty();
+    if (!flags.page || summary.interrupted || (!trained && std::filesystem::exists(file))) return;
+    PageFlags page;
+    if (flags.train.white_background) page.background = "white";
+    const SplatModel scene = load_scene(trained ? summary.model : scene_of_run(flags.run.output));
+    write_or_let_go("page     " + write_page(device, scene, page, title_of(flags.run.output),
+                                             dataset.views, file));
+}
+
 int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
     if (recalled) recall_arguments(arguments, flags, tune);
@@ -100,6 +116,7 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     if (!write_or_let_go(summary_text(summary, flags)))
         throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
                     "The run is complete: its folder holds everything.");
+    leave_page(device, dataset, flags, summary);
     if (view) view->finish(summary.model);
     return summary.interrupted ? stop_exit_code() : 0;
 }

@@ -118,6 +118,10 @@ void add_saving_flags(CLI::App& command, TrainFlags& f) {
         .add_flag("--report,!--no-report", f.run.report,
                   "write OUT/report.html at the end (default): curves, time by pass, pictures")
         ->group(help_group::kSaving);
+    command
+        .add_flag("--html", f.page,
+                  "write OUT/scene.html at the end: a web page that shows the scene")
+        ->group(help_group::kSaving);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ struct TrainFlags {
     bool antialiasing = false;  // as 3DGS spells +antialias
     bool resume = false;
     bool view = false;  // follow in a window
+    bool page = false;  // OUT/scene.html at the end
     bool sequential = false;
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;

@@ -123,6 +123,8 @@ void edit_panel(Session& s) {
     path_field("file", s.save_file);
     ImGui::SameLine();
     if (ImGui::Button("Save")) s.ask(request::Save{});
+    if (ImGui::Button("Save as web page")) s.ask(request::SavePage{});
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("an .html beside the file, for any browser");
 }
 
 }  // namespace darb

@@ -1,0 +1,185 @@
+// WebGL 2: projects all splats into two textures of integers, then blends a quad a splat, front to back.
+class Renderer {
+  constructor(canvas) {
+    const gl = canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance"});
+    if (!gl) throw Error("this browser or device has no WebGL 2");
+    this.gl = gl;
+    this.canvas = canvas;
+    const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+    this.columns = Math.min(2048, most);
+    this.rows = Math.max(1, Math.ceil(scene.count / this.columns));
+    if (this.rows > most) throw Error(`${scene.count} splats are too many for this device, which takes ${most * this.columns}`);
+    const float = gl.getExtension("EXT_color_buffer_float"), half = float || gl.getExtension("EXT_color_buffer_half_float");
+    const whole = float && gl.getExtension("EXT_float_blend");
+    this.formats = {float32: whole && gl.RGBA32F, float16: half && gl.RGBA16F, unorm8: gl.RGBA8};
+    this.smooth = gl.getExtension("OES_texture_float_linear");
+    this.coarse = !half;
+    this.project = this.program("corner.vert", "project.frag");
+    this.blend = this.program("splat.vert", "splat.frag");
+    this.show = this.program("corner.vert", "show.frag");
+    this.count = 0;
+    this.targets = new Map();
+  }
+
+  program(vertex, fragment) {
+    const gl = this.gl, program = gl.createProgram();
+    const shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].map(([kind, name]) => {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, scene.shaders[name]);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+      return [shader, name];
+    });
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
+      throw Error([...shaders.map(([s, name]) => name + ": " + gl.getShaderInfoLog(s)), gl.getProgramInfoLog(program)].join("\n"));
+    const at = {};
+    return {use: () => gl.useProgram(program), at: name => at[name] ??= gl.getUniformLocation(program, name)};
+  }
+
+  texture(target, format, width, height, depth) {
+    const gl = this.gl, texture = gl.createTexture();
+    gl.bindTexture(target, texture);
+    for (const p of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, p, gl.NEAREST);
+    for (const p of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(target, p, gl.CLAMP_TO_EDGE);
+    if (depth) gl.texStorage3D(target, 1, format, width, height, depth);
+    else gl.texStorage2D(target, 1, format, width, height);
+    return texture;
+  }
+
+  framebuffer(textures) {
+    const gl = this.gl, framebuffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    textures.forEach((t, i) => gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, t, 0));
+    gl.drawBuffers(textures.map((_, i) => gl.COLOR_ATTACHMENT0 + i));
+    if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE) {
+      gl.deleteFramebuffer(framebuffer);
+      return null;
+    }
+    return framebuffer;
+  }
+
+  // Whole rows, then what the last one holds.
+  fill(values, width, upload) {
+    const rows = Math.floor(scene.count / this.columns), rest = scene.count % this.columns;
+    if (rows) upload(0, this.columns, rows, values.subarray(0, rows * this.columns * width));
+    if (rest) upload(rows, rest, 1, values.subarray(rows * this.columns * width));
+  }
+
+  upload(splats) {
+    const gl = this.gl;
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    this.inputs = ["place", "turn", "size", "tint"].map(name => {
+      const texture = this.texture(gl.TEXTURE_2D, gl.RGBA32F, this.columns, this.rows);
+      this.fill(splats[name], 4, (row, width, height, values) =>
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RGBA, gl.FLOAT, values));
+      return texture;
+    });
+    this.light = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGB16F, splats.light.length ? this.columns : 1, splats.light.length ? this.rows : 1, splats.light.length || 1);
+    splats.light.forEach((layer, k) => this.fill(layer, 3, (row, width, height, values) =>
+      gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, row, k, width, height, 1, gl.RGB, gl.FLOAT, values)));
+    this.projected = [0, 1].map(() => this.texture(gl.TEXTURE_2D, gl.RGBA32UI, this.columns, this.rows));
+    this.projection = this.framebuffer(this.projected);
+    const order = gl.createBuffer();
+    this.quads = gl.createVertexArray();
+    gl.bindVertexArray(this.quads);
+    gl.bindBuffer(gl.ARRAY_BUFFER, order);
+    gl.bufferData(gl.ARRAY_BUFFER, Math.max(4, 4 * scene.count), gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
+    gl.vertexAttribDivisor(0, 1);
+    this.order = order;
+    this.nothing = gl.createVertexArray();
+    const failure = gl.getError();
+    if (failure) throw Error(failure === gl.OUT_OF_MEMORY ? `${scene.count} splats do not fit into the memory of this device` : `WebGL error ${failure}`);
+  }
+
+  setOrder(order) {
+    const gl = this.gl;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
+    this.count = order.length;
+  }
+
+  // The target that is blended into, of the finest format that the device can blend; at rest in full precision.
+  target(width, height, fine) {
+    const held = this.targets.get(fine), gl = this.gl;
+    if (held?.width === width && held.height === height) return held;
+    if (held) { gl.deleteTexture(held.texture); gl.deleteFramebuffer(held.framebuffer); }
+    for (const name of fine ? ["float32", "float16", "unorm8"] : ["float16", "unorm8"]) {
+      if (!this.formats[name]) continue;
+      const texture = this.texture(gl.TEXTURE_2D, this.formats[name], width, height);
+      if (name !== "float32" || this.smooth)
+        for (const p of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, p, gl.LINEAR);
+      const framebuffer = this.framebuffer([texture]);
+      if (framebuffer) {
+        const target = {width, height, name, texture, framebuffer};
+        this.targets.set(fine, target);
+        return target;
+      }
+      gl.deleteTexture(texture);
+    }
+    throw Error(`a picture of ${width}x${height} does not fit`);
+  }
+
+  setCamera(program, camera) {
+    const gl = this.gl, at = name => program.at("camera." + name);
+    const centre = camera.eye.map(Math.fround);
+    camera.axes.forEach((row, i) => gl.uniform3fv(at("row" + i), row));
+    gl.uniform3fv(at("centre"), centre);
+    gl.uniform3fv(at("centre_rest"), camera.eye.map((x, i) => x - centre[i]));
+    gl.uniform2f(at("focal"), camera.fx, camera.fy);
+    gl.uniform2f(at("principal"), camera.cx, camera.cy);
+    const x = scene.jacobianMargin * 0.5 * camera.width / camera.fx, y = scene.jacobianMargin * 0.5 * camera.height / camera.fy;
+    gl.uniform2f(at("ratio_min"), -camera.cx / camera.fx - x, -camera.cy / camera.fy - y);
+    gl.uniform2f(at("ratio_max"), (camera.width - camera.cx) / camera.fx + x, (camera.height - camera.cy) / camera.fy + y);
+    gl.uniform1ui(at("width"), camera.width);
+    gl.uniform1ui(at("height"), camera.height);
+    gl.uniform1f(at("near_plane"), scene.near);
+    gl.uniform1f(program.at("low_pass"), scene.lowPass);
+  }
+
+  bind(program, names, textures, target = this.gl.TEXTURE_2D, first = 0) {
+    names.forEach((name, i) => {
+      this.gl.activeTexture(this.gl.TEXTURE0 + first + i);
+      this.gl.bindTexture(target, textures[i]);
+      this.gl.uniform1i(program.at(name), first + i);
+    });
+  }
+
+  pass(framebuffer, width, height, program) {
+    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, framebuffer);
+    this.gl.viewport(0, 0, width, height);
+    program.use();
+  }
+
+  draw(camera, fine) {
+    const gl = this.gl, {width, height} = camera, target = this.target(width, height, fine);
+    gl.disable(gl.BLEND);
+    gl.bindVertexArray(this.nothing);
+    this.pass(this.projection, this.columns, this.rows, this.project);
+    this.setCamera(this.project, camera);
+    this.bind(this.project, ["place", "turn", "size", "tint"], this.inputs);
+    this.bind(this.project, ["light"], [this.light], gl.TEXTURE_2D_ARRAY, 4);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+
+    this.pass(target.framebuffer, width, height, this.blend);
+    gl.clearColor(0, 0, 0, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.BLEND);
+    gl.blendFuncSeparate(gl.DST_ALPHA, gl.ONE, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
+    gl.bindVertexArray(this.quads);
+    this.bind(this.blend, ["shapes", "lights"], this.projected);
+    gl.uniform2f(this.blend.at("frame"), width, height);
+    if (this.count) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.count);
+
+    gl.disable(gl.BLEND);
+    gl.bindVertexArray(this.nothing);
+    this.pass(null, this.canvas.width, this.canvas.height, this.show);
+    this.bind(this.show, ["blended"], [target.texture]);
+    gl.uniform3fv(this.show.at("background"), scene.background);
+    gl.uniform2f(this.show.at("window"), this.canvas.width, this.canvas.height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    return target.name;
+  }
+}

@@ -1,0 +1,106 @@
+// The panel, loading, and the hook for tests.
+const element = id => document.getElementById(id);
+const opened = performance.now();
+let viewer, place = scene.start, loadedAfter;
+
+function say(text) {
+  element("note").textContent = text;
+  element("note").hidden = false;
+}
+
+function fail(error) {
+  element("loading").hidden = true;
+  say("Cannot show this scene: " + error.message + ".");
+}
+
+function firstPicture() {
+  loadedAfter = performance.now() - opened;
+  element("poster").classList.add("gone");
+  element("loading").hidden = true;
+}
+
+function goTo(index) {
+  place = (index + scene.cameras.length) % scene.cameras.length;
+  element("camera").textContent = scene.cameras[place].name;
+  viewer.jumpTo(scene.cameras[place], true);
+}
+
+function switchMode() {
+  viewer.flying = !viewer.flying;
+  element("mode").textContent = viewer.flying ? "Fly" : "Orbit";
+}
+
+function switchFullScreen() {
+  const root = document.documentElement;
+  if (document.fullscreenElement) document.exitFullscreen();
+  else root.requestFullscreen?.().catch(() => say("This browser refuses full screen."));
+}
+
+function wirePanel() {
+  element("bookmarks").hidden = scene.cameras.length < 2;
+  element("camera").textContent = scene.cameras[place].name;
+  element("full").hidden = !document.documentElement.requestFullscreen;
+  const actions = {
+    ArrowLeft: () => goTo(place - 1), ArrowRight: () => goTo(place + 1), 0: () => goTo(place), o: switchMode,
+    f: switchFullScreen, "?": () => element("help").showModal(), h: () => element("help").showModal(),
+  };
+  for (const [id, key] of [["previous", "ArrowLeft"], ["next", "ArrowRight"], ["camera", "0"], ["mode", "o"], ["full", "f"], ["ask", "?"]])
+    element(id).onclick = actions[key];
+  listenToPointers(viewer);
+  listenToKeys(viewer, actions);
+  element("facts").textContent = scene.facts;
+}
+
+// #camera=NAME or its number, from 1, in the address.
+function cameraOfAddress() {
+  const wanted = new URLSearchParams(location.hash.slice(1)).get("camera");
+  if (wanted === null) return;
+  const named = scene.cameras.findIndex(c => c.name === wanted), number = /^\d+$/.test(wanted) ? Number(wanted) - 1 : -1;
+  if (scene.cameras[named >= 0 ? named : number]) place = scene.start = named >= 0 ? named : number;
+}
+
+async function start() {
+  cameraOfAddress();
+  const canvas = element("view");
+  canvas.addEventListener("webglcontextlost", () => say("The browser took the graphics memory back. Load the page again to go on."));
+  const renderer = new Renderer(canvas);
+  if (renderer.coarse) say("This device blends in 8 bits: colours show steps.");
+  viewer = new Viewer(canvas, renderer);
+  if (place !== Number(scene.poster)) element("poster").hidden = true;
+  wirePanel();
+  addEventListener("hashchange", () => { cameraOfAddress(); goTo(place); });
+  viewer.load(await decode(share => {
+    element("bar").style.width = 100 * share + "%";
+    element("loaded").textContent = `${Math.round(scene.megabytes * share * 10) / 10} of ${scene.megabytes} MB`;
+  }));
+}
+
+const ready = start();
+ready.catch(fail);
+
+// For tests. A camera is {width, height, fx, fy, cx, cy, eye, axes}, axes right, down, forward; or a bookmark's number.
+const cameraOf = c => typeof c === "number" ? scene.cameras[c] : c;
+window.darb = {
+  ready, scene,
+  picture: async (camera, fine) => { await ready; viewer.fine = fine; return viewer.picture(cameraOf(camera)); },
+  get state() { return {shown: !!viewer?.shown, loadedAfter, camera: viewer?.camera, distance: viewer?.distance, format: viewer?.format, place, step: viewer?.step}; },
+  // Milliseconds a frame, sorted and finished, of a turn about the focus.
+  turn: async (frames, width, height) => {
+    await ready;
+    const camera = inWindow(copyCamera(viewer.camera), width, height), pivot = viewer.focus, pixel = new Uint8Array(4), {gl} = viewer.renderer, start = performance.now();
+    for (let i = 0; i < frames; ++i) {
+      turnCamera(camera, scene.up, 0.02, pivot);
+      viewer.held = true;
+      while (viewer.sorting) await new Promise(done => { viewer.wake = done; });
+      viewer.sort(copyCamera(camera));
+      while (viewer.sorting) await new Promise(done => { viewer.wake = done; });
+      viewer.canvas.width = width;
+      viewer.canvas.height = height;
+      viewer.renderer.draw(camera, false);
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    }
+    viewer.held = false;
+    viewer.changed();
+    return (performance.now() - start) / frames;
+  },
+};

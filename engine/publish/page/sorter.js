@@ -1,0 +1,50 @@
+// The worker: splats by the depth of their centres, front to back, equal depths by their number.
+let position, keys, other, order, otherOrder;
+const counts = new Uint32Array(3 << 11);
+
+function sort(row, centre, near) {
+  const n = position.length / 3, depth = new Float32Array(keys.buffer);
+  const [a, b, c] = row, [x, y, z] = centre;
+  let visible = 0;
+  counts.fill(0);
+  for (let i = 0; i < n; ++i) {
+    const d = a * (position[3 * i] - x) + b * (position[3 * i + 1] - y) + c * (position[3 * i + 2] - z);
+    if (!(d > near)) continue;
+    depth[visible] = d;
+    const bits = keys[visible];
+    order[visible++] = i;
+    ++counts[bits & 2047];
+    ++counts[2048 + ((bits >>> 11) & 2047)];
+    ++counts[4096 + (bits >>> 22)];
+  }
+  let from = keys, to = other, list = order, next = otherOrder;
+  for (let pass = 0; pass < 3; ++pass) {
+    const first = pass << 11, shift = 11 * pass;
+    for (let k = first, sum = 0; k < first + 2048; ++k) {
+      const count = counts[k];
+      counts[k] = sum;
+      sum += count;
+    }
+    for (let i = 0; i < visible; ++i) {
+      const at = counts[first + ((from[i] >>> shift) & 2047)]++;
+      to[at] = from[i];
+      next[at] = list[i];
+    }
+    [from, to, list, next] = [to, from, next, list];
+  }
+  return list.slice(0, visible);
+}
+
+onmessage = ({data}) => {
+  if (data.position) {
+    position = data.position;
+    const n = position.length / 3;
+    keys = new Uint32Array(n);
+    other = new Uint32Array(n);
+    order = new Uint32Array(n);
+    otherOrder = new Uint32Array(n);
+    return;
+  }
+  const sorted = sort(data.row, data.centre, data.near);
+  postMessage({id: data.id, order: sorted}, [sorted.buffer]);
+};

@@ -1,0 +1,14 @@
+#include "engine/publish/page_files.h"
+
+#include "engine/core/check.h"
+
+namespace darb {
+
+std::string_view page_file(std::string_view name) {
+    const PageFile* file = kPageFiles;
+    while (!file->name.empty() && file->name != name) ++file;
+    DARB_CHECK(!file->name.empty(), "{} is not embedded", name);
+    return file->text;
+}
+
+}  // namespace darb

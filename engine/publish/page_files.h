@@ -1,0 +1,20 @@
+// The sources of the web page and the shaders that it shares with darb, embedded at build time by
+// cmake/embed.cmake.
+#pragma once
+
+#include <string_view>
+
+namespace darb {
+
+struct PageFile {
+    std::string_view name;  // path below the root of the tree: "engine/publish/page/page.css"
+    std::string_view text;
+};
+
+/// Ends with a nameless one.
+extern const PageFile kPageFiles[];
+
+/// The text of a file by its path below the root; aborts where it is not embedded.
+std::string_view page_file(std::string_view name);
+
+}  // namespace darb

@@ -1,0 +1,84 @@
+#include "engine/publish/page_splats.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/inflate.h"
+#include "tests/support/splat_files.h"
+
+namespace darb {
+namespace {
+
+TEST(PageSplats, exact_keeps_every_bit_and_the_order) {
+    const SplatModel model = test::sample_model(3, 300);
+    const PageSplats packed = pack_page_splats(model, page_precision(kPageLevels));
+    const SplatModel back = unpack_page_splats(packed, model);
+    ASSERT_EQ(packed.count, 300u);
+    EXPECT_EQ(packed.planes.size(), 300u * 59 * 4);
+    for (int a = 0; a < kAttributeCount; ++a)
+        EXPECT_EQ(attribute_values(back, a), attribute_values(model, a)) << attribute_name(a);
+}
+
+TEST(PageSplats, rounded_values_are_within_half_a_step) {
+    const SplatModel model = test::sample_model(2, 500);
+    for (int level = 0; level < kPageLevels; ++level) {
+        const PagePrecision p = page_precision(level);
+        const PageSplats packed = pack_page_splats(model, p);
+        const SplatModel back = unpack_page_splats(packed, model);
+        ASSERT_EQ(back.size(), model.size());
+        double step = 0;
+        for (const PageColumn& column : packed.columns)
+            if (column.attribute == kPosition) step = std::max(step, column.step);
+        // Splats come in another order: each has its nearest.
+        for (std::size_t i = 0; i < model.size(); ++i) {
+            std::size_t nearest = 0;
+            double least = 1e300;
+            for (std::size_t j = 0; j < back.size(); ++j) {
+                const double d = glm::length(position_of(model, i) - position_of(back, j));
+                if (d < least) nearest = j;
+                least = std::min(least, d);
+            }
+            ASSERT_LE(least, step) << "level " << level << " splat " << i;
+            for (std::size_t k = 0; k < 3; ++k) {
+                EXPECT_NEAR(back.log_scale[3 * nearest + k], model.log_scale[3 * i + k],
+                            0.501 * p.log_scale);
+                EXPECT_NEAR(back.sh_dc[3 * nearest + k], model.sh_dc[3 * i + k],
+                            0.501 * p.colour / 0.282);
+            }
+            EXPECT_NEAR(sigmoid(back.opacity_logit[nearest]), sigmoid(model.opacity_logit[i]),
+                        0.501 * p.opacity);
+        }
+    }
+}
+
+TEST(PageSplats, what_is_never_drawn_is_left_out) {
+    SplatModel model = test::sample_model(0, 10);
+    for (float& logit : model.opacity_logit) logit = 1;
+    model.opacity_logit[1] = -9;
+    model.position[3 * 2] = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t k = 0; k < 4; ++k) model.rotation[4 * 3 + k] = 0;
+    for (const int level : {0, kPageLevels})
+        EXPECT_EQ(pack_page_splats(model, page_precision(level)).count, 7u);
+}
+
+TEST(PageSplats, far_splats_and_equal_ones_survive) {
+    SplatModel model = test::sample_model(0, 64);
+    for (float& logit : model.opacity_logit) logit = 2;
+    for (float& v : model.position) v = 0.25f;
+    model.position[0] = 1e30f;
+    const SplatModel back = unpack_page_splats(pack_page_splats(model, page_precision(0)), model);
+    ASSERT_EQ(back.size(), 64u);
+    for (const float v : back.position) EXPECT_TRUE(std::isfinite(v));
+}
+
+TEST(PageSplats, no_splats_are_no_bytes) {
+    const PageSplats packed = pack_page_splats(SplatModel{}, page_precision(0));
+    EXPECT_EQ(packed.count, 0u);
+    EXPECT_TRUE(packed.planes.empty());
+}
+
+}  // namespace
+}  // namespace darb

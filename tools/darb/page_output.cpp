@@ -1,0 +1,123 @@
+#include "tools/darb/page_output.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/core/say.h"
+#include "engine/core/text.h"
+#include "engine/publish/web_page.h"
+#include "tools/darb/device_options.h"
+#include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
+
+namespace darb {
+
+namespace {
+
+/// black, white or #rrggbb.
+glm::vec3 parse_colour(const std::string& text) {
+    if (lower(text) == "black") return glm::vec3(0);
+    if (lower(text) == "white") return glm::vec3(1);
+    const std::string digits = text.starts_with('#') ? text.substr(1) : std::string();
+    if (digits.size() != 6 || digits.find_first_not_of("0123456789abcdefABCDEF") != digits.npos)
+        throw Error("--background " + printable(text), "is no colour",
+                    "Give black, white or six digits, as '#20304a'.");
+    const auto part = [&](std::size_t at) {
+        return static_cast<float>(std::stoi(digits.substr(at, 2), nullptr, 16)) / 255;
+    };
+    return {part(0), part(2), part(4)};
+}
+
+}  // namespace
+
+void add_page_options(CLI::App& command, PageFlags& flags) {
+    const std::string group = "Web page (.html)";
+    command.add_option("--title", flags.title, "its title (default: the name of the scene)")
+        ->group(group);
+    command
+        .add_option("--start-camera", flags.start_camera,
+                    "name or number of the camera it opens at (default: 1)")
+        ->group(group);
+    command.add_option("--background", flags.background, "black, white or '#rrggbb'")
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--max-size", flags.max_bytes,
+                    "largest size of the file, as 10MB (1,000,000 bytes each): splats are merged "
+                    "to fit, and the error is printed")
+        ->transform(CLI::AsSizeValue(true))
+        ->check(CLI::PositiveNumber)
+        ->group(group);
+    command
+        .add_flag("--exact", flags.exact,
+                  "keep float32 values; without, they are rounded, and the error is printed")
+        ->group(group);
+}
+
+bool is_page(const std::filesystem::path& output) {
+    return has_extension(output, ".html") || has_extension(output, ".htm");
+}
+
+void check_page_options(const PageFlags& flags, const std::filesystem::path& output) {
+    if (is_page(output)) return;
+    const PageFlags none;
+    const char* given = !flags.title.empty()                  ? "--title"
+                        : !flags.start_camera.empty()         ? "--start-camera"
+                        : flags.background != none.background ? "--background"
+                        : flags.max_bytes > 0                 ? "--max-size"
+                        : flags.exact                         ? "--exact"
+                                                              : nullptr;
+    if (given) throw Error(given, "is an option of web pages", "Let the output end in .html.");
+}
+
+std::vector<View> named_views(const std::filesystem::path& cameras) {
+    if (cameras.empty()) return {};
+    std::vector<View> views = open_cameras(cameras);
+    if (views.empty())
+        throw Error(cameras.string(), "holds no cameras", "Name another list or data set.");
+    return views;
+}
+
+std::string title_of(const std::filesystem::path& input) {
+    const std::filesystem::path path =
+        input.has_filename() ? input : input.parent_path();  // a folder with its slash
+    const std::string name =
+        std::filesystem::is_directory(path) ? path.filename().string() : path.stem().string();
+    return name.empty() || name == "." ? "Scene" : name;
+}
+
+std::string write_page(Device& device, const SplatModel& model, const PageFlags& flags,
+                       const std::string& title, std::vector<View> views,
+                       const std::filesystem::path& output) {
+    WebPageOptions options;
+    options.title = flags.title.empty() ? title : flags.title;
+    options.start = flags.start_camera;
+    options.background = parse_colour(flags.background);
+    options.exact = flags.exact;
+    options.max_bytes = flags.max_bytes;
+    options.views = std::move(views);
+    WebPageFacts facts;
+    write_file_atomic(output, make_web_page(device, model, options, &facts));
+    return fmt::format("{}: {}\n", printable(output.string()), web_page_text(facts));
+}
+
+std::FILE* stream_beside(const std::filesystem::path& output) {
+    return std::filesystem::exists(output) && !std::filesystem::is_regular_file(output) ? stderr
+                                                                                        : stdout;
+}
+
+int convert_to_page(const SplatModel& model, const PageFlags& flags,
+                    const std::filesystem::path& input, const std::filesystem::path& cameras,
+                    const std::filesystem::path& output, const std::string& device,
+                    std::FILE* say) {
+    Device chosen(command_device(device));
+    tell(say, "{}",
+         write_page(chosen, model, flags, title_of(input), named_views(cameras), output));
+    tell_paths(say == nullptr && stream_beside(output) == stdout, {output});
+    return 0;
+}
+
+}  // namespace darb
