@@ -31,7 +31,7 @@ class Examples(unittest.TestCase):
 
     def test_fit_picture(self):
         said = self.run_example("fit_picture", "--splats", "40", "--steps", "25", "--size", "48")
-        figures = [float(line.split()[-9]) for line in said.splitlines() if " dB " in line]
+        figures = [float(line.split(" dB ")[0].split()[-1]) for line in said.splitlines() if " dB " in line]
         self.assertEqual(len(figures), 3, said)
         self.assertGreater(min(figures), 14)
 

@@ -153,7 +153,7 @@ void write_scene(const PyScene& scene, const py::object& value) {
     const auto format = format_to_write(path);
     if (!format)
         throw Error(path, "has the name of no splat file that can be written",
-                    "End it in .ply, .compressed.ply, .splat or .spz.");
+                    "End it in " + endings_to_write() + ".");
     SplatModel model = scene.model();
     const py::gil_scoped_release free;
     drop_unwritable(*format, model);

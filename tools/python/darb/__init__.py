@@ -162,7 +162,7 @@ Scene.__doc__ = """A splat scene in memory.
 
     scene = darb.Scene.read("scene.ply")    # any format that `darb` reads
     image, alpha, info = scene.render(viewmats, Ks, 640, 480)
-    scene.write("copy.spz")                 # .ply, .compressed.ply, .splat, .spz
+    scene.write("copy.spz")                 # any format that `darb convert` writes to one file
 
 Attributes are read-only looks at the scene's own float32; assign an array of the same shape to
 change one: means [N, 3], log_scales [N, 3], quats [N, 4] (w x y z), opacity_logits [N], sh_dc

@@ -4,7 +4,7 @@
     fit_picture.py [PICTURE.png] [-o FOLDER] [--splats N] [--steps N] [--kernel NAME]
 
 Without a picture it makes one. Adam is written out, so that numpy is all that is needed;
-fit_with_torch in docs/python.md is the same with an optimizer of torch's.
+docs/python.md has the same with an optimizer of torch's.
 """
 
 import argparse
