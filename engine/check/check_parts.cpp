@@ -130,19 +130,15 @@ Row sort_row(Device& device, std::uint32_t n, SortScatter scatter) {
 
 }  // namespace
 
-std::vector<Row> check_kernels(Device& device) {
+std::vector<Row> check_kernels(Device& device, std::optional<int> kernel) {
     std::vector<Row> rows;
-    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+    for (int k = kernel.value_or(0); k < (kernel ? *kernel + 1 : KERNEL_ROWS); ++k)
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
+            if (footprint == Footprint::exact && !has_exact_footprint(k)) continue;
             Row slope;
-            rows.push_back(value_row(device, kernel, footprint, slope));
+            rows.push_back(value_row(device, k, footprint, slope));
             rows.push_back(slope);
         }
-    for (int kernel = KERNEL_COUNT; kernel < KERNEL_ROWS; ++kernel) {
-        Row slope;
-        rows.push_back(value_row(device, kernel, Footprint::psi, slope));
-        rows.push_back(slope);
-    }
     return rows;
 }
 

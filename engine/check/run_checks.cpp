@@ -14,7 +14,12 @@ struct Variant {
     int evaluation = EVALUATION_POLYNOMIAL;
 };
 
-std::vector<Variant> variants(bool every) {
+std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt) {
+    if (one) {
+        std::vector<Variant> footprints{{*one}};
+        if (has_exact_footprint(*one)) footprints.push_back({*one, Footprint::exact});
+        return footprints;
+    }
     if (!every)  // the kernels of the paper, an exact footprint, and the built-in exp
         return {{KERNEL_GAUSSIAN},
                 {KERNEL_RAISED_COSINE},
@@ -57,15 +62,18 @@ class Checks {
 
 std::vector<Row> run_checks(Device& device, const CheckOptions& options, const OnRow& on_row) {
     Checks checks(on_row);
-    checks.run([&] { return check_kernels(device); });
-    checks.run([&] { return check_scan_and_sort(device); });
-    checks.run([&] { return check_loss(device); });
-    for (const Variant& v : variants(options.every_kernel))
+    checks.run([&] { return check_kernels(device, options.kernel); });
+    if (!options.kernel) {
+        checks.run([&] { return check_scan_and_sort(device); });
+        checks.run([&] { return check_loss(device); });
+    }
+    for (const Variant& v : variants(options.every_kernel, options.kernel))
         checks.run([&] {
             return check_walk(device, v.kernel, v.footprint, v.evaluation, options.every_kernel);
         });
-    for (const Variant& v :
-         options.every_kernel ? variants(true) : std::vector<Variant>{{KERNEL_RAISED_COSINE}}) {
+    for (const Variant& v : options.every_kernel || options.kernel
+                                ? variants(true, options.kernel)
+                                : std::vector<Variant>{{KERNEL_RAISED_COSINE}}) {
         if (v.evaluation != EVALUATION_POLYNOMIAL) continue;
         const std::string group =
             fmt::format("hard cases, {} {}", kernel_name(v.kernel), footprint_name(v.footprint));

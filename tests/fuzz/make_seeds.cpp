@@ -5,6 +5,7 @@
 #include <webp/encode.h>
 #include <zip.h>
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -16,6 +17,8 @@
 #include "engine/data/colmap_write.h"
 #include "engine/data/image_io.h"
 #include "engine/data/transforms.h"
+#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_registry.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/spz_layout.h"
@@ -189,6 +192,18 @@ void make_scenes(const fs::path& corpus) {
             add_scene(corpus, "spz", old + "_gzip", gzip(plain));
         }
     }
+    SplatModel own = sample_model(0);
+    own.kernel = register_kernel("own", 7, [](double q) { return std::pow(std::cos(q / 5), 2); });
+    add_scene(corpus, "ply", "own_kernel", encode_splats(SplatFormat::ply, own));
+    write_file_atomic(corpus / "kernel/function",
+                      definition_json(*kernel_definition(own.kernel)).dump());
+    write_file_atomic(
+        corpus / "kernel/table",
+        std::string(R"({"name": "t", "table": [[0, 1], [1, 0.75], [2, 0.5], [4, 0]]})"));
+    write_file_atomic(corpus / "kernel/expression",
+                      std::string(R"([{"expression": "(1 - q/9)^2", "support": 9}])"));
+    write_file_atomic(corpus / "kernel/list",
+                      std::string("sinc, expr: 0.5 + 0.5*cos(pi*d/3), support 3^2, name a"));
     add_scene(corpus, "ply", "ascii", bytes_of(ascii_ply(sample_model(0))));
     add_scene(corpus, "ply", "dialects", bytes_of(dialects_ply()));
     add_scene(corpus, "dot_splat", "scene.splat",

@@ -3,6 +3,7 @@
 // and of the reference's images in double.
 #include "engine/core/rng.h"
 #include "engine/reference/reference_render.h"
+#include "tests/support/own_kernels.h"
 #include "tests/support/test_walk.h"
 
 namespace darb::test {
@@ -19,6 +20,11 @@ double weighted_sum(const Image<double>& weights, const auto& image) {
     double sum = 0;
     for (size_t i = 0; i < weights.data.size(); ++i) sum += weights.data[i] * image.data[i];
     return sum;
+}
+
+std::string name_of(const testing::TestParamInfo<std::tuple<int, Footprint>>& info) {
+    const auto [kernel, footprint] = info.param;
+    return std::string(kernel_name(kernel)) + "_" + std::string(footprint_name(footprint));
 }
 
 class KernelGradient : public testing::TestWithParam<std::tuple<int, Footprint>> {
@@ -155,6 +161,12 @@ TEST_P(KernelGradient, matches_differences_of_the_double_images) {
     compare_with_double_images(options(), 6);
 }
 
+// One that meets its formula, and one whose polynomial takes its place and ends with a jump.
+INSTANTIATE_TEST_SUITE_P(own, KernelGradient,
+                         testing::Combine(testing::ValuesIn(own_kernels()),
+                                          testing::Values(Footprint::psi, Footprint::exact)),
+                         name_of);
+
 class RingGradient : public KernelGradient {};
 
 TEST_P(RingGradient, matches_differences_of_the_double_images) {
@@ -164,10 +176,7 @@ TEST_P(RingGradient, matches_differences_of_the_double_images) {
 INSTANTIATE_TEST_SUITE_P(every_kernel, KernelGradient,
                          testing::Combine(testing::Range(0, KERNEL_COUNT),
                                           testing::Values(Footprint::psi, Footprint::exact)),
-                         [](const auto& i) {
-                             return std::string(kernel_name(std::get<0>(i.param))) + "_" +
-                                    std::string(footprint_name(std::get<1>(i.param)));
-                         });
+                         name_of);
 
 INSTANTIATE_TEST_SUITE_P(every_kernel, RingGradient,
                          testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_ROWS),

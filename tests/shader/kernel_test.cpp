@@ -13,6 +13,7 @@
 #include "engine/raster/kernel_constants.h"
 #include "shaders/shared/kernel_probe_args.h"
 #include "tests/support/kernel_vectors.h"
+#include "tests/support/own_kernels.h"
 
 namespace darb {
 namespace {
@@ -84,6 +85,9 @@ class KernelShader : public testing::Test {
                     check({kernel, f, EVALUATION_POLYNOMIAL, degree});
                 check({kernel, f, EVALUATION_BUILTIN, kFullDegree});
             }
+        for (const int own : test::own_kernels())
+            for (const Footprint f : {Footprint::psi, Footprint::exact})
+                check({own, f, EVALUATION_POLYNOMIAL, kFullDegree});
         for (int rings = KERNEL_COUNT; rings < KERNEL_ROWS; ++rings)
             check({rings, Footprint::psi, EVALUATION_BUILTIN, kFullDegree});
     }

@@ -16,6 +16,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/json_output.h"
+#include "tools/darb/kernel_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
@@ -33,6 +34,7 @@ struct CheckFlags {
     TuneFlags tune;
     DatasetOptions data;
     check::CheckOptions checks;
+    KernelFlags kernel;
 };
 
 nlohmann::json row_json(const check::Row& row) {
@@ -47,15 +49,55 @@ nlohmann::json row_json(const check::Row& row) {
 
 void print_row(std::FILE* out, const check::Row& row, std::string& group) {
     if (row.group != group) tell(out, "\n{}\n", group = row.group);
-    const std::string outside =
-        row.outside > 0 || row.band > 0
-            ? fmt::format("{} of {} outside, {} may be", row.outside, row.count, row.band)
-            : "";
+    std::string outside;
+    if (row.outside > 0 || row.band > 0)
+        outside = fmt::format("{} of {} outside, {} may be", row.outside, row.count, row.band);
     tell(out, "  {:<44} {:>9.2e} {:>9.2e}  {}  {}{}\n", row.name, row.error, row.allowed,
          row.pass ? "pass" : "FAIL", outside, row.detail);
 }
 
-int check_device(Device& device, const CheckFlags& flags) {
+int dump_view(const CheckFlags& flags) {
+    if (flags.scene.empty() || flags.cameras.empty() || flags.dump.empty())
+        throw Error("darb check", "--scene, --cameras and --dump belong together",
+                    "darb check --scene S.ply --cameras cameras.json --view 0 --dump DIR");
+    if (!flags.json.empty() || flags.checks.every_kernel)
+        throw Error(flags.json.empty() ? "darb check --every-kernel" : "darb check --json",
+                    "has nothing to say of --dump", "Leave one of them out.");
+    const SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
+    const std::vector<View> views = open_cameras(flags.cameras, flags.data);
+    if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())
+        throw Error(flags.cameras.string(), fmt::format("there is no view {}", flags.view),
+                    fmt::format("--view takes 0 to {}.", views.size() - 1));
+    const View& view = views[static_cast<size_t>(flags.view)];
+    refuse_to_overwrite_inputs(check::dump_files(flags.dump), files_of(flags.scene));
+    std::string from = "the reference in double";
+    if (flags.reference) {
+        check::dump_from_reference(model, view.camera, flags.dump);
+    } else {
+        DeviceOptions options = command_device(flags.device);
+        Device device(options);
+        settle_tuning(device, flags.tune);
+        check::dump_from_device(device, model, view.camera, flags.dump);
+        from = device.info().name;
+    }
+    tell_paths(flags.quiet, {flags.dump});
+    tell(flags.quiet ? nullptr : stdout,
+         "{}: image and gradients of view {} ({}), {} splats, {} x {} px, from {}\n",
+         flags.dump.string(), flags.view, printable(view.name), model.size(), view.camera.width,
+         view.camera.height, from);
+    return 0;
+}
+
+int check_command(CheckFlags flags) {
+    if (!flags.scene.empty() || !flags.cameras.empty() || !flags.dump.empty())
+        return dump_view(flags);
+    if (flags.reference)
+        throw Error("darb check --reference", "is for a view of a scene",
+                    "Add --scene, --cameras and --dump.");
+    flags.checks.kernel = chosen_kernel(flags.kernel);
+    DeviceOptions options = command_device(flags.device);
+    Device device(options);
+    settle_tuning(device, flags.tune);
     const DeviceInfo& info = device.info();
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
     tell(out, "darb {}\ndevice   {}\ndriver   {}\nsubgroup {} lanes\n{:<46} {:>9} {:>9}\n",
@@ -81,50 +123,6 @@ int check_device(Device& device, const CheckFlags& flags) {
     return failed == 0 ? 0 : 1;
 }
 
-int dump_view(const CheckFlags& flags) {
-    if (flags.scene.empty() || flags.cameras.empty() || flags.dump.empty())
-        throw Error("darb check", "--scene, --cameras and --dump belong together",
-                    "darb check --scene S.ply --cameras cameras.json --view 0 --dump DIR");
-    if (!flags.json.empty() || flags.checks.every_kernel)
-        throw Error(flags.json.empty() ? "darb check --every-kernel" : "darb check --json",
-                    "has nothing to say of --dump", "Leave one of them out.");
-    const SplatModel model = load_scene(flags.scene);
-    const std::vector<View> views = open_cameras(flags.cameras, flags.data);
-    if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())
-        throw Error(flags.cameras.string(), fmt::format("there is no view {}", flags.view),
-                    fmt::format("--view takes 0 to {}.", views.size() - 1));
-    const View& view = views[static_cast<size_t>(flags.view)];
-    refuse_to_overwrite_inputs(check::dump_files(flags.dump), files_of(flags.scene));
-    std::string from = "the reference in double";
-    if (flags.reference) {
-        check::dump_from_reference(model, view.camera, flags.dump);
-    } else {
-        DeviceOptions options = command_device(flags.device);
-        Device device(options);
-        settle_tuning(device, flags.tune);
-        check::dump_from_device(device, model, view.camera, flags.dump);
-        from = device.info().name;
-    }
-    tell_paths(flags.quiet, {flags.dump});
-    tell(flags.quiet ? nullptr : stdout,
-         "{}: image and gradients of view {} ({}), {} splats, {} x {} px, from {}\n",
-         flags.dump.string(), flags.view, printable(view.name), model.size(), view.camera.width,
-         view.camera.height, from);
-    return 0;
-}
-
-int check_command(const CheckFlags& flags) {
-    if (!flags.scene.empty() || !flags.cameras.empty() || !flags.dump.empty())
-        return dump_view(flags);
-    if (flags.reference)
-        throw Error("darb check --reference", "is for a view of a scene",
-                    "Add --scene, --cameras and --dump.");
-    DeviceOptions options = command_device(flags.device);
-    Device device(options);
-    settle_tuning(device, flags.tune);
-    return check_device(device, flags);
-}
-
 }  // namespace
 
 void add_check(CLI::App& app, Action& action) {
@@ -134,6 +132,7 @@ void add_check(CLI::App& app, Action& action) {
     add_json_option(*command, flags->json);
     command->add_flag("--every-kernel", flags->checks.every_kernel,
                       "walks and hard cases in every kernel and footprint: minutes, not seconds");
+    add_kernel_flags(*command, flags->kernel, "check it alone; with --scene: draw with it");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     command->add_option("--scene", flags->scene, "a PLY file whose view --dump writes");

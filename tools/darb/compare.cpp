@@ -50,8 +50,9 @@ void check_flags(CompareFlags& flags) {
     if (flags.html.empty()) flags.html = flags.output / "compare.html";
     if (flags.json.empty()) flags.json = flags.output / "compare.json";
     for (const std::string& dataset : flags.datasets)
-        refuse_to_overwrite_inputs({flags.json, flags.html},
-                                   together({files_of(dataset_path(dataset)), flags.lpips}));
+        refuse_to_overwrite_inputs(
+            {flags.json, flags.html},
+            together({files_of(dataset_path(dataset)), flags.lpips, flags.kernel_files}));
 }
 
 std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {

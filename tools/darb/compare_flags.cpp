@@ -31,8 +31,11 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
                        "as darb train takes them; PATH@images_4 for its own photo folder");
     command.add_option("-o,--output", flags.output,
                        "folder of the runs, OUT/DATASET/KERNEL/seedN: finished ones are kept");
-    command.add_option("--kernels", flags.kernels, "paper (its five), all (nine), or names")
+    command
+        .add_option("--kernels", flags.kernels,
+                    "paper (its five), all (nine), or names and expressions with commas")
         ->capture_default_str();
+    add_kernel_file_flag(command, flags.kernel_files);
     command
         .add_option("--pulses", flags.pulses,
                     "of raised_cosine and sinc, with commas: 1,2,3 tests what rings cost and gain")
@@ -75,7 +78,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
 
 std::vector<int> kernels_of(const CompareFlags& flags) {
     std::vector<int> rows;
-    for (const int kernel : kernels_from_list("--kernels", flags.kernels))
+    for (const int kernel : kernels_from_list("--kernels", flags.kernels, flags.kernel_files))
         for (const int pulses : flags.pulses)
             if (const auto row = kernel_with_pulses(kernel, pulses);
                 row && std::find(rows.begin(), rows.end(), *row) == rows.end())

@@ -17,6 +17,7 @@ struct CompareFlags {
     std::vector<std::string> datasets;
     std::filesystem::path output, html, json;
     std::string kernels = "paper", device, train_options;
+    std::vector<std::filesystem::path> kernel_files;
     std::vector<int> iterations{7'000, 30'000};
     std::vector<int> pulses{1};
     int seeds = 1;

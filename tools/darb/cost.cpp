@@ -57,7 +57,7 @@ int cost(const CostFlags& flags) {
     refuse_to_overwrite_inputs({flags.json, flags.html},
                                together({files_of(flags.scene), files_of(flags.dataset)}));
     const Extent extent = extent_of(flags);
-    const SplatModel model = load_scene(flags.scene);
+    const SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
     if (model.size() == 0)
         throw Error(flags.scene, "holds no splats", "There is nothing to measure.");
     const CostViews views = views_of(flags, model, extent.views);
@@ -120,6 +120,10 @@ void add_cost(CLI::App& app, Action& action) {
                         "as in training: 1, 2, 4, 8 or a width in px");
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
     add_quiet_flag(*command, flags->quiet);
+    add_kernel_flags(*command, flags->kernel,
+                     "measure with this kernel in the place of the scene's");
+    for (const char* option : {"--kernel", "--kernel-file"})
+        command->get_option(option)->excludes(train);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     command->callback([flags, &action] { action = [flags] { return cost(*flags); }; });

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "engine/data/dataset.h"
+#include "tools/darb/kernel_flags.h"
 #include "tools/darb/tune_flags.h"
 
 namespace darb {
@@ -16,6 +17,7 @@ struct CostFlags {
     bool quick = false, full = false, quiet = false, white_background = false;
     DatasetOptions data;
     TuneFlags tune;
+    KernelFlags kernel;  // in the place of the scene's
     std::string size = "640x480";
 };
 

@@ -79,8 +79,8 @@ void add_plan(CLI::App& app, Action& action) {
         ->add_option("--sh-degree", flags->sh_degree,
                      "of a data set: the highest degree (default 3)")
         ->check(CLI::Range(0, 3));
-    command->add_option("--kernel", flags->kernel,
-                        "of a data set: the kernel to train with (default gaussian)");
+    add_kernel_flags(*command, flags->kernel,
+                     "of a data set: the kernel to train with (default gaussian)");
     command->add_flag("--depth", flags->depth, "of a scene: depth images are wanted too");
     add_effects_flag(*command, flags->effects);
     add_lens_flag(*command, flags->data);

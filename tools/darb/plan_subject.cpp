@@ -16,12 +16,7 @@ namespace darb {
 namespace {
 
 int kernel_of(const PlanFlags& flags) {
-    if (!flags.kernel) return TrainOptions{}.kernel;
-    const auto kernel = kernel_from_name(*flags.kernel);
-    if (!kernel)
-        throw Error("--kernel " + *flags.kernel, "no such kernel",
-                    "See `darb train --help` for their names.");
-    return *kernel;
+    return chosen_kernel(flags.kernel).value_or(TrainOptions{}.kernel);
 }
 
 bool distorted(const Dataset& dataset) {
@@ -58,7 +53,8 @@ PlanSubject open_subject(const PlanFlags& flags) {
         return s;
     }
     refuse(flags.sh_degree.has_value(), "--sh-degree");
-    refuse(flags.kernel.has_value(), "--kernel");
+    refuse(!flags.kernel.kernel.empty(), "--kernel");
+    refuse(!flags.kernel.files.empty(), "--kernel-file");
     s.model = load_scene(flags.what);
     if (!flags.cameras.empty()) s.views = open_cameras(flags.cameras, flags.data);
     return s;

@@ -10,6 +10,7 @@
 #include "engine/data/dataset.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/scene/splat_model.h"
+#include "tools/darb/kernel_flags.h"
 #include "tools/darb/plan_price.h"
 
 namespace darb {
@@ -19,7 +20,7 @@ struct PlanFlags {
     std::string device, effects = "auto";
     bool quiet = false, no_price = false, compare = false, depth = false;
     std::optional<int> sh_degree;
-    std::optional<std::string> kernel;
+    KernelFlags kernel;
     DatasetOptions data;
 };
 

@@ -21,21 +21,27 @@ namespace {
 struct PsiFlags {
     std::string kernels = "all";
     PsiGridOptions grid;
+    std::vector<std::filesystem::path> kernel_files;
     std::filesystem::path json, html;
     bool quiet = false;
 };
 
 int psi(const PsiFlags& flags) {
-    refuse_to_overwrite_inputs({flags.json, flags.html}, {});
+    refuse_to_overwrite_inputs({flags.json, flags.html}, flags.kernel_files);
     std::vector<PsiResult> results;
     std::vector<const DerivedKernel*> kernels;
-    for (const int k : kernels_from_list("--kernel", flags.kernels)) {
+    const std::vector<int> list = kernels_from_list("--kernel", flags.kernels, flags.kernel_files);
+    for (const int k : list) {
         kernels.push_back(&derived_kernel(k));
         results.push_back(measure_psi(*kernels.back(), flags.grid));
     }
-    write_json(flags.json, psi_json(results, flags.grid));
-    if (!flags.html.empty()) write_file_atomic(flags.html, psi_html(results, kernels, flags.grid));
-    tell(stream_beside_json(flags.json, flags.quiet), "{}", psi_table(results));
+    const std::vector<KernelFit> fits = fits_of(list);
+    nlohmann::json numbers = psi_json(results, flags.grid);
+    numbers["in_the_shaders"] = fits_json(fits);
+    write_json(flags.json, numbers);
+    if (!flags.html.empty())
+        write_file_atomic(flags.html, psi_html(results, kernels, fits, flags.grid));
+    tell(stream_beside_json(flags.json, flags.quiet), "{}{}", psi_table(results), fits_table(fits));
     tell_paths(flags.quiet, {flags.json, flags.html});
     return 0;
 }
@@ -46,8 +52,11 @@ void add_psi(CLI::App& app, Action& action) {
     auto flags = std::make_shared<PsiFlags>();
     CLI::App* command = app.add_subcommand(
         "psi", "The correction factor of a kernel three ways, and its splats beside the truth");
-    command->add_option("--kernel,--kernels", flags->kernels, "names with commas, or all")
+    command
+        ->add_option("--kernel,--kernels", flags->kernels,
+                     "names and expressions with commas, or all")
         ->capture_default_str();
+    add_kernel_file_flag(*command, flags->kernel_files);
     command->add_option("--samples", flags->grid.samples, "random covariances of the grid")
         ->capture_default_str()
         ->check(CLI::Range(1, 100'000));

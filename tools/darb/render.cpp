@@ -18,6 +18,7 @@
 #include "tools/darb/depth_file.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/kernel_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
@@ -36,6 +37,7 @@ struct RenderFlags {
     std::string effects = "auto";
     DepthFlags depth;
     DatasetOptions data;
+    KernelFlags kernel;
     AccuracyFlags accuracy;
     TuneFlags tune;
 };
@@ -53,17 +55,15 @@ void scale_camera(Camera& camera, int resolution) {
 }
 
 double median(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+    std::ranges::sort(values);
+    return values.empty() ? 0 : values[values.size() / 2];
 }
 
 int render(RenderFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     check_depth(flags.depth, accuracy, choice);
-    SplatModel model = load_scene(flags.scene);
+    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
     std::vector<View> views = open_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
     if (is_list)
@@ -129,6 +129,7 @@ void add_render(CLI::App& app, Action& action) {
     command->add_option("--near", flags->near_plane, "nearest distance drawn, world units")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
+    add_kernel_flags(*command, flags->kernel, "draw with it in the place of the scene's own");
     add_accuracy_flags(*command, flags->accuracy);
     add_effects_flag(*command, flags->effects);
     add_lens_flag(*command, flags->data);

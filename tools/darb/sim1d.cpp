@@ -23,6 +23,7 @@ struct Sim1dFlags {
     std::string kernels = "all", signals = "all";
     bool quiet = false;
     Study1dOptions study;
+    std::vector<std::filesystem::path> kernel_files;
     std::filesystem::path json, html;
 };
 
@@ -44,19 +45,20 @@ std::vector<int> signals_from_list(const std::string& list) {
     return signals;
 }
 
-std::vector<int> kernels_1d_from_list(const std::string& list) {
+std::vector<int> kernels_1d_from_list(const std::string& list,
+                                      const std::vector<std::filesystem::path>& files) {
     const std::string generalised(kernel_1d_name(kGeneralisedExponential));
     if (list == generalised) return {kGeneralisedExponential};
     const bool ends = list.ends_with("," + generalised);
     std::vector<int> kernels = kernels_from_list(
-        "--kernels", ends ? list.substr(0, list.size() - generalised.size() - 1) : list);
+        "--kernels", ends ? list.substr(0, list.size() - generalised.size() - 1) : list, files);
     if (ends || list == "all") kernels.push_back(kGeneralisedExponential);
     return kernels;
 }
 
 int sim1d(Sim1dFlags flags) {
-    refuse_to_overwrite_inputs({flags.json, flags.html}, {});
-    flags.study.kernels = kernels_1d_from_list(flags.kernels);
+    refuse_to_overwrite_inputs({flags.json, flags.html}, flags.kernel_files);
+    flags.study.kernels = kernels_1d_from_list(flags.kernels, flags.kernel_files);
     flags.study.signals = signals_from_list(flags.signals);
     const bool shown = !flags.quiet && ::isatty(STDERR_FILENO) == 1;
     const Study1dResult result = study_1d(flags.study, [&](std::size_t done, std::size_t all) {
@@ -80,8 +82,9 @@ void add_sim1d(CLI::App& app, Action& action) {
         ->capture_default_str();
     command
         ->add_option("--kernels", flags->kernels,
-                     "names with commas, generalised_exponential last; or all")
+                     "names and expressions with commas, generalised_exponential last; or all")
         ->capture_default_str();
+    add_kernel_file_flag(*command, flags->kernel_files);
     Study1dOptions& study = flags->study;
     command->add_option("-N,--primitives", study.primitives, "numbers of kernels, with commas")
         ->delimiter(',')

@@ -59,9 +59,10 @@ void add_data_flags(CLI::App& command, TrainFlags& f) {
 }
 
 void add_scene_flags(CLI::App& command, TrainFlags& f) {
-    command.add_option("--kernel", f.kernel, kernel_names())
-        ->capture_default_str()
-        ->group(option_group::kScene);
+    add_kernel_flags(command, f.kernel,
+                     kernel_names() + ", or one of your own: \"expr: (1 - q/9)^3, support 9\"",
+                     option_group::kScene);
+    command.get_option("--kernel")->default_str("gaussian");
     std::string strategies;
     for (const Strategy strategy : all_strategies())
         strategies += fmt::format("{}{} ({})", strategies.empty() ? "" : "; ",

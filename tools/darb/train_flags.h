@@ -8,6 +8,7 @@
 
 #include "engine/data/dataset.h"
 #include "tools/darb/accuracy_flags.h"
+#include "tools/darb/kernel_flags.h"
 #include "tools/darb/option_flags.h"
 #include "trainer/run.h"
 
@@ -24,7 +25,8 @@ struct TrainFlags {
     bool sequential = false;
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
-    std::string kernel = "gaussian", strategy = "adc";
+    KernelFlags kernel;
+    std::string strategy = "adc";
     std::string schedule = "darb";  // or 3dgs
     std::string strategy_note;      // what plan_strategy decided, for people
     GivenOfStrategies of_strategies;

@@ -75,13 +75,10 @@ void note_iterations_beyond(const TrainFlags& f) {
 
 void finish_train_flags(TrainFlags& f) {
     f.effects = effects_beside(f.schedule_effects, f.effects);
-    const auto kernel = kernel_from_name(f.kernel);
-    if (!kernel)
-        throw Error("--kernel " + f.kernel, "no such kernel",
-                    "See `darb train --help` for the nine names.");
-    const auto row = kernel_with_pulses(*kernel, f.pulses);
-    if (*kernel >= KERNEL_COUNT || !row)
-        throw Error(fmt::format("--kernel {} --pulses {}", f.kernel, f.pulses),
+    const int kernel = chosen_kernel(f.kernel).value_or(KERNEL_GAUSSIAN);
+    const auto row = kernel_with_pulses(kernel, f.pulses);
+    if (!row)
+        throw Error(fmt::format("--kernel {} --pulses {}", kernel_name(kernel), f.pulses),
                     "there is no such kernel",
                     "Only raised_cosine and sinc have --pulses 2 or 3; others have one.");
     choose_effects(f.effects, EffectUse::training, f.data);
@@ -91,8 +88,9 @@ void finish_train_flags(TrainFlags& f) {
     f.train.footprint =
         f.train.accuracy.value(kFootprint) == FOOTPRINT_EXACT ? Footprint::exact : Footprint::psi;
     if (f.train.footprint == Footprint::exact && !has_exact_footprint(f.train.kernel))
-        throw Error(fmt::format("--pulses {}", f.pulses), "goes with the footprint psi only",
-                    "Leave --footprint out, or use one pulse.");
+        throw Error(fmt::format("--kernel {} --pulses {}", kernel_name(kernel), f.pulses),
+                    "goes with the footprint psi only",
+                    "Leave --footprint out, or use another kernel or one pulse.");
     note_iterations_beyond(f);
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())

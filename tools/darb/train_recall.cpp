@@ -63,7 +63,7 @@ std::string shared_value(std::string_view option, const std::string& value,
 
 bool takes_path(std::string_view option) {
     return is_one_of(option, {"-o", "-m", "--output", "--model-path", "-s", "--source-path",
-                              "--start-checkpoint"});
+                              "--start-checkpoint", "--kernel-file"});
 }
 
 // The word that is the data set, where no option names it: the first one behind "train", or one
@@ -127,6 +127,7 @@ void recall_arguments(const std::vector<std::string>& typed, TrainFlags& flags, 
     };
     recalled.dataset = there(recalled.dataset).string();
     recalled.start_checkpoint = there(recalled.start_checkpoint);
+    for (std::filesystem::path& file : recalled.kernel.files) file = there(file);
     recalled.resume = true;
     recalled.run.output = flags.run.output;
     if (!flags.device.empty()) recalled.device = flags.device;

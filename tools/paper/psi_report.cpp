@@ -47,12 +47,15 @@ std::string profiles(const std::vector<const DerivedKernel*>& kernels) {
     Plot w{"Kernels", "distance d (standard deviations)", "w", {}};
     Plot a{"Their true projections, peak 1", "distance d (standard deviations)", "A / A(0)", {}};
     Plot p{"The paper's splats: w(d / sqrt psi)", "distance d (standard deviations)", "w", {}};
+    double end = 4;
+    for (const DerivedKernel* k : kernels)
+        if (std::isfinite(k->row().support)) end = std::max(end, 1.1 * std::sqrt(k->row().support));
     for (const DerivedKernel* k : kernels) {
         const std::string name(k->row().name);
-        w.series.push_back(curve(name, 4, [&](double q) { return k->value(Footprint::psi, q); }));
-        a.series.push_back(curve(name, 4, [&](double q) { return projected_profile(*k, q); }));
+        w.series.push_back(curve(name, end, [&](double q) { return k->value(Footprint::psi, q); }));
+        a.series.push_back(curve(name, end, [&](double q) { return projected_profile(*k, q); }));
         p.series.push_back(
-            curve(name, 4, [&](double q) { return k->value(Footprint::psi, q / k->psi()); }));
+            curve(name, end, [&](double q) { return k->value(Footprint::psi, q / k->psi()); }));
     }
     std::vector<std::string> names;
     for (const PlotSeries& s : w.series) names.push_back(s.name);
@@ -226,8 +229,9 @@ nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOpti
 
 std::string psi_html(const std::vector<PsiResult>& results,
                      const std::vector<const DerivedKernel*>& kernels,
-                     const PsiGridOptions& options) {
-    std::string body = "<h2>Every kernel</h2>" + html_table(results) + profiles(kernels);
+                     const std::vector<KernelFit>& fits, const PsiGridOptions& options) {
+    std::string body =
+        "<h2>Every kernel</h2>" + html_table(results) + profiles(kernels) + fits_html(fits);
     for (std::size_t i = 0; i < results.size(); ++i)
         body += "<h2>" + html_escape(results[i].kernel) + "</h2>" +
                 fields(results[i], *kernels[i]) + footprints(results[i], *kernels[i]);

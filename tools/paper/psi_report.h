@@ -5,15 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "tools/paper/kernel_fits.h"
 #include "tools/paper/psi_measure.h"
 
 namespace darb {
 
 std::string psi_table(const std::vector<PsiResult>& results);
 nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOptions& options);
-/// kernels: those of the results, in their order.
+/// kernels and fits: those of the results, in their order.
 std::string psi_html(const std::vector<PsiResult>& results,
                      const std::vector<const DerivedKernel*>& kernels,
-                     const PsiGridOptions& options);
+                     const std::vector<KernelFit>& fits, const PsiGridOptions& options);
 
 }  // namespace darb

@@ -60,8 +60,8 @@ struct Compact {
             p = p * x + k.c[i];
         }
         for (int i = 1; i < Power; ++i) lower *= u;
-        w = lower * u * p;
-        slope = lower * (u * dp - Power * p) * dx;
+        w = Power == 0 ? lower * p : lower * u * p;
+        slope = Power == 0 ? lower * dp * dx : lower * (u * dp - Power * p) * dx;
     }
 };
 
@@ -173,6 +173,8 @@ AddTerm term_of(const KernelCoefficients& k) {
     if (k.form == KERNEL_FORM_QUADRIC)
         return k.half_power == 2 ? add_term_as<Quadric<true>> : add_term_as<Quadric<false>>;
     switch (k.half_power) {
+        case 0:
+            return compact_of<0>(k.squared, k.degree);
         case 2:
             return compact_of<1>(k.squared, k.degree);
         case 4:

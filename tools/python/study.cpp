@@ -146,7 +146,7 @@ py::object plan(const py::dict& given) {
     if (!given["sh_degree"].is_none())
         flags.sh_degree = static_cast<int>(take_integer(given["sh_degree"], "sh_degree", 0, 3));
     if (!given["kernel"].is_none())
-        flags.kernel = std::string(kernel_name(take_kernel(given["kernel"], "kernel")));
+        flags.kernel.kernel = kernel_name(take_kernel(given["kernel"], "kernel"));
     const bool price = take_flag(given["price"], "price");
     nlohmann::json result;
     {

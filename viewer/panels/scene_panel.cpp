@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "engine/kernels/kernel_registry.h"
 #include "viewer/panels/panels.h"
 
 namespace darb {
@@ -13,7 +14,7 @@ void kernel_choice(Session& s) {
     DisplaySettings& d = s.display;
     const std::string now(kernel_name(d.kernel));
     if (ImGui::BeginCombo("kernel", now.c_str())) {
-        for (int k = 0; k < KERNEL_COUNT; ++k) {
+        for (const int k : known_kernels()) {
             const std::string name(kernel_name(k));
             if (ImGui::Selectable(name.c_str(), k == d.kernel)) d.kernel = k;
         }
