@@ -152,6 +152,10 @@ void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
     if (target.empty()) return;
     Device::State& state = device_->state();
     check_vulkan(state.wait_idle(), "download of " + describe(name_, target.size()));
+    if (state.compile_only) {
+        std::memset(target.data(), 0, target.size());
+        return;
+    }
     if (direct_ != nullptr) {
         std::memcpy(target.data(), static_cast<const std::byte*>(direct_) + offset, target.size());
         return;

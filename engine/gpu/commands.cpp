@@ -78,7 +78,7 @@ struct Commands::State {
     bool timed = false;
     bool recording = false;
     bool in_flight = false;
-    std::vector<std::string> passes;
+    std::vector<RecordedPass> passes;
 
     void create();
     VkDescriptorSet allocate_set(const Pipeline& pipeline);
@@ -86,7 +86,11 @@ struct Commands::State {
               std::span<const BufferRange> buffers);
     void place_barriers();
     void finish_pass();
-    std::string here() const { return passes.empty() ? "pass" : "pass \"" + passes.back() + "\""; }
+    RecordedPass unnamed;  // what comes before the first
+    RecordedPass& now() { return passes.empty() ? unnamed : passes.back(); }
+    std::string here() const {
+        return passes.empty() ? "pass" : "pass \"" + passes.back().name + "\"";
+    }
     std::string all_passes() const;
 };
 
@@ -113,7 +117,7 @@ void Commands::State::create() {
     VkFenceCreateInfo fence_info{};
     fence_info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
     check_vulkan(vkCreateFence(device.handle(), &fence_info, nullptr, &fence), "fence");
-    timed = device.info().timestamp_period_ns > 0;
+    timed = device.info().timestamp_period_ns > 0 && !device.state().compile_only;
 }
 
 VkDescriptorSet Commands::State::allocate_set(const Pipeline& pipeline) {
@@ -189,6 +193,7 @@ void Commands::State::bind(const Pipeline& pipeline, std::span<const std::byte> 
                       access.reads ? VK_ACCESS_2_SHADER_STORAGE_READ_BIT : VkAccessFlags2{},
                       access.writes ? VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT : VkAccessFlags2{}});
     }
+    now().descriptors += static_cast<std::uint32_t>(count);
     vkUpdateDescriptorSets(device.handle(), static_cast<std::uint32_t>(count), writes.data(), 0,
                            nullptr);
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.handle());
@@ -202,6 +207,7 @@ void Commands::State::bind(const Pipeline& pipeline, std::span<const std::byte> 
 void Commands::State::place_barriers() {
     const std::vector<VkBufferMemoryBarrier2>& needed = barriers.resolve();
     if (needed.empty()) return;
+    ++now().barriers;
     VkDependencyInfo info{};
     info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
     info.bufferMemoryBarrierCount = static_cast<std::uint32_t>(needed.size());
@@ -218,7 +224,8 @@ void Commands::State::finish_pass() {
 std::string Commands::State::all_passes() const {
     if (passes.empty()) return "submission";
     if (passes.size() == 1) return here();
-    return fmt::format("passes \"{}\" to \"{}\"", passes.front(), passes.back());
+    return fmt::format("passes \"{}\" to \"{}\"", passes.front().name,
+                       passes.back().name);
 }
 
 Commands::Commands(Device& device) : state_(std::make_unique<State>(device)) {
@@ -252,12 +259,12 @@ void Commands::pass(std::string_view name) {
     check_recording(s.recording);
     if (s.timed && s.passes.empty()) s.timestamps.write(s.commands);
     s.finish_pass();
-    s.passes.emplace_back(name);
+    s.passes.push_back({std::string(name)});
     const DebugUtils& debug = s.device.state().instance.debug();
     if (debug.begin_label == nullptr) return;
     VkDebugUtilsLabelEXT label{};
     label.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_LABEL_EXT;
-    label.pLabelName = s.passes.back().c_str();
+    label.pLabelName = s.passes.back().name.c_str();
     debug.begin_label(s.commands, &label);
 }
 
@@ -271,6 +278,7 @@ void Commands::dispatch_bytes(const Pipeline& pipeline, std::span<const std::byt
                "{}: {} x {} x {} groups", pipeline.name(), groups_x, groups_y, groups_z);
     s.bind(pipeline, args, buffers);
     s.place_barriers();
+    ++s.now().dispatches;
     vkCmdDispatch(s.commands, groups_x, groups_y, groups_z);
 }
 
@@ -284,6 +292,7 @@ void Commands::dispatch_indirect_bytes(const Pipeline& pipeline, std::span<const
     s.barriers.use({indirect.handle(), VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT,
                     VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT, 0});
     s.place_barriers();
+    ++s.now().dispatches;
     vkCmdDispatchIndirect(s.commands, indirect.handle(), offset);
 }
 
@@ -414,7 +423,7 @@ void Commands::submit(VkSemaphore wait_for, VkSemaphore signal) {
     check_vulkan(vkEndCommandBuffer(s.commands), s.all_passes());
     check_vulkan(vkResetFences(s.device.handle(), 1, &s.fence), s.all_passes());
     check_vulkan(s.device.state().submit(s.commands, s.fence, wait_for, signal), s.all_passes());
-    s.in_flight = true;
+    s.in_flight = !s.device.state().compile_only;
 }
 
 void Commands::wait() {
@@ -423,6 +432,10 @@ void Commands::wait() {
     const VkResult result = vkWaitForFences(s.device.handle(), 1, &s.fence, VK_TRUE, UINT64_MAX);
     s.in_flight = false;
     check_vulkan(result, s.all_passes());
+}
+
+const std::vector<RecordedPass>& Commands::recorded() const {
+    return state_->passes;
 }
 
 std::vector<PassTime> Commands::pass_times() const {
@@ -437,7 +450,7 @@ std::vector<PassTime> Commands::pass_times() const {
     const std::uint64_t mask = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
     for (std::size_t i = 0; i < s.passes.size(); ++i) {
         const double elapsed = static_cast<double>((ticks[i + 1] - ticks[i]) & mask);
-        times.push_back({s.passes[i], elapsed * s.device.info().timestamp_period_ns * 1e-6});
+        times.push_back({s.passes[i].name, elapsed * s.device.info().timestamp_period_ns * 1e-6});
     }
     return times;
 }

@@ -25,6 +25,12 @@ struct PassTime {
     double ms = 0;
 };
 
+/// What the recording of a pass() holds; a barrier is one command, however many buffers it names.
+struct RecordedPass {
+    std::string name;
+    std::uint32_t dispatches = 0, barriers = 0, descriptors = 0;
+};
+
 /// For shaders without a push constant block.
 struct NoArgs {};
 
@@ -98,6 +104,9 @@ class Commands {
         submit();
         wait();
     }
+
+    /// Since begin(), in order.
+    const std::vector<RecordedPass>& recorded() const;
 
     /// After wait(): one row per pass() in order of recording, empty if timestamps are off.
     std::vector<PassTime> pass_times() const;

@@ -17,6 +17,8 @@ namespace {
 // Vulkan's header names it only with VK_ENABLE_BETA_EXTENSIONS.
 constexpr const char* kPortabilitySubset = "VK_KHR_portability_subset";
 
+constexpr const char* kStatistics = VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
+
 // Features in the chain that vkCreateDevice and the query share.
 struct Features {
     VkPhysicalDeviceFeatures2 core{};
@@ -24,6 +26,7 @@ struct Features {
     VkPhysicalDeviceVulkan12Features v12{};
     VkPhysicalDeviceVulkan13Features v13{};
     VkPhysicalDeviceShaderAtomicFloatFeaturesEXT atomics{};
+    VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR executable{};
 
     explicit Features(bool with_atomics) {
         core.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
@@ -35,6 +38,12 @@ struct Features {
         v11.pNext = &v12;
         v12.pNext = &v13;
         if (with_atomics) v13.pNext = &atomics;
+    }
+    void add_statistics() {
+        executable.sType =
+            VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR;
+        executable.pipelineExecutableInfo = VK_TRUE;
+        executable.pNext = std::exchange(core.pNext, &executable);
     }
     Features(const Features&) = delete;
     Features& operator=(const Features&) = delete;
@@ -85,6 +94,7 @@ bool offers_extension(VkPhysicalDevice physical, const std::string& name) {
 Device::State::State(const DeviceOptions& options, bool validation)
     : instance(validation, options.instance_extensions) {
     faults = options.faults;
+    compile_only = options.compile_only;
     const ListedDevice chosen = choose(instance, options.select);
     physical = chosen.handle;
     info = chosen.info;
@@ -132,6 +142,11 @@ void Device::State::create_device(const DeviceOptions& options) {
     // Must be enabled where it is offered. None of the features that it takes away is used here.
     if (offers_extension(physical, kPortabilitySubset)) extensions.push_back(kPortabilitySubset);
     if (info.float_atomics) extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
+    const bool statistics = compile_only && offers_extension(physical, kStatistics);
+    if (statistics) {
+        extensions.push_back(kStatistics);
+        wanted.add_statistics();
+    }
 
     const float priority = 1;
     VkDeviceQueueCreateInfo queue_info{};
@@ -148,6 +163,14 @@ void Device::State::create_device(const DeviceOptions& options) {
     device_info.ppEnabledExtensionNames = extensions.data();
     check_vulkan(vkCreateDevice(physical, &device_info, nullptr, &device), info.name);
     vkGetDeviceQueue(device, queue_family, 0, &queue);
+    if (statistics) load_statistics();
+}
+
+void Device::State::load_statistics() {
+    executable.properties = reinterpret_cast<PFN_vkGetPipelineExecutablePropertiesKHR>(
+        vkGetDeviceProcAddr(device, "vkGetPipelineExecutablePropertiesKHR"));
+    executable.statistics = reinterpret_cast<PFN_vkGetPipelineExecutableStatisticsKHR>(
+        vkGetDeviceProcAddr(device, "vkGetPipelineExecutableStatisticsKHR"));
 }
 
 void Device::State::create_cache(const DeviceOptions& options) {
@@ -159,7 +182,7 @@ void Device::State::create_cache(const DeviceOptions& options) {
     properties.pNext = &id;
     vkGetPhysicalDeviceProperties2(physical, &properties);
     std::vector<std::byte> data;
-    if (!cache_folder.empty()) {
+    if (!cache_folder.empty() && !compile_only) {
         cache_file = cache_folder / fmt::format("pipelines-{}-{:08x}.bin", hex(id.deviceUUID),
                                                 properties.properties.driverVersion);
         data = load_pipeline_cache(cache_file);
@@ -207,6 +230,7 @@ void Device::State::set_name(VkObjectType type, std::uint64_t handle,
 VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for,
                                VkSemaphore signal) {
     if (faults.fails_submit(++submits)) return VK_ERROR_DEVICE_LOST;
+    if (compile_only) return VK_SUCCESS;
     VkCommandBufferSubmitInfo buffer_info{};
     buffer_info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO;
     buffer_info.commandBuffer = commands;
@@ -230,6 +254,7 @@ VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence, VkSemaph
 }
 
 VkResult Device::State::wait_idle() {
+    if (compile_only) return VK_SUCCESS;
     const std::lock_guard lock(queue_mutex);
     return vkQueueWaitIdle(queue);
 }
@@ -293,6 +318,12 @@ void Device::set_memory_budget(std::uint64_t bytes) {
 }
 std::uint64_t Device::memory_budget() const {
     return state_->budget;
+}
+const std::vector<CompiledPipeline>& Device::compiled() const {
+    return state_->compiled;
+}
+bool Device::has_pipeline_statistics() const {
+    return state_->executable.statistics != nullptr;
 }
 std::uint64_t Device::validation_message_count() const {
     return state_->instance.message_count();

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/gpu/faults.h"
+#include "engine/gpu/pipeline_statistics.h"
 #include "engine/gpu/tuning.h"
 
 namespace darb {
@@ -56,6 +57,9 @@ struct DeviceOptions {
     std::string select;                  // "" = best usable; a number = index; else part of a name
     bool validation = false;             // core + synchronization validation
     Faults faults;                       // injected for tests
+    /// Nothing is given to the queue: what is downloaded is 0. Pipelines are compiled anew, past
+    /// every cache, and Device::compiled says what the driver tells of them.
+    bool compile_only = false;
     std::filesystem::path cache_folder;  // pipeline cache; "" = default_cache_folder()
     /// For a window: surface extensions of the instance, VK_KHR_swapchain of the device. A name
     /// that is not offered is an Error. The queue does graphics too wherever the device has such a
@@ -99,6 +103,11 @@ class Device {
     /// A budget for all Buffers together; 0 = none. Exceeding it throws as out of memory does.
     void set_memory_budget(std::uint64_t bytes);
     std::uint64_t memory_budget() const;
+
+    /// With compile_only: every pipeline that was made, in order.
+    const std::vector<CompiledPipeline>& compiled() const;
+    /// Whether the driver has statistics of pipelines.
+    bool has_pipeline_statistics() const;
 
     /// Messages of the validation layers since the start (0 where validation is off).
     std::uint64_t validation_message_count() const;

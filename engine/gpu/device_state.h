@@ -9,6 +9,7 @@
 #include <mutex>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "engine/gpu/device.h"
 #include "engine/gpu/faults.h"
@@ -66,6 +67,15 @@ struct Device::State {
     std::size_t loaded_cache_bytes = 0;
     VkPipelineCache cache = VK_NULL_HANDLE;
 
+    bool compile_only = false;
+    struct {  // of VK_KHR_pipeline_executable_properties, null without it
+        PFN_vkGetPipelineExecutablePropertiesKHR properties = nullptr;
+        PFN_vkGetPipelineExecutableStatisticsKHR statistics = nullptr;
+    } executable;
+    std::vector<CompiledPipeline> compiled;
+    /// Adds what the driver says of a pipeline to `compiled`.
+    void note_compiled(VkPipeline pipeline, CompiledPipeline row);
+
     std::atomic<std::uint64_t> allocated{0}, peak{0}, budget{0}, submits{0};
 
     /// Where staging copies run; made at the first use.
@@ -83,6 +93,7 @@ struct Device::State {
 
   private:
     void create_device(const DeviceOptions& options);
+    void load_statistics();
     void create_cache(const DeviceOptions& options);
     void release() noexcept;
 };

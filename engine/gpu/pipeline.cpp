@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -71,6 +72,18 @@ std::uint32_t fitting_subgroup_size(const DeviceInfo& info, std::uint32_t thread
     return info.min_subgroup_size == info.max_subgroup_size ? 0 : size;
 }
 
+// "SH_DEGREE=3 THREADS=64", of what the shader declares.
+std::string given_constants(const ShaderInterface& shader, const SpecConstants& given) {
+    std::string text;
+    for (const ShaderInterface::Constant& constant : shader.constants) {
+        const auto found = given.find(constant.name);
+        if (found == given.end()) continue;
+        text += fmt::format("{}{}=", text.empty() ? "" : " ", constant.name);
+        std::visit([&](auto value) { text += fmt::format("{}", value); }, found->second);
+    }
+    return text;
+}
+
 VkDescriptorSetLayout create_set_layout(VkDevice device, std::size_t count,
                                         const std::string& what) {
     std::vector<VkDescriptorSetLayoutBinding> bindings(count);
@@ -124,9 +137,12 @@ VkPipeline create_pipeline(const Device::State& state, VkPipelineLayout layout,
     info.stage.module = module;
     info.stage.pName = "main";
     info.stage.pSpecializationInfo = &specialization;
+    if (state.executable.statistics != nullptr)
+        info.flags = VK_PIPELINE_CREATE_CAPTURE_STATISTICS_BIT_KHR;
     VkPipeline pipeline = VK_NULL_HANDLE;
+    const VkPipelineCache cache = state.compile_only ? VK_NULL_HANDLE : state.cache;
     const VkResult result =
-        vkCreateComputePipelines(state.device, state.cache, 1, &info, nullptr, &pipeline);
+        vkCreateComputePipelines(state.device, cache, 1, &info, nullptr, &pipeline);
     vkDestroyShaderModule(state.device, module, nullptr);
     check_vulkan(result, what);
     return pipeline;
@@ -158,7 +174,7 @@ void check_device_limits(const Device::State& state, const Pipeline& pipeline,
 Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants& constants,
                    bool require_full_subgroups, std::uint32_t subgroup_size)
     : device_(&device), name_(shader) {
-    const Device::State& state = device.state();
+    Device::State& state = device.state();
     const std::string what = "shader " + name_;
     const std::span<const std::uint32_t> words = find_shader(shader);
     const ShaderInterface interface = reflect_spirv(words, shader);
@@ -181,7 +197,13 @@ Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants&
     try {
         set_layout_ = create_set_layout(state.device, bindings_.size(), what);
         layout_ = create_layout(state.device, set_layout_, push_constant_bytes_, what);
+        const auto begun = std::chrono::steady_clock::now();
         pipeline_ = create_pipeline(state, layout_, words, specialization_info, full, size, what);
+        const std::chrono::duration<double, std::milli> took =
+            std::chrono::steady_clock::now() - begun;
+        if (state.compile_only)
+            state.note_compiled(pipeline_, {name_, given_constants(interface, constants), threads_x_,
+                                            size, took.count(), {}});
     } catch (...) {
         release();
         throw;

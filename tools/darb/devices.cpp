@@ -7,7 +7,9 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/gpu/device.h"
+#include "tools/bench/pass_statistics.h"
 #include "tools/darb/command_list.h"
+#include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 
@@ -71,15 +73,31 @@ void print_devices(std::FILE* out, const std::string& select) {
 }
 
 void add_devices(CLI::App& app, Action& action) {
-    auto select = std::make_shared<std::string>();
-    auto quiet = std::make_shared<bool>(false);
+    struct Flags {
+        std::string select;
+        std::filesystem::path json;
+        bool passes = false, quiet = false;
+    };
+    auto flags = std::make_shared<Flags>();
     CLI::App* command = app.add_subcommand("devices", "List the Vulkan devices and their limits");
-    command->add_option("--device", *select,
+    command->add_option("--device", flags->select,
                         "show what this number or part of a name would choose");
-    add_quiet_flag(*command, *quiet);
-    command->callback([select, quiet, &action] {
-        action = [select, quiet] {
-            print_devices(*quiet ? nullptr : stdout, *select);
+    add_quiet_flag(*command, flags->quiet);
+    CLI::Option* passes = command->add_flag(
+        "--passes", flags->passes,
+        "compile every pass for the chosen device and say what its compiler tells of them: "
+        "registers, spills, occupancy, instructions; nothing is executed");
+    add_json_option(*command, flags->json)->needs(passes);
+    command->callback([flags, &action] {
+        action = [flags] {
+            if (!flags->passes) {
+                print_devices(flags->quiet ? nullptr : stdout, flags->select);
+                return 0;
+            }
+            const PassStatistics statistics = compile_every_pass(flags->select);
+            print_pass_statistics(stream_beside_json(flags->json, flags->quiet), statistics);
+            write_json(flags->json, pass_statistics_json(statistics));
+            tell_paths(flags->quiet, {flags->json});
             return 0;
         };
     });
