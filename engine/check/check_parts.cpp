@@ -20,9 +20,8 @@ namespace {
 
 constexpr double kCutoff = 1 / 255.0;
 constexpr double kSlopeRounding = 2e-6;
-// Of the built-in sin and cos, which rings take: 2^-11 by the letter of Vulkan, no driver is so
-// bad.
-constexpr double kRingRounding = 2e-5, kRingSlopeRounding = 1e-4;
+// Of shaders/kernels/sine.glsl, which rings take, and of the root of q before it.
+constexpr double kRingRounding = 2e-6, kRingSlopeRounding = 1e-5;
 
 struct Probe {
     float q, opacity;

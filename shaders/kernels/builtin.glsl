@@ -1,7 +1,17 @@
 // The kernels by the formulas of the paper, with sqrt, division and the built-in exp, sin and cos, corrected near
 // d = 0. For comparison of cost and accuracy; Vulkan leaves sin and cos 2^-11 of error. Only kernels that have
 // such a formula: others, and the exact footprints of the compact ones, keep their polynomial. KERNEL_SUPPORT ends
-// the pulses; there is no polynomial for more than one.
+// the pulses; there is no polynomial for more than one, so these take sin and cos of kernels/sine.glsl.
+#include "kernels/sine.glsl"
+
+float kernel_sin(float x) {
+    return KERNEL_PULSES > 1 ? steady_sin(x) : sin(x);
+}
+
+float kernel_cos(float x) {
+    return KERNEL_PULSES > 1 ? steady_cos(x) : cos(x);
+}
+
 bool builtin_exists() {
     return KERNEL == KERNEL_GAUSSIAN ||
            (FOOTPRINT == FOOTPRINT_PSI &&
@@ -16,7 +26,7 @@ const float PI = 3.14159265;
 // the centre.
 float sinc(float x) {
     const float s = x * x;
-    return s < 0.25 ? 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0))) : sin(x) / x;
+    return s < 0.25 ? 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0))) : kernel_sin(x) / x;
 }
 
 // sinc and its derivative by x^2, whose closed form cancels near 0.
@@ -24,7 +34,7 @@ void sinc_slope(float x, out float w, out float slope) {
     const float s = x * x;
     w = sinc(x);
     slope = s < 0.25 ? -1.0 / 6.0 + s * (1.0 / 60.0 - s * (1.0 / 1680.0))
-                     : (cos(x) - w) / (2.0 * s);
+                     : (kernel_cos(x) - w) / (2.0 * s);
 }
 
 void builtin_value_slope(float q, out float w, out float slope) {
@@ -36,12 +46,12 @@ void builtin_value_slope(float q, out float w, out float slope) {
     const float d = sqrt(q);
     if (KERNEL == KERNEL_RAISED_COSINE) {
         const float k = PI / 2.5;
-        w = 0.5 + 0.5 * cos(k * d);
+        w = 0.5 + 0.5 * kernel_cos(k * d);
         slope = -0.25 * k * k * sinc(k * d);
     } else if (KERNEL == KERNEL_HALF_COSINE_SQUARED) {
         const float k = PI / 18.0;
-        w = cos(k * q);
-        slope = -k * sin(k * q);
+        w = kernel_cos(k * q);
+        slope = -k * kernel_sin(k * q);
     } else if (KERNEL == KERNEL_SINC) {
         const float k = PI / 3.0;
         sinc_slope(k * d, w, slope);
@@ -52,11 +62,11 @@ void builtin_value_slope(float q, out float w, out float slope) {
         }
     } else if (KERNEL == KERNEL_COSINE) {
         const float k = PI / 6.0;
-        w = cos(k * d);
+        w = kernel_cos(k * d);
         slope = -0.5 * k * k * sinc(k * d);
     } else {
         const float k = PI / 3.0;
-        const float root = 0.5 + 0.5 * cos(k * d);
+        const float root = 0.5 + 0.5 * kernel_cos(k * d);
         w = root * root;
         slope = -0.5 * k * k * root * sinc(k * d);
     }
