@@ -73,7 +73,7 @@ void Device::State::note_compiled(VkPipeline pipeline, CompiledPipeline row) {
 
 CommonStatistics common_statistics(const CompiledPipeline& pipeline) {
     CommonStatistics c;
-    c.registers = sum_of(pipeline, {"vgprs", "numgprs", "gprs", "registers", "registercount",
+    c.registers = sum_of(pipeline, {"vgprs", "numberofgprs", "gprs", "registers", "registercount",
                                     "maxliveregisters", "fullregisters"});
     c.spills = sum_of(pipeline, {"spilledvgprs", "spilledsgprs", "spillstomemory", "fillsfrommemory",
                                  "spillstoreg", "fillsfromreg", "spillcount", "fillcount", "spills",

@@ -78,17 +78,16 @@ Partial sum_partials(uint i) {
     Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
     uint e = first_intersection[i];
     const uint end = e + intersection_count[i];
-    if (e == end) return sums;
-    do {  // loops end at their bottoms: see emit_cells
-        const uint stop = min(e + 32768u, end);  // some drivers end loops at 65,535
-        do {
+    for (uint stop = e; e < end;) {
+        stop = min(stop + 32768u, end);  // some drivers end loops at 65,535
+        for (; e < stop; ++e) {
             const vec4 light = load_partial(e, 1u);
             sums.a += load_partial(e, 0u);
             sums.b += partial_rest[e];
             sums.d_opacity += light.x;
             sums.d_colour += light.yzw;
-        } while (++e < stop);
-    } while (e < end);
+        }
+    }
     return sums;
 }
 

@@ -34,7 +34,7 @@ void compile_frames(Device& device) {
     for (int degree = 0; degree < kDegree; ++degree)
         BenchStep(device, random_scene(64, degree), camera);
     ForwardOptions options;
-    options.crowds = Crowds::always;
+    options.huge_splat_path = HugeSplatPath::always;
     FrameBuffers buffers(device, options);
     Forward forward(device, options);
     const SplatModel model = random_scene(64, kDegree);
@@ -68,7 +68,7 @@ void compile_training(Device& device) {
 std::vector<RecordedWork> iteration_of(const BenchStep& step) {
     FrameCounts counts;
     counts.splats = counts.visible = kNamedSplats;
-    counts.pairs = kIntersectionsOfASplat * kNamedSplats;
+    counts.intersections = kIntersectionsOfASplat * kNamedSplats;
     counts.pixels = kNamedPixels;
     counts.rest_floats = attribute_floats(kShRest, kDegree);
     std::vector<RecordedWork> rows;
