@@ -3,7 +3,7 @@
 
     gpu_compilers.py fetch DIR [--all]       unpacks Mesa's drivers below DIR: AMD's, with --all every vendor's
     gpu_compilers.py run DIR GPU [--json F]  darb devices --passes as that GPU's driver would compile
-    gpu_compilers.py check DIR               AMD's compiler against assets/results/gpu_passes.json; 1: worse than there
+    gpu_compilers.py check DIR [GPU]         AMD's compiler against assets/results/gpu_passes.json; 1: worse than there
     gpu_compilers.py record DIR              writes what is measured now to that table
     gpu_compilers.py tables DIR              prints the tables of docs/gpu.md, of every GPU that is there
 
@@ -171,10 +171,10 @@ def worse(gpu, report, table):
     return found
 
 
-def check(root, darb):
+def check(root, darb, gpus):
     table = json.loads(TABLE.read_text())
     found = []
-    for gpu in CHECKED:
+    for gpu in gpus:
         report = measured(root, gpu, darb)
         if not report["has_statistics"] or not report["passes"]:
             fail(f"{gpu}: the driver tells nothing of its passes")
@@ -245,7 +245,10 @@ def main():
         print(done.stdout, end="")
         print(done.stderr, end="", file=sys.stderr)
         return done.returncode
-    return {"check": check, "record": record, "tables": tables}[flags.verb](root, flags.darb.resolve())
+    darb = flags.darb.resolve()
+    if flags.verb == "check":
+        return check(root, darb, [flags.gpu] if flags.gpu else CHECKED)
+    return {"record": record, "tables": tables}[flags.verb](root, darb)
 
 
 if __name__ == "__main__":
