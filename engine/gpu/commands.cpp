@@ -224,8 +224,7 @@ void Commands::State::finish_pass() {
 std::string Commands::State::all_passes() const {
     if (passes.empty()) return "submission";
     if (passes.size() == 1) return here();
-    return fmt::format("passes \"{}\" to \"{}\"", passes.front().name,
-                       passes.back().name);
+    return fmt::format("passes \"{}\" to \"{}\"", passes.front().name, passes.back().name);
 }
 
 Commands::Commands(Device& device) : state_(std::make_unique<State>(device)) {

@@ -54,9 +54,9 @@ std::vector<DeviceInfo> list_devices();
 std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::string& select);
 
 struct DeviceOptions {
-    std::string select;                  // "" = best usable; a number = index; else part of a name
-    bool validation = false;             // core + synchronization validation
-    Faults faults;                       // injected for tests
+    std::string select;       // "" = best usable; a number = index; else part of a name
+    bool validation = false;  // core + synchronization validation
+    Faults faults;            // injected for tests
     /// Nothing is given to the queue: what is downloaded is 0. Pipelines are compiled anew, past
     /// every cache, and Device::compiled says what the driver tells of them.
     bool compile_only = false;

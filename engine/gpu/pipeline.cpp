@@ -202,8 +202,9 @@ Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants&
         const std::chrono::duration<double, std::milli> took =
             std::chrono::steady_clock::now() - begun;
         if (state.compile_only)
-            state.note_compiled(pipeline_, {name_, given_constants(interface, constants), threads_x_,
-                                            size, took.count(), {}});
+            state.note_compiled(
+                pipeline_,
+                {name_, given_constants(interface, constants), threads_x_, size, took.count(), {}});
     } catch (...) {
         release();
         throw;

@@ -14,12 +14,14 @@ namespace {
 
 double as_number(const VkPipelineExecutableStatisticKHR& statistic) {
     switch (statistic.format) {
-        case VK_PIPELINE_EXECUTABLE_STATISTIC_FORMAT_BOOL32_KHR: return statistic.value.b32 != 0;
+        case VK_PIPELINE_EXECUTABLE_STATISTIC_FORMAT_BOOL32_KHR:
+            return statistic.value.b32 != 0;
         case VK_PIPELINE_EXECUTABLE_STATISTIC_FORMAT_INT64_KHR:
             return static_cast<double>(statistic.value.i64);
         case VK_PIPELINE_EXECUTABLE_STATISTIC_FORMAT_UINT64_KHR:
             return static_cast<double>(statistic.value.u64);
-        default: return statistic.value.f64;
+        default:
+            return statistic.value.f64;
     }
 }
 
@@ -75,12 +77,11 @@ CommonStatistics common_statistics(const CompiledPipeline& pipeline) {
     CommonStatistics c;
     c.registers = sum_of(pipeline, {"vgprs", "numberofgprs", "gprs", "registers", "registercount",
                                     "maxliveregisters", "fullregisters"});
-    c.spills = sum_of(pipeline, {"spilledvgprs", "spilledsgprs", "spillstomemory", "fillsfrommemory",
-                                 "spillstoreg", "fillsfromreg", "spillcount", "fillcount", "spills",
-                                 "fills"});
-    c.scratch_bytes =
-        sum_of(pipeline, {"scratchsize", "slmsize", "scratchmemorysize", "privatememory",
-                          "localmemory", "scratch"});
+    c.spills = sum_of(
+        pipeline, {"spilledvgprs", "spilledsgprs", "spillstomemory", "fillsfrommemory",
+                   "spillstoreg", "fillsfromreg", "spillcount", "fillcount", "spills", "fills"});
+    c.scratch_bytes = sum_of(pipeline, {"scratchsize", "slmsize", "scratchmemorysize",
+                                        "privatememory", "localmemory", "scratch"});
     c.shared_bytes = sum_of(pipeline, {"ldssize", "sharedmemory", "workgroupmemorysize"});
     c.occupancy = sum_of(pipeline, {"subgroupspersimd", "occupancy", "maxwarpssm", "maxwaves"});
     c.instructions = sum_of(pipeline, {"instructions", "instructioncount", "instrs"});

@@ -1,6 +1,6 @@
 // What a device's compiler says of the passes that it compiled: registers, spills, occupancy and
-// whatever else it counts (VK_KHR_pipeline_executable_properties). Place: DeviceOptions::compile_only
-// collects them; `darb devices --passes` prints them.
+// whatever else it counts (VK_KHR_pipeline_executable_properties). Place:
+// DeviceOptions::compile_only collects them; `darb devices --passes` prints them.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,9 @@ struct PipelineStatistic {
 
 struct CompiledPipeline {
     std::string shader;
-    std::string constants;                  // those given and declared: "SH_DEGREE=3 THREADS=64"
-    std::uint32_t threads = 0;              // of a workgroup
-    std::uint32_t subgroup_size = 0;        // as the driver says, 0 where it does not
+    std::string constants;            // those given and declared: "SH_DEGREE=3 THREADS=64"
+    std::uint32_t threads = 0;        // of a workgroup
+    std::uint32_t subgroup_size = 0;  // as the driver says, 0 where it does not
     double compile_ms = 0;
     std::vector<PipelineStatistic> values;  // empty where the driver has no statistics
 };

@@ -20,7 +20,7 @@ struct RecordedWork {
 
 struct PassStatistics {
     DeviceInfo device;
-    bool has_statistics = false;            // of the driver; without: times of compilation alone
+    bool has_statistics = false;             // of the driver; without: times of compilation alone
     std::vector<CompiledPipeline> compiled;  // each once, by shader and constants
     /// An iteration of `splats` visible splats of degree 3 in a picture of this size with six
     /// intersections a splat, the Adam step within the backward pass.
