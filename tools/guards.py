@@ -79,7 +79,7 @@ GUARDS = [
      "opacity_logit[i] -= FADING", "opacity_logit[i] -= 0.0",
      "adam_update_test", "AdamUpdate.splats_beside_the_camera_fade"),
     ("splat centre exactly on a pixel centre", "series_at_the_centre", "shaders/kernels/builtin.glsl",
-     "s < 0.25 ? 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0))) : sin(x) / x", "sin(x) / x",
+     "s < 0.25 ? 1.0 - s * (1.0 / 6.0 - s * (1.0 / 120.0 - s * (1.0 / 5040.0))) : kernel_sin(x) / x", "sin(x) / x",
      "blend_test", "*sinc_psi_builtin:*mean_on_a_pixel_centre*"),
     ("q within 1e-6 of the support's edge", "zero_beyond_the_edge", "shaders/kernels/builtin.glsl",
      "w = inside ? max(w, 0.0) : 0.0;", "w = max(w, 0.0);",
