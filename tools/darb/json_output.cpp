@@ -6,8 +6,8 @@
 
 namespace darb {
 
-void add_json_option(CLI::App& command, std::filesystem::path& json) {
-    command.add_option("--json", json, "write every number to this file; - is stdout");
+CLI::Option* add_json_option(CLI::App& command, std::filesystem::path& json) {
+    return command.add_option("--json", json, "write every number to this file; - is stdout");
 }
 
 std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet) {

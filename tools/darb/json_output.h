@@ -10,7 +10,7 @@
 
 namespace darb {
 
-void add_json_option(CLI::App& command, std::filesystem::path& json);
+CLI::Option* add_json_option(CLI::App& command, std::filesystem::path& json);
 
 /// Where text for people goes; null, nowhere, where quiet.
 std::FILE* stream_beside_json(const std::filesystem::path& json, bool quiet);
