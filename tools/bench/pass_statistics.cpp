@@ -125,38 +125,37 @@ void print_pass_statistics(std::FILE* out, const PassStatistics& all) {
     tell(out, "{} ({})\n", all.device.name, all.device.driver);
     if (!all.has_statistics)
         tell(out,
-                   "This driver has no statistics of pipelines "
-                   "(VK_KHR_pipeline_executable_properties): times of compilation alone.\n");
+             "This driver has no statistics of pipelines "
+             "(VK_KHR_pipeline_executable_properties): times of compilation alone.\n");
     tell(out, "\n{:<26}{:>8}{:>9}{:>10}{:>8}{:>9}{:>8}{:>10}{:>9}{:>9}{:>9}  {}\n", "pass",
-               "threads", "subgroup", "registers", "spills", "scratch", "shared", "occupancy",
-               "instr.", "cycles", "ms", "constants");
+         "threads", "subgroup", "registers", "spills", "scratch", "shared", "occupancy", "instr.",
+         "cycles", "ms", "constants");
     for (const CompiledPipeline& one : all.compiled) {
         const CommonStatistics c = common_statistics(one);
-        tell(out, "{:<26}{:>8}{:>9}{:>10}{:>8}{:>9}{:>8}{:>10}{:>9}{:>9}{:>9.1f}  {}\n",
-                   one.shader, one.threads,
-                   one.subgroup_size != 0 ? fmt::format("{}", one.subgroup_size) : "-",
-                   amount(c.registers), amount(c.spills), amount(c.scratch_bytes),
-                   amount(c.shared_bytes), amount(c.occupancy), amount(c.instructions),
-                   amount(c.cycles), one.compile_ms, one.constants);
+        tell(out, "{:<26}{:>8}{:>9}{:>10}{:>8}{:>9}{:>8}{:>10}{:>9}{:>9}{:>9.1f}  {}\n", one.shader,
+             one.threads, one.subgroup_size != 0 ? fmt::format("{}", one.subgroup_size) : "-",
+             amount(c.registers), amount(c.spills), amount(c.scratch_bytes), amount(c.shared_bytes),
+             amount(c.occupancy), amount(c.instructions), amount(c.cycles), one.compile_ms,
+             one.constants);
     }
     tell(out,
-               "\nOne iteration, {:.0f} visible splats of degree {}, {:.0f} pixels, {:.0f} "
-               "intersections:\n{:<26}{:>11}{:>10}{:>13}{:>10}\n",
-               all.splats, kDegree, all.pixels, all.intersections, "pass", "dispatches", "barriers",
-               "descriptors", "MiB");
+         "\nOne iteration, {:.0f} visible splats of degree {}, {:.0f} pixels, {:.0f} "
+         "intersections:\n{:<26}{:>11}{:>10}{:>13}{:>10}\n",
+         all.splats, kDegree, all.pixels, all.intersections, "pass", "dispatches", "barriers",
+         "descriptors", "MiB");
     RecordedPass sum;
     double bytes = 0;
     for (const RecordedWork& row : all.iteration) {
         tell(out, "{:<26}{:>11}{:>10}{:>13}{:>10}\n", row.pass.name, row.pass.dispatches,
-                   row.pass.barriers, row.pass.descriptors,
-                   row.bytes > 0 ? fmt::format("{:.0f}", row.bytes / (1 << 20)) : "-");
+             row.pass.barriers, row.pass.descriptors,
+             row.bytes > 0 ? fmt::format("{:.0f}", row.bytes / (1 << 20)) : "-");
         sum.dispatches += row.pass.dispatches;
         sum.barriers += row.pass.barriers;
         sum.descriptors += row.pass.descriptors;
         bytes += row.bytes;
     }
     tell(out, "{:<26}{:>11}{:>10}{:>13}{:>10.0f}\n", "all", sum.dispatches, sum.barriers,
-               sum.descriptors, bytes / (1 << 20));
+         sum.descriptors, bytes / (1 << 20));
 }
 
 nlohmann::json pass_statistics_json(const PassStatistics& all) {
