@@ -18,4 +18,15 @@ struct Bounds {
 /// exist; at most 100,000 evenly chosen ones are looked at.
 Bounds scene_bounds(const SplatModel& model);
 
+/// How far from the centre of the bounds an eye must be, looking along the third of `axes` (right,
+/// down, forward), for a view that is 2 tan_x by 2 tan_y wide at distance 1 to show all but 0.2 %
+/// of the splats within 1.35 radii. 0 where there are none.
+double framing_distance(const SplatModel& model, const Bounds& bounds, const glm::dmat3& axes,
+                        double tan_x, double tan_y);
+
+/// A guess which way is up in a scene without cameras: -y, as 3DGS has it, but where the top looks
+/// like a foot: opacity times area within 5 % of the height, times how wide that is, is more than
+/// 1.5 times that of the bottom. What stands is wide where it stands.
+glm::dvec3 guess_up(const SplatModel& model);
+
 }  // namespace darb

@@ -2,15 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <utility>
 
 namespace darb {
 
 namespace {
 
 constexpr int kSlowFrames = 2, kQuickFrames = 12;
-constexpr double kAim = 0.85, kRoom = 0.7;  // of the target: what a change aims at; room for more
-constexpr double kMostDown = 0.2, kMostUp = 2;  // factor of one change
-constexpr double kLeastPixels = 1.0 / 16, kLeastSplats = 10'000;
+constexpr double kAim = 0.85, kRoom = 0.7;   // of the target: what a change aims at; room for more
+constexpr double kMostUp = 2;                // factor of one change
+constexpr double kPixelsWeight = 2.5;        // in the error
+constexpr int kScales = 8, kLeastScale = 2;  // eighths
+constexpr double kLeastSplats = 10'000;
 
 }  // namespace
 
@@ -28,32 +32,54 @@ MotionCost motion_cost(double frame_ms, std::span<const PassTime> passes) {
     return cost;
 }
 
-MotionQuality MotionControl::quality() const {
-    return {std::ceil(std::sqrt(pixels_) * 8 - 1e-9) / 8, splats_};
+double motion_error(const MotionQuality& q) {
+    return kPixelsWeight * (1 / (q.scale * q.scale) - 1) + 1 / q.splats - 1;
 }
 
-void MotionControl::start(std::size_t splats, double most) {
+std::vector<double> motion_shares(std::size_t splats, double most) {
+    std::vector<double> shares;
+    const double least = (1 - 1e-9) * kLeastSplats / std::max(static_cast<double>(splats), 1.0);
+    for (double share = most; share > 0 && (shares.empty() || share >= least);
+         share /= std::numbers::sqrt2)
+        shares.push_back(share);
+    return shares;
+}
+
+void MotionControl::start(std::vector<double> shares) {
     *this = MotionControl(target_ms_);
-    most_ = most;
-    least_ = std::min(kLeastSplats / std::max(static_cast<double>(splats), 1.0), most);
-    splats_ = std::clamp(splats_, least_, most_);
+    shares_ = std::move(shares);
+    for (const double share : shares_)
+        if (share >= 0.2) quality_.splats = share;  // about a quarter, or the nearest there is
+    if (quality_.splats == 1 && !shares_.empty()) quality_.splats = shares_.front();
 }
 
-// `factor` for what costs more, less of a change for the other; up, where one is whole, all for the
-// other. Between most_ and all splats there is nothing: a step, taken where they fit.
-void MotionControl::change(double factor, double room_ms) {
-    const bool at_most = factor > 1 && splats_ < 1 && splats_ >= most_;
-    if (at_most && best_.splats_ms / splats_ + best_.pixels_ms <= room_ms) {
-        splats_ = 1;
-        return;
-    }
-    const double most = std::max({best_.splats_ms, best_.pixels_ms, 1e-9});
-    const bool up = factor > 1;
-    const double of_splats = up && pixels_ >= 1 ? 1 : best_.splats_ms / most;
-    const double of_pixels = up && (splats_ >= 1 || at_most) ? 1 : best_.pixels_ms / most;
-    splats_ = std::clamp(splats_ * std::pow(factor, of_splats), least_, 1.0);
-    if (splats_ < 1) splats_ = std::min(splats_, most_);
-    pixels_ = std::clamp(pixels_ * std::pow(factor, of_pixels), kLeastPixels, 1.0);
+// From the time of the best of the last frames; where nothing fits, what takes least.
+void MotionControl::choose(double room_ms) {
+    const double splats_ms = best_.splats_ms / quality_.splats;
+    const double pixels_ms = best_.pixels_ms / (quality_.scale * quality_.scale);
+    std::vector<double> shares = {1};
+    shares.insert(shares.end(), shares_.begin(), shares_.end());
+    double largest = kMostUp * quality_.splats;  // the next share, where that is farther off
+    for (const double share : shares)
+        if (share > quality_.splats) largest = std::max(kMostUp * quality_.splats, share);
+    const MotionQuality now = quality_;
+    double best_error = 0, least_ms = 0;
+    bool any_fits = false, first = true;
+    for (const double share : shares)
+        for (int eighths = kLeastScale; eighths <= kScales; ++eighths) {
+            const MotionQuality q{static_cast<double>(eighths) / kScales, share};
+            const double ms = splats_ms * q.splats + pixels_ms * q.scale * q.scale;
+            if (share > largest || q.scale > kMostUp * now.scale) continue;
+            const bool fits = ms <= room_ms;
+            const double error = motion_error(q);
+            if (fits ? !any_fits || error < best_error : !any_fits && (first || ms < least_ms)) {
+                quality_ = q;
+                best_error = error;
+            }
+            least_ms = first ? ms : std::min(least_ms, ms);
+            any_fits |= fits;
+            first = false;
+        }
 }
 
 void MotionControl::measured(const MotionCost& cost) {
@@ -68,8 +94,8 @@ void MotionControl::measured(const MotionCost& cost) {
     slow_ = quick_ = 0;
     // Where panels and presentation leave nothing, a fifth of the time all the same.
     const double room_ms = std::max(kAim * target_ms_ - best_.fixed_ms, 0.2 * target_ms_);
-    const double factor = room_ms / std::max(best_.splats_ms + best_.pixels_ms, 1e-6);
-    if (slow == (factor < 1)) change(std::clamp(factor, kMostDown, kMostUp), room_ms);
+    const bool fits = best_.splats_ms + best_.pixels_ms <= room_ms;
+    if (slow != fits) choose(room_ms);
 }
 
 }  // namespace darb

@@ -66,7 +66,11 @@ void Navigation::fly(const glm::dvec3& step) {
 
 void Navigation::frame(const glm::dvec3& centre, double radius, double aspect) {
     const double fov_x = 2 * std::atan(std::tan(fov_y / 2) * aspect);
-    distance = std::max(radius / std::sin(std::min(fov_x, fov_y) / 2), kMinDistance);
+    look_from(centre, radius / std::sin(std::min(fov_x, fov_y) / 2));
+}
+
+void Navigation::look_from(const glm::dvec3& centre, double from) {
+    distance = std::max(from, kMinDistance);
     eye = centre - distance * forward();
 }
 
@@ -108,7 +112,7 @@ Camera Navigation::camera(int width_px, int height_px) const {
     c.width = width_px;
     c.height = height_px;
     c.fx = c.fy = 0.5 * height_px / std::tan(fov_y / 2);
-    c.cx = 0.5 * width_px;
+    c.cx = centre_x * width_px;
     c.cy = 0.5 * height_px;
     c.rotation = glm::transpose(axes);
     c.translation = -(c.rotation * eye);
@@ -123,6 +127,14 @@ glm::dvec3 up_from_name(const std::string& name) {
     glm::dvec3 up(0.0);
     up[i] = negative ? -1 : 1;
     return up;
+}
+
+glm::dmat3 turn_to_up(const glm::dvec3& up) {
+    const glm::dvec3 to(0, -1, 0);
+    glm::dvec3 axis = glm::cross(up, to);
+    const double sine = glm::length(axis);
+    axis = sine > 1e-12 ? axis / sine : glm::dvec3(1, 0, 0);  // a half turn, where it is opposite
+    return rotation_about(axis, std::atan2(sine, glm::dot(up, to)));
 }
 
 std::string up_name(const glm::dvec3& up) {

@@ -15,6 +15,7 @@ struct Navigation {
     glm::dvec3 up{0, -1, 0};   // unit, world; what an orbit turns around
     double distance = 3;       // world, from the eye to the pivot in front of it
     double fov_y = glm::radians(50.0);  // rad, full height
+    double centre_x = 0.5;              // share of the window's width left of the optical axis
 
     glm::dvec3 right() const { return axes[0]; }
     glm::dvec3 down() const { return axes[1]; }
@@ -35,6 +36,8 @@ struct Navigation {
     void fly(const glm::dvec3& right_up_forward);
     /// The sphere fills the smaller side of a window; direction and horizon stay.
     void frame(const glm::dvec3& centre, double radius, double aspect);
+    /// Looks at the centre from this distance; direction and horizon stay.
+    void look_from(const glm::dvec3& centre, double distance);
     /// A new pivot in the direction of `point`, without turning: only its distance changes.
     void set_pivot_depth(const glm::dvec3& point);
     /// New world up: around the pivot the camera turns along with it, so that it goes on looking as
@@ -44,7 +47,7 @@ struct Navigation {
     void level();
     /// Pose and field of view of a photo's camera.
     void take(const Camera& camera);
-    /// The pinhole for a window, principal point in its middle.
+    /// The pinhole for a window, principal point at half its height and centre_x of its width.
     Camera camera(int width_px, int height_px) const;
 
   private:
@@ -53,6 +56,8 @@ struct Navigation {
 
 /// Unit vector of x, -x, y, -y, z, -z. Throws Error for other names.
 glm::dvec3 up_from_name(const std::string& name);
+/// The shortest turn of the world that takes `up`, of unit length, to -y.
+glm::dmat3 turn_to_up(const glm::dvec3& up);
 /// Name of the axis nearest to a direction.
 std::string up_name(const glm::dvec3& up);
 

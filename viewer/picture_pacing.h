@@ -65,6 +65,7 @@ class PicturePacing {
     bool settled() const { return unsettled_ == 0; }
 
     MotionControl& motion() { return motion_; }
+    const MotionControl& motion() const { return motion_; }
 
   private:
     bool is_drawn() const { return drawn_ && *drawn_ == last_; }

@@ -107,6 +107,7 @@ struct Session {
     int sh_degree = 0;  // highest of the scene or the run
     bool panels = true;
     float gui_scale = 1;
+    bool save_upright = false;  // turns what is saved so that up becomes -y
 
     void ask(const Request& request) { requests.push_back(request); }
 };
@@ -114,5 +115,7 @@ struct Session {
 /// The panels of one frame; progress, errors and questions also where session.panels is off. Needs
 /// an ImGui frame, in whose coordinates they are.
 void draw_panels(Session& session);
+/// px that the side panel takes from the left of the window where it was not moved; 0: hidden.
+float panel_width(const Session& session);
 
 }  // namespace darb

@@ -61,6 +61,7 @@ void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
     own_ = GpuSplats(*device_, model, false);
     styled_.reset();
     some_.reset();
+    drop_levels();
     live_ = nullptr;
     model_ = &model;
     bounds_ = bounds;
@@ -78,6 +79,7 @@ void SplatPicture::clear() {
     own_.reset();
     styled_.reset();
     some_.reset();
+    drop_levels();
     important_.clear();
     slots_ = {};
     live_ = nullptr;
@@ -93,6 +95,25 @@ void SplatPicture::set_removed(const std::vector<std::uint8_t>& removed) {
     if (!opacity_logit.empty()) own_->parameters(kOpacityLogit).upload(opacity_logit);
     styled_.reset();
     some_.reset();
+    drop_levels();
+}
+
+void SplatPicture::add_level(const SplatModel& level) {
+    levels_.emplace_back(*device_, level, false);
+}
+
+void SplatPicture::drop_levels() {
+    levels_.clear();
+    levels_ended_ = false;
+}
+
+// The largest that is not more than asked for.
+const GpuSplats* SplatPicture::level_of(SplatStyle style, double share) const {
+    if (style != SplatStyle::splats || !own_) return nullptr;
+    const double most = share * static_cast<double>(own_->count()) + 1;
+    for (const GpuSplats& level : levels_)
+        if (level.count() <= most) return &level;
+    return nullptr;
 }
 
 const GpuSplats& SplatPicture::styled(SplatStyle style) {
@@ -107,9 +128,10 @@ const GpuSplats& SplatPicture::styled(SplatStyle style) {
     return *styled_;
 }
 
-// A share of the splats is the beginning of a copy in the order of importance.
+// A level where there is one; else the beginning of a copy in the order of importance.
 const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
     if (share >= 1 || important_.empty() || !own_) return styled(style);
+    if (const GpuSplats* level = level_of(style, share)) return *level;
     if (!some_ || some_as_ != style) {
         SplatModel model = in_style(pick_splats(*model_, important_), style);
         for (size_t i = 0; i < important_.size() && !removed_.empty(); ++i)
@@ -184,7 +206,8 @@ SplatPicture::Slot& SplatPicture::slot_for(const GpuSplats& splats, const Displa
 
 bool SplatPicture::ready_to_move(const DisplaySettings& display) const {
     const Slot& slot = slots_[1];
-    const bool some = important_.empty() || !own_ || (some_ && some_as_ == display.style);
+    const bool some = important_.empty() || !own_ || (some_ && some_as_ == display.style) ||
+                      (levels_ended_ && display.style == SplatStyle::splats);
     return some && slot.forward && slot.key == key_for(display, true) &&
            slot.degree == std::min(display.sh_degree, slot.key.sh_stored);
 }

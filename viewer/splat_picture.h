@@ -34,6 +34,12 @@ class SplatPicture {
     /// important: what to draw in motion, most important first; may be none.
     void set_scene(const SplatModel& model, const Bounds& bounds,
                    std::vector<std::uint32_t> important = {});
+    /// A level of the scene's merged splats, fewer than those before it; in motion it is drawn
+    /// instead of so many important ones. Not for display styles. Throws Error.
+    void add_level(const SplatModel& level);
+    /// All levels are there: the important splats are not needed any more.
+    void end_levels() { levels_ended_ = true; }
+    bool levels_ended() const { return levels_ended_; }
     /// Shows splats that someone else owns and changes (a training run); display styles that
     /// need the model on the host fall back to splats.
     void set_live(const GpuSplats& splats, const Bounds& bounds);
@@ -42,7 +48,7 @@ class SplatPicture {
     const Bounds& bounds() const { return bounds_; }
     std::uint32_t splat_count() const { return splats() ? splats()->count() : 0; }
 
-    /// Deleted splats (1) vanish, the others are as in the model.
+    /// Deleted splats (1) vanish, the others are as in the model. Levels go.
     void set_removed(const std::vector<std::uint8_t>& removed);
 
     /// Renders and waits. camera: at the size of the frame that is wanted. moving: with the fast
@@ -72,6 +78,8 @@ class SplatPicture {
     const GpuSplats* splats() const { return live_ ? live_ : own_ ? &*own_ : nullptr; }
     const GpuSplats& styled(SplatStyle style);
     const GpuSplats& some_styled(SplatStyle style, double share);
+    const GpuSplats* level_of(SplatStyle style, double share) const;
+    void drop_levels();
     // The splats' colours become their depths, between the two steps of a frame.
     void record_depth_colours(const ProjectedSplats& projected, const Camera& camera,
                               std::uint32_t splats);
@@ -108,6 +116,8 @@ class SplatPicture {
     std::optional<GpuSplats> own_, styled_, some_;  // all; all in a style; the important ones
     SplatStyle styled_as_ = SplatStyle::splats, some_as_ = SplatStyle::splats;
     std::vector<std::uint32_t> important_;
+    std::vector<GpuSplats> levels_;  // fewer and fewer
+    bool levels_ended_ = false;
     std::vector<std::uint8_t> removed_;
     Bounds bounds_;
     std::array<Slot, 2> slots_;  // at rest, moving

@@ -31,7 +31,8 @@ Viewer::Viewer(Device& device, ViewerOptions options, GLFWwindow* window)
       loader_(options_.resolve, options_.wake),
       canvas_(device),
       gui_(device, canvas_.render_pass(), options_.gui_scale > 0 ? options_.gui_scale : 1, window),
-      picture_(device) {
+      picture_(device),
+      remembered_(options_.up_list) {
     session_.photos.views = options_.views;
     session_.navigation.set_up(start_up(options_));
     session_.device_name = device.info().name;
@@ -78,6 +79,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
         continuous_ ? std::chrono::duration<double>(frame_start_ - last_frame_).count() : kStep_s;
     last_frame_ = frame_start_;
     take_loaded();
+    take_levels();
     for (const auto& path : input.dropped) drop(path);
     canvas_.resize(width, height);
     gui_.begin(width, height);  // now it knows whether the pointer is on a panel
@@ -88,6 +90,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     draw_panels(session_);
     gui_.end();
     act_on_requests(width, height);
+    remember_up();
     const bool works = work_.draws();
     step_work();
     load_current_photo();

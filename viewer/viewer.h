@@ -3,13 +3,16 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "viewer/canvas.h"
 #include "viewer/gui.h"
+#include "viewer/motion_levels.h"
 #include "viewer/picture_pacing.h"
 #include "viewer/picture_work.h"
+#include "viewer/remembered_up.h"
 #include "viewer/saved_files.h"
 #include "viewer/scene_loader.h"
 #include "viewer/session.h"
@@ -19,7 +22,7 @@ namespace darb {
 
 struct ViewerOptions {
     std::vector<View> views;  // cameras of a data set, may be none
-    std::string up;           // x, -x, ...; "" = from the cameras, else -y
+    std::string up;           // x, -x, ...; "" = from the cameras, else remembered or guessed
     bool quiet = false;       // says nothing of what it has loaded
     float gui_scale = 0;      // size of the panels; 0: as the display wants it
     Accuracy accuracy;        // to start with
@@ -29,6 +32,9 @@ struct ViewerOptions {
     /// Cameras that lie beside a scene, for one that is dropped; where there is no such function,
     /// views stay. What it throws is a note.
     std::function<std::vector<View>(const std::filesystem::path&)> find_cameras;
+    /// Scenes with cameras open at the first, with its photo where there is one.
+    bool start_at_camera = false;
+    std::filesystem::path up_list;  // of RememberedUp
     /// Called from other threads when there is something to show.
     std::function<void()> wake;
 };
@@ -77,6 +83,8 @@ class Viewer {
     bool at_rest() const;
     /// It has all pixels, and the most important splats at least.
     bool refined() const;
+    /// No levels of merged splats for motion are being made.
+    bool levels_ready() const;
 
   private:
     using Clock = std::chrono::steady_clock;
@@ -90,6 +98,8 @@ class Viewer {
     void show_as_meant(const Scene& scene, bool first);
     void follow_plan();
     void set_pivot(const Bounds& bounds);
+    void first_look(bool of_run);
+    void remember_up();
     void lose_scene(const char* why);
 
     // viewer_requests.cpp: what is asked for.
@@ -114,6 +124,9 @@ class Viewer {
     void pace_picture(int width, int height, bool full, bool works);
     void draw_picture(const PictureKey& key, PictureStep step);
     void rehearse_motion(const PictureKey& key);
+    void start_levels();
+    void take_levels();
+    void lose_levels();
 
     Device* device_;
     ViewerOptions options_;
@@ -125,8 +138,13 @@ class Viewer {
     SplatPicture picture_;
     PicturePacing pacing_;
     PictureWork work_;
-    int version_ = 0;          // of the scene and its edits
-    bool continuous_ = false;  // the last frame wanted this one at once
+    RememberedUp remembered_;
+    glm::dvec3 known_up_{0.0};              // of the scene, as it was opened or last remembered
+    std::vector<double> shares_;            // of the splats, below all
+    std::unique_ptr<MotionLevels> levels_;  // of the scene; null: none asked for
+    std::vector<std::unique_ptr<MotionLevels>> ended_;  // cancelled, their threads still run
+    int version_ = 0;                                   // of the scene and its edits
+    bool continuous_ = false;                           // the last frame wanted this one at once
     Clock::time_point frame_start_, last_frame_;
 };
 

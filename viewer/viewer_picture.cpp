@@ -2,15 +2,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/error.h"
 #include "viewer/viewer.h"
 
 namespace darb {
 
 namespace {
 
-constexpr double kLong_ms = 500;   // for a whole picture
-constexpr size_t kTimesKept = 60;  // frames in motion that the panel averages over
-constexpr int kRehearsals = 8;     // of motion, after the one that compiles
+constexpr double kLong_ms = 500;            // for a whole picture
+constexpr std::size_t kFewSplats = 20'000;  // half of them are always drawn
+constexpr double kQuick_ms = 20;            // it will be drawn in motion, too
+constexpr size_t kTimesKept = 60;           // frames in motion that the panel averages over
+constexpr int kRehearsals = 8;              // of motion, after the one that compiles
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -25,6 +28,41 @@ Camera scaled(const Camera& camera, double scale) {
 }
 
 }  // namespace
+
+// Where a picture in motion cannot have all splats. Another scene and edits end them.
+void Viewer::start_levels() {
+    if (levels_ || !session_.scene || shares_.empty() || !pacing_.is_whole()) return;
+    if (pacing_.motion().quality().splats == 1 || session_.times.full_ms < kQuick_ms) return;
+    const Scene& s = *session_.scene;
+    if (s.model.size() < kFewSplats) return;
+    std::vector<std::size_t> counts;
+    for (const double share : shares_)
+        counts.push_back(static_cast<std::size_t>(share * static_cast<double>(s.model.size())));
+    levels_ =
+        std::make_unique<MotionLevels>(s.model, session_.edit.removed(), counts, options_.wake);
+}
+
+void Viewer::take_levels() {
+    std::erase_if(ended_, [](const auto& job) { return job->done(); });
+    if (!levels_ || picture_.levels_ended()) return;
+    const bool done = levels_->done();
+    try {
+        while (const std::optional<SplatModel> level = levels_->take()) picture_.add_level(*level);
+    } catch (const Error&) {  // no room: the important splats do without it
+        levels_->cancel();
+    }
+    if (done) picture_.end_levels();
+}
+
+void Viewer::lose_levels() {
+    if (!levels_) return;
+    levels_->cancel();
+    ended_.push_back(std::move(levels_));
+}
+
+bool Viewer::levels_ready() const {
+    return picture_.levels_ended() || !levels_;
+}
 
 void Viewer::load_current_photo() {
     Photos& p = session_.photos;
@@ -53,6 +91,7 @@ void Viewer::pace_picture(int width, int height, bool full, bool works) {
         rehearse_motion(key);
     else if (step != PictureStep::none)
         draw_picture(key, step);
+    if (!works) start_levels();
 }
 
 // All but the whole one are replaced soon.

@@ -1,6 +1,7 @@
 // What panels, keys and the window asked for: files, edits, paths.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -8,6 +9,7 @@
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/publish/web_page.h"
+#include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/controls.h"
 #include "viewer/viewer.h"
@@ -17,6 +19,9 @@ namespace darb {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kLeastFree = 0.4;  // of the width: less room beside the panel is not used alone
+constexpr double kFilled = 0.94;    // of the free area, by what is framed
 
 // Not one of a link either, to whatever it leads.
 fs::path free_picture_name() {
@@ -97,7 +102,19 @@ void Viewer::need_scene(const char* what) const {
 void Viewer::frame_all(int width, int height) {
     leave_photo(session_);
     const Bounds bounds = picture_.bounds();
-    session_.navigation.frame(bounds.centre, bounds.radius, double(width) / height);
+    Navigation& n = session_.navigation;
+    const double panel = panel_width(session_), free = width - panel;
+    const bool beside = free >= kLeastFree * width && session_.display.effects.off_centre;
+    n.centre_x = beside ? (panel + free / 2) / width : 0.5;
+    const double wide = beside ? free : width;
+    const double tan_y = std::tan(n.fov_y / 2), tan_x = tan_y * wide / height;
+    const double distance = session_.scene ? framing_distance(session_.scene->model, bounds, n.axes,
+                                                              kFilled * tan_x, kFilled * tan_y)
+                                           : 0;
+    if (distance > 0)
+        n.look_from(bounds.centre, distance);
+    else
+        n.frame(bounds.centre, bounds.radius, wide / height);
 }
 
 void Viewer::load_path() {
@@ -124,7 +141,8 @@ void Viewer::save_scene() {
         throw Error(s.save_file.string(), "its ending names no format to write",
                     "Use " + endings_to_write() + ".");
     saved_.check(s.save_file);
-    const SplatModel model = s.edit.apply(s.scene->model);
+    SplatModel model = s.edit.apply(s.scene->model);
+    if (s.save_upright) transform_splats({.turn = turn_to_up(s.navigation.up)}, model);
     save_splats(s.save_file, *format, model);
     saved_.wrote(s.save_file);
     s.edit.mark_saved();

@@ -14,6 +14,8 @@ namespace darb {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 bool any_lens(const std::vector<View>& views) {
     return std::any_of(views.begin(), views.end(),
                        [](const View& v) { return v.camera.lens.active; });
@@ -65,7 +67,10 @@ void Viewer::show(LoadedScene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded.scene));
     picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
     lose_scene("another scene was opened");
-    pacing_.motion().start(picture_.splat_count(), picture_.most_moving());
+    shares_ = picture_.most_moving() < 1
+                  ? motion_shares(picture_.splat_count(), picture_.most_moving())
+                  : std::vector<double>();
+    pacing_.motion().start(shares_);
     // The scene of a run that was shown: from where the user looked at the run.
     const bool of_run = session_.scene == nullptr && session_.training.finished;
     const bool first = session_.scene == nullptr && !of_run;
@@ -86,14 +91,41 @@ void Viewer::show(LoadedScene loaded) {
     tell(options_.quiet ? nullptr : stdout, "loaded {}: {} splats in {:.2f} s\neffects: {}\n",
          s.file.string(), s.model.size(), s.load_s, plan_line(*session_.plan));
     if (first) session_.navigation.level();
-    if (session_.photos.current < 0 && !of_run) session_.ask(request::FrameAll{});
+    first_look(of_run);
     set_pivot(s.bounds);
+}
+
+// Through a camera of the data set where there are some; else from outside, upright.
+void Viewer::first_look(bool of_run) {
+    const Scene& s = *session_.scene;
+    Photos& p = session_.photos;
+    if (!of_run && p.current < 0 && p.views.empty() && options_.up.empty()) {
+        const std::optional<glm::dvec3> up = remembered_.find(s.file);
+        session_.navigation.set_up(up ? *up : guess_up(s.model));
+    }
+    known_up_ = session_.navigation.up;
+    if (of_run || p.current >= 0) return;
+    if (options_.start_at_camera && !p.views.empty()) {
+        choose_camera(0);
+        p.compare = fs::is_regular_file(p.view().photo);
+    } else {
+        session_.ask(request::FrameAll{});
+    }
+}
+
+// Where cameras or the command line say what is up, nothing is to be remembered.
+void Viewer::remember_up() {
+    const glm::dvec3 up = session_.navigation.up;
+    if (!session_.scene || up == known_up_) return;
+    known_up_ = up;
+    if (session_.photos.views.empty()) attempt([&] { remembered_.keep(session_.scene->file, up); });
 }
 
 // The frames of an export, and the pictures of a measurement, are of one scene.
 void Viewer::lose_scene(const char* why) {
     const std::string note = work_.lose_scene(why);
     if (!note.empty()) session_.note = note;
+    lose_levels();
     ++version_;
 }
 
@@ -166,7 +198,8 @@ void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
     session_.display.effects.smoothing = session_.own.effects.smoothing =
         splats.antialias() && smoothing;
     if (!first) return;
-    pacing_.motion().start(splats.count(), 1);
+    shares_.clear();
+    pacing_.motion().start({});
     session_.display.kernel = splats.kernel();
     session_.display.footprint = splats.footprint();
     session_.display.effects.antialias = splats.antialias();

@@ -69,7 +69,9 @@ EffectChoice parse_effects(std::string_view text);
 struct RenderOutputs {
     bool depth = false;
     float near_plane = static_cast<float>(NEAR_DEFAULT);
-    bool free_camera = false;  // a viewer's, beside the views: near-plane care is called for
+    /// A viewer's, beside the views: near-plane care is called for, and its principal point is in
+    /// the middle of the area beside the panel.
+    bool free_camera = false;
 };
 
 /// For pictures of a scene through these cameras (none: only what the file decides, and care for

@@ -317,10 +317,13 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
     plan.row(EFFECT_DEPTH) = {outputs.depth, false, 0, outputs.depth ? 1.0 : 0.0,
                               outputs.depth ? "depth was asked for" : "no output asks for it"};
     plan.row(EFFECT_HUGE) = huge_rule();
-    if (outputs.free_camera)
+    if (outputs.free_camera) {
         plan.row(EFFECT_NEAR) = {true, false, 0, 0, "the camera moves, a splat may lie beside it"};
-    else
+        EffectRow& centre = plan.row(EFFECT_OFF_CENTRE);
+        if (!centre.on) centre = {true, false, 0, 0, "the camera looks past the panel"};
+    } else {
         plan.row(EFFECT_NEAR) = near_rule(model, views, outputs.near_plane);
+    }
     override_rows(choice, plan, model.sh_degree,
                   {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH});
     return plan;

@@ -61,12 +61,7 @@ void expect_alike(const SplatModel& a, const SplatModel& b, double tolerance) {
     for (size_t i = 0; i < a.size(); ++i) {
         EXPECT_LT(glm::distance(position_of(a, i), position_of(b, i)), tolerance) << i;
         EXPECT_NEAR(opacity_of(a.opacity_logit[i]), opacity_of(b.opacity_logit[i]), tolerance);
-        // Not the rotations: half a turn about an axis of its own leaves a splat as it is.
-        const glm::dmat3 off = covariance_of(a, i) - covariance_of(b, i);
-        const double size = glm::length(covariance_of(a, i)[0]) +
-                            glm::length(covariance_of(a, i)[1]) +
-                            glm::length(covariance_of(a, i)[2]);
-        for (int k = 0; k < 3; ++k) EXPECT_LT(glm::length(off[k]), 10 * tolerance * size) << i;
+        EXPECT_NEAR(same_rotation(a, i, b, i), 1, tolerance) << i;
     }
     const auto near = [&](const std::vector<float>& x, const std::vector<float>& y) {
         ASSERT_EQ(x.size(), y.size());

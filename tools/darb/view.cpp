@@ -96,6 +96,8 @@ int view(ViewFlags flags) {
     refuse_frames_among_photos(flags.frames, options.views);
     if (!note.empty()) say("warning: {}\n", note);
     options.resolve = find_scene;
+    options.start_at_camera = true;
+    options.up_list = remembered_up_file();
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())
         return without_window(flags, options, size, note);

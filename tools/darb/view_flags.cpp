@@ -71,7 +71,9 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
                  "a data set, to look through its cameras and compare with its photos");
     c.add_option("--camera", flags.camera, "start at this camera of the data set, from 0")
         ->check(CLI::NonNegativeNumber);
-    c.add_option("--up", flags.up, "x, -x, y, -y, z or -z (default: from the cameras, else -y)");
+    c.add_option(
+        "--up", flags.up,
+        "x, -x, y, -y, z or -z (default: from the cameras, else as turned before, else guessed)");
     c.add_option("--size", flags.size, "WIDTHxHEIGHT of window, screenshot and frames, px")
         ->capture_default_str();
     c.add_option("--screenshot", flags.screenshot,

@@ -125,6 +125,7 @@ void edit_panel(Session& s) {
     if (ImGui::Button("Save")) s.ask(request::Save{});
     if (ImGui::Button("Save as web page")) s.ask(request::SavePage{});
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("an .html beside the file, for any browser");
+    ImGui::Checkbox("save upright: up becomes -y", &s.save_upright);
 }
 
 }  // namespace darb

@@ -10,6 +10,7 @@ namespace darb {
 namespace {
 
 constexpr float kWidth = 330;  // px at scale 1
+constexpr float kMargin = 8;   // px
 
 void progress_window(Session& s, float width, float height) {
     const WorkProgress& p = s.progress;
@@ -93,9 +94,9 @@ void empty_hint(const Session& s, float width, float height) {
 }
 
 void side_panel(Session& s, float height) {
-    ImGui::SetNextWindowPos(ImVec2(8, 8), ImGuiCond_FirstUseEver);
+    ImGui::SetNextWindowPos(ImVec2(kMargin, kMargin), ImGuiCond_FirstUseEver);
     ImGui::SetNextWindowSizeConstraints(ImVec2(kWidth * s.gui_scale, 0),
-                                        ImVec2(kWidth * s.gui_scale, height - 16));
+                                        ImVec2(kWidth * s.gui_scale, height - 2 * kMargin));
     ImGui::Begin("darb", nullptr, ImGuiWindowFlags_AlwaysAutoResize);
     ImGui::PushItemWidth(150 * s.gui_scale);
     scene_panel(s);
@@ -136,6 +137,10 @@ void draw_panels(Session& s) {
     progress_window(s, width, height);
     leaving_window(s, width, height);
     error_window(s, width, height);
+}
+
+float panel_width(const Session& s) {
+    return s.panels ? kWidth * s.gui_scale + 2 * kMargin : 0;
 }
 
 }  // namespace darb
