@@ -201,12 +201,6 @@ void write_ply(const std::filesystem::path& path, const SplatModel& model) {
     write_file_atomic(path, encode_ply(model));
 }
 
-bool is_point_cloud(const PlyHeader& header) {
-    const PlyElement* vertex = header.find("vertex");
-    return vertex && vertex->find("x") >= 0 && vertex->find("opacity") < 0 &&
-           vertex->find("scale_0") < 0 && vertex->find("f_dc_0") < 0 && !is_compressed_ply(header);
-}
-
 const SplatFormatRow& ply_format() {
     static const SplatFormatRow row{
         .name = "PLY",

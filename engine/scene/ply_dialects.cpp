@@ -8,7 +8,9 @@
 #include <string_view>
 
 #include "engine/core/error.h"
+#include "engine/scene/compressed_ply.h"
 #include "engine/scene/quantise.h"
+#include "engine/scene/splat_file.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {
@@ -94,6 +96,12 @@ void apply_filter(const PlyColumns& columns, double* row) {
 }
 
 }  // namespace
+
+bool is_point_cloud(const PlyHeader& header) {
+    const PlyElement* vertex = header.find("vertex");
+    return vertex && vertex->find("x") >= 0 && vertex->find("opacity") < 0 &&
+           vertex->find("scale_0") < 0 && vertex->find("f_dc_0") < 0 && !is_compressed_ply(header);
+}
 
 PlyColumns find_ply_columns(const PlyElement& vertex, const std::string& where) {
     PlyColumns columns;
