@@ -104,7 +104,7 @@ void Viewer::frame_all(int width, int height) {
     const Bounds bounds = picture_.bounds();
     Navigation& n = session_.navigation;
     const double panel = panel_width(session_), free = width - panel;
-    const bool beside = free >= kLeastFree * width && session_.display.effects.off_centre;
+    const bool beside = free >= kLeastFree * width && draws_every_centre(session_.display.effects);
     n.centre_x = beside ? (panel + free / 2) / width : 0.5;
     const double wide = beside ? free : width;
     const double tan_y = std::tan(n.fov_y / 2), tan_x = tan_y * wide / height;

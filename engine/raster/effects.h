@@ -43,6 +43,11 @@ inline constexpr ProjectionSwitch kProjectionSwitches[] = {
     {&ProjectionEffects::near_care, "NEAR_CARE", EFFECT_NEAR},
 };
 
+/// Whether a principal point other than the centre of its image is drawn where it is.
+inline bool draws_every_centre(const ProjectionEffects& effects) {
+    return effects.off_centre || effects.lens;
+}
+
 inline void add_constants(const ProjectionEffects& effects, SpecConstants& constants) {
     for (const ProjectionSwitch& s : kProjectionSwitches)
         constants[s.constant] = effects.*s.on ? 1 : 0;

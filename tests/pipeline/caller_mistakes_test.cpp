@@ -140,8 +140,9 @@ TEST(CallerMistakes, pictures_and_scenes_that_cannot_be_worked_on) {
     SplatModel model = random_scene({.count = 3}).model;
     EXPECT_NE(refusal([&] { transform_splats({.scale = 0}, model); }).find("scale"),
               std::string::npos);
-    EXPECT_NE(refusal([&] { encode_splats(SplatFormat::sog, model, "a.sog"); }).find("a.sog"),
-              std::string::npos);
+    EXPECT_NE(
+        refusal([&] { encode_splats(SplatFormat::ksplat, model, "a.ksplat"); }).find("a.ksplat"),
+        std::string::npos);
 }
 
 TEST(CallerMistakes, kernels_and_their_tables) {
