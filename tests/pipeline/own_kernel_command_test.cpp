@@ -43,7 +43,7 @@ TEST_F(OwnKernelCommand, psi_and_sim1d_show_it_beside_the_family) {
     EXPECT_NE(read_text_file(page).find("cubic"), std::string::npos);
 
     const fs::path study = scratch() / "sim1d.json";
-    const Outcome sim = darb("sim1d -q -N 3 --seeds 1 --steps 50 --signals square --kernels " +
+    const Outcome sim = darb("sim1d -N 3 --seeds 1 --steps 50 --signals square --kernels " +
                              kCubic + ",generalised_exponential --json " + study.string());
     ASSERT_EQ(sim.code, 0) << sim.err;
     EXPECT_NE(sim.out.find("cubic"), std::string::npos) << sim.out;
@@ -103,7 +103,7 @@ TEST(OwnKernelFileCommand, A_table_trains_and_draws_another_scene) {
     const Outcome drawn = darb("render " + out.string() + " --kernel sinc --cameras " + kScene +
                                " -r 8 -o " + (scratch() / "sinc").string());
     EXPECT_EQ(drawn.code, 0) << drawn.err;
-    const Outcome plan = darb("plan " + kScene + " --no-price --json" + with);
+    const Outcome plan = darb("plan " + kScene + " --no-price --json -" + with);
     EXPECT_EQ(plan.code, 0) << plan.err;
 }
 
