@@ -4,6 +4,7 @@ the size of files. The error is said, earlier outputs stay whole, and the next r
 import errno
 import json
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -106,6 +107,10 @@ def is_whole(path):
                 json.loads(line)
         elif path.endswith(".html"):
             return data.rstrip().endswith(b"</html>")
+        elif path.endswith(".ply"):
+            head, _, body = data.partition(b"end_header\n")  # what a run that fails saves at its end
+            splats = int(re.search(rb"element vertex (\d+)", head).group(1))
+            return len(body) == 4 * splats * head.count(b"property float")
         else:
             # A resumed run reads the first; the last lists the frames so far.
             return path.endswith((".darb", ".mp4", "/darb_export.txt"))
