@@ -1,10 +1,52 @@
-// Both functions are looked for in what is loaded: GLFW may be built without X11, and an older
-// libX11 lacks the second.
+// Functions are looked for in what is loaded: GLFW may be built without X11, and an older libX11
+// lacks one of them.
 #include "viewer/display_loss.h"
 
 #include <dlfcn.h>
 
+#include <cstddef>
+#include <cstdlib>
+
 namespace darb {
+
+namespace {
+
+constexpr std::size_t kRoom = 1 << 20;  // bytes: requests of a window's end take some hundred
+
+// How Xlib's Display begins (X11/Xlib.h: _XPrivDisplay, with the names of X11/Xlibint.h).
+struct DisplayHead {
+    void *extensions, *free_functions;
+    int socket, connection_index, major_version, minor_version;
+    char* vendor;
+    unsigned long id_base, id_mask, next_id;
+    int id_shift;
+    void (*id_allocator)();
+    int byte_order, bitmap_unit, bitmap_pad, bitmap_order, format_count;
+    void* formats;
+    int vendor_number, release;
+    void *queue_head, *queue_tail;
+    int queue_length;
+    unsigned long last_read, last_sent;
+    char *last_request, *buffer, *end, *limit;  // of the requests that wait to be sent
+};
+
+// Requests find no room once Xcb has the connection back and it is dead: Xlib then returns a null
+// that its own functions do not look for. Nothing of what goes into this room is sent.
+void make_room(void* display) {
+    auto* const head = static_cast<DisplayHead*>(display);
+    auto* const room = static_cast<char*>(std::malloc(kRoom));  // XCloseDisplay frees it
+    if (room == nullptr) return;
+    std::free(head->buffer);
+    head->buffer = head->end = head->last_request = room;
+    head->limit = room + kRoom;
+}
+
+void note_loss(void* display, void* user) {
+    *static_cast<std::atomic<bool>*>(user) = true;
+    make_room(display);
+}
+
+}  // namespace
 
 bool survive_display_loss(std::atomic<bool>& lost) {
     using GetDisplay = void* (*)();
@@ -23,8 +65,7 @@ bool survive_display_loss(std::atomic<bool>& lost) {
     // The first handler ends the process unless it is replaced, the second one if the first
     // returns.
     set_on_error([](void*) { return 0; });
-    set(
-        display, [](void*, void* user) { *static_cast<std::atomic<bool>*>(user) = true; }, &lost);
+    set(display, note_loss, &lost);
     return true;
 }
 

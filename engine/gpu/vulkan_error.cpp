@@ -23,6 +23,8 @@ void check_vulkan(VkResult result, const std::string& what) {
             throw Error(what, "the device was lost",
                         "The driver stopped the device: a time-out, a driver fault or a device "
                         "that was removed. See the system log; restart from the last checkpoint.");
+        case VK_ERROR_SURFACE_LOST_KHR:
+            throw Error(what, "the display is gone", "Start it again on one that is there.");
         case VK_ERROR_INCOMPATIBLE_DRIVER:
             throw Error(what, "no Vulkan driver was found",
                         "Install one: mesa-vulkan-drivers, or the driver of the GPU's vendor.");

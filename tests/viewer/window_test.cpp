@@ -121,6 +121,7 @@ TEST_F(WindowTest, A_dropped_pipe_is_refused_and_the_window_closes_slow) {
 // Edited by the keys of a user: a path of one key, which nobody saved.
 TEST_F(WindowTest, What_was_not_saved_is_kept_when_the_display_ends_or_a_signal_comes_slow) {
     const fs::path kept = "camera_path_recovered.json";
+    const ImageU8 wanted = headless();
     for (const bool display_ends : {false, true}) {
         SCOPED_TRACE(display_ends);
         fs::remove(folder_ / kept);
@@ -133,7 +134,7 @@ TEST_F(WindowTest, What_was_not_saved_is_kept_when_the_display_ends_or_a_signal_
                          folder_ / "view.log");
         ASSERT_TRUE(eventually([&] { return log("view.log").find("loaded") != std::string::npos; }))
             << log("view.log");
-        settled();
+        ASSERT_TRUE(shows(wanted)) << log("view.log");
         xdo({"mousemove", "300", "200", "key", "k"});
         settled();
         ASSERT_TRUE(program_->running()) << log("view.log");
@@ -153,6 +154,16 @@ TEST_F(WindowTest, What_was_not_saved_is_kept_when_the_display_ends_or_a_signal_
             << log("view.log");
         EXPECT_TRUE(fs::exists(folder_ / kept));
     }
+}
+
+// Frames are under way then, and other libraries have the connection.
+TEST_F(WindowTest, A_display_that_ends_while_a_window_draws_is_an_error_slow) {
+    start();
+    display_->terminate();
+    EXPECT_TRUE(eventually([&] { return !program_->running(); }));
+    EXPECT_EQ(program_->wait(), 2) << log("view.log");
+    EXPECT_NE(log("view.log").find("error: window: the display is gone"), std::string::npos)
+        << log("view.log");
 }
 
 TEST_F(WindowTest, Mouse_and_keys_move_the_camera_slow) {

@@ -57,8 +57,10 @@ LiveView::~LiveView() = default;
 
 // The run matters more than its window.
 void LiveView::warn(const std::exception& error) {
-    say("warning: the window is closed: {}\n",
-        state_->lost ? "the display is gone; the run goes on" : error.what());
+    const auto* known = dynamic_cast<const Error*>(&error);
+    say("warning: the window is closed: {}; the run goes on\n", state_->lost ? "the display is gone"
+                                                                : known != nullptr ? known->reason
+                                                                                   : error.what());
     state_->window.reset();
 }
 
