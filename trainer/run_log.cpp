@@ -62,6 +62,16 @@ double peak_host_bytes() {
     return static_cast<double>(usage.ru_maxrss) * 1024.0;
 }
 
+// Whole, in as many writes as it takes.
+bool append(int file, std::string_view line) {
+    while (!line.empty()) {
+        const ssize_t wrote = ::write(file, line.data(), line.size());
+        if (wrote < 0 && errno != EINTR) return false;
+        if (wrote > 0) line.remove_prefix(static_cast<std::size_t>(wrote));
+    }
+    return true;
+}
+
 }  // namespace
 
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
@@ -108,8 +118,7 @@ std::string RunLog::shared_text(const std::string& text) const {
 
 void RunLog::write(const Json& event) {
     const std::string line = text_of(event) + "\n";
-    if (std::fwrite(line.data(), 1, line.size(), file_.get()) != line.size() ||
-        std::fflush(file_.get()) != 0)
+    if (!append(::fileno(file_.get()), line))
         throw Error((folder_ / "run.jsonl").string(),
                     std::string("cannot be written: ") + std::strerror(errno),
                     "Free space; the last checkpoint is intact, go on with --resume.");
