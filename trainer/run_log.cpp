@@ -1,6 +1,7 @@
 #include "trainer/run_log.h"
 
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
