@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# SwiftShader, the second driver that executes: darb check passes whole, and 50 iterations of training give held-out
-# photos within 0.1 dB of lavapipe's. Skips (77) where Debian's chromium, which brings it, is not installed.
+# SwiftShader, the second driver that executes: darb check passes whole. Skips (77) where Debian's chromium, which brings it, is not installed.
 #   swiftshader.sh BUILD
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -13,15 +12,6 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.3.0"}}\n' "$library" \
     >"$folder/icd.json"
-train() { # NAME COMMAND...
-    "${@:2}" train assets/scene -o "$folder/$1" --iterations 50 --eval -q
-    "$darb" eval "$folder/$1" assets/scene --json "$folder/$1.json" >/dev/null
-    python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["mean"]["psnr_db"])' "$folder/$1.json"
-}
 on_swiftshader=(env "VK_DRIVER_FILES=$folder/icd.json" "VK_ICD_FILENAMES=$folder/icd.json" "XDG_CACHE_HOME=$folder" "$darb")
 "${on_swiftshader[@]}" check >"$folder/check" || { grep -B 3 FAIL "$folder/check" | head -60; exit 1; }
 tail -n 1 "$folder/check"
-here=$(train lavapipe "$darb" | tail -n 1)
-there=$(train swiftshader "${on_swiftshader[@]}" | tail -n 1)
-echo "after 50 iterations: $here dB, on SwiftShader $there dB"
-python3 -c 'import sys; sys.exit(abs(float(sys.argv[1]) - float(sys.argv[2])) > 0.1)' "$here" "$there"
