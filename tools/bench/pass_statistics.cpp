@@ -23,6 +23,8 @@ namespace darb {
 
 namespace {
 
+using Json = nlohmann::json;
+
 // Buffers are made for them, so they are few; the counts of an iteration are for the ones named.
 constexpr std::size_t kSplats = 20'000;
 constexpr int kDegree = 3, kSide = 256;
@@ -159,7 +161,6 @@ void print_pass_statistics(std::FILE* out, const PassStatistics& all) {
 }
 
 nlohmann::json pass_statistics_json(const PassStatistics& all) {
-    using Json = nlohmann::json;
     Json json{{"device", all.device.name},
               {"driver", all.device.driver},
               {"has_statistics", all.has_statistics},
