@@ -202,6 +202,23 @@ void GradientRenderer::replace(const SplatModel& model) {
     s.note(model);
 }
 
+bool GradientRenderer::holds(std::size_t count, int sh_degree) const {
+    return count == state_->splats.count() && sh_degree == state_->header.sh_degree &&
+           state_->header.origin == glm::dvec3(0.0);
+}
+
+void GradientRenderer::set_values(int attribute, std::span<const float> values) {
+    State& s = *state_;
+    const std::size_t wanted = std::size_t{s.splats.count()} * s.splats.stride(attribute);
+    if (values.size() != wanted)
+        throw Error(
+            attribute_name(attribute),
+            fmt::format("{} values, {} splats need {}", values.size(), s.splats.count(), wanted),
+            "Give the values of all splats.");
+    s.image = {};
+    s.splats.parameters(attribute).upload(std::as_bytes(values));
+}
+
 void GradientRenderer::set_view(int sh_degree, float near_plane) {
     state_->options.sh_degree = sh_degree;
     state_->options.near_plane = near_plane;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/core/image.h"
@@ -61,6 +62,11 @@ class GradientRenderer {
     /// Other splats, of any count, degree and origin; kernel, footprint and anti-aliasing are as
     /// before. Pipelines and the frame's buffers stay.
     void replace(const SplatModel& model);
+    /// Whether the splats are of this count and degree, and of origin 0.
+    bool holds(std::size_t count, int sh_degree) const;
+    /// Other values of one attribute for the same splats, from where the caller has them. Throws
+    /// Error for another number of them.
+    void set_values(int attribute, std::span<const float> values);
     /// From the next picture on, in place of what the options say.
     void set_view(int sh_degree, float near_plane);
 

@@ -240,6 +240,21 @@ TEST(ViewInputs, other_splats_take_the_place_of_those_on_the_device) {
     EXPECT_THROW(renderer.replace(cosine), Error);
 }
 
+TEST(ViewInputs, attributes_come_one_at_a_time) {
+    const TestScene scene = small_scene();
+    SplatModel moved = scene.model;
+    for (int a = 0; a < kAttributeCount; ++a)
+        for (float& value : attribute_values(moved, a)) value += 0.1f;
+    GradientRenderer renderer(shared_device(), scene.model);
+    EXPECT_TRUE(renderer.holds(moved.size(), moved.sh_degree));
+    EXPECT_FALSE(renderer.holds(moved.size() + 1, moved.sh_degree));
+    for (int a = 0; a < kAttributeCount; ++a) renderer.set_values(a, attribute_values(moved, a));
+    EXPECT_EQ(renderer.render(scene.camera).data,
+              GradientRenderer(shared_device(), moved).render(scene.camera).data);
+    moved.position.pop_back();
+    EXPECT_THROW(renderer.set_values(ATTRIBUTE_POSITION, moved.position), Error);
+}
+
 TEST(ViewInputs, depths_are_those_of_the_renderer) {
     const TestScene scene = small_scene();
     GradientRenderer renderer(shared_device(), scene.model);
