@@ -5,10 +5,16 @@
 
 Arguments are right, wrong in one place, or nonsense: shapes, types, order, released memory, NaN,
 huge numbers, other objects. An abort, a hang, an empty message or an exception of another kind than
-darb.Error, TypeError, MemoryError and what a callback raises is a finding. Under ASan:
+darb.Error, TypeError, MemoryError and what a callback raises is a finding. With the engine under
+ASan:
 
-    LD_PRELOAD=$(gcc -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \
-        PYTHONPATH=build-python-asan/python tests/python/fuzz_calls.py --calls 10000
+    cmake -B build-python-asan -G Ninja -DCMAKE_CXX_COMPILER=g++ -DCMAKE_BUILD_TYPE=Debug \
+        -DCMAKE_CXX_FLAGS_DEBUG=-O1 -DCMAKE_UNITY_BUILD=ON -DDARB_SANITIZE=address \
+        -DDARB_PYTHON=ON -DDARB_WERROR=OFF
+    cmake --build build-python-asan --target darb_python
+    LD_PRELOAD="$(g++ -print-file-name=libasan.so) $(g++ -print-file-name=libstdc++.so)" \
+        ASAN_OPTIONS=detect_leaks=0 \
+        PYTHONPATH=build-python-asan/python /usr/bin/python3 tests/python/fuzz_calls.py
 """
 
 import argparse
