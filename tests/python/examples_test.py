@@ -60,7 +60,7 @@ class Examples(unittest.TestCase):
                 mine = list(inspect.signature(getattr(darb, node.name)).parameters)
                 theirs = [a.arg for a in node.args.args + node.args.kwonlyargs]
                 self.assertEqual(mine, theirs, node.name)
-            elif node.name not in ("Error", "Info"):
+            elif isinstance(node, ast.ClassDef) and node.name not in ("Error", "Info"):
                 for part in node.body:
                     if isinstance(part, ast.FunctionDef):
                         self.assertTrue(hasattr(getattr(darb, node.name), part.name),

@@ -4,18 +4,22 @@ import os
 import pathlib
 import sys
 
-import numpy as np
-
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
-SHIPPED = SOURCE / "assets" / "scene"
-COMMAND = os.environ.get("DARB_COMMAND", str(SOURCE / "build" / "darb"))
-
 SKIP = 77  # what ctest takes for skipped
 
 
 def skip(reason):
     print(f"skipped: {reason}")
     sys.exit(SKIP)
+
+
+try:
+    import numpy as np
+except ImportError as error:
+    skip(f"numpy is not here: {error}")
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+SHIPPED = SOURCE / "assets" / "scene"
+COMMAND = os.environ.get("DARB_COMMAND", str(SOURCE / "build" / "darb"))
 
 
 def camera(count=1, width=40, height=32, focal=45.0):

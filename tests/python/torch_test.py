@@ -51,7 +51,8 @@ class Autograd(unittest.TestCase):
             self.assertGreater(int(info["visible"].min()), 10)
 
     def test_central_differences_of_every_input(self):
-        pictures, arrays = camera(), splats(count=10)
+        # A splat that grows crosses the cut-off of alphas, which is lower in "exact".
+        pictures, arrays = {**camera(), "accuracy": "exact"}, splats(count=10)
         arrays["background"] = np.float32([0.3, 0.1, 0.6])
         weight = torch.from_numpy(weights(pictures)[0])
         given = tensors(arrays)

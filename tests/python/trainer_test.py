@@ -127,6 +127,8 @@ class Training(unittest.TestCase):
                               ("output: is an option of the command alone", {"output": "x"}),
                               ("strategy", {"strategy": "none"}),
                               ("noise.lr.*means nothing", {"noise_lr": 3.0}),
+                              ("iterations: is of the type numpy.ndarray, no whole number",
+                               {"iterations": np.zeros((2, 3))}),
                               ("lambda_dssim: is of the type object", {"lambda_dssim": object()})):
             with self.subTest(text), self.assertRaisesRegex(darb.Error, text):
                 self.trained(**options)

@@ -64,6 +64,15 @@ void check_shape(const py::array& array, const char* name,
                 "Check the order of the arguments, and the arrays' axes.");
 }
 
+// Of a fixed length, and without a way out, so that compilers take several at once.
+constexpr std::size_t kBlock = 1024;
+bool block_is_within(const float* values, float least, float most) {
+    int inside = 1;
+    for (std::size_t i = 0; i < kBlock; ++i)
+        inside &= int(values[i] >= least) & int(values[i] <= most);
+    return inside != 0;
+}
+
 void check_layout(const py::array& array, const char* name) {
     if (!has_flag(array, py::array::c_style) ||
         !has_flag(array, py::detail::npy_api::NPY_ARRAY_ALIGNED_))
@@ -148,7 +157,10 @@ std::vector<double> take_doubles(const py::object& value, const char* name,
 
 void check_values(const Floats& values, const char* name, float least, float most,
                   const char* hint) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t size = values.size();
+    for (std::size_t i = 0; i < size; ++i) {
+        while (i + kBlock <= size && block_is_within(values.data + i, least, most)) i += kBlock;
+        if (i == size) return;
         const float v = values.data[i];
         if (v >= least && v <= most) continue;  // false for NaN
         std::string place;
@@ -162,11 +174,18 @@ void check_values(const Floats& values, const char* name, float least, float mos
     }
 }
 
+py::object take_whole_number(const py::object& value, const char* name) {
+    if (PyBool_Check(value.ptr()) == 0 && PyIndex_Check(value.ptr()) != 0) {
+        // Arrays of several numbers have an __index__, too, and fail in it.
+        if (auto number = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr())))
+            return number;
+        PyErr_Clear();
+    }
+    throw Error(name, type_text(value) + ", no whole number", "Give an int.");
+}
+
 long long take_integer(const py::object& value, const char* name, long long least, long long most) {
-    if (PyBool_Check(value.ptr()) != 0 || PyIndex_Check(value.ptr()) == 0)
-        throw Error(name, type_text(value) + ", no whole number", "Give an int.");
-    const py::object number = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
-    if (!number) throw py::error_already_set();
+    const py::object number = take_whole_number(value, name);
     int overflow = 0;
     const long long result = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
     if (overflow != 0 || result < least || result > most)

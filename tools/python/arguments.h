@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,7 @@ struct Floats {
     std::vector<py::ssize_t> shape;
 
     std::size_t size() const { return static_cast<std::size_t>(holder.size()); }
+    std::span<const float> values() const { return {data, size()}; }
     std::vector<float> copy() const { return {data, data + size()}; }
 };
 
@@ -43,6 +45,8 @@ std::vector<double> take_doubles(const py::object& value, const char* name,
 void check_values(const Floats& values, const char* name, float least, float most,
                   const char* hint);
 
+/// An int: of numpy's integers, too.
+py::object take_whole_number(const py::object& value, const char* name);
 long long take_integer(const py::object& value, const char* name, long long least, long long most);
 double take_number(const py::object& value, const char* name, double least, double most);
 bool take_flag(const py::object& value, const char* name);

@@ -24,22 +24,23 @@ py::dict info_dict(const DeviceInfo& info) {
 
 }  // namespace
 
-KeptRenderer& Renderers::of(Device& device, const RendererKey& key, const SplatModel& model,
-                            bool& made) {
-    made = false;
+KeptRenderer* Renderers::find(const RendererKey& key) {
     for (auto it = kept_.begin(); it != kept_.end(); ++it) {
         if (it->key != key) continue;
         kept_.splice(kept_.begin(), kept_, it);
-        return kept_.front();
+        return &kept_.front();
     }
-    made = true;
+    return nullptr;
+}
+
+KeptRenderer& Renderers::make(Device& device, const RendererKey& key, const SplatModel& model) {
     if (kept_.size() >= kMost) kept_.pop_back();
     GradientOptions options;
     options.accuracy = preset_accuracy(key.preset);
     options.linear_values = key.linear;
     options.direct_colour = key.direct_colour;
     options.camera = key.camera;
-    kept_.push_front(KeptRenderer{key, GradientRenderer(device, model, options)});
+    kept_.push_front(KeptRenderer{key, GradientRenderer(device, model, options), 0, {}, {}});
     return kept_.front();
 }
 

@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "engine/gpu/device.h"
 #include "engine/render/render_gradients.h"
@@ -30,14 +31,17 @@ struct RendererKey {
 struct KeptRenderer {
     RendererKey key;
     GradientRenderer renderer;
-    std::uint64_t picture = 0;  // number of the picture that it drew last; 0: none
+    std::uint64_t picture = 0;          // number of the picture that it drew last; 0: none
+    std::vector<float> sh_dc, sh_rest;  // of the last call with `sh`: their memory is used again
 };
 
 /// The renderers of one owner, the latest used first; at most a few.
 class Renderers {
   public:
-    /// model: what a new one begins with. made: whether it is new, and so has the model.
-    KeptRenderer& of(Device& device, const RendererKey& key, const SplatModel& model, bool& made);
+    /// nullptr where there is none of this kind.
+    KeptRenderer* find(const RendererKey& key);
+    /// A new one, which begins with the model.
+    KeptRenderer& make(Device& device, const RendererKey& key, const SplatModel& model);
     void clear() { kept_.clear(); }
     /// To be left behind, in a child process.
     void leak() { static_cast<void>(new std::list<KeptRenderer>(std::move(kept_))); }

@@ -4,8 +4,10 @@
 
 #include <chrono>
 #include <limits>
+#include <type_traits>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/raster/frame_limit.h"
 #include "tools/python/cameras.h"
 #include "tools/python/kernel.h"
 #include "tools/python/scene.h"
@@ -23,12 +25,12 @@ int take_preset(const py::object& value) {
     throw Error("accuracy " + name, "no such preset", "Use fast, balanced or exact.");
 }
 
-RendererKey key_of(const SplatModel& model, const Pictures& pictures, const SplatArraysGiven* given,
-                   bool camera) {
+RendererKey key_of(const SplatModel& header, const Pictures& pictures,
+                   const SplatArraysGiven* given, bool camera) {
     RendererKey key;
-    key.kernel = model.kernel;
-    key.footprint = model.footprint;
-    key.antialias = model.antialias;
+    key.kernel = header.kernel;
+    key.footprint = header.footprint;
+    key.antialias = header.antialias;
     key.linear = given != nullptr;
     key.direct_colour = given != nullptr && given->direct_colour;
     key.camera = camera;
@@ -36,16 +38,32 @@ RendererKey key_of(const SplatModel& model, const Pictures& pictures, const Spla
     return key;
 }
 
-// The renderer with the splats that a call is of, on the device.
-KeptRenderer& ready(const std::shared_ptr<PyDevice>& device, const Pictures& pictures, bool camera,
-                    const SplatArraysGiven* given, PyScene* scene) {
-    bool made = false;
-    if (scene != nullptr) return scene->renderer(key_of(scene->model(), pictures, nullptr, camera));
-    KeptRenderer& kept = device->renderers().of(
-        device->device(), key_of(given->model, pictures, given, camera), given->model, made);
-    if (!made) kept.renderer.replace(given->model);
-    kept.picture = 0;
-    return kept;
+// From where the arrays lie, into the buffers of a call before of as many splats.
+void put(KeptRenderer& kept, const SplatArraysGiven& given) {
+    GradientRenderer& renderer = kept.renderer;
+    if (!renderer.holds(given.count(), given.header.sh_degree))
+        return renderer.replace(given.model());
+    renderer.set_values(ATTRIBUTE_POSITION, given.means.values());
+    renderer.set_values(ATTRIBUTE_ROTATION, given.quats.values());
+    renderer.set_values(ATTRIBUTE_LOG_SCALE, given.scales.values());
+    renderer.set_values(ATTRIBUTE_OPACITY_LOGIT, given.opacities.values());
+    if (given.direct_colour) return renderer.set_values(ATTRIBUTE_SH_DC, given.colours.values());
+    split_harmonics(given.colours, kept.sh_dc, kept.sh_rest);
+    renderer.set_values(ATTRIBUTE_SH_DC, kept.sh_dc);
+    renderer.set_values(ATTRIBUTE_SH_REST, kept.sh_rest);
+}
+
+// The renderer with the splats that a call is of, on the device. drawn: the number of a picture of
+// these splats: where it is the last one, the splats are there.
+KeptRenderer& ready(PyDevice& device, const RendererKey& key, const SplatArraysGiven* given,
+                    PyScene* scene, std::uint64_t drawn = 0) {
+    if (scene != nullptr) return scene->renderer(key);
+    KeptRenderer* const kept = device.renderers().find(key);
+    if (kept == nullptr) return device.renderers().make(device.device(), key, given->model());
+    if (drawn != 0 && kept->picture == drawn) return *kept;
+    kept->picture = 0;
+    put(*kept, *given);
+    return *kept;
 }
 
 PyScene* scene_of(const std::shared_ptr<PyDevice>& device, const py::dict& options) {
@@ -85,7 +103,10 @@ py::tuple rasterize(const std::shared_ptr<PyDevice>& device, const py::dict& opt
     {
         const py::gil_scoped_release free;
         lock = device->lock();
-        kept = &ready(device, pictures, false, given ? &*given : nullptr, scene);
+        check_frame(device->device(), pictures.width(), pictures.height());
+        const SplatModel& header = scene != nullptr ? scene->model() : given->header;
+        const SplatArraysGiven* const arrays = given ? &*given : nullptr;
+        kept = &ready(*device, key_of(header, pictures, arrays, false), arrays, scene);
     }
     return draw(*device, *kept, pictures);
 }
@@ -98,8 +119,12 @@ struct Sums {
     std::uint64_t bad = 0;
 };
 
-void add_into(std::vector<float>& sum, const std::vector<float>& more) {
-    if (sum.empty()) sum.resize(more.size());
+template <class T, class More>
+void add_into(std::vector<T>& sum, std::vector<More>& more) {
+    if constexpr (std::is_same_v<T, More>) {
+        if (sum.empty()) return sum.swap(more);
+    }
+    sum.resize(more.size());
     for (std::size_t i = 0; i < more.size(); ++i) sum[i] += more[i];
 }
 
@@ -117,13 +142,11 @@ void add_camera(Sums& sums, const ViewGradients& view) {
         sums.intrinsics.push_back(value);
 }
 
-// The last camera first, whose picture may still be there.
-void add_view(Sums& sums, const ViewGradients& view) {
+void add_view(Sums& sums, ViewGradients view) {
     for (int a = 0; a < kAttributeCount; ++a)
         add_into(attribute_values(sums.d, a), attribute_values(view.d, a));
     add_into(sums.mean_ndc, view.mean_gradient_ndc);
-    sums.shown.resize(view.shown.size());
-    for (std::size_t i = 0; i < view.shown.size(); ++i) sums.shown[i] += view.shown[i];
+    add_into(sums.shown, view.shown);
     sums.bad += view.status.bad_gradients;
     add_camera(sums, view);
 }
@@ -146,11 +169,11 @@ std::vector<float> narrowed(const std::vector<double>& values) {
     return {values.begin(), values.end()};
 }
 
-py::dict gradients_dict(const Sums& sums, const SplatModel& model, const Pictures& pictures,
+py::dict gradients_dict(const Sums& sums, int sh_degree, const Pictures& pictures,
                         const SplatArraysGiven* given) {
-    const auto n = static_cast<py::ssize_t>(model.size());
+    const auto n = static_cast<py::ssize_t>(sums.mean_ndc.size());
     const auto c = static_cast<py::ssize_t>(pictures.cameras.size());
-    const py::ssize_t bands = (model.sh_degree + 1) * (model.sh_degree + 1);
+    const py::ssize_t bands = (sh_degree + 1) * (sh_degree + 1);
     py::dict d;
     d["means"] = to_array(sums.d.position, {n, 3});
     d["quats"] = to_array(sums.d.rotation, {n, 4});
@@ -160,7 +183,7 @@ py::dict gradients_dict(const Sums& sums, const SplatModel& model, const Picture
     if (given && given->direct_colour)
         d["colors"] = to_array(sums.d.sh_dc, {n, 3});
     else
-        d["sh"] = to_array(harmonics(sums.d, model.sh_degree), {n, bands, 3});
+        d["sh"] = to_array(harmonics(sums.d, sh_degree), {n, bands, 3});
     d["backgrounds"] = to_array(narrowed(sums.backgrounds), {c, 3});
     if (!sums.viewmats.empty()) {
         d["viewmats"] = to_array(narrowed(sums.viewmats), {c, 4, 4});
@@ -189,33 +212,27 @@ py::dict rasterize_backward(const std::shared_ptr<PyDevice>& device, const py::d
     const auto drawn = static_cast<std::uint64_t>(take_integer(picture, "picture", 0, 1LL << 62));
     const bool camera = take_flag(with_camera, "camera");
     Sums sums;
-    const SplatModel* model = nullptr;
+    const SplatArraysGiven* const arrays = given ? &*given : nullptr;
+    int sh_degree = 0;
     {
         const py::gil_scoped_release free;
         const auto lock = device->lock();
-        model = scene != nullptr ? &scene->model() : &given->model;
-        const RendererKey key = key_of(*model, pictures, given ? &*given : nullptr, camera);
-        KeptRenderer* kept = nullptr;
-        bool there = false;
-        if (scene != nullptr) {
-            kept = &scene->renderer(key);
-        } else {
-            bool made = false;
-            kept = &device->renderers().of(device->device(), key, given->model, made);
-            there = !made && drawn != 0 && kept->picture == drawn && count == 1;
-            if (!made && !there) kept->renderer.replace(given->model);
-        }
-        kept->renderer.set_view(pictures.sh_degree, pictures.near_plane);
+        const SplatModel& header = scene != nullptr ? scene->model() : given->header;
+        sh_degree = header.sh_degree;
+        KeptRenderer& kept =
+            ready(*device, key_of(header, pictures, arrays, camera), arrays, scene, drawn);
+        const bool there = scene == nullptr && drawn != 0 && kept.picture == drawn && count == 1;
+        kept.renderer.set_view(pictures.sh_degree, pictures.near_plane);
         for (std::size_t c = 0; c < pictures.cameras.size(); ++c) {
             check_signals();
-            kept->picture = 0;
-            if (!there) kept->renderer.render(pictures.cameras[c], pictures.backgrounds[c]);
-            add_view(sums, kept->renderer.backward(
+            kept.picture = 0;
+            if (!there) kept.renderer.render(pictures.cameras[c], pictures.backgrounds[c]);
+            add_view(sums, kept.renderer.backward(
                                one_image(of_image, c, pictures, 3),
                                of_alpha ? one_image(*of_alpha, c, pictures, 1) : ImageF()));
         }
     }
-    return gradients_dict(sums, *model, pictures, given ? &*given : nullptr);
+    return gradients_dict(sums, sh_degree, pictures, arrays);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ double logit(double opacity) {
 }
 
 reference::Splats<double> splats_of(const SplatArraysGiven& given) {
-    reference::Splats<double> splats = reference::make_splats<double>(given.model);
+    reference::Splats<double> splats = reference::make_splats<double>(given.model());
     for (double& s : splats.log_scale) s = std::log(s);
     for (double& o : attribute_values(splats, ATTRIBUTE_OPACITY_LOGIT)) o = logit(o);
     if (!given.direct_colour) return splats;
@@ -33,12 +33,12 @@ reference::Splats<double> splats_of(const SplatArraysGiven& given) {
 
 // From logits, logarithms and harmonics to what was given.
 void to_given(const SplatArraysGiven& given, reference::SplatGradients<double>& d) {
-    const auto& opacities = attribute_values(given.model, ATTRIBUTE_OPACITY_LOGIT);
     auto& d_opacity = attribute_values(d, ATTRIBUTE_OPACITY_LOGIT);
+    const std::span<const float> opacities = given.opacities.values();
     for (std::size_t i = 0; i < opacities.size(); ++i)
         d_opacity[i] /= double(opacities[i]) * (1 - double(opacities[i]));
     for (std::size_t i = 0; i < d.log_scale.size(); ++i)
-        d.log_scale[i] /= double(given.model.log_scale[i]);
+        d.log_scale[i] /= double(given.scales.data[i]);
     if (given.direct_colour)
         for (double& c : d.sh_dc) c /= SH_C0;
 }
@@ -84,7 +84,7 @@ py::tuple reference_pictures(const py::dict& options, const py::object& d_image,
         }
         for (int k = 0; k < 3; ++k) backgrounds.push_back(d.background[k]);
     }
-    const auto n = static_cast<py::ssize_t>(given.model.size());
+    const auto n = static_cast<py::ssize_t>(given.count());
     const py::ssize_t h = pictures.height(), w = pictures.width();
     py::dict d;
     d["means"] = to_array(sum.position, {n, 3});

@@ -58,16 +58,17 @@ void PyScene::change(const std::function<void()>& change) {
 }
 
 KeptRenderer& PyScene::renderer(const RendererKey& key) {
-    bool made = false;
-    KeptRenderer& kept = renderers_.of(device_->device(), key, model_, made);
+    KeptRenderer* kept = renderers_.find(key);
+    const bool made = kept == nullptr;
+    if (made) kept = &renderers_.make(device_->device(), key, model_);
     for (auto& [drawn_as, changes] : uploaded_) {
         if (drawn_as != key) continue;
-        if (changes != changes_ && !made) kept.renderer.replace(model_);
+        if (changes != changes_ && !made) kept->renderer.replace(model_);
         changes = changes_;
-        return kept;
+        return *kept;
     }
     uploaded_.emplace_back(key, changes_);
-    return kept;
+    return *kept;
 }
 
 namespace {
@@ -113,27 +114,32 @@ void bind_attribute(py::class_<PyScene>& scene, const char* name, const char* do
         doc);
 }
 
+// What logarithms and logits can hold.
+constexpr double kLeastScale = 1e-8, kLeastOpacity = 1e-6;
+
 PyScene scene_of_arrays(const py::dict& options) {
     SplatModel model;
     const Floats means = take_floats(options["means"], "means", {kAny, 3});
     const py::ssize_t n = means.shape[0];
-    const Floats scales = take_floats(options["log_scales"], "log_scales", {n, 3});
     const Floats quats = take_floats(options["quats"], "quats", {n, 4});
-    const Floats logits = take_floats(options["opacity_logits"], "opacity_logits", {n});
+    const Floats scales = take_floats(options["scales"], "scales", {n, 3});
+    const Floats opacities = take_floats(options["opacities"], "opacities", {n});
     const Floats sh = take_floats(options["sh"], "sh", {n, kAny, 3});
     constexpr float most = std::numeric_limits<float>::max();
-    for (const auto& [values, name] : {std::pair(&means, "means"),
-                                       {&scales, "log_scales"},
-                                       {&quats, "quats"},
-                                       {&logits, "opacity_logits"},
-                                       {&sh, "sh"}})
+    for (const auto& [values, name] : {std::pair(&means, "means"), {&quats, "quats"}, {&sh, "sh"}})
         check_values(*values, name, -most, most, "Check what it was computed from.");
+    check_values(scales, "scales", 0, most, "Scales are standard deviations, not logarithms.");
+    check_values(opacities, "opacities", 0, 1, "Opacities are from 0 to 1, not logits.");
     model.sh_degree = degree_of_coefficients(sh.shape[1]);
     model.position = means.copy();
-    model.log_scale = scales.copy();
     model.rotation = quats.copy();
-    attribute_values(model, ATTRIBUTE_OPACITY_LOGIT) = logits.copy();
-    split_harmonics(sh, model);
+    for (const float s : scales.values())
+        model.log_scale.push_back(static_cast<float>(std::log(std::max(double(s), kLeastScale))));
+    for (const float given : opacities.values()) {
+        const double o = std::clamp(double(given), kLeastOpacity, 1 - kLeastOpacity);
+        model.opacity_logit.push_back(static_cast<float>(std::log(o / (1 - o))));
+    }
+    split_harmonics(sh, model.sh_dc, model.sh_rest);
     model.kernel = take_kernel(options["kernel"], "kernel");
     model.footprint = take_footprint(options["footprint"]);
     model.antialias = take_flag(options["antialiased"], "antialiased");

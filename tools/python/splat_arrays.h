@@ -6,16 +6,22 @@
 
 namespace darb::python {
 
-/// A model whose opacities and scales are these themselves (GradientOptions::linear_values).
+/// The arrays where they lie. Opacities and scales are these themselves
+/// (GradientOptions::linear_values).
 struct SplatArraysGiven {
-    SplatModel model;
-    bool direct_colour = false;  // sh_dc holds `colors`
+    SplatModel header;  // of no splats
+    Floats means, quats, scales, opacities, colours;
+    bool direct_colour = false;  // colours is `colors`, not `sh`
+
+    std::size_t count() const { return opacities.size(); }
+    /// A copy with all; sh_dc holds `colors` where these are given.
+    SplatModel model() const;
 };
 
 /// Of 1, 4, 9 or 16 coefficients; Error for others.
 int degree_of_coefficients(py::ssize_t coefficients);
-/// sh [N,K,3] into sh_dc and sh_rest; sh_degree is set.
-void split_harmonics(const Floats& sh, SplatModel& model);
+/// sh [N,K,3] into the first band [N,3] and the others [N,K-1,3].
+void split_harmonics(const Floats& sh, std::vector<float>& first, std::vector<float>& others);
 
 /// options: means, quats, scales, opacities, colors or sh, kernel, footprint, antialiased.
 SplatArraysGiven take_splats(const py::dict& options);

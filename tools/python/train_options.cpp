@@ -37,7 +37,7 @@ std::string value_text(const py::object& value, const std::string& name) {
     if (py::isinstance<py::str>(value)) return take_text(value, name.c_str());
     if (py::hasattr(value, "__fspath__")) return take_path(value, name.c_str());
     if (PyIndex_Check(value.ptr()) != 0)
-        return std::string(py::str(py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()))));
+        return std::string(py::str(take_whole_number(value, name.c_str())));
     if (py::hasattr(value, "__float__"))
         return std::string(py::repr(py::float_(take_number(value, name.c_str(), -1e300, 1e300))));
     throw Error(name, type_text(value) + ", which no option takes",

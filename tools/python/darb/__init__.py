@@ -104,7 +104,8 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
     image  [C, H, W, 3] float32, not clamped.
     alpha  [C, H, W]    float32, 1 - transmittance.
     info   a dict: "visible" and "intersections" (of splats and tiles) [C]; "device_ms", the time
-           of the passes, and "frame_ms", that and the way to the host; "depth" [C, H, W], the expected z, 0 where nothing is seen.
+           of the passes, and "frame_ms", that and the way to the host; "depth" [C, H, W], the
+           expected z, 0 where nothing is seen; "picture", its number for rasterize_backward.
     """
     return _darb.rasterize(
         _device(device),
@@ -178,12 +179,9 @@ def _scene_from_arrays(means, quats, scales, opacities, *, sh, kernel="gaussian"
     Opacities are clamped to 1e-6 and 1 - 1e-6, scales to 1e-8 and more, as files hold logits and
     logarithms.
     """
-    opacity = _np.clip(_np.asarray(opacities, dtype=_np.float64), 1e-6, 1 - 1e-6)
-    length = _np.maximum(_np.asarray(scales, dtype=_np.float64), 1e-8)
     return _scene_of_arrays({
-        "means": means, "quats": quats, "sh": sh, "kernel": kernel, "footprint": footprint,
-        "antialiased": antialiased, "log_scales": _np.log(length).astype(_np.float32),
-        "opacity_logits": _np.log(opacity / (1 - opacity)).astype(_np.float32)})
+        "means": means, "quats": quats, "scales": scales, "opacities": opacities, "sh": sh,
+        "kernel": kernel, "footprint": footprint, "antialiased": antialiased})
 
 
 def _scene_render(self, viewmats, Ks, width, height, **options):
