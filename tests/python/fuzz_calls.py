@@ -19,6 +19,7 @@ ASan:
 
 import argparse
 import collections
+import os
 import pathlib
 import random
 import tempfile
@@ -220,6 +221,7 @@ def main():
     np.seterr(all="ignore")
     tally = collections.Counter()
     folder = tempfile.TemporaryDirectory()
+    os.chdir(folder.name)  # an odd path may name a file of here
     world = {"folder": pathlib.Path(folder.name),
              "scenes": [darb.Scene.from_arrays(**support.splats(n, n, 4)) for n in (1, 5)]}
     world["scenes"][0].write(world["folder"] / "good.ply")
