@@ -198,7 +198,8 @@ def record(root, darb):
 # Rows of the tables: what stands before them, and which of the compiled passes they are.
 ROWS = (("project, degree 3", r"^project \[.*SH_DEGREE=3"), ("emit", r"^emit \["),
         ("radix scatter, ballot", r"^radix_scatter_ballot "), ("blend", r"^blend \["),
-        ("blend backward", r"^blend_backward \["), ("blend backward, buckets", r"^blend_backward_buckets "),
+        ("blend backward, team", r"^blend_backward_team "),
+        ("blend backward, one subgroup", r"^blend_backward \["), ("blend backward, buckets", r"^blend_backward_buckets "),
         ("project backward + Adam, degree 3", r"^project_backward \[.*SH_DEGREE=3.*UPDATE=0 REST=0"),
         ("loss", r"^loss \["))
 

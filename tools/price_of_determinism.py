@@ -21,11 +21,14 @@ PASSES = ("blend backward", "project backward")
 
 # file, text, with atomics
 CHANGES = [
-    ("shaders/lib/partials.glsl", "partials0[at] += value;", "atomicAdd(partials0[at], value);"),
-    ("shaders/lib/reduce.glsl", "partial_rest[slot] += rest;", "atomicAdd(partial_rest[slot], rest);"),
+    ("shaders/lib/partials.glsl", "partials0[at] PARTIALS_PUT value;", "atomicAdd(partials0[at], value);"),
+    ("shaders/backward/blend_backward_team.comp", "#extension GL_KHR_shader_subgroup_arithmetic : require",
+     "#extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_shader_atomic_float : require"),
+    ("shaders/backward/blend_backward.comp", "partial_rest[slot] += rest;", "atomicAdd(partial_rest[slot], rest);"),
     ("shaders/backward/blend_backward.comp", "#extension GL_KHR_shader_subgroup_arithmetic : require",
      "#extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_shader_atomic_float : require"),
-    ("shaders/backward/blend_backward.comp", "slot = intersection_from_sorted[number - 1u];", "slot = splat;"),
+    ("shaders/backward/blend_backward.comp", "return intersection_from_sorted[j];",
+     "return splat_from_intersection[intersection_from_sorted[j]] & INTERSECTION_SPLAT_MASK;"),
     ("shaders/backward/project_backward.comp", "uint e = first_intersection[i];", "uint e = i;"),
     ("shaders/backward/project_backward.comp", "const uint end = e + intersection_count[i];",
      "const uint end = e + min(intersection_count[i], 1u);"),

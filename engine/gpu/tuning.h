@@ -11,8 +11,12 @@ struct DeviceInfo;
 
 enum class BackwardBlend {
     subgroup,  // a subgroup walks a tile's list, reductions over its pixels: blend_backward.comp
+    team,      // the same by a subgroup an area of the tile: blend_backward_team.comp
     buckets,   // a thread owns an intersection, from checkpoints: blend_backward_buckets.comp
 };
+
+/// In the order of the enum.
+inline constexpr const char* kBackwardBlends[] = {"subgroup", "team", "buckets"};
 
 /// How the scatter pass of the radix sort ranks keys, shaders/sort/radix_scatter_*; in the order of
 /// their names.

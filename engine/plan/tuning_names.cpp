@@ -62,11 +62,18 @@ void check_names(const DeviceInfo& info, const TuningNames& names, const std::st
     }
 }
 
-std::vector<std::string> usual_first(const std::string& usual) {
-    std::vector<std::string> names{usual};
-    for (const char* name : kSortScatters)
-        if (name != usual) names.emplace_back(name);
+template <std::size_t count, class Enum>
+std::vector<std::string> usual_first(const char* const (&all)[count], Enum usual) {
+    const std::string first = all[static_cast<std::size_t>(usual)];
+    std::vector<std::string> names{first};
+    for (const char* name : all)
+        if (name != first) names.emplace_back(name);
     return names;
+}
+
+template <class Enum, std::size_t count>
+Enum named(const char* const (&all)[count], const std::string& name) {
+    return static_cast<Enum>(std::find(std::begin(all), std::end(all), name) - std::begin(all));
 }
 
 }  // namespace
@@ -82,10 +89,13 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
              lavapipe ? Names{"thread", "subgroup"} : Names{"subgroup", "thread"},
              {"compact", "depth sort", "emit", "tile sort"}},
             {"scatter",
-             usual_first(kSortScatters[static_cast<std::size_t>(usual_tuning(info).scatter)]),
+             usual_first(kSortScatters, usual_tuning(info).scatter),
              {"depth sort", "tile sort"}},
             {"blend", blend_shapes(info), {"blend"}},
-            {"backward", {"subgroup", "buckets"}, {"blend", "blend backward"}, true}};
+            {"backward",
+             usual_first(kBackwardBlends, usual_tuning(info).backward),
+             {"blend", "blend backward"},
+             true}};
 }
 
 TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const std::string& where) {
@@ -115,21 +125,16 @@ TuningNames tuning_names(const Tuning& tuning) {
     return {{"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
             {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
             {"blend", shape_name(tuning.blend_threads)},
-            {"backward", tuning.backward == BackwardBlend::buckets ? "buckets" : "subgroup"}};
+            {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]}};
 }
 
 Tuning with_names(Tuning tuning, const TuningNames& names) {
     for (const auto& [name, choice] : names) {
         if (name == "scan") tuning.scan_by_thread = choice == "thread";
-        if (name == "scatter")
-            tuning.scatter = static_cast<SortScatter>(
-                std::find(std::begin(kSortScatters), std::end(kSortScatters), choice) -
-                std::begin(kSortScatters));
+        if (name == "scatter") tuning.scatter = named<SortScatter>(kSortScatters, choice);
         if (name == "blend")
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_threads);
-        if (name == "backward")
-            tuning.backward =
-                choice == "buckets" ? BackwardBlend::buckets : BackwardBlend::subgroup;
+        if (name == "backward") tuning.backward = named<BackwardBlend>(kBackwardBlends, choice);
     }
     return tuning;
 }

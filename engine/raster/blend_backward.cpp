@@ -68,6 +68,11 @@ void BlendBackward::make_pipelines(bool segmented) {
         blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
         return;
     }
+    if (method_ == BackwardBlend::team) {
+        constants["THREADS"] = static_cast<std::int32_t>(4 * subgroup);  // a subgroup a block
+        blend_ = Pipeline(*device_, "blend_backward_team", constants, true, subgroup);
+        return;
+    }
     if (!blend_) blend_ = Pipeline(*device_, "blend_backward_buckets", constants, true, subgroup);
     constants["THREADS"] = SPLAT_GROUP;
     if (!bucket_tiles_) bucket_tiles_ = Pipeline(*device_, "bucket_tiles", constants);
@@ -106,8 +111,10 @@ void BlendBackward::record(Commands& commands, const FrameView& view, const Fram
     if (size.list_segments > 1 && !segmented_) make_pipelines(true);
     if (size.list_segments > 1 && behind_.bytes() < size.pixels * 4)
         make_buffers(*device_, *this, segment_buffers(size), "blend backward");
-    commands.fill(partials_, 0);
-    commands.fill(rest_, 0);
+    if (method_ != BackwardBlend::team) {  // which writes every slot
+        commands.fill(partials_, 0);
+        commands.fill(rest_, 0);
+    }
     const gpu::CameraData& camera = view.camera;
     const gpu::BlendArgs args{camera.width,
                               camera.height,
@@ -117,15 +124,15 @@ void BlendBackward::record(Commands& commands, const FrameView& view, const Fram
                               view.background.b,
                               0,
                               size.list_segments};
-    if (method_ == BackwardBlend::subgroup)
-        record_subgroup(commands, frame, d_image, args);
+    if (method_ != BackwardBlend::buckets)
+        record_lists(commands, frame, d_image, args);
     else
         record_buckets(commands, frame, d_image, args);
 }
 
 // Long lists take several dispatches, the last part of every list first.
-void BlendBackward::record_subgroup(Commands& commands, const Frame& frame, const Buffer& d_image,
-                                    gpu::BlendArgs args) {
+void BlendBackward::record_lists(Commands& commands, const Frame& frame, const Buffer& d_image,
+                                 gpu::BlendArgs args) {
     const ProjectedSplats& s = frame.splats;
     const TileIntersections& t = frame.intersections;
     const FrameImages& images = frame.images;

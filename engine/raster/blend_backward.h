@@ -41,15 +41,15 @@ class BlendBackward {
     static BufferList<BlendBackward> segment_buffers(const FrameSize& size);
     static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
     void make_pipelines(bool segmented);
-    void record_subgroup(Commands& commands, const Frame& frame, const Buffer& d_image,
-                         gpu::BlendArgs args);
+    void record_lists(Commands& commands, const Frame& frame, const Buffer& d_image,
+                      gpu::BlendArgs args);
     void record_buckets(Commands& commands, const Frame& frame, const Buffer& d_image,
                         gpu::BlendArgs args);
 
     Device* device_;
     ForwardOptions options_;
     BackwardBlend method_;
-    Pipeline blend_;                         // of either method
+    Pipeline blend_;                         // of every method
     Pipeline bucket_tiles_, bucket_behind_;  // of buckets
     bool segmented_ = false;                 // whether the pipelines take segments
     Buffer behind_;                          // pixels' state between their dispatches

@@ -1,7 +1,7 @@
 // Gradients of blend.comp: from dL/dimage to sums over pixels from which dL/d(mean, l11, l21, l22, opacity, colour)
 // follow, PARTIALS floats for each splat-tile intersection in the intersection's own slot, so that sums per splat need
 // no atomics and repeat bit by bit. Place: after the loss. Source: docs/math.md, Gradients.
-// One of two ways to the same sums; the other is blend_backward_buckets.comp.
+// One of three ways to the same sums: blend_backward_team.comp, blend_backward_buckets.comp.
 // Work: one subgroup a tile, its areas one after another, pixels dealt as in blend.comp; the lanes' sums are
 // reduced within the subgroup and added to the slot, which nobody else writes. No shared memory, no barrier.
 // Reads what the forward pass stored; slots must be zero before. Lists too long for one dispatch are worked off
@@ -43,96 +43,27 @@ layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H]
 const uint CHUNK = 128u;
 #include "lib/hits.glsl"
 #define PARTIALS_BINDING 9
-#define PARTIALS_ADD
+#define PARTIALS_PUT +=
 #include "lib/partials.glsl"
 #include "lib/reduce.glsl"
 #include "backward/splat_sums.glsl"
 
-struct Pixels {
-    float transmittance[PIXELS];
-    float behind[PIXELS];
-    vec3 d_colour[PIXELS];
-    uint last[PIXELS];
-};
-
-uint load_pixels(uvec2 first, out Pixels px) {
-    const vec3 background = vec3(args.background_r, args.background_g, args.background_b);
-    const uint plane = args.width * args.height;
-    uint last = 0u;
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        px.d_colour[k] = vec3(0.0);
-        px.behind[k] = 0.0;
-        px.transmittance[k] = 1.0;
-        px.last[k] = 0u;
-        if (at.x < args.width && at.y < args.height) {
-            const uint o = at.y * args.width + at.x;
-            px.d_colour[k] = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
-            px.transmittance[k] = final_transmittance[o];
-            px.last[k] = last_intersection[o];
-            if (ALPHA_GRADIENT == 1) px.behind[k] = -d_image[3u * plane + o];
-        }
-        px.behind[k] += dot(px.d_colour[k], background);
-        last = max(last, px.last[k]);
+uint place_of(uint j) {
+    return intersection_from_sorted[j];
+}
+void put_sums(uint slot, float v[PARTIALS], float rest) {
+    const vec2 mine = transposed_sum(v);
+    rest = subgroup_sum(rest);
+    const uint lane = gl_SubgroupInvocationID;
+    if (SUBGROUP_SIZE == 4u) {
+        put_partial(slot, 2u * lane, mine.x);
+        put_partial(slot, 2u * lane + 1u, mine.y);
+    } else if (SUBGROUP_SIZE == PARTIALS || lane < PARTIALS) {
+        put_partial(slot, lane, mine.x);
     }
-    return last;
+    if (lane == 0u) partial_rest[slot] += rest;
 }
-
-Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number) {
-    Sums s = NO_SUMS;
-    for (uint k = 0u; k < PIXELS; ++k)
-        add_pixel(s, px.transmittance[k], px.behind[k], d - vec2(slot_offset(k)), shape, l22, light,
-                  px.d_colour[k], number <= px.last[k]);
-    return s;
-}
-
-// The collected splats of an area, at least one, last to first.
-void blend_hits(inout Pixels px, vec2 centre, uint count) {
-    uint rest = count;
-    do {  // ends at its bottom, as the one within: see emit_cells
-        const uint size = min(rest, SUBGROUP_SIZE);
-        rest -= size;
-        vec4 shape = vec4(0.0), light = vec4(0.0);
-        float l22 = 0.0;
-        uint number = 0u, slot = 0u;
-        if (gl_SubgroupInvocationID < size) {
-            const uint at = hits_base() + rest + gl_SubgroupInvocationID;
-            const uint splat = hit_splat[at];
-            number = hit_index[at] + 1u;
-            slot = intersection_from_sorted[number - 1u];
-            shape = load_shape(splat, l22);
-            light = load_light(splat);
-        }
-        uint lane = size;
-        do {
-            --lane;
-            const vec4 s = subgroupBroadcast(shape, lane);
-            const vec4 c = subgroupBroadcast(light, lane);
-            const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
-                                         subgroupBroadcast(number, lane));
-            float parts[PARTIALS] =
-                float[](sums.gx * c.w, sums.gxx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
-                        sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
-            add_to_slot(subgroupBroadcast(slot, lane), parts, sums.gdydy * c.w);
-        } while (lane > 0u);
-    } while (rest > 0u);
-}
-
-// What is behind the intersections of this dispatch, from and for the other dispatches.
-void load_behind(inout Pixels px, uvec2 first) {
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        if (at.x < args.width && at.y < args.height) px.behind[k] = behind[at.y * args.width + at.x];
-    }
-}
-void store_state(Pixels px, uvec2 first) {
-    for (uint k = 0u; k < PIXELS; ++k) {
-        const uvec2 at = first + slot_offset(k);
-        if (at.x >= args.width || at.y >= args.height) continue;
-        final_transmittance[at.y * args.width + at.x] = px.transmittance[k];
-        behind[at.y * args.width + at.x] = px.behind[k];
-    }
-}
+#include "backward/area_walk.glsl"
 
 void blend_area(uint area, uvec2 tile, uvec2 range) {
     const uvec2 first = tile * TILE_SIZE + first_pixel(area, gl_SubgroupInvocationID);

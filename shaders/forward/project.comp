@@ -4,6 +4,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_ballot : require
 
 #include "shared/attribute_list.h"
 #include "shared/limits.h"
@@ -173,6 +174,14 @@ uint project(uint i, out int reason) {
     return count;
 }
 
+// One addition to memory a subgroup and reason.
+void count_culled(bool culled, int reason) {
+    for (int r = 0; r <= CULL_COLOUR; ++r) {
+        const uint n = subgroupBallotBitCount(subgroupBallot(culled && reason == r));
+        if (n > 0u && subgroupElect()) atomicAdd(status.culled[r], n);
+    }
+}
+
 void main() {
     const uint i = args.first_splat + linear_id();
     if (i >= args.splat_end) return;
@@ -180,5 +189,5 @@ void main() {
     const uint count = project(i, reason);
     intersection_count[i] = count;
     visible[i] = count > 0u ? 1u : 0u;
-    if (count == 0u) atomicAdd(status.culled[reason], 1u);
+    count_culled(count == 0u, reason);
 }

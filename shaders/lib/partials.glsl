@@ -1,10 +1,10 @@
 // The sums of splat-tile intersections, PARTIALS floats each, in the order of the intersections' slots: blend_backward
-// adds to them (define PARTIALS_ADD), others read them. Where they are more than one binding holds, the buffer is bound
+// adds to them (define PARTIALS_PUT as +=), blend_backward_team sets them (as =), others read them. Where they are more than one binding holds, the buffer is bound
 // in PARTIAL_WINDOWS windows of WINDOW_INTERSECTIONS intersections each, from PARTIALS_BINDING on.
 
 layout(constant_id = 9) const uint WINDOW_INTERSECTIONS = 0;  // 0: the first window has them all
 
-#ifdef PARTIALS_ADD
+#ifdef PARTIALS_PUT
 #define PARTIALS_WINDOW(number) layout(set = 0, binding = PARTIALS_BINDING + number, scalar) buffer
 #define PARTIALS_OF float
 #else
@@ -25,14 +25,14 @@ uint partial_window(inout uint slot) {
     return window;
 }
 
-#ifdef PARTIALS_ADD
-void add_partial(uint slot, uint i, float value) {
+#ifdef PARTIALS_PUT
+void put_partial(uint slot, uint i, float value) {
     const uint window = partial_window(slot), at = slot * PARTIALS + i;
-    if (WINDOW_INTERSECTIONS == 0u || window == 0u) partials0[at] += value;
-    else if (window == 1u) partials1[at] += value;
-    else if (window == 2u) partials2[at] += value;
-    else if (window == 3u) partials3[at] += value;
-    else partials4[at] += value;
+    if (WINDOW_INTERSECTIONS == 0u || window == 0u) partials0[at] PARTIALS_PUT value;
+    else if (window == 1u) partials1[at] PARTIALS_PUT value;
+    else if (window == 2u) partials2[at] PARTIALS_PUT value;
+    else if (window == 3u) partials3[at] PARTIALS_PUT value;
+    else partials4[at] PARTIALS_PUT value;
 }
 #else
 // part: 0, the first four of an intersection's sums, or 1, the others.

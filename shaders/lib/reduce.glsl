@@ -1,5 +1,5 @@
-// Sums nine values over a subgroup and adds them to a slot of the partials, each value by one lane.
-// Needs SUBGROUP_SIZE, lib/partials.glsl and the buffer partial_rest [K].
+// Sums of eight values over a subgroup, each in lanes of its own, so that every shuffle halves what is left to add.
+// Needs SUBGROUP_SIZE, a power of two from 4 to 64.
 
 // Halves the number of values: lanes with the bit keep the upper ones, the others the lower ones.
 float keep_half(float low, float high, uint bit) {
@@ -7,26 +7,27 @@ float keep_half(float low, float high, uint bit) {
     return (upper ? high : low) + subgroupShuffleXor(upper ? low : high, bit);
 }
 
-// For 8 lanes, lane i returns the sum of v[i]: 7 shuffles in place of 8 reductions.
-float transposed_sum(float v[PARTIALS]) {
-    const float a0 = keep_half(v[0], v[4], 4u), a1 = keep_half(v[1], v[5], 4u);
-    const float a2 = keep_half(v[2], v[6], 4u), a3 = keep_half(v[3], v[7], 4u);
-    return keep_half(keep_half(a0, a2, 2u), keep_half(a1, a3, 2u), 1u);
+// The sum over the groups of eight lanes, of each lane of a group by itself. No loop: lavapipe counts their rounds.
+float sum_of_eights(float v) {
+    if (SUBGROUP_SIZE > 32u) v += subgroupShuffleXor(v, 32u);
+    if (SUBGROUP_SIZE > 16u) v += subgroupShuffleXor(v, 16u);
+    if (SUBGROUP_SIZE > 8u) v += subgroupShuffleXor(v, 8u);
+    return v;
 }
 
-void add_to_slot(uint slot, float v[PARTIALS], float rest) {
-    if (SUBGROUP_SIZE == 8u) {
-        const float mine = transposed_sum(v);
-        rest += subgroupShuffleXor(rest, 4u);
-        rest += subgroupShuffleXor(rest, 2u);
-        rest += subgroupShuffleXor(rest, 1u);
-        add_partial(slot, gl_SubgroupInvocationID, mine);
-    } else {
-        rest = subgroupAdd(rest);
-        for (uint i = 0u; i < PARTIALS; ++i) {
-            const float total = subgroupAdd(v[i]);
-            if (gl_SubgroupInvocationID == i % SUBGROUP_SIZE) add_partial(slot, i, total);
-        }
-    }
-    if (gl_SubgroupInvocationID == 0u) partial_rest[slot] += rest;
+float subgroup_sum(float v) {
+    v = sum_of_eights(v);
+    if (SUBGROUP_SIZE > 4u) v += subgroupShuffleXor(v, 4u);
+    v += subgroupShuffleXor(v, 2u);
+    return v + subgroupShuffleXor(v, 1u);
+}
+
+// From 8 lanes on lane i returns the sum of v[i % 8] as x; of 4 lanes lane i returns those of v[2i] and v[2i + 1].
+vec2 transposed_sum(float v[PARTIALS]) {
+    const uint first = SUBGROUP_SIZE == 4u ? 2u : 4u;
+    const float a0 = keep_half(v[0], v[4], first), a1 = keep_half(v[1], v[5], first);
+    const float a2 = keep_half(v[2], v[6], first), a3 = keep_half(v[3], v[7], first);
+    const float b0 = keep_half(a0, a2, first >> 1u), b1 = keep_half(a1, a3, first >> 1u);
+    if (SUBGROUP_SIZE == 4u) return vec2(b0, b1);
+    return vec2(sum_of_eights(keep_half(b0, b1, 1u)), 0.0);
 }

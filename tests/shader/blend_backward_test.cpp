@@ -1,4 +1,4 @@
-// Both ways of the backward blend alone, blend_backward.comp and blend_backward_buckets.comp,
+// Every way of the backward blend alone, blend_backward.comp and those with _team and _buckets,
 // against the reference: one gradient for each splat-tile intersection.
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare_arrays.h"
@@ -98,12 +98,11 @@ class BlendBackward : public testing::TestWithParam<BlendVariant> {
     }
 };
 
-/// Whether by buckets.
-class BothWays : public testing::TestWithParam<bool> {
+class EveryWay : public testing::TestWithParam<BackwardBlend> {
   protected:
     BlendScene empty_scene(int width = 16, int height = 16) const {
         BlendScene s = BlendVariant{KERNEL_RAISED_COSINE}.scene(width, height);
-        s.buckets = GetParam();
+        s.back = GetParam();
         return s;
     }
 };
@@ -120,7 +119,7 @@ class ByBuckets : public BlendBackward {};
 
 TEST_P(ByBuckets, random_layers_match_double) {
     BlendScene scene = GetParam().scene(53, 37);
-    scene.buckets = true;
+    scene.back = BackwardBlend::buckets;
     scene.add_random(120, 4, 0.01, 0.98);
     const Result r = expect_backward_matches(scene, allowed());
     EXPECT_GT(r.lists.intersection_count(), 200U);
@@ -150,22 +149,26 @@ std::vector<BlendVariant> every_polynomial() {
 INSTANTIATE_TEST_SUITE_P(every_kernel, ByBuckets, testing::ValuesIn(every_polynomial()),
                          [](const auto& v) { return v.param.name(); });
 
-INSTANTIATE_TEST_SUITE_P(BlendBackwardCases, BothWays, testing::Bool(),
-                         [](const auto& v) { return v.param ? "buckets" : "subgroup"; });
+INSTANTIATE_TEST_SUITE_P(BlendBackwardCases, EveryWay,
+                         testing::Values(BackwardBlend::subgroup, BackwardBlend::team,
+                                         BackwardBlend::buckets),
+                         [](const auto& v) {
+                             return kBackwardBlends[static_cast<size_t>(v.param)];
+                         });
 
-TEST_P(BothWays, opaque_layers_match_double_through_clamp_and_stop) {
+TEST_P(EveryWay, opaque_layers_match_double_through_clamp_and_stop) {
     BlendScene scene = empty_scene();
     add_opaque_layers(scene);
     expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
 }
 
-TEST_P(BothWays, mean_on_a_pixel_centre_gives_finite_gradients) {
+TEST_P(EveryWay, mean_on_a_pixel_centre_gives_finite_gradients) {
     BlendScene scene = empty_scene();
     add_centred_layers(scene);
     expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
 }
 
-TEST_P(BothWays, ten_thousand_thin_layers_match_double) {
+TEST_P(EveryWay, ten_thousand_thin_layers_match_double) {
     BlendScene scene = empty_scene();
     scene.cutoff = 1e-6f;
     for (int i = 0; i < 10'000; ++i)
@@ -173,7 +176,7 @@ TEST_P(BothWays, ten_thousand_thin_layers_match_double) {
     expect_backward_matches(scene, tolerance("gradient_thin_layers"));
 }
 
-TEST_P(BothWays, odd_image_sizes_match_double) {
+TEST_P(EveryWay, odd_image_sizes_match_double) {
     for (const auto& [width, height] :
          std::vector<std::pair<int, int>>{{1, 1}, {17, 5}, {1, 300}, {300, 1}, {31, 33}}) {
         SCOPED_TRACE(fmt::format("{} x {}", width, height));
@@ -184,7 +187,7 @@ TEST_P(BothWays, odd_image_sizes_match_double) {
     }
 }
 
-TEST_P(BothWays, intersections_behind_the_stop_get_zero) {
+TEST_P(EveryWay, intersections_behind_the_stop_get_zero) {
     BlendScene scene = empty_scene();
     for (int i = 0; i < 100; ++i) scene.add({8.5, 8.5}, {400, 0, 400}, 0.97, {1, 0.5, 0.2});
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
@@ -196,7 +199,7 @@ TEST_P(BothWays, intersections_behind_the_stop_get_zero) {
     }
 }
 
-TEST_P(BothWays, alpha_at_its_limit_moves_only_the_colour) {
+TEST_P(EveryWay, alpha_at_its_limit_moves_only_the_colour) {
     BlendScene scene = empty_scene();
     scene.add({8, 8}, {1e6, 0, 1e6}, 0.9999, {1, 0.5, 0.2});  // above 0.99 in every pixel
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
@@ -207,7 +210,7 @@ TEST_P(BothWays, alpha_at_its_limit_moves_only_the_colour) {
     EXPECT_NE(p.d_colour, glm::vec3(0));
 }
 
-TEST_P(BothWays, the_second_of_two_clamped_layers_gets_its_gradient) {
+TEST_P(EveryWay, the_second_of_two_clamped_layers_gets_its_gradient) {
     BlendScene scene = empty_scene();
     for (int i = 0; i < 3; ++i) scene.add({8, 8}, {1e6, 0, 1e6}, 0.9999, {1, 0.5, 0.2});
     const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
@@ -221,7 +224,21 @@ bool same_bits(const BlendOutput& a, const BlendOutput& b) {
                        a.intersections.size() * sizeof(IntersectionSums)) == 0;
 }
 
-TEST_P(BothWays, a_second_run_gives_the_same_bits) {
+TEST(BlendBackwardTeam, gives_the_sums_of_one_subgroup) {
+    BlendScene scene = BlendVariant{KERNEL_RAISED_COSINE}.scene(53, 37);
+    scene.add_random(700, 4, 0.01, 1);
+    const std::vector<float> d_image(53 * 37 * 3, 0.3f);
+    const reference::TileLists lists = scene.lists();
+    const BlendOutput one = blend_on_device(scene, lists, true, d_image);
+    scene.back = BackwardBlend::team;
+    const BlendOutput team = blend_on_device(scene, lists, true, d_image);
+    // As numbers: a sum of nothing may be -0 on one side.
+    for (size_t k = 0; k < lists.intersection_count(); ++k)
+        for (int i = 0; i < 9; ++i)
+            ASSERT_EQ((&one.intersections[k].gx)[i], (&team.intersections[k].gx)[i]) << k;
+}
+
+TEST_P(EveryWay, a_second_run_gives_the_same_bits) {
     BlendScene scene = empty_scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);
     const std::vector<float> d_image(53 * 37 * 3, 0.3f);
@@ -231,7 +248,7 @@ TEST_P(BothWays, a_second_run_gives_the_same_bits) {
     EXPECT_NE(one.intersections[0].d_colour, glm::vec3(0));
 }
 
-TEST_P(BothWays, skipping_blocks_that_are_not_touched_changes_no_bit) {
+TEST_P(EveryWay, skipping_blocks_that_are_not_touched_changes_no_bit) {
     BlendScene scene = empty_scene(53, 37);
     scene.add_random(150, 4, 0.01, 1);
     const std::vector<float> d_image(53 * 37 * 3, 0.3f);
@@ -240,7 +257,7 @@ TEST_P(BothWays, skipping_blocks_that_are_not_touched_changes_no_bit) {
                           blend_on_device(scene, lists, true, d_image, true)));
 }
 
-TEST_P(BothWays, lists_worked_off_in_parts_change_no_bit) {
+TEST_P(EveryWay, lists_worked_off_in_parts_change_no_bit) {
     BlendScene scene = empty_scene(53, 37);
     scene.add_random(2000, 4, 0.01, 0.3);
     const std::vector<float> d_image(53 * 37 * 3, 0.3f);
@@ -251,7 +268,7 @@ TEST_P(BothWays, lists_worked_off_in_parts_change_no_bit) {
 }
 
 // Mesa 22.3 would cut a dispatch after 12,800 splats, 10,700 at four lanes: see blend_test.
-TEST_P(BothWays, twenty_five_thousand_layers_match_double) {
+TEST_P(EveryWay, twenty_five_thousand_layers_match_double) {
     BlendScene scene = empty_scene();
     scene.cutoff = 1e-6f;
     scene.segment = LIST_SEGMENT;

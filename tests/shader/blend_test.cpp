@@ -162,7 +162,7 @@ TEST(BlendCases, checkpoints_change_no_bit) {
     scene.add_random(150, 4, 0.01, 1);
     const reference::TileLists lists = scene.lists();
     const BlendOutput usual = blend_on_device(scene, lists);
-    scene.buckets = true;
+    scene.back = BackwardBlend::buckets;
     const BlendOutput out = blend_on_device(scene, lists);
     EXPECT_EQ(out.image, usual.image);
     EXPECT_EQ(out.transmittance, usual.transmittance);

@@ -26,8 +26,10 @@ struct BlendScene {
     glm::vec3 background{0.0f};
     std::uint32_t segment = 0;  // intersections of a list a dispatch; 0: all
     std::uint32_t threads = 0;  // of a workgroup of blend.comp; 0: a subgroup a block
-    bool buckets = false;       // back by blend_backward_buckets.comp
+    BackwardBlend back = BackwardBlend::subgroup;
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first
+
+    bool buckets() const { return back == BackwardBlend::buckets; }
 
     /// Mean in px, S' = [[xx, xy], [xy, yy]] in px^2. Everything is rounded to float, so that both
     /// sides start from the same numbers.
@@ -181,14 +183,18 @@ struct BlendPipelines {
         bucket = bucket_length(device);
         constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
         constants["BUCKET"] = static_cast<std::int32_t>(bucket);
-        constants["THREADS"] = static_cast<std::int32_t>(subgroup);
-        backward = Pipeline(device, scene.buckets ? "blend_backward_buckets" : "blend_backward",
+        const bool team = scene.back == BackwardBlend::team;
+        constants["THREADS"] = static_cast<std::int32_t>(team ? 4 * subgroup : subgroup);
+        backward = Pipeline(device,
+                            scene.buckets() ? "blend_backward_buckets"
+                            : team          ? "blend_backward_team"
+                                            : "blend_backward",
                             constants, true, subgroup);
         const std::uint32_t threads = scene.threads > 0 ? scene.threads : subgroup * 4;
         constants["THREADS"] = static_cast<std::int32_t>(threads);
         constants["PIXELS"] = static_cast<std::int32_t>(256 / threads);
         constants["STORE_FOR_BACKWARD"] = store ? 1 : 0;
-        constants["CHECKPOINTS"] = scene.buckets ? 1 : 0;
+        constants["CHECKPOINTS"] = scene.buckets() ? 1 : 0;
         constants["MIN_TRANSMITTANCE"] = least_transmittance(scene.stop);
         blend = Pipeline(device, "blend", constants, true, subgroup);
         constants["THREADS"] = SPLAT_GROUP;
@@ -213,8 +219,9 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     const size_t pixels = size_t(scene.width) * scene.height,
                  intersections = lists.intersection_count();
     const size_t records = intersections / pipelines.bucket + lists.tile_count();
+    const float start = scene.back == BackwardBlend::team ? NAN : 0.0f;
     // A record that no pixel reaches must not be read: NaN would show.
-    const std::vector<float> unwritten(scene.buckets ? records * CHECKPOINT_BYTES / 4 : 1, NAN);
+    const std::vector<float> unwritten(scene.buckets() ? records * CHECKPOINT_BYTES / 4 : 1, NAN);
     const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
         order(device, "intersection from sorted", shuffled.order),
         splats(device, "splat from intersection", shuffled.splat_from_intersection),
@@ -224,12 +231,13 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         behind(device, "behind", scene.segment > 0 ? pixels * 4 : 4),
         last(device, "last intersection", store ? pixels * 4 : 4),
         d_images(device, "d_image", d_image),
-        partials(device, "partials", std::vector<float>(intersections * 8, 0.0f)),
-        rest(device, "partial rest", std::vector<float>(intersections, 0.0f)),
+        // A team writes every slot.
+        partials(device, "partials", std::vector<float>(intersections * 8, start)),
+        rest(device, "partial rest", std::vector<float>(intersections, start)),
         checkpoints(device, "checkpoints", unwritten),
         bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0)),
         bucket_rest(device, "behind buckets",
-                    std::vector<float>(scene.buckets ? records * 256 : 1, NAN));
+                    std::vector<float>(scene.buckets() ? records * 256 : 1, NAN));
     std::uint32_t longest = 0;
     for (const glm::uvec2& r : shuffled.ranges) longest = std::max(longest, r.y - r.x);
     gpu::BlendArgs args{static_cast<std::uint32_t>(scene.width),
@@ -255,11 +263,11 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     commands.begin();
     const gpu::BucketArgs bucket_args{args.width, args.height, args.tiles_x,
                                       static_cast<std::uint32_t>(records)};
-    if (scene.buckets)
+    if (scene.buckets())
         commands.dispatch(pipelines.bucket_tiles, bucket_args, {ranges, bucket_tile}, groups_x,
                           groups_y);
     while (args.segment-- > 0 && !d_image.empty())
-        if (scene.buckets)
+        if (scene.buckets())
             commands.dispatch(pipelines.bucket_behind, args,
                               {ranges, d_images, last, checkpoints, behind, bucket_rest}, groups_x,
                               groups_y, 4);
@@ -269,7 +277,7 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
                 {ranges, order, splats, shapes, lights, bounds, d_images, final_t, last, partials,
                  partials, partials, partials, partials, rest, behind},
                 groups_x, groups_y);
-    if (scene.buckets && !d_image.empty())
+    if (scene.buckets() && !d_image.empty())
         commands.dispatch(pipelines.backward, bucket_args,
                           {ranges, order, splats, shapes, lights, bounds, d_images, last,
                            bucket_tile, checkpoints, bucket_rest, partials, rest},

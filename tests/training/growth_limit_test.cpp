@@ -164,7 +164,7 @@ TEST(Limits, a_device_without_ample_room_for_the_backward_pass_gets_what_it_need
         EXPECT_GT(trainer.counters().redone_iterations, 0U);
         return trainer.memory_demand().intersections;
     };
-    for (const char* way : {"subgroup", "buckets"}) {
+    for (const char* way : {"subgroup", "team", "buckets"}) {
         SCOPED_TRACE(way);
         backward = way;
         std::uint64_t peak = 0, within = 0;

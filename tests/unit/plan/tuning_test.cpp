@@ -83,7 +83,7 @@ TEST(Tuning, unknown_names_are_errors_that_list_the_known_ones) {
     for (const char* text :
          {"no_such=1", "blend=1x256", "backward", "backward=", "=", "backward=buckets,,"}) {
         SCOPED_TRACE(text);
-        EXPECT_NE(refusal(text).find("backward=subgroup|buckets"), std::string::npos)
+        EXPECT_NE(refusal(text).find("backward=team|subgroup|buckets"), std::string::npos)
             << refusal(text);
     }
     EXPECT_NE(refusal("no_such=1").find("'no_such'"), std::string::npos);
@@ -123,7 +123,8 @@ TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_intersections) 
     };
     EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.98}}), "subgroup");
     EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.9}}), "thread");
-    EXPECT_EQ(taken("backward", {{"backward", "subgroup", 1}, {"backward", "buckets", 0.1}}),
+    EXPECT_EQ(taken("backward", {{"backward", "team", 1}, {"backward", "buckets", 0.1}}), "team");
+    EXPECT_EQ(taken("backward", {{"backward", "team", 1}, {"backward", "subgroup", 0.9}}),
               "subgroup");
 }
 

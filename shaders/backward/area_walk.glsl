@@ -1,0 +1,89 @@
+// A subgroup walks a part of a tile's list from its end over the pixels of an area: what blend_backward.comp and
+// blend_backward_team.comp have in common. Needs their bindings, lib/area.glsl, lib/hits.glsl,
+// backward/splat_sums.glsl, and where the sums of intersection j of the sorted list go: place_of(j), put_sums.
+
+struct Pixels {
+    float transmittance[PIXELS];
+    float behind[PIXELS];
+    vec3 d_colour[PIXELS];
+    uint last[PIXELS];
+};
+
+uint load_pixels(uvec2 first, out Pixels px) {
+    const vec3 background = vec3(args.background_r, args.background_g, args.background_b);
+    const uint plane = args.width * args.height;
+    uint last = 0u;
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uvec2 at = first + slot_offset(k);
+        px.d_colour[k] = vec3(0.0);
+        px.behind[k] = 0.0;
+        px.transmittance[k] = 1.0;
+        px.last[k] = 0u;
+        if (at.x < args.width && at.y < args.height) {
+            const uint o = at.y * args.width + at.x;
+            px.d_colour[k] = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
+            px.transmittance[k] = final_transmittance[o];
+            px.last[k] = last_intersection[o];
+            if (ALPHA_GRADIENT == 1) px.behind[k] = -d_image[3u * plane + o];
+        }
+        px.behind[k] += dot(px.d_colour[k], background);
+        last = max(last, px.last[k]);
+    }
+    return last;
+}
+
+Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number) {
+    Sums s = NO_SUMS;
+    for (uint k = 0u; k < PIXELS; ++k)
+        add_pixel(s, px.transmittance[k], px.behind[k], d - vec2(slot_offset(k)), shape, l22, light,
+                  px.d_colour[k], number <= px.last[k]);
+    return s;
+}
+
+// The collected splats of an area, at least one, last to first. centre: of the thread's first pixel.
+void blend_hits(inout Pixels px, vec2 centre, uint count) {
+    uint rest = count;
+    do {  // ends at its bottom, as the one within: see emit_cells
+        const uint size = min(rest, SUBGROUP_SIZE);
+        rest -= size;
+        vec4 shape = vec4(0.0), light = vec4(0.0);
+        float l22 = 0.0;
+        uint number = 0u, place = 0u;
+        if (gl_SubgroupInvocationID < size) {
+            const uint at = hits_base() + rest + gl_SubgroupInvocationID;
+            const uint splat = hit_splat[at];
+            number = hit_index[at] + 1u;
+            place = place_of(hit_index[at]);
+            shape = load_shape(splat, l22);
+            light = load_light(splat);
+        }
+        uint lane = size;
+        do {
+            --lane;
+            const vec4 s = subgroupBroadcast(shape, lane);
+            const vec4 c = subgroupBroadcast(light, lane);
+            const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
+                                         subgroupBroadcast(number, lane));
+            float parts[PARTIALS] =
+                float[](sums.gx * c.w, sums.gxx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
+                        sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
+            put_sums(subgroupBroadcast(place, lane), parts, sums.gdydy * c.w);
+        } while (lane > 0u);
+    } while (rest > 0u);
+}
+
+// What is behind the intersections of this dispatch, from and for the other dispatches.
+void load_behind(inout Pixels px, uvec2 first) {
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uvec2 at = first + slot_offset(k);
+        if (at.x < args.width && at.y < args.height) px.behind[k] = behind[at.y * args.width + at.x];
+    }
+}
+void store_state(Pixels px, uvec2 first) {
+    for (uint k = 0u; k < PIXELS; ++k) {
+        const uvec2 at = first + slot_offset(k);
+        if (at.x >= args.width || at.y >= args.height) continue;
+        final_transmittance[at.y * args.width + at.x] = px.transmittance[k];
+        behind[at.y * args.width + at.x] = px.behind[k];
+    }
+}

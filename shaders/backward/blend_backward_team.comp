@@ -1,0 +1,122 @@
+// Gradients of blend.comp as blend_backward.comp sums them, in the same order of additions, so that both give the same
+// numbers, with TEAM subgroups a tile: each walks the tile's list over an area of its own, a chunk of intersections at a
+// time. Place: after the loss. Source: docs/math.md, Gradients.
+// Work: one workgroup of TEAM subgroups a tile, pixels dealt as in blend.comp. Shared memory: the chunk's sums of every
+// subgroup; three barriers a chunk. Every intersection of the list is written once, those that nothing reaches with
+// zeros, eight neighbouring threads a slot, so that the slots need no zeros before.
+// Lists too long for one dispatch are worked off as in blend_backward.comp.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+
+#include "shared/limits.h"
+#include "shared/render_args.h"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 0) const uint THREADS = 128;  // AREAS * SUBGROUP_SIZE
+layout(constant_id = 3) const uint SUBGROUP_SIZE = 32;
+layout(constant_id = 4) const uint SEGMENT = 0;  // intersections of a list a dispatch; 0: all of them
+layout(constant_id = 31) const int ALPHA_GRADIENT = 0;  // 1: d_image has a plane more, dL/d(1 - transmittance)
+
+#include "kernels/kernel.glsl"
+layout(push_constant, scalar) uniform Push { BlendArgs args; };
+layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
+layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
+layout(set = 0, binding = 14, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
+
+#define SHAPE_BINDING 3
+#define LIGHT_BINDING 4
+#define BOUND_BINDING 5
+#include "lib/projected.glsl"
+#include "lib/area.glsl"
+#include "lib/list_part.glsl"
+const uint CHUNK = 32u;
+#include "lib/hits.glsl"
+#define PARTIALS_BINDING 9
+#define PARTIALS_PUT =
+#include "lib/partials.glsl"
+#include "lib/reduce.glsl"
+#include "backward/splat_sums.glsl"
+
+const uint TEAM = AREAS, SUMS = PARTIALS + 1u;
+shared float chunk_sums[TEAM * CHUNK * SUMS];
+shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // of each intersection: its slot, its splat and blocks
+shared uint area_end[TEAM];  // the list's intersections before it reach a pixel of the area
+uint chunk_begin;
+
+uint place_of(uint j) {
+    return (gl_SubgroupID * CHUNK + j - chunk_begin) * SUMS;
+}
+void put_sums(uint place, float v[PARTIALS], float rest) {
+    const vec2 mine = transposed_sum(v);
+    rest = subgroup_sum(rest);
+    const uint lane = gl_SubgroupInvocationID;
+    if (SUBGROUP_SIZE == 4u) {
+        chunk_sums[place + 2u * lane] = mine.x;
+        chunk_sums[place + 2u * lane + 1u] = mine.y;
+    } else if (SUBGROUP_SIZE == PARTIALS || lane < PARTIALS) {
+        chunk_sums[place + lane] = mine.x;
+    }
+    if (lane == 0u) chunk_sums[place + PARTIALS] = rest;
+}
+#include "backward/area_walk.glsl"
+
+void load_chunk(uint end) {
+    for (uint i = gl_LocalInvocationIndex; chunk_begin + i < end && i < CHUNK; i += THREADS) {
+        chunk_slot[i] = intersection_from_sorted[chunk_begin + i];
+        chunk_word[i] = splat_from_intersection[chunk_slot[i]];
+    }
+}
+
+// The sum of one value over the areas that the intersection touches.
+float team_sum(uint local, uint value) {
+    float sum = 0.0;
+    [[unroll]] for (uint area = 0u; area < TEAM; ++area)
+        if ((chunk_word[local] & area_bits(area)) != 0u && chunk_begin + local < area_end[area])
+            sum += chunk_sums[(area * CHUNK + local) * SUMS + value];
+    return sum;
+}
+
+void store_chunk(uint end) {
+    const uint count = min(end - chunk_begin, CHUNK);
+    for (uint i = gl_LocalInvocationIndex; i < count * PARTIALS; i += THREADS)
+        put_partial(chunk_slot[i / PARTIALS], i % PARTIALS, team_sum(i / PARTIALS, i % PARTIALS));
+    for (uint i = gl_LocalInvocationIndex; i < count; i += THREADS)
+        partial_rest[chunk_slot[i]] = team_sum(i, PARTIALS);
+}
+
+void main() {
+    const uvec2 tile = gl_WorkGroupID.xy;
+    const uvec2 range = list_part(tile_range[tile.y * args.tiles_x + tile.x]);
+    if (range.x >= range.y) return;
+    const uint area = gl_SubgroupID;
+    const uvec2 first = tile * TILE_SIZE + first_pixel(area, gl_SubgroupInvocationID);
+    Pixels px;
+    const uint last = subgroupMax(load_pixels(first, px));
+    const uint own_end = min(last, range.y);
+    if (gl_SubgroupInvocationID == 0u) area_end[area] = own_end;
+    if (SEGMENT > 0u && last > range.y) load_behind(px, first);
+    chunk_begin = range.x + (range.y - 1u - range.x) / CHUNK * CHUNK;
+    for (;; chunk_begin -= CHUNK) {
+        load_chunk(range.y);
+        if (chunk_begin < own_end) {
+            const uint count =
+                collect_hits(chunk_begin, min(chunk_begin + CHUNK, own_end), area_bits(area));
+            if (count > 0u) blend_hits(px, vec2(first) + 0.5, count);
+        }
+        barrier();
+        store_chunk(range.y);
+        if (chunk_begin == range.x) break;
+        barrier();
+    }
+    if (SEGMENT > 0u && args.segment > 0u && own_end > range.x) store_state(px, first);
+}
