@@ -45,6 +45,8 @@ long='_long(/|$)'
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others: not under sanitizers.
 numerics='^every_kernel/KernelGradient|^settings/Every(Choice|Kernel.every_choice)|for_every_kernel$'
+# Of processes and of scripts, seconds each: they run in the steps unit and gpu, and find nothing new in the others.
+once='^scripts\.|^Outputs\.'
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
@@ -87,10 +89,10 @@ do_includes() { build clang; }
 do_long() { run_ctest build -R "$long"; }
 do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
-        run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$numerics" --timeout 300
+        run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$once|$numerics" --timeout 300
 }
 do_fuzz() { tools/fuzz.sh 0.02; }
-do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E "$gpu_alone" --timeout 300; }
+do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E "$gpu_alone|$once" --timeout 300; }
 
 started=$SECONDS
 for step in $steps; do
