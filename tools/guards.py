@@ -27,7 +27,7 @@ COVARIANCE = "shaders/lib/covariance.glsl"
 VALUES = "shaders/lib/splat_values.glsl"
 GRADIENT = "shaders/backward/project_gradient.glsl"
 BLEND = "shaders/forward/blend.comp"
-BLEND_BACK = "shaders/backward/blend_backward.comp"
+BLEND_BACK = "shaders/backward/area_walk.glsl"
 SPLAT_SUMS = "shaders/backward/splat_sums.glsl"
 BACK = "shaders/backward/project_backward.comp"
 
