@@ -72,11 +72,12 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
         if (progress) progress(kReadShare + kDecodeShare * share, "decoding");
     };
     decoding(0);
-    scene.is_points = is_point_cloud(bytes, file.string());
+    const auto read_points = [&](const PlyHeader& header) {
+        scene.is_points = true;
+        return points_as_splats(parse_point_cloud_ply(bytes, header, file.string(), facts.dropped));
+    };
     const std::filesystem::path folder = inner.has_parent_path() ? inner.parent_path() : ".";
-    scene.model = scene.is_points
-                      ? points_as_splats(parse_point_cloud_ply(bytes, file.string(), facts.dropped))
-                      : parse_splats(bytes, inner.string(), &facts, decoding, folder);
+    scene.model = parse_splats(bytes, inner.string(), &facts, decoding, folder, read_points);
     scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
     scene.notes = facts.notes;
     if (facts.dropped > 0)

@@ -30,7 +30,11 @@ std::uint8_t colour_byte(double value) {
 
 PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const std::string& where,
                                  std::size_t& dropped) {
-    const PlyHeader header = parse_ply_header(file, where);
+    return parse_point_cloud_ply(file, parse_ply_header(file, where), where, dropped);
+}
+
+PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeader& header,
+                                 const std::string& where, std::size_t& dropped) {
     const PlyElement* vertex = header.find("vertex");
     if (!vertex) throw Error(where, "has no element vertex", "A point cloud is needed.");
     int position[3], colour[3];

@@ -7,13 +7,17 @@
 #include <string>
 
 #include "engine/data/dataset.h"
+#include "engine/scene/ply_table.h"
 
 namespace darb {
 
 /// Without colours: mid grey. Float colours are in [0, 1]. Points with NaN or infinity are dropped,
 /// `dropped` is their count. Throws Error naming file and record.
+/// header: parse_ply_header's, where that was called before.
 PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const std::string& where,
                                  std::size_t& dropped);
+PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeader& header,
+                                 const std::string& where, std::size_t& dropped);
 PointCloud read_point_cloud_ply(const std::filesystem::path& path, std::size_t& dropped);
 
 }  // namespace darb

@@ -97,7 +97,9 @@ SplatModel load_ply(const SplatSource& source, SplatFile& file) {
     const PlyHeader header = parse_ply_header(source.bytes, source.where);
     if (is_compressed_ply(header)) file.format = SplatFormat::compressed_ply;
     file.details = encoding_of(header);
-    if (is_point_cloud(header))
+    const bool points = is_point_cloud(header);
+    if (points && source.read_points) return source.read_points(header);
+    if (points)
         throw Error(source.where,
                     "is a point cloud: its vertices have no opacity, scale and rotation",
                     "darb train starts from it where it lies beside the cameras; a viewer shows it "

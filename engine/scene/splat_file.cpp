@@ -97,16 +97,13 @@ bool names_scene_folder(const fs::path& path) {
     });
 }
 
-bool is_point_cloud(std::span<const std::byte> bytes, const std::string& where) {
-    return starts_with(bytes, "ply") && is_point_cloud(parse_ply_header(bytes, where));
-}
-
 SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& where, SplatFile* file,
-                        const ReadProgress& progress, const fs::path& folder) {
+                        const ReadProgress& progress, const fs::path& folder,
+                        const ReadPoints& read_points) {
     SplatFile unused;
     SplatFile& facts = file ? *file : unused;
     facts.bytes = bytes.size();
-    const SplatSource source{bytes, where, folder, progress};
+    const SplatSource source{bytes, where, folder, progress, read_points};
     for (const SplatFormat format : kSplatFormats) {
         const SplatFormatRow& row = row_of(format);
         if (!row.recognise || !row.recognise(source)) continue;

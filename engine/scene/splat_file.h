@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -39,17 +40,19 @@ struct SplatFile {
 SplatModel load_splats(const std::filesystem::path& path, SplatFile* file = nullptr);
 /// The same from memory. A name that ends in .splat is believed. folder: where files are that this
 /// one names; empty: such a file is refused. progress: as read_ply_rows takes it; of PLY and
-/// compressed PLY alone, the others are small or quick.
+/// compressed PLY alone, the others are small or quick. read_points: what becomes of a point cloud,
+/// a PLY whose vertices have positions and no opacity; null: it is refused.
+using ReadPoints = std::function<SplatModel(const PlyHeader&)>;
 SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& where,
                         SplatFile* file = nullptr, const ReadProgress& progress = {},
-                        const std::filesystem::path& folder = {});
+                        const std::filesystem::path& folder = {},
+                        const ReadPoints& read_points = {});
 
 /// The file that makes a folder a scene, as the meta.json of SOG; nothing where there is none.
 std::optional<std::filesystem::path> scene_file_in(const std::filesystem::path& folder);
 /// Whether a file of this name is the scene_file_in of its folder.
 bool names_scene_folder(const std::filesystem::path& path);
-/// PLY whose vertices have positions and no opacity: opens as points (engine/data/point_splats.h).
-bool is_point_cloud(std::span<const std::byte> bytes, const std::string& where = "PLY");
+/// Whether its vertices have positions and no opacity.
 bool is_point_cloud(const PlyHeader& header);
 
 /// What a name ends in that asks for the format, or the whole name where there is no dot at its

@@ -18,6 +18,7 @@ struct SplatSource {
     std::string where;             // the file's name, in errors
     std::filesystem::path folder;  // of files beside it; empty: there are none to be read
     ReadProgress progress;         // may be empty
+    ReadPoints read_points = {};   // of a PLY that is a point cloud; may be empty
 };
 
 /// What a format has a place for beyond Gaussians with their harmonics; bits.

@@ -9,6 +9,7 @@
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/ply.h"
+#include "engine/scene/ply_table.h"
 #include "tests/support/splat_files.h"
 #include "tests/support/test_data.h"
 
@@ -59,13 +60,22 @@ TEST(SplatFile, a_point_cloud_is_named_as_one) {
         "end_header\n1 2 3 4 5 6\n";
     FileBytes bytes;
     append_text(text, bytes);
-    EXPECT_TRUE(is_point_cloud(bytes));
     EXPECT_NE(error_of([&] { parse_splats(bytes, "test"); }).find("is a point cloud"),
               std::string::npos);
-    EXPECT_EQ(error_of([&] { is_point_cloud(std::span(bytes).first(60), "a.ply"); }).find("a.ply"),
+    EXPECT_EQ(error_of([&] { parse_splats(std::span(bytes).first(60), "a.ply"); }).find("a.ply"),
               0u);
-    EXPECT_FALSE(is_point_cloud(encode_ply(sample_model(0, 1))));
-    EXPECT_FALSE(is_point_cloud(encode_splats(SplatFormat::compressed_ply, sample_model(0, 1))));
+    int read = 0;
+    const auto read_points = [&](const PlyHeader& header) {
+        ++read;
+        EXPECT_EQ(header.find("vertex")->count, 1u);
+        return SplatModel();
+    };
+    parse_splats(bytes, "test", nullptr, {}, {}, read_points);
+    EXPECT_EQ(read, 1);
+    for (const SplatFormat format : {SplatFormat::ply, SplatFormat::compressed_ply})
+        parse_splats(encode_splats(format, sample_model(0, 1)), "test", nullptr, {}, {},
+                     read_points);
+    EXPECT_EQ(read, 1);
 }
 
 TEST(SplatFile, a_dot_splat_that_begins_like_gzip_is_read) {
