@@ -30,7 +30,7 @@ class Comparer {
         TrainFlags first = train_flags_of(flags, name, kernel, 0);
         std::optional<RunLock> lock;  // while COLMAP writes
         dataset_ = load_training_data(first, lock);
-        if (!flags.quiet) print_notes(dataset_.notes);
+        print_notes(dataset_.notes);
         if (held_out().empty())
             throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
         plan_sees_photos_ = !dataset_.points.seen_begin.empty() || dataset_.has_alpha;
@@ -49,7 +49,6 @@ class Comparer {
     }
     void train(TrainFlags& f, const std::atomic<bool>& stop);
     void measure(ComparedRun& run);
-    void note(const std::string& line) const { say_text(flags_.quiet ? "" : line + "\n"); }
 
     const CompareFlags& flags_;
     std::string name_;
@@ -71,9 +70,9 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
                                      f.train.iterations, held_out().size());
     const std::string title = fmt::format("{}: {}, seed {}", dataset_name(name_),
                                           kernel_name(f.train.kernel), f.train.seed);
-    if (state == RunState::finished) return note(title + ": is there");
+    if (state == RunState::finished) return say_note(title + ": is there");
     if (state == RunState::partial) f.run.resume_from = f.run.output / "checkpoint.darb";
-    note(title);
+    say_note(title);
     const RunLock lock(f.run.output);
     DeviceOptions options = command_device(flags_.device);
     Device device(options);  // of its own, so that the peak of memory is this run's
@@ -115,7 +114,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
     else
         read_unfinished_run(run, flags_.iterations, settings_text(f.train),
                             format_camera_list(dataset_.views));
-    if (!run.notes.empty()) note("note: " + run.notes);
+    if (!run.notes.empty()) say_note("note: " + run.notes);
     return run;
 }
 

@@ -99,8 +99,9 @@ int convert(const ConvertFlags& flags) {
         const auto write = [&](const std::filesystem::path& file, SplatModel& level) {
             return write_scene(file, *format, level, inputs, flags).bytes();
         };
-        write_levels(flags.levels, model,
-                     {flags.output, *format, views_for(model, flags), flags.device, say, write});
+        const LevelOutput to{flags.output, *format, views_for(model, flags),
+                             flags.device, say,     write};
+        tell_paths(flags.quiet, write_levels(flags.levels, model, to));
         return 0;
     }
     const EncodedSplats encoded = write_scene(flags.output, *format, model, inputs, flags);
@@ -127,8 +128,7 @@ void add_convert(CLI::App& app, Action& action) {
         ->required();
     command
         ->add_option("--kernel", flags->kernel,
-                     "gaussian: the nearest Gaussians of a scene of another kernel; prints how far "
-                     "renders of both differ")
+                     "gaussian: the nearest Gaussians; prints how far renders of both differ")
         ->check(CLI::IsMember({"gaussian"}));
     add_edit_options(*command, flags->edits);
     command

@@ -31,7 +31,7 @@ std::vector<SplatModel> merged(const SplatModel& model, const std::vector<std::s
     int said = -1;
     const auto progress = [&](double share) {
         const int tenth = static_cast<int>(10 * share);
-        if (tenth > said && share < 1) say("merging: {} %\n", 10 * tenth);
+        if (tenth > said && share < 1) say_note(fmt::format("merging: {} %", 10 * tenth));
         said = std::max(said, tenth);
     };
     return merge_levels(model, counts, {.progress = progress});
@@ -109,7 +109,7 @@ std::filesystem::path level_file(const std::filesystem::path& output, SplatForma
     return output.parent_path() / name;
 }
 
-void write_levels(const LevelFlags& flags, const SplatModel& model, const LevelOutput& to) {
+Paths write_levels(const LevelFlags& flags, const SplatModel& model, const LevelOutput& to) {
     if (model.size() == 0)
         throw Error("--levels", "there are no splats to merge", "Name another scene.");
     const std::vector<std::size_t> counts = level_counts(flags, model.size());
@@ -141,6 +141,9 @@ void write_levels(const LevelFlags& flags, const SplatModel& model, const LevelO
         levels[i] = SplatModel();
     }
     print_table(rows, to.views.size(), photos_db, refines, to.say);
+    Paths written;
+    for (const Row& row : rows) written.push_back(row.file);
+    return written;
 }
 
 }  // namespace darb

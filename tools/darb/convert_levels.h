@@ -12,6 +12,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/scene/splat_file.h"
+#include "tools/darb/outputs.h"
 
 namespace darb {
 
@@ -36,7 +37,7 @@ std::filesystem::path level_file(const std::filesystem::path& output, SplatForma
 
 /// Merges the scene and writes its levels; prints a row for each: splats, bytes, PSNR against the
 /// scene in `views` and, with --refine, against the held-out photos before and after. write: the
-/// model to a file, returns its bytes. Throws Error.
+/// model to a file, returns its bytes. Returns the names of the files. Throws Error.
 struct LevelOutput {
     std::filesystem::path output;
     SplatFormat format = SplatFormat::ply;
@@ -45,6 +46,6 @@ struct LevelOutput {
     std::FILE* say = stdout;
     std::function<std::size_t(const std::filesystem::path&, SplatModel&)> write;
 };
-void write_levels(const LevelFlags& flags, const SplatModel& model, const LevelOutput& to);
+Paths write_levels(const LevelFlags& flags, const SplatModel& model, const LevelOutput& to);
 
 }  // namespace darb

@@ -45,7 +45,7 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
     DatasetOptions options = flags.data;
     options.hold_out = true;
     const Dataset dataset = load_dataset(flags.dataset, options);
-    if (!flags.quiet) print_notes(dataset.notes);
+    print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(dataset.views));
     return dataset_views(dataset, most);
 }
@@ -67,9 +67,7 @@ int cost(const CostFlags& flags) {
     require_timestamps(device);
     const CostResult result =
         measure_cost(device, model, views, glm::vec3(flags.white_background ? 1.0f : 0.0f),
-                     extent.plan, [&](const std::string& line) {
-                         if (!flags.quiet) say("{}\n", line);
-                     });
+                     extent.plan, say_note);
     nlohmann::json json = cost_json(result);
     json["scene"] = name_in_json(flags.json, flags.scene);
     json["dataset"] = flags.dataset.empty() ? "" : name_in_json(flags.json, flags.dataset);

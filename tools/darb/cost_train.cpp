@@ -36,7 +36,7 @@ int train_cost(const CostFlags& flags) {
     plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
     if (flags.seeds > 0) plan.seeds = flags.seeds;
     Dataset dataset = load_dataset(run.dataset, run.data);
-    if (!flags.quiet) print_notes(dataset.notes);
+    print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json, flags.html},
                                together({files_of(flags.train), files_of(dataset.views)}));
     DeviceOptions device_options = command_device(flags.device);
@@ -44,11 +44,8 @@ int train_cost(const CostFlags& flags) {
     settle_tuning(device, flags.tune);
     plan_effects(dataset, run);
     plan_strategy(dataset, run);
-    if (!flags.quiet) say("effects: {}\n", run.run.effects);
-    TrainCostResult result =
-        measure_train_cost(device, dataset, run.train, plan, [&](const std::string& line) {
-            if (!flags.quiet) say("{}\n", line);
-        });
+    say_note("effects: " + run.run.effects);
+    TrainCostResult result = measure_train_cost(device, dataset, run.train, plan, say_note);
     result.dataset = name_in_json(flags.json, flags.train);
     write_json(flags.json, train_cost_json(result));
     result.dataset = name_in_json(flags.html, flags.train);

@@ -77,7 +77,7 @@ int eval(EvalFlags flags) {
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::measuring, flags.data);
     SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
-    if (!flags.quiet) print_notes(dataset.notes);
+    print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
     std::vector<View> views = views_of(dataset, flags);
     DeviceOptions device_options = command_device(flags.device);

@@ -5,10 +5,10 @@
 #include <algorithm>
 
 #include "engine/core/error.h"
-#include "engine/core/say.h"
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
+#include "tools/darb/outputs.h"
 
 namespace darb {
 
@@ -17,7 +17,7 @@ namespace {
 int registered(const KernelDefinition& definition) {
     const int kernel = register_kernel(definition);
     for (const std::string& note : definition.notes)
-        say("note: kernel {}: {}\n", kernel_name(kernel), note);
+        say_note(fmt::format("note: kernel {}: {}", kernel_name(kernel), note));
     return kernel;
 }
 

@@ -2,14 +2,14 @@
 
 #include <fmt/format.h>
 
-#include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/camera_list.h"
+#include "tools/darb/outputs.h"
 
 namespace darb {
 
 void print_notes(const std::vector<std::string>& notes) {
-    for (const std::string& note : notes) say("note: {}\n", note);
+    for (const std::string& note : notes) say_note("note: " + note);
 }
 
 std::vector<View> open_cameras(const std::filesystem::path& path, const DatasetOptions& options) {

@@ -9,7 +9,7 @@
 
 namespace darb {
 
-/// "note: ..." lines on stderr, as of Dataset::notes.
+/// "note: ..." lines on stderr, as of Dataset::notes; none after -q.
 void print_notes(const std::vector<std::string>& notes);
 
 /// load_cameras, its notes printed.

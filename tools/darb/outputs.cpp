@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
+bool notes_left_out = false;  // by the -q of this process's command
+
 using Identity = std::pair<dev_t, ino_t>;
 
 // Of a regular file that is there.
@@ -107,8 +109,13 @@ void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs) {
                 throw Error(at->second.string(), "is what is read", "Name another file to write.");
 }
 
-void add_quiet_flag(CLI::App& command, bool& quiet) {
-    command.add_flag("-q,--quiet", quiet, "print paths, warnings and errors only");
+CLI::Option* add_quiet_flag(CLI::App& command, bool& quiet) {
+    const auto take = [&quiet](std::int64_t times) { notes_left_out = quiet = times > 0; };
+    return command.add_flag_function("-q,--quiet", take, "print paths, warnings and errors only");
+}
+
+void say_note(std::string_view line) {
+    if (!notes_left_out) say("{}\n", line);
 }
 
 void tell_paths(bool quiet, const Paths& written) {

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "engine/data/dataset.h"
@@ -24,7 +25,9 @@ Paths files_of(const std::vector<View>& views);
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs);
 
 /// -q, the same in every command: paths of what was written, warnings and errors are printed.
-void add_quiet_flag(CLI::App& command, bool& quiet);
+CLI::Option* add_quiet_flag(CLI::App& command, bool& quiet);
+/// A line on stderr that is neither warning nor error: nothing after -q, whichever option took it.
+void say_note(std::string_view line);
 /// A line with each on stdout where quiet; who is not finds them in the text. Empty paths and "-"
 /// do not count.
 void tell_paths(bool quiet, const Paths& written);

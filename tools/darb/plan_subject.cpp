@@ -47,7 +47,7 @@ PlanSubject open_subject(const PlanFlags& flags) {
         refuse(flags.depth, "--depth");
         refuse(!flags.cameras.empty(), "--cameras");
         s.dataset = load_dataset(flags.what, flags.data);
-        if (!flags.quiet) print_notes(s.dataset.notes);
+        print_notes(s.dataset.notes);
         if (!s.dataset.points.seen_begin.empty() || s.dataset.has_alpha)
             s.photos = load_photos(s.dataset.views);
         return s;

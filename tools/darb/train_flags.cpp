@@ -5,6 +5,7 @@
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/help.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/outputs.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -90,8 +91,7 @@ void add_run_flags(CLI::App& command, TrainFlags& f) {
         ->group(option_group::kRun);
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training")
         ->group(option_group::kRun);
-    command.add_flag("-q,--quiet", f.run.quiet, "print paths, warnings and errors only")
-        ->group(option_group::kRun);
+    add_quiet_flag(command, f.run.quiet)->group(option_group::kRun);
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`")
         ->group(option_group::kRun);
     command.add_flag("--deterministic", f.deterministic)->group("");

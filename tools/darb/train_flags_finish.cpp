@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "engine/core/error.h"
-#include "engine/core/say.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/train_flags.h"
 #include "trainer/strategy.h"
 
@@ -66,9 +66,9 @@ void note_iterations_beyond(const TrainFlags& f) {
         {"--checkpoint-iterations", f.run.checkpoint_iterations}};
     for (const auto& [name, list] : lists)
         for (const int iteration : list)
-            if (iteration > f.train.iterations && !f.run.quiet)
-                say("note: {} {} is beyond the end at {}: it never comes\n", name, iteration,
-                    f.train.iterations);
+            if (iteration > f.train.iterations)
+                say_note(fmt::format("note: {} {} is beyond the end at {}: it never comes", name,
+                                     iteration, f.train.iterations));
 }
 
 }  // namespace
