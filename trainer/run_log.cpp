@@ -77,11 +77,13 @@ bool append(int file, std::string_view line) {
 
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
                      const std::filesystem::path& output) {
+    const std::filesystem::path images = dataset.options.images_folder;
     return fmt::format(
         "Namespace(sh_degree={}, source_path={}, model_path={}, images={}, "
         "resolution={}, white_background={}, data_device='cpu', eval={})",
         options.sh_degree, python_string(seen_from(output, dataset.root).string()),
-        python_string("."), python_string(dataset.options.images_folder),
+        python_string("."),
+        python_string((images.is_absolute() ? seen_from(dataset.root, images) : images).string()),
         dataset.options.resolution, options.white_background ? "True" : "False",
         std::any_of(dataset.views.begin(), dataset.views.end(),
                     [](const View& v) { return v.is_test; })

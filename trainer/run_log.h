@@ -16,7 +16,7 @@ namespace darb {
 
 /// cfg_args as 3DGS writes it: one Python Namespace, which the ecosystem's viewers parse and 3DGS
 /// evaluates; names are quoted so that nothing in them runs. Paths are as
-/// seen from the output folder.
+/// seen from the output folder, that of the photos as seen from the data set.
 std::string cfg_args(const Dataset& dataset, const TrainOptions& options,
                      const std::filesystem::path& output);
 

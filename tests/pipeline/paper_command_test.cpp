@@ -172,11 +172,17 @@ TEST(CompareCommand, DataSetThatCannotBeLoaded_isAFailureInTheReport) {
 TEST(CompareCommand, RunThatCannotBeRead_isSaidWhereProgressIsNot) {
     const fs::path out = scratch() / "compare_unread";
     write_file_atomic(out / "scene/gaussian/seed0/metrics.json", "[]");
-    const Outcome one =
-        darb("compare " + kScene +
-             " --kernels gaussian --iterations 4 -r 8 --blending-views 0 -q -o " + out.string());
+    const Outcome one = darb(
+        "compare " + kScene + " --kernels gaussian --iterations 4 -r 8 --blending-views 0 -q -o " +
+        out.string() + " --train-options '--images " + kScene + "/images --sh-degree 1'");
     EXPECT_EQ(one.code, 2);
     EXPECT_NE(one.err.find("metrics.json"), std::string::npos) << one.err;
+    // What was typed names no folder of the machine in what is shared.
+    EXPECT_NE(read_json(out / "compare.json").dump().find("--images images --sh-degree 1."),
+              std::string::npos);
+    for (const char* name : {"compare.json", "compare.html"})
+        for (const std::string& folder : {kScene, out.string()})
+            EXPECT_EQ(read_text_file(out / name).find(folder), std::string::npos) << name;
 }
 
 TEST(PsiCommand, TableJsonAndPage_agree) {

@@ -46,8 +46,8 @@ class RunFiles : public testing::Test {
         EXPECT_NE(o.err.find("\n  "), std::string::npos) << "no remedy: " << o.err;
     }
     // What was trained 2 iterations long and then interrupted.
-    void leave_unfinished() const {
-        ASSERT_EQ(train("--checkpoint-iterations 2").code, 0);
+    void leave_unfinished(const std::string& options = "") const {
+        ASSERT_EQ(train("--checkpoint-iterations 2 " + options).code, 0);
         fs::rename(run() / "chkpnt2.darb", run() / "checkpoint.darb");
         edit("metrics.json", [](json& m) {
             m["iteration"] = 2;
@@ -59,7 +59,7 @@ class RunFiles : public testing::Test {
 };
 
 TEST_F(RunFiles, name_no_folder_of_the_machine_and_move_with_the_data) {
-    leave_unfinished();
+    leave_unfinished("--images " + (data() / "images").string());
     for (const auto& entry : fs::recursive_directory_iterator(run())) {
         const std::string name = entry.path().extension().string();
         if (!entry.is_regular_file() || name == ".ply" || name == ".png" || name == ".darb")

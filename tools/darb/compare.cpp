@@ -74,12 +74,14 @@ std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
     return lpips;
 }
 
-// What runs say names their data set and the output, and no folder around these.
+// What runs say names their data set, the output and files of their options, and no folder around
+// these.
 void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags) {
-    const std::string path = dataset_path(dataset.path.string());
+    std::vector<std::filesystem::path> paths = paths_in_options(flags);
+    paths.insert(paths.end(), {dataset_path(dataset.path.string()), flags.output});
     for (ComparedRun& run : dataset.runs)
         for (std::string* text : {&run.failure, &run.notes})
-            *text = without_folders(without_folders(*text, path), flags.output);
+            for (const std::filesystem::path& path : paths) *text = without_folders(*text, path);
 }
 
 // Paths as the file sees them.

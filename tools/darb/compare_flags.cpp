@@ -13,6 +13,8 @@
 
 namespace darb {
 
+namespace fs = std::filesystem;
+
 namespace {
 
 /// An option that goes to `darb train` as it is.
@@ -90,12 +92,11 @@ std::vector<int> kernels_of(const CompareFlags& flags) {
 }
 
 std::string dataset_path(const std::string& dataset) {
-    const bool whole = std::filesystem::exists(dataset);
-    return whole ? dataset : dataset.substr(0, dataset.rfind('@'));
+    return fs::exists(dataset) ? dataset : dataset.substr(0, dataset.rfind('@'));
 }
 
 std::string dataset_name(const std::string& dataset) {
-    const auto path = std::filesystem::absolute(dataset_path(dataset)).lexically_normal();
+    const auto path = fs::absolute(dataset_path(dataset)).lexically_normal();
     return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
@@ -119,18 +120,6 @@ TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset,
     TrainFlags f = parse_train_flags(std::move(words), flags.train_options, "darb compare");
     f.run.quiet = flags.quiet;
     return f;
-}
-
-std::string settings_of(const CompareFlags& flags) {
-    std::string words;
-    for (const std::string& word : flags.forwarded) words += " " + word;
-    return fmt::format(
-        "{}Options of training:{}{}{}.",
-        flags.max_splats > 0
-            ? fmt::format("Growth stops at {} splats. ", flags.max_splats)
-            : "Equal densification threshold, so each kernel has its own number of splats. ",
-        words, flags.train_options.empty() ? "" : " " + flags.train_options,
-        words.empty() && flags.train_options.empty() ? " the defaults" : "");
 }
 
 }  // namespace darb

@@ -46,7 +46,10 @@ std::string dataset_name(const std::string& dataset);
 TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset, int kernel,
                           std::uint64_t seed);
 
-/// What the runs have in common, as sentences.
+/// Files and folders that the options of the runs name.
+std::vector<std::filesystem::path> paths_in_options(const CompareFlags& flags);
+
+/// What the runs have in common, as sentences; paths in them as seen from the output.
 std::string settings_of(const CompareFlags& flags);
 
 /// Trains what is not there yet and reads and measures everything, one data set; ends early, with

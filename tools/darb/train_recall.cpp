@@ -54,16 +54,19 @@ bool is_one_of(std::string_view name, std::initializer_list<std::string_view> na
     return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// What an option with a path gets in its place; paths are relative to the output folder.
+// What an option with a path gets in its place; paths are relative to the output folder, that of
+// photos to the data set.
 std::string shared_value(std::string_view option, const std::string& value,
-                         const std::filesystem::path& output) {
+                         const TrainFlags& flags) {
     if (is_one_of(option, {"-o", "-m", "--output", "--model-path"})) return ".";
-    return seen_from(output, value).string();
+    if (is_one_of(option, {"-i", "--images"}))
+        return value.starts_with('/') ? seen_from(flags.dataset, value).string() : value;
+    return seen_from(flags.run.output, value).string();
 }
 
 bool takes_path(std::string_view option) {
     return is_one_of(option, {"-o", "-m", "--output", "--model-path", "-s", "--source-path",
-                              "--start-checkpoint", "--kernel-file"});
+                              "--start-checkpoint", "--kernel-file", "-i", "--images"});
 }
 
 // The word that is the data set, where no option names it: the first one behind "train", or one
@@ -90,13 +93,13 @@ std::string command_text(std::vector<std::string> arguments, const TrainFlags& f
         const std::string name = word.substr(0, equals), attached = word.substr(0, 2);
         named = named || is_one_of(name, {"-s", "--source-path"});
         if (takes_path(name) && equals != std::string::npos) {
-            word = name + "=" + shared_value(name, word.substr(equals + 1), output);
+            word = name + "=" + shared_value(name, word.substr(equals + 1), flags);
         } else if (takes_path(name) && i + 1 < arguments.size()) {
-            arguments[i + 1] = shared_value(name, arguments[i + 1], output);
+            arguments[i + 1] = shared_value(name, arguments[i + 1], flags);
             ++i;
         } else if (takes_path(attached) && word.size() > 2) {
             named = named || attached == "-s";
-            word = attached + shared_value(attached, word.substr(2), output);
+            word = attached + shared_value(attached, word.substr(2), flags);
         }
     }
     if (!named)
