@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -71,6 +72,8 @@ Tensor read_tensor(const nlohmann::json& entry, std::span<const std::byte> bytes
     tensor.data.resize(count);
     for (std::size_t i = 0; i < count; ++i)
         tensor.data[i] = value_at(type, &bytes[offsets[0] + i * size]);
+    if (!std::ranges::all_of(tensor.data, [](float value) { return std::isfinite(value); }))
+        throw bad("holds NaN or infinity");
     return tensor;
 }
 

@@ -248,5 +248,32 @@ TEST(Safetensors, EveryTruncation_isAnErrorAndNoCrash) {
         EXPECT_THROW(parse_safetensors(bytes_of(bad, 16), "f"), Error) << bad;
 }
 
+// The format has no checksum, so a number may become another, but it stays a number.
+TEST(Safetensors, EveryFlippedBit_isAnErrorOrFillsTheShapes) {
+    auto file = bytes_of(R"({"x":{"dtype":"F32","shape":[2,2],"data_offsets":[0,16]},)"
+                         R"("h":{"dtype":"F16","shape":[3],"data_offsets":[16,22]}})",
+                         22);
+    const float values[] = {1, -2, 1e-3f, 1e30f};
+    std::memcpy(file.data() + file.size() - 22, values, sizeof values);
+    std::size_t refused = 0;
+    for (std::size_t bit = 0; bit < 8 * file.size(); ++bit) {
+        file[bit / 8] ^= std::byte(1 << bit % 8);
+        try {
+            for (const auto& [name, tensor] : parse_safetensors(file, "f")) {
+                std::size_t count = 1;
+                for (const std::size_t n : tensor.shape) count *= n;
+                EXPECT_EQ(tensor.data.size(), count) << bit;
+                for (const float value : tensor.data) EXPECT_TRUE(std::isfinite(value)) << bit;
+            }
+        } catch (const Error& e) {
+            ++refused;
+            EXPECT_EQ(std::string(e.what()).find("f"), 0u) << e.what();
+        }
+        file[bit / 8] ^= std::byte(1 << bit % 8);
+    }
+    EXPECT_GT(refused, 100u);
+    EXPECT_EQ(parse_safetensors(file, "f").size(), 2u);
+}
+
 }  // namespace
 }  // namespace darb
