@@ -67,7 +67,7 @@ TEST_F(WindowTest, Window_shows_the_headless_screenshot_and_closes_with_0_slow) 
     EXPECT_TRUE(shows(wanted)) << "differs by " << largest_difference(window(), wanted) << "\n"
                                << log("view.log");
     xdo({"key", "ctrl+q"});
-    EXPECT_TRUE(eventually([&] { return !program_->running(); }));
+    ASSERT_TRUE(eventually([&] { return !program_->running(); }));
     EXPECT_EQ(program_->wait(), 0) << log("view.log");
 }
 
@@ -114,7 +114,7 @@ TEST_F(WindowTest, A_dropped_pipe_is_refused_and_the_window_closes_slow) {
     xdo({"key", "Escape"});
     EXPECT_TRUE(shows(before)) << "the scene before is gone";
     xdo({"key", "ctrl+q"});
-    EXPECT_TRUE(eventually([&] { return !program_->running(); }));
+    ASSERT_TRUE(eventually([&] { return !program_->running(); }));
     EXPECT_EQ(program_->wait(), 0) << log("view.log");
 }
 
@@ -160,7 +160,7 @@ TEST_F(WindowTest, What_was_not_saved_is_kept_when_the_display_ends_or_a_signal_
 TEST_F(WindowTest, A_display_that_ends_while_a_window_draws_is_an_error_slow) {
     start();
     display_->terminate();
-    EXPECT_TRUE(eventually([&] { return !program_->running(); }));
+    ASSERT_TRUE(eventually([&] { return !program_->running(); }));
     EXPECT_EQ(program_->wait(), 2) << log("view.log");
     EXPECT_NE(log("view.log").find("error: window: the display is gone"), std::string::npos)
         << log("view.log");

@@ -158,7 +158,6 @@ TEST(Commands, pass_times_have_a_row_per_pass_in_order) {
     EXPECT_EQ(times[299].name, "pass 299");
     for (const PassTime& time : times) {
         EXPECT_GE(time.ms, 0) << time.name;
-        EXPECT_LT(time.ms, 60'000) << time.name;
     }
 }
 
