@@ -9,14 +9,13 @@ to a copy of the sources. It is trained, kept by density control, saved, resumed
 """
 
 import os
-import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-COPY = os.path.join(ROOT, "build-attribute")
+from changed_copy import ROOT, built_copy, changed_texts
+
 MOST_FILES = 8
 
 # file, text, with the attribute
@@ -51,41 +50,6 @@ CHANGES = [
 ]
 
 
-def changed_texts():
-    """The text of each file with its changes; ends where one does not fit the sources any more."""
-    texts = {}
-    for path, held, other in CHANGES:
-        if path not in texts:
-            with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-                texts[path] = file.read()
-        if texts[path].count(held) != 1:
-            sys.exit(f"tools/new_attribute.py: {path} holds '{held}' {texts[path].count(held)} times")
-        texts[path] = texts[path].replace(held, other)
-    return texts
-
-
-def build():
-    files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True,
-                           capture_output=True, text=True).stdout
-    changed = changed_texts()
-    for name in files.splitlines():
-        old, new = os.path.join(ROOT, name), os.path.join(COPY, name)
-        if not os.path.isfile(old) or name.startswith(("docs/", "assets/")):
-            continue
-        os.makedirs(os.path.dirname(new), exist_ok=True)
-        if name in changed:
-            with open(new, "w", encoding="utf-8") as file:
-                file.write(changed[name])
-        elif not os.path.isfile(new) or os.path.getmtime(old) > os.path.getmtime(new):
-            shutil.copy2(old, new)
-    os.environ.update(CCACHE_BASEDIR=COPY, CCACHE_NOHASHDIR="1")
-    folder = os.path.join(COPY, "build")
-    for command in (["cmake", "-G", "Ninja", "-S", COPY, "-B", folder, "-DCMAKE_BUILD_TYPE=Release", "-DDARB_TESTS=OFF",
-                     "-DCMAKE_UNITY_BUILD=ON"], ["ninja", "-j2", "-C", folder, "darb"]):
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return os.path.join(folder, "darb")
-
-
 def column(ply, name):
     """Of a binary PLY of floats."""
     head, _, body = ply.partition(b"end_header\n")
@@ -105,11 +69,12 @@ def main():
     if {"-h", "--help"} & set(sys.argv[1:]):
         print(__doc__.strip())
         return 0
-    files = sorted(changed_texts())
+    texts = changed_texts("tools/new_attribute.py", CHANGES)
+    files = sorted(texts)
     print(f"a new attribute: {len(files)} files, at most {MOST_FILES}: {' '.join(files)}")
     if len(files) > MOST_FILES or "--check" in sys.argv[1:]:
         return 1 if len(files) > MOST_FILES else 0
-    darb = build()
+    darb = built_copy("build-attribute", texts)
     subprocess.run([darb, "check"], check=True)
     with tempfile.TemporaryDirectory() as folder:
         scene = trained(darb, os.path.join(folder, "whole"), "--checkpoint-iterations", "80")

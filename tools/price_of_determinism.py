@@ -9,14 +9,13 @@ trains both in turn on the shipped scene, and prints the milliseconds of the two
 
 import json
 import os
-import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-COPY = os.path.join(ROOT, "build-atomics")
+from changed_copy import ROOT, built_copy, changed_texts
+
 PASSES = ("blend backward", "project backward")
 
 # file, text, with atomics
@@ -37,38 +36,6 @@ CHANGES = [
 ]
 
 
-def changed_texts():
-    """The text of each file with its changes; ends where one does not fit the sources any more."""
-    texts = {}
-    for path, held, other in CHANGES:
-        if path not in texts:
-            with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-                texts[path] = file.read()
-        if texts[path].count(held) != 1:
-            sys.exit(f"tools/price_of_determinism.py: {path} holds '{held}' {texts[path].count(held)} times")
-        texts[path] = texts[path].replace(held, other)
-    return texts
-
-
-def build_atomics():
-    files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True,
-                           capture_output=True, text=True).stdout
-    for name in files.splitlines():
-        old, new = os.path.join(ROOT, name), os.path.join(COPY, name)
-        if os.path.isfile(old):
-            os.makedirs(os.path.dirname(new), exist_ok=True)
-            shutil.copy2(old, new)
-    for path, text in changed_texts().items():
-        with open(os.path.join(COPY, path), "w", encoding="utf-8") as file:
-            file.write(text)
-    os.environ.update(CCACHE_BASEDIR=COPY, CCACHE_NOHASHDIR="1")
-    build = os.path.join(COPY, "build")
-    for command in (["cmake", "-G", "Ninja", "-S", COPY, "-B", build, "-DCMAKE_BUILD_TYPE=Release"],
-                    ["ninja", "-C", build, "darb"]):
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return os.path.join(build, "darb")
-
-
 def train(darb, folder):
     subprocess.run([darb, "train", os.path.join(ROOT, "assets/scene"), "-o", folder, "-q", "--eval", "--iterations", "300",
                     "--densify-until-iter", "0", "--test-iterations", "300", "--save-iterations", "300"],
@@ -85,11 +52,12 @@ def main():
     if {"-h", "--help"} & set(sys.argv[1:]):
         print(__doc__.strip())
         return 0
+    texts = changed_texts("tools/price_of_determinism.py", CHANGES)
     if "--check" in sys.argv[1:]:
-        print(f"atomics: {len(changed_texts())} files, the changes fit")
+        print(f"atomics: {len(texts)} files, the changes fit")
         return 0
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
-    commands = {"deterministic": os.path.join(ROOT, "build/darb"), "atomics": build_atomics()}
+    commands = {"deterministic": os.path.join(ROOT, "build/darb"), "atomics": built_copy("build-atomics", texts)}
     times = {name: [] for name in commands}
     scenes = {name: set() for name in commands}
     with tempfile.TemporaryDirectory() as folder:
