@@ -1,7 +1,6 @@
 #include "viewer/remembered_up.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
@@ -64,18 +63,6 @@ void RememberedUp::keep(const fs::path& scene, const glm::dvec3& up) const {
     while (kept.size() > kMostScenes) kept.erase(kept.begin());
     fs::create_directories(list_.parent_path());
     write_file_atomic(list_, kept.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
-}
-
-fs::path remembered_up_file() {
-    const auto folder = [](const char* name) -> fs::path {
-        const char* value = std::getenv(name);
-        return value != nullptr && *value == '/' ? value : "";
-    };
-    if (const fs::path state = folder("XDG_STATE_HOME"); !state.empty())
-        return state / "darb" / "up.json";
-    if (const fs::path home = folder("HOME"); !home.empty())
-        return home / ".local" / "state" / "darb" / "up.json";
-    return {};
 }
 
 }  // namespace darb

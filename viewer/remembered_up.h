@@ -22,7 +22,4 @@ class RememberedUp {
     std::filesystem::path list_;
 };
 
-/// darb/up.json in $XDG_STATE_HOME, or in ~/.local/state; empty where there is neither.
-std::filesystem::path remembered_up_file();
-
 }  // namespace darb

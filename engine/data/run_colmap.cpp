@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -97,16 +96,9 @@ std::string largest_model(const fs::path& sparse,
 
 }  // namespace
 
-bool is_installed(std::string_view program) {
-    const char* path = std::getenv("PATH");
-    std::string_view rest = path ? path : "";
-    while (!rest.empty()) {
-        const std::size_t end = std::min(rest.find(':'), rest.size());
-        const fs::path candidate = fs::path(rest.substr(0, end)) / program;
-        if (fs::is_regular_file(candidate) && ::access(candidate.c_str(), X_OK) == 0) return true;
-        rest.remove_prefix(std::min(end + 1, rest.size()));
-    }
-    return false;
+bool is_installed(const std::string& program) {
+    return std::system(("command -v " + quoted(fs::path(program)) + " > /dev/null 2>&1").c_str()) ==
+           0;
 }
 
 bool has_new_names(std::string_view help) {

@@ -33,7 +33,7 @@ bool has_new_names(std::string_view help);
 std::filesystem::path run_colmap(const ColmapRun& run,
                                  const std::function<void(std::string_view line)>& progress);
 
-/// Whether a program of that name is on PATH.
-bool is_installed(std::string_view program);
+/// Whether the shell finds a program of that name.
+bool is_installed(const std::string& program);
 
 }  // namespace darb

@@ -174,7 +174,7 @@ void Device::State::load_statistics() {
 }
 
 void Device::State::create_cache(const DeviceOptions& options) {
-    cache_folder = options.cache_folder.empty() ? default_cache_folder() : options.cache_folder;
+    cache_folder = options.cache_folder;
     VkPhysicalDeviceIDProperties id{};
     id.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES;
     VkPhysicalDeviceProperties2 properties{};

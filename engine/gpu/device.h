@@ -60,16 +60,14 @@ struct DeviceOptions {
     /// Nothing is given to the queue: what is downloaded is 0. Pipelines are compiled anew, past
     /// every cache, and Device::compiled says what the driver tells of them.
     bool compile_only = false;
-    std::filesystem::path cache_folder;  // pipeline cache; "" = default_cache_folder()
+    /// Compiled pipelines and the record of the tuner are kept there; "" = nowhere.
+    std::filesystem::path cache_folder;
     /// For a window: surface extensions of the instance, VK_KHR_swapchain of the device. A name
     /// that is not offered is an Error. The queue does graphics too wherever the device has such a
     /// queue.
     std::vector<std::string> instance_extensions;
     std::vector<std::string> device_extensions;
 };
-
-/// $XDG_CACHE_HOME/darb, else $HOME/.cache/darb; "" where neither is set.
-std::filesystem::path default_cache_folder();
 
 class Device {
   public:

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 
 #include "engine/core/error.h"
@@ -59,33 +58,10 @@ VkDebugUtilsMessengerCreateInfoEXT messenger_info(std::atomic<std::uint64_t>* co
     return info;
 }
 
-// The key of Mesa's shader cache leaves out lavapipe's vector width: a cache filled at one width
-// gives wrong sums at another (seen on Mesa 22.3), so each width gets its own folder.
-void separate_mesa_caches() {
-    if (std::getenv("MESA_SHADER_CACHE_DIR") != nullptr) return;
-    const std::filesystem::path root = default_cache_folder();
-    if (root.empty()) return;
-    const char* width = std::getenv("LP_NATIVE_VECTOR_WIDTH");
-    const std::filesystem::path folder =
-        root / ("mesa-width-" + std::string(width != nullptr ? width : "default"));
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (!error) ::setenv("MESA_SHADER_CACHE_DIR", folder.c_str(), 0);
-}
-
 }  // namespace
-
-std::filesystem::path default_cache_folder() {
-    if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg != nullptr && *xdg != '\0')
-        return std::filesystem::path(xdg) / "darb";
-    if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
-        return std::filesystem::path(home) / ".cache" / "darb";
-    return {};
-}
 
 Instance::Instance(bool validation, const std::vector<std::string>& extensions)
     : messages_(std::make_unique<std::atomic<std::uint64_t>>(0)) {
-    separate_mesa_caches();
     if (validation && !validation_installed())
         throw Error("Vulkan validation", std::string(kValidationLayer) + " is not installed",
                     "Install vulkan-validationlayers, or run without validation.");

@@ -1,7 +1,6 @@
 #include "tools/bench/scenes.h"
 
 #include <cmath>
-#include <cstdlib>
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
@@ -58,7 +57,8 @@ View bench_view(const Camera& camera, const std::string& name) {
     return view;
 }
 
-std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::path& named) {
+std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::path& named,
+                                                       const std::filesystem::path& usual) {
     std::error_code error;
     if (!named.empty()) {
         if (!std::filesystem::is_directory(named, error))
@@ -66,10 +66,8 @@ std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::pa
                         "Name the folder that holds fox_800, sceaux_castle_800, splats, ...");
         return named;
     }
-    const char* variable = std::getenv("DARB_TEST_DATA");
-    const std::filesystem::path folder = variable ? variable : "../shared/data";
-    if (!std::filesystem::is_directory(folder, error)) return std::nullopt;
-    return folder;
+    if (!std::filesystem::is_directory(usual, error)) return std::nullopt;
+    return usual;
 }
 
 }  // namespace darb

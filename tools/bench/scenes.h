@@ -21,8 +21,9 @@ Camera bench_camera(const glm::dvec3& centre, bool upright, int width, int heigh
 /// A view without a photo, its lens the camera's pinhole.
 View bench_view(const Camera& camera, const std::string& name);
 
-/// The folder of photos and trained scenes: named, else $DARB_TEST_DATA, else ../shared/data beside
-/// the working folder; nothing where there is none. Throws Error where the named one is missing.
-std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::path& named);
+/// The folder of photos and trained scenes: named, else the usual one; nothing where that is not
+/// there. Throws Error where the named one is missing.
+std::optional<std::filesystem::path> bench_data_folder(const std::filesystem::path& named,
+                                                       const std::filesystem::path& usual);
 
 }  // namespace darb

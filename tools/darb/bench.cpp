@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <regex>
@@ -57,7 +58,7 @@ std::vector<BenchCase> possible_cases(std::vector<BenchCase> cases, const BenchO
     std::erase_if(cases, [&](const BenchCase& one) {
         if (one.file.empty()) return false;
         if (options.data && std::filesystem::exists(*options.data / one.file, error)) return false;
-        say("{} is left out: no {}; name its folder with --data or DARB_TEST_DATA\n", one.name,
+        say("warning: {} is left out: no {}; name its folder with --data\n", one.name,
             ((options.data ? *options.data : "DATA") / one.file).string());
         return true;
     });
@@ -85,7 +86,8 @@ int bench(BenchFlags flags) {
         if (flags.list) tell("{}\n", one.name);
     if (flags.list) return 0;
     BenchOptions& options = flags.options;
-    options.data = bench_data_folder(flags.data);
+    const char* usual = std::getenv("DARB_TEST_DATA");
+    options.data = bench_data_folder(flags.data, usual != nullptr ? usual : "../shared/data");
     options.device = flags.device;
     flags.growth.plan.sampling = options.sampling;
     options.program = std::filesystem::read_symlink("/proc/self/exe");
@@ -95,9 +97,7 @@ int bench(BenchFlags flags) {
         apply_plan(plan, train);
         apply_plan(plan, dataset.views);
     };
-    options.progress = [&](const std::string& line) {
-        if (!flags.quiet) say("{}\n", line);
-    };
+    options.progress = say_note;
     if (!flags.growth.on) cases = possible_cases(std::move(cases), options);
     Paths read;
     for (const BenchCase& one : cases)

@@ -4,9 +4,10 @@
 
 #include <cstdlib>
 
-#include "engine/core/say.h"
 #include "engine/plan/tuner.h"
 #include "tools/darb/help.h"
+#include "tools/darb/outputs.h"
+#include "tools/darb/user_folders.h"
 
 namespace darb {
 
@@ -24,12 +25,11 @@ void add_tune_flags(CLI::App& command, TuneFlags& flags) {
 
 void settle_tuning(Device& device, const TuneFlags& flags) {
     const char* environment = std::getenv("DARB_TUNE");
-    tune(device, {flags.choice, environment != nullptr ? environment : "", flags.retune,
-                  [](const std::string& line) { say("{}\n", line); }});
+    tune(device, {flags.choice, environment != nullptr ? environment : "", flags.retune, say_note});
 }
 
 std::string tuning_of_listed(const DeviceInfo& info) {
-    if (const auto record = read_tuning(info, default_cache_folder()))
+    if (const auto record = read_tuning(info, cache_folder()))
         return "measured: " + tuning_text(*record);
     const std::string usual = names_text(tuning_names(usual_tuning(info)));
     return usual + (is_known_device(info) ? " (known; --retune measures)"

@@ -14,6 +14,7 @@
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
+#include "tools/darb/user_folders.h"
 #include "tools/darb/view_flags.h"
 #include "tools/darb/view_window.h"
 
@@ -97,7 +98,7 @@ int view(ViewFlags flags) {
     if (!note.empty()) say("warning: {}\n", note);
     options.resolve = find_scene;
     options.start_at_camera = true;
-    options.up_list = remembered_up_file();
+    if (const auto kept = state_folder(); !kept.empty()) options.up_list = kept / "up.json";
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())
         return without_window(flags, options, size, note);
