@@ -75,7 +75,7 @@ def blending_table(title, figures):
     """Of each kernel's first run: a column a data set; nothing where none was measured."""
     rows = [r for r in figures["median_low_high"] if "blended_per_pixel" in r]
     sets, kernels = (list(dict.fromkeys(r[key] for r in rows)) for key in ("dataset", "kernel"))
-    lines = [f"**{title}**", "", "| blended per pixel, pairs per splat, ms | " + " | ".join(sets) + " |",
+    lines = [f"**{title}**", "", "| blended per pixel, intersections per splat, ms | " + " | ".join(sets) + " |",
              "|---|" + "---|" * len(sets)]
     for kernel in kernels:
         cells = {r["dataset"]: f"{r['blended_per_pixel']:.1f}, {r['pairs_per_splat']:.2f}, {r['blend_ms']:.1f}"

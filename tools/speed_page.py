@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Writes the tables of docs/speed.md from results of `darb bench`: every case with its most expensive passes and their shares of
-the roofline, and, where there is one of `darb bench --growth`, time against splats, pixels and pairs.
+the roofline, and, where there is one of `darb bench --growth`, time against splats, pixels and intersections.
 
     tools/speed_page.py          from assets/results/bench_lavapipe.json and growth_lavapipe.json
 """
@@ -41,7 +41,7 @@ def growth_table(report):
     lines = []
     for curve in report["growth"]:
         lines += [f"**One {curve['name']} by {curve['by']}**: ms = a {curve['by']}^{curve['exponent']:.2f} over the last "
-                  f"decade, by pairs {curve['exponent_by_pairs']:.2f}", "", "| splats | pixels | pairs | ms |", "|---|---|---|---|"]
+                  f"decade, by intersections {curve['exponent_by_pairs']:.2f}", "", "| splats | pixels | intersections | ms |", "|---|---|---|---|"]
         lines += [f"| {p['splats']:,.0f} | {p['pixels']:,.0f} | {p['pairs']:,.0f} | {ms(p['ms'])} |" for p in curve["points"]]
         lines.append("")
     return "\n".join(lines)

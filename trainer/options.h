@@ -49,7 +49,7 @@ struct TrainOptions {
     std::optional<float> scale_lr, rotation_lr, opacity_lr;
     float sh_dc_lr = 2.5e-3f;
     // Whether the rate of the other bands, a twentieth of it, is multiplied by 30,000 / iterations,
-    // at most 10: they come late in a run. ARCHITECTURE has what that brings.
+    // at most 10: they come late in a run. docs/experiments/harmonics.md has what that brings.
     bool speed_up_sh_rest = true;
     // These bands make a step in every so many iterations, of their mean gradient, at the root of
     // as many times the rate: what Adam reads and writes for them is most of what it moves. Absent:
@@ -111,7 +111,7 @@ struct TrainOptions {
 
     // The lengths above and below are a Gaussian's. A kernel that covers less of the picture at the
     // same scale has them longer and learns its scales faster; one that covers more keeps them
-    // (ARCHITECTURE has both measured). false: as they are, for every kernel.
+    // (docs/experiments/kernel_lengths.md has both). false: as they are, for every kernel.
     bool lengths_by_area = true;
 
     // Start.

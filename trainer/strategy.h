@@ -49,11 +49,11 @@ struct GrowthStart {
     bool random = false;  // without points
 };
 
-/// What 3DGS does where the defaults depart from it (ARCHITECTURE says why they do): constant rates
-/// but the position's, those of its paper, pruning below 0.005, no regularisers, one background,
-/// the same lengths for every kernel, no largest scale, whole photos from the start, no mean.
-/// Effects are not part of it: 3DGS has harmonics by the iteration, +sh, and neither anti-aliasing
-/// nor exposure.
+/// What 3DGS does where the defaults depart from it (docs/experiments/README.md says why): constant
+/// rates but the position's, those of its paper, pruning below 0.005, no regularisers, one
+/// background, the same lengths for every kernel, no largest scale, whole photos from the start, no
+/// mean. Effects are not part of it: 3DGS has harmonics by the iteration, +sh, and neither
+/// anti-aliasing nor exposure.
 void use_3dgs_schedule(TrainOptions& options);
 
 /// StrategyRow::target of the options' strategy.
