@@ -215,10 +215,10 @@ bool SplatPicture::ready_to_move(const DisplaySettings& display) const {
 std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const DisplaySettings& display,
                                              double moving) {
     Buffer kept = std::exchange(pixels_, Buffer());
-    const auto before = std::tuple(width_, height_, status_);
+    const auto before = std::tuple(size_.x, size_.y, status_);
     const auto put_back = [&] {
         pixels_ = std::move(kept);
-        std::tie(width_, height_, status_) = before;
+        std::tie(size_.x, size_.y, status_) = before;
     };
     try {
         render(camera, display, {}, moving);
@@ -270,8 +270,8 @@ void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
         status_ = exchange_.status();
     } while (buffers.make_room(status_));
     pass_times_ = commands_.pass_times();
-    width_ = camera.width;
-    height_ = camera.height;
+    size_.x = camera.width;
+    size_.y = camera.height;
 }
 
 void SplatPicture::record_depth_colours(const ProjectedSplats& projected, const Camera& camera,

@@ -67,8 +67,8 @@ class SplatPicture {
 
     /// Of the last render: B8G8R8A8 [height][width], its size, counters, times of the passes.
     const Buffer& pixels() const { return pixels_; }
-    int width() const { return width_; }
-    int height() const { return height_; }
+    int width() const { return size_.x; }
+    int height() const { return size_.y; }
     const gpu::FrameStatus& status() const { return status_; }
     /// Whether it had to build pipelines, which some drivers compile while they run.
     bool compiled() const { return compiled_; }
@@ -122,7 +122,7 @@ class SplatPicture {
     Bounds bounds_;
     std::array<Slot, 2> slots_;  // at rest, moving
     Buffer pixels_, no_photo_;
-    int width_ = 0, height_ = 0;
+    glm::ivec2 size_{0};  // px
     bool compiled_ = false;
     gpu::FrameStatus status_{};
     std::vector<PassTime> pass_times_;

@@ -54,7 +54,7 @@ DeviceWalk walk_on_device(Device& device, const SplatModel& model, const Camera&
         commands.begin();
         forward.record(commands, splats, view, frame);
         if (!d_image.data.empty())
-            backward.record_gradients(commands, view, frame, splats, d_planes, gradients, false);
+            backward.record_gradients(commands, view, frame, splats, d_planes, {gradients});
         commands.submit_and_wait();
         walk.status = frame.read_status();
         if (!buffers.make_room(walk.status)) break;

@@ -118,8 +118,9 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
 }
 
 void Backward::record_gradients(Commands& commands, const FrameView& view, const Frame& frame,
-                                const GpuSplats& splats, const Buffer& d_image, GradientBuffers& to,
-                                bool add, const Buffer* camera) {
+                                const GpuSplats& splats, const Buffer& d_image,
+                                const GradientTarget& target) {
+    const auto& [to, add, camera] = target;
     check_stored(options_);
     if (options_.camera_gradient &&
         (!camera || add || view.camera.lens_fold < static_cast<float>(LENS_FOLD_NONE)))

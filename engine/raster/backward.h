@@ -15,6 +15,15 @@
 
 namespace darb {
 
+/// Where gradients go.
+struct GradientTarget {
+    GradientBuffers& to;
+    bool add = false;  // to what it holds, else in its place
+    /// float [N][Backward::kCameraFloats], where options.camera_gradient asks for it, without add,
+    /// of a pinhole: what shaders/backward/camera_gradient.glsl leaves.
+    const Buffer* camera = nullptr;
+};
+
 class Backward {
   public:
     Backward(Device& device, const ForwardOptions& options);
@@ -29,12 +38,10 @@ class Backward {
     /// moments; what the view shows of each is added to gradient_sum().
     void record(Commands& commands, const FrameView& view, const Frame& frame, GpuSplats& splats,
                 const Buffer& d_image, const AdamStep& step);
-    /// The same into `to`, in place of what it holds or, with add, added to it; splats stay as they
-    /// are and need no moments. camera: float [N][kCameraFloats], where options.camera_gradient
-    /// asks for it, without add, of a pinhole: what shaders/backward/camera_gradient.glsl leaves.
+    /// The same into `target`; splats stay as they are and need no moments.
     void record_gradients(Commands& commands, const FrameView& view, const Frame& frame,
-                          const GpuSplats& splats, const Buffer& d_image, GradientBuffers& to,
-                          bool add, const Buffer* camera = nullptr);
+                          const GpuSplats& splats, const Buffer& d_image,
+                          const GradientTarget& target);
     static constexpr std::uint32_t kCameraFloats = 13;
 
     /// The backward blend alone: the intersections' sums of alpha T times the planes of `image`,

@@ -301,8 +301,9 @@ ViewGradients GradientRenderer::backward(const ImageF& d_image, const ImageF& d_
         s.camera_shares = Buffer(s.device, "camera shares", share_bytes);
     s.backward->reserve(s.splats.count(), frame.size.intersections, frame.checkpoint_records());
     s.commands.begin();
-    s.backward->record_gradients(s.commands, s.view, frame, s.splats, s.d_image, s.gradients, false,
-                                 s.options.camera ? &s.camera_shares : nullptr);
+    s.backward->record_gradients(
+        s.commands, s.view, frame, s.splats, s.d_image,
+        {s.gradients, false, s.options.camera ? &s.camera_shares : nullptr});
     s.exchange.fetch(s.commands, frame.counters.status);
     s.commands.submit_and_wait();
     ViewGradients view;

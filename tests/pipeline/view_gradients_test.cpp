@@ -244,7 +244,7 @@ struct Views {
         Commands commands(device);
         commands.begin();
         forward.record(commands, splats, seen, frame);
-        backward.record_gradients(commands, seen, frame, splats, d_image, to, add);
+        backward.record_gradients(commands, seen, frame, splats, d_image, {to, add});
         commands.submit_and_wait();
         ASSERT_EQ(frame.read_status().overflow, 0u);
     }

@@ -166,7 +166,7 @@ std::array<std::vector<float>, kAttributeCount> gradients(const TestScene& scene
     forward.record(commands, splats, view, frame);
     if (scored)
         score.record(commands, view, frame, backward, {frame.images.image, ground, scratch}, n);
-    backward.record_gradients(commands, view, frame, splats, d_image, into, false);
+    backward.record_gradients(commands, view, frame, splats, d_image, {into});
     commands.submit_and_wait();
     EXPECT_EQ(frame.read_status().overflow, 0U);
     std::array<std::vector<float>, kAttributeCount> result;

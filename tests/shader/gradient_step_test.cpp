@@ -215,7 +215,7 @@ struct ExposedStep {
         exposure.record_backward(commands, frame.images.image, d_image, status,
                                  {0, pixels(), 0.01f, t});
         if (apart) {
-            backward.record_gradients(commands, view, frame, splats, d_image, gradients, false);
+            backward.record_gradients(commands, view, frame, splats, d_image, {gradients});
             update.record(commands, splats, gradients, status, 1, step);
             update.record_fading(commands, splats, gradients, status, view, step.clearance);
             update.record_sums(commands, gradients, status, backward.gradient_sum());

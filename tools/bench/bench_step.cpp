@@ -71,7 +71,7 @@ std::vector<PassTime> BenchStep::run(bool apart) {
 void BenchStep::record_apart(GpuSplats& splats) {
     const Frame& frame = buffers_.frame();
     const Buffer& status = frame.counters.status;
-    backward_.record_gradients(commands_, view_, frame, splats, d_image_, gradients_, false);
+    backward_.record_gradients(commands_, view_, frame, splats, d_image_, {gradients_});
     update_.record(commands_, splats, gradients_, status, sh_degree_, small_step());
     update_.record_fading(commands_, splats, gradients_, status, view_, small_step().clearance);
     update_.record_sums(commands_, gradients_, status, backward_.gradient_sum());

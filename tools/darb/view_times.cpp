@@ -27,6 +27,24 @@ double peak_memory_bytes() {
     return at == std::string::npos ? 0 : 1024 * std::stod(text.substr(at + 6));
 }
 
+// Several rests after small turns.
+nlohmann::ordered_json rests_json(ViewerWindow& window, const Measured& measured) {
+    std::vector<double> refined_s, whole_s, rest_ms;
+    for (int i = 0; i < kRests; ++i) {
+        if (i > 0) turn(window, 0.05);
+        const Rest times = rest(measured);
+        refined_s.push_back(times.refined_s);
+        whole_s.push_back(times.whole_s);
+        rest_ms.push_back(window.viewer().session().times.full_ms);
+    }
+    return {{"median_ms", quantile(rest_ms, 0.5)},
+            {"worst_ms", quantile(rest_ms, 1)},
+            {"refined_after_s", quantile(refined_s, 0.5)},
+            {"refined_after_worst_s", quantile(refined_s, 1)},
+            {"whole_after_s", quantile(whole_s, 0.5)},
+            {"whole_after_worst_s", quantile(whole_s, 1)}};
+}
+
 }  // namespace
 
 void write_view_times(ViewerWindow& window, const Device& device, const std::atomic<bool>& lost,
@@ -43,14 +61,7 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
     move(measured, kMotion_s, moving_ms);
     const double frames_per_s = double(moving_ms.size()) / seconds_since(motion);
     const MotionQuality quality = s.times.quality;
-    std::vector<double> refined_s, whole_s, rest_ms;
-    for (int i = 0; i < kRests; ++i) {
-        if (i > 0) turn(window, 0.05);
-        const Rest times = rest(measured);
-        refined_s.push_back(times.refined_s);
-        whole_s.push_back(times.whole_s);
-        rest_ms.push_back(s.times.full_ms);
-    }
+    const nlohmann::ordered_json rests = rests_json(window, measured);
     const std::vector<double> psnr_db = compare_motion(measured);
     const Canvas& canvas = window.viewer().canvas();
     const nlohmann::ordered_json json = {{"scene", s.scene->file.filename().string()},
@@ -73,13 +84,7 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
                                            {"splat_share", quality.splats},
                                            {"psnr_db", quantile(psnr_db, 0.5)},
                                            {"worst_psnr_db", quantile(psnr_db, 0)}}},
-                                         {"rest",
-                                          {{"median_ms", quantile(rest_ms, 0.5)},
-                                           {"worst_ms", quantile(rest_ms, 1)},
-                                           {"refined_after_s", quantile(refined_s, 0.5)},
-                                           {"refined_after_worst_s", quantile(refined_s, 1)},
-                                           {"whole_after_s", quantile(whole_s, 0.5)},
-                                           {"whole_after_worst_s", quantile(whole_s, 1)}}},
+                                         {"rest", rests},
                                          {"peak_memory_bytes", peak_memory_bytes()},
                                          {"device_memory_bytes", device.allocated_bytes()}};
     write_file_atomic(file,
@@ -88,7 +93,7 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
         "{}: {:.1f} frames/s in motion ({:.1f} ms, first {:.1f} ms, {:.1f} dB), at rest {:.1f} "
         "ms\n",
         s.scene->file.filename().string(), frames_per_s, quantile(moving_ms, 0.5),
-        moving_ms.front(), quantile(psnr_db, 0.5), quantile(rest_ms, 0.5));
+        moving_ms.front(), quantile(psnr_db, 0.5), rests["median_ms"].get<double>());
 }
 
 }  // namespace darb
