@@ -25,6 +25,11 @@ py::object stacked(const PyDataset& set, const One& one) {
     return py::module_::import("numpy").attr("stack")(all);
 }
 
+constexpr const char* kView =
+    "A view by number, from the end where it is below 0: a dict of name, photo (its path), viewmat "
+    "[4, 4], K [3, 3] (px), width, height (px), is_test and has_lens (whether more than a "
+    "pinhole).";
+
 py::dict view_dict(const View& view) {
     py::dict d;
     d["name"] = view.name;
@@ -80,26 +85,40 @@ void bind_dataset(py::module_& module) {
     py::class_<PyDataset>(module, "Dataset", "Photos with cameras; see darb.Dataset.")
         .def_static("_read", &read_dataset)
         .def("__len__", [](const PyDataset& s) { return s.data.views.size(); })
-        .def("view",
-             [](const PyDataset& s, const py::object& i) { return view_dict(view_at(s, i)); })
-        .def("photo", &photo_array)
-        .def_property_readonly("source", [](const PyDataset& s) { return s.data.source; })
-        .def_property_readonly("notes", [](const PyDataset& s) { return s.data.notes; })
-        .def_property_readonly("alpha_is_mask",
-                               [](const PyDataset& s) { return s.data.alpha_is_mask; })
-        .def_property_readonly("viewmats",
-                               [](const PyDataset& s) { return stacked(s, viewmat_of); })
-        .def_property_readonly("Ks", [](const PyDataset& s) { return stacked(s, intrinsics_of); })
+        .def(
+            "view",
+            [](const PyDataset& s, const py::object& i) { return view_dict(view_at(s, i)); },
+            py::arg("index"), kView)
+        .def("photo", &photo_array, py::arg("index"),
+             "uint8 [H, W, 4] of a view: RGB, and alpha, which is 0 where it is masked or empty.")
+        .def_property_readonly(
+            "source", [](const PyDataset& s) { return s.data.source; }, "What was read, as text.")
+        .def_property_readonly(
+            "notes", [](const PyDataset& s) { return s.data.notes; },
+            "What was found odd while reading: a list of str.")
+        .def_property_readonly(
+            "alpha_is_mask", [](const PyDataset& s) { return s.data.alpha_is_mask; },
+            "Whether pixels of alpha 0 are left out of the loss, and not the background.")
+        .def_property_readonly(
+            "viewmats", [](const PyDataset& s) { return stacked(s, viewmat_of); },
+            "[V, 4, 4] float64, world to camera: x right, y down, z forward.")
+        .def_property_readonly(
+            "Ks", [](const PyDataset& s) { return stacked(s, intrinsics_of); },
+            "[V, 3, 3] float64, px of the photos as they are read.")
         .def_property_readonly(
             "points",
             [](const PyDataset& s) {
                 const PointCloud& p = s.data.points;
                 return to_array(p.position, {static_cast<py::ssize_t>(p.size()), 3});
-            })
-        .def_property_readonly("point_colors", [](const PyDataset& s) {
-            const PointCloud& p = s.data.points;
-            return to_array(p.colour, {static_cast<py::ssize_t>(p.size()), 3});
-        });
+            },
+            "[P, 3] float64, world units.")
+        .def_property_readonly(
+            "point_colors",
+            [](const PyDataset& s) {
+                const PointCloud& p = s.data.points;
+                return to_array(p.colour, {static_cast<py::ssize_t>(p.size()), 3});
+            },
+            "[P, 3] uint8, RGB.");
 }
 
 }  // namespace darb::python

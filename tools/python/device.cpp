@@ -82,8 +82,11 @@ void bind_device(py::module_& module) {
                  return std::make_shared<PyDevice>(text);
              }),
              py::arg("select") = "")
-        .def_property_readonly("name", [](const PyDevice& d) { return d.info().name; })
-        .def_property_readonly("info", [](const PyDevice& d) { return info_dict(d.info()); })
+        .def_property_readonly(
+            "name", [](const PyDevice& d) { return d.info().name; }, "As the driver gives it.")
+        .def_property_readonly(
+            "info", [](const PyDevice& d) { return info_dict(d.info()); },
+            "A dict, as an item of darb.devices().")
         .def_property_readonly(
             "allocated_bytes", [](PyDevice& d) { return d.device().allocated_bytes(); },
             "Bytes of device memory that buffers hold now.")

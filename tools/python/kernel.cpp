@@ -73,11 +73,21 @@ Footprint take_footprint(const py::object& value) {
 void bind_kernel(py::module_& module) {
     py::class_<PyKernel>(module, "Kernel", "A kernel of one's own; see darb.Kernel.")
         .def(py::init(&make_kernel), py::arg("profile"), py::arg("support"), py::arg("name") = "")
-        .def_property_readonly("name", [](const PyKernel& k) { return k.definition().name; })
-        .def_property_readonly("support", [](const PyKernel& k) { return k.definition().support; })
-        .def_property_readonly("psi", [](const PyKernel& k) { return kernel_psi(k.id); })
-        .def_property_readonly("error", [](const PyKernel& k) { return k.definition().error; })
-        .def_property_readonly("notes", [](const PyKernel& k) { return k.definition().notes; })
+        .def_property_readonly(
+            "name", [](const PyKernel& k) { return k.definition().name; },
+            "By which rasterize, Scene and Trainer know it, too.")
+        .def_property_readonly(
+            "support", [](const PyKernel& k) { return k.definition().support; },
+            "The q, squared Mahalanobis distance, from which on it is 0.")
+        .def_property_readonly(
+            "psi", [](const PyKernel& k) { return kernel_psi(k.id); },
+            "The projected second moment over the 2x2 block of the covariance.")
+        .def_property_readonly(
+            "error", [](const PyKernel& k) { return k.definition().error; },
+            "The largest distance of the fit from the profile, where w(0) = 1.")
+        .def_property_readonly(
+            "notes", [](const PyKernel& k) { return k.definition().notes; },
+            "What was changed of the profile: a list of str.")
         .def("__call__",
              [](const PyKernel& k, const py::object& q) {
                  return kernel_value(k.id, Footprint::psi, take_number(q, "q", 0, 1e300));

@@ -170,34 +170,44 @@ void write_scene(const PyScene& scene, const py::object& value) {
 
 void bind_scene(py::module_& module) {
     py::class_<PyScene> scene(module, "Scene", "A splat scene; see darb.Scene.");
-    scene.def_static("read", &read_scene, py::arg("path"))
+    scene
+        .def_static("read", &read_scene, py::arg("path"),
+                    "A Scene of a file of any format that `darb` reads.")
         .def_static("from_arrays", &scene_of_arrays)
-        .def("write", &write_scene, py::arg("path"))
+        .def("write", &write_scene, py::arg("path"),
+             "Writes a file of the format that its ending names, as `darb convert` does.")
         .def("__len__", [](const PyScene& s) { return s.model().size(); })
-        .def_property_readonly("sh_degree", [](const PyScene& s) { return s.model().sh_degree; })
-        .def_property_readonly("origin",
-                               [](const PyScene& s) {
-                                   const glm::dvec3& o = s.model().origin;
-                                   return py::make_tuple(o.x, o.y, o.z);
-                               })
+        .def_property_readonly(
+            "sh_degree", [](const PyScene& s) { return s.model().sh_degree; },
+            "Of the harmonics, 0 to 3: K = (sh_degree + 1)^2 coefficients a colour.")
+        .def_property_readonly(
+            "origin",
+            [](const PyScene& s) {
+                const glm::dvec3& o = s.model().origin;
+                return py::make_tuple(o.x, o.y, o.z);
+            },
+            "(x, y, z), world units: what a file adds to means.")
         .def_property(
             "kernel", [](const PyScene& s) { return std::string(kernel_name(s.model().kernel)); },
             [](PyScene& s, const py::object& value) {
                 s.set_drawing(take_kernel(value, "kernel"), s.model().footprint,
                               s.model().antialias);
-            })
+            },
+            "The kernel's name; a name of kernel_names() or a Kernel may be assigned.")
         .def_property(
             "footprint",
             [](const PyScene& s) { return std::string(footprint_name(s.model().footprint)); },
             [](PyScene& s, const py::object& value) {
                 s.set_drawing(s.model().kernel, take_footprint(value), s.model().antialias);
-            })
+            },
+            "\"psi\" or \"exact\".")
         .def_property(
             "antialiased", [](const PyScene& s) { return s.model().antialias; },
             [](PyScene& s, const py::object& value) {
                 s.set_drawing(s.model().kernel, s.model().footprint,
                               take_flag(value, "antialiased"));
-            });
+            },
+            "Whether opacities are compensated for the low-pass of 0.3 px^2.");
     bind_attribute<ATTRIBUTE_POSITION>(scene, "means", "[N, 3] float32, world units.");
     bind_attribute<ATTRIBUTE_LOG_SCALE>(scene, "log_scales",
                                         "[N, 3] float32, natural logarithms of world units.");

@@ -246,15 +246,21 @@ void PyTrainer::checkpoint(const py::object& value) {
 void bind_trainer(py::module_& module) {
     py::class_<PyTrainer>(module, "Trainer", "`darb train` step by step; see darb.Trainer.")
         .def(py::init<std::shared_ptr<PyDevice>, const py::object&, const py::dict&>())
-        .def("step", &PyTrainer::step, py::arg("n") = 1, py::arg("loss") = py::none())
-        .def("evaluate", &PyTrainer::evaluate)
-        .def("scene", [](PyTrainer& t) { return PyScene(t.model()); })
-        .def("checkpoint", &PyTrainer::checkpoint, py::arg("path"))
+        .def("step", &PyTrainer::step, py::arg("n") = 1, py::arg("loss") = py::none(),
+             "n iterations, fewer where the run ends; a dict of the last one. See darb.Trainer.")
+        .def("evaluate", &PyTrainer::evaluate,
+             "A dict of psnr (dB), ssim and views, over the views that are held out.")
+        .def(
+            "scene", [](PyTrainer& t) { return PyScene(t.model()); },
+            "The splats of now as a Scene.")
+        .def("checkpoint", &PyTrainer::checkpoint, py::arg("path"),
+             "Writes all that start_checkpoint= needs to go on bit by bit.")
         .def_property(
             "on_round", [](const PyTrainer& t) { return t.on_round; },
-            [](PyTrainer& t, const py::object& f) { t.on_round = take_callable(f, "on_round"); })
-        .def_property_readonly("iteration", &PyTrainer::iteration)
-        .def_property_readonly("iterations", &PyTrainer::iterations)
+            [](PyTrainer& t, const py::object& f) { t.on_round = take_callable(f, "on_round"); },
+            "A function of a dict, called after each round of density control, or None.")
+        .def_property_readonly("iteration", &PyTrainer::iteration, "Iterations done.")
+        .def_property_readonly("iterations", &PyTrainer::iterations, "Iterations of the whole run.")
         .def("__len__", &PyTrainer::splats);
 }
 
