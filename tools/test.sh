@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.." || exit 1
 all_steps="setup style release unit gpu clang sanitize fuzz sync"
 usage() {
     cat <<TEXT
-usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all but includes and long)
+usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all but includes, long and python)
   setup      install missing packages (tools/setup.sh)
   style      include arrows, length caps, clang-format (tools/check_style.sh)
   release    build with gcc, warnings are errors
@@ -19,6 +19,7 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all 
   sync       unit tests and the quick device tests under Vulkan synchronization validation
   includes   build all with clang without precompiled headers: a forgotten include is an error
   long       device tests that take minutes
+  python     the Python module: installs what it needs, builds it and the command, runs tests/python
   quick      = setup style release unit
 TEXT
 }
@@ -30,7 +31,7 @@ case "${1:-full}" in
     *) steps=$* ;;
 esac
 for step in $steps; do
-    [[ " $all_steps includes long " == *" $step "* ]] || { usage >&2; exit 2; }
+    [[ " $all_steps includes long python " == *" $step "* ]] || { usage >&2; exit 2; }
 done
 
 jobs=$(nproc)
@@ -87,6 +88,7 @@ do_unit() { run_ctest build -L '^unit$'; }
 do_gpu() { run_ctest build -LE '^unit$' -E "$long"; }
 do_includes() { build clang; }
 do_long() { run_ctest build -R "$long"; }
+do_python() { tools/setup.sh --with-python --with-torch && build python && run_ctest build-python -R '^python\.'; }
 do_sanitize() {
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
         run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$once|$numerics" --timeout 300
@@ -103,7 +105,7 @@ for step in $steps; do
         continue
     fi
     case $step in
-        unit | gpu | sanitize | sync | long) # counted case by case
+        unit | gpu | sanitize | sync | long | python) # counted case by case
             "do_$step"
             status=$?
             ;;
@@ -123,7 +125,7 @@ done
 for step in ${failures[@]+"${failures[@]}"}; do
     echo "=== $step, what failed:"
     case $step in
-        unit | gpu | sanitize | sync | long) grep -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step" | head -120 ;;
+        unit | gpu | sanitize | sync | long | python) grep -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step" | head -120 ;;
         *) tail -n 60 "$logs/$step" ;;
     esac
 done

@@ -223,14 +223,20 @@ class Scenes(unittest.TestCase):
                      "position": centre.tolist(), "rotation": rotation.tolist(),
                      "fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2]}
             pathlib.Path(f"{folder}/cameras.json").write_text(json.dumps([entry]))
-            subprocess.run([support.COMMAND, "render", f"{folder}/scene.ply", "--cameras",
-                            f"{folder}/cameras.json", "-o", f"{folder}/out"],
-                           check=True, capture_output=True)
             views = darb.cameras(f"{folder}/cameras.json")
-            darb.write_png(f"{folder}/mine.png",
-                           scene.render(views["viewmats"], views["Ks"], 64, 48)[0][0])
-            self.assertEqual(pathlib.Path(f"{folder}/mine.png").read_bytes(),
-                             pathlib.Path(f"{folder}/out/a.png").read_bytes())
+            for words, options in (
+                    ((), {}), (("--accuracy", "exact", "-w"),
+                               {"accuracy": "exact", "background": (1, 1, 1)}),
+                    (("--accuracy", "fast", "--near", "3.6"), {"accuracy": "fast", "near": 3.6}),
+                    (("--sh-degree", "0"), {"sh_degree": 0})):
+                with self.subTest(words):
+                    subprocess.run([support.COMMAND, "render", f"{folder}/scene.ply", "--cameras",
+                                    f"{folder}/cameras.json", "-o", f"{folder}/out", *words],
+                                   check=True, capture_output=True)
+                    darb.write_png(f"{folder}/mine.png", scene.render(
+                        views["viewmats"], views["Ks"], 64, 48, **options)[0][0])
+                    self.assertEqual(pathlib.Path(f"{folder}/mine.png").read_bytes(),
+                                     pathlib.Path(f"{folder}/out/a.png").read_bytes())
 
 
 class Kernels(unittest.TestCase):
