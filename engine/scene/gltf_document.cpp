@@ -134,20 +134,14 @@ std::vector<std::byte> load_buffer(const json& buffer, GltfBytes binary, const S
                                               : from_file(uri, source, where);
 }
 
-std::size_t bytes_of(ComponentType type, const std::string& what) {
-    switch (type) {
-        case kInt8:
-        case kUint8:
-            return 1;
-        case kInt16:
-        case kUint16:
-            return 2;
-        case kUint32:
-        case kFloat:
-            return 4;
-    }
-    throw Error(what, fmt::format("has the unknown component type {}", static_cast<int>(type)),
-                kCopyAgain);
+ComponentType component_type(std::size_t number, const std::string& what) {
+    for (const ComponentType known : {kInt8, kUint8, kInt16, kUint16, kUint32, kFloat})
+        if (number == known) return known;
+    throw Error(what, fmt::format("has the unknown component type {}", number), kCopyAgain);
+}
+
+std::size_t bytes_of(ComponentType type) {
+    return type == kInt8 || type == kUint8 ? 1 : type == kInt16 || type == kUint16 ? 2 : 4;
 }
 
 int components_of(const std::string& type, const std::string& what) {
@@ -240,11 +234,10 @@ Accessor find_accessor(const Document& document, std::size_t index, const std::s
     const std::vector<std::byte>& buffer = document.buffers.at(whole_number(view, "buffer"));
     Accessor result;
     result.count = whole_number(accessor, "count");
-    result.type = static_cast<ComponentType>(whole_number(accessor, "componentType") & 0xffff);
+    result.type = component_type(whole_number(accessor, "componentType"), place);
     result.normalized = accessor.value("normalized", false);
     result.components = components_of(accessor.at("type").get<std::string>(), place);
-    const std::size_t element =
-        bytes_of(result.type, place) * static_cast<std::size_t>(result.components);
+    const std::size_t element = bytes_of(result.type) * static_cast<std::size_t>(result.components);
     result.stride = whole_number(view, "byteStride", element);
     const std::size_t view_at = whole_number(view, "byteOffset", 0),
                       view_bytes = whole_number(view, "byteLength"),

@@ -7,6 +7,8 @@
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
+#include "engine/kernels/kernel_file.h"
+#include "engine/kernels/kernel_registry.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/gltf.h"
 #include "engine/scene/infinite_values.h"
@@ -47,7 +49,6 @@ struct RadialKernel {
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
     bool antialias = false;
-    bool operator==(const RadialKernel&) const = default;
 };
 
 struct GltfScene {
@@ -196,16 +197,38 @@ const json* radial_object(const json& primitive) {
     return extensions.contains(gltf::kRadial) ? &extensions.at(gltf::kRadial) : nullptr;
 }
 
-/// Nothing where this version does not know it: the fallback is read.
-std::optional<RadialKernel> radial_kernel(GltfScene& scene, const json& primitive) {
+/// All that says which kernel it is: of our extension all but the attributes. null without it.
+json radial_facts(const json& primitive) {
     const json* object = radial_object(primitive);
-    if (!object) return std::nullopt;
-    const std::string name = object->at("kernel").get<std::string>(),
-                      footprint = object->value("footprint", "psi"),
-                      mode = object->value("renderMode", "default");
-    const std::optional<int> kernel = kernel_from_name(name);
+    if (!object) return nullptr;
+    json facts = *object;
+    facts.erase("attributes");
+    return facts;
+}
+
+/// By name, or by the function of a kernel of one's own, which is registered.
+std::optional<int> kernel_of(GltfScene& scene, const std::string& name, const json& facts) {
+    if (!facts.contains("function")) return kernel_from_name(name);
+    std::vector<std::string> notes;
+    const int kernel = register_kernel_of_file(
+        definition_from_json({{"name", name}, {"function", facts.at("function")}},
+                             scene.document.where),
+        scene.document.where, notes);
+    for (const std::string& note : notes) scene.note(note);
+    return kernel;
+}
+
+/// Nothing where this version does not know it: the fallback is read.
+std::optional<RadialKernel> radial_kernel(GltfScene& scene, const json& facts) {
+    if (facts.is_null()) return std::nullopt;
+    const std::string name = facts.at("kernel").get<std::string>(),
+                      footprint = facts.value("footprint", "psi"),
+                      mode = facts.value("renderMode", "default");
+    const std::optional<int> kernel = kernel_of(scene, name, facts);
     const std::optional<Footprint> known = footprint_from_name(footprint);
-    if (kernel && known && (mode == "mip" || mode == "default"))
+    const bool projected =
+        kernel && known && (*known != Footprint::exact || has_exact_footprint(*kernel));
+    if (projected && (mode == "mip" || mode == "default"))
         return RadialKernel{*kernel, *known, mode == "mip"};
     scene.note(fmt::format("the kernel '{}' ({}, {}) is not known: its nearest Gaussians are read",
                            printable(name), printable(footprint), printable(mode)));
@@ -352,13 +375,13 @@ SplatModel read_placed(GltfScene& scene, const PlacedSplats& placed,
 /// Where all primitives have the same; nothing, with a note, where they do not.
 std::optional<RadialKernel> common_kernel(GltfScene& scene,
                                           const std::vector<PlacedSplats>& placed) {
-    const std::optional<RadialKernel> first = radial_kernel(scene, placed[0].primitive);
+    const json first = radial_facts(placed[0].primitive);
     for (const PlacedSplats& one : placed)
-        if (radial_kernel(scene, one.primitive) != first) {
+        if (radial_facts(one.primitive) != first) {
             scene.note("primitives have several kernels: their nearest Gaussians are read");
             return std::nullopt;
         }
-    return first;
+    return radial_kernel(scene, first);
 }
 
 SplatModel joined(const std::vector<SplatModel>& parts) {

@@ -7,6 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
+#include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/scene/gaussian_scene.h"
 #include "engine/scene/gltf.h"
@@ -107,10 +108,13 @@ json radial_extension(const SplatModel& model, GltfWriter& to) {
     const json exact = {{"LOG_SCALE", to.add(model.log_scale, 3)},
                         {"ROTATION", to.add(model.rotation, 4)},
                         {"OPACITY_LOGIT", to.add(model.opacity_logit, 1)}};
-    return {{"kernel", std::string(kernel_name(model.kernel))},
-            {"footprint", std::string(footprint_name(model.footprint))},
-            {"renderMode", model.antialias ? "mip" : "default"},
-            {"attributes", exact}};
+    json radial = {{"kernel", std::string(kernel_name(model.kernel))},
+                   {"footprint", std::string(footprint_name(model.footprint))},
+                   {"renderMode", model.antialias ? "mip" : "default"},
+                   {"attributes", exact}};
+    if (const KernelDefinition* definition = kernel_definition(model.kernel))
+        radial["function"] = definition_json(*definition)["function"];
+    return radial;
 }
 
 json document_of(const SplatModel& model, GltfWriter& to) {
@@ -189,17 +193,11 @@ std::string percent_encoded(const std::string& name) {
 std::vector<std::string> fallback_losses(const SplatModel& model, const std::string&) {
     if (model.kernel == KERNEL_GAUSSIAN) return {};
     const GaussianEquivalent fit = gaussian_equivalent(model.kernel, model.footprint, false);
-    const std::string name(kernel_name(model.kernel));
-    std::vector<std::string> losses;
-    if (kernel_definition(model.kernel))
-        losses.push_back(fmt::format(
-            "the kernel {} is one's own, of which glTF keeps the name alone: a PLY keeps all",
-            name));
-    losses.push_back(fmt::format(
+    return {fmt::format(
         "other programs than darb draw the nearest Gaussians of the kernel {} ({}), covariance x "
         "{:.4f}, opacity x {:.4f}, profile off by {:.2f} % (relative L2)",
-        name, footprint_name(model.footprint), fit.covariance, fit.opacity, 100 * fit.error));
-    return losses;
+        kernel_name(model.kernel), footprint_name(model.footprint), fit.covariance, fit.opacity,
+        100 * fit.error)};
 }
 
 EncodedSplats encode(const SplatModel& model, const std::string& where, const EncodeOptions&) {
@@ -208,11 +206,12 @@ EncodedSplats encode(const SplatModel& model, const std::string& where, const En
         throw Error(where, "glTF has no place for a scene without splats", "Write a PLY.");
     GltfWriter writer;
     json document = document_of(model, writer);
-    if (!lower(where).ends_with(".gltf")) return {glb_of(document.dump(), writer.buffer, where)};
+    const auto text = [&] { return document.dump(-1, ' ', false, json::error_handler_t::replace); };
+    if (!lower(where).ends_with(".gltf")) return {glb_of(text(), writer.buffer, where)};
     const std::string name = std::filesystem::path(where).stem().string() + ".bin";
     document["buffers"][0]["uri"] = percent_encoded(name);
     EncodedSplats encoded;
-    append_bytes(document.dump(), encoded.file);
+    append_bytes(text(), encoded.file);
     encoded.beside.emplace_back(name, std::move(writer.buffer));
     return encoded;
 }

@@ -287,6 +287,8 @@ TEST(Gltf, hostile_documents_are_refused_by_name) {
         {"sparse", accessor({{"sparse", {{"count", 1}}}}), "sparse"},
         {"type", accessor({{"type", "MAT4"}}), "MAT4"},
         {"component", accessor({{"componentType", 5130}}), "5130"},
+        {"large component", accessor({{"componentType", 54121}}), "54121"},
+        {"wrapped component", accessor({{"componentType", 65536 + 5126}}), "70662"},
         {"double", accessor({{"componentType", 5125}}), "POSITION"},
         {"few", [](Handmade& m) { m.document["accessors"][3]["count"] = 1; }, "1 values"},
         {"needs", [](Handmade& m) { m.document["extensionsRequired"] = {"EXT_meshopt\x07"}; },

@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "engine/core/error.h"
 #include "engine/kernels/gaussian_equivalent.h"
@@ -148,6 +150,50 @@ TEST(OwnKernelFile, A_header_cut_or_changed_at_every_byte_is_a_scene_or_an_error
                 EXPECT_TRUE(std::isfinite(kernel_psi(model.kernel)));
             } catch (const Error&) {
             }
+}
+
+/// Of the same length: the chunks of a .glb stay as they are.
+std::vector<std::byte> changed(std::vector<std::byte> file, std::string_view from,
+                               std::string_view to) {
+    EXPECT_EQ(from.size(), to.size());
+    const std::string text = text_of(file);
+    std::size_t found = 0;
+    for (std::size_t at = text.find(from); at != text.npos; at = text.find(from, at + 1), ++found)
+        std::ranges::copy(std::as_bytes(std::span(to)),
+                          file.begin() + static_cast<std::ptrdiff_t>(at));
+    EXPECT_GT(found, 0u) << from;
+    return file;
+}
+
+TEST(OwnKernelFile, glTF_keeps_the_kernel_too) {
+    for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
+        const SplatModel model = scene_of(bump(), footprint);
+        const auto file = encode_splats(SplatFormat::gltf, model);
+        const SplatModel again = parse_splats(file, "own.glb");
+        EXPECT_EQ(again.kernel, bump());
+        EXPECT_EQ(again.footprint, footprint);
+        EXPECT_EQ(again.log_scale, model.log_scale);
+    }
+}
+
+TEST(OwnKernelFile, glTF_makes_a_kernel_that_this_program_has_not_seen) {
+    const auto file = encode_splats(SplatFormat::gltf, scene_of(bump()));
+    const SplatModel unseen =
+        parse_splats(changed(file, "\"bump_of_files\"", "\"bump_in_a_glb\""), "a");
+    EXPECT_EQ(kernel_name(unseen.kernel), "bump_in_a_glb");
+    for (const double q : {0.5, 3.0, 6.5})
+        EXPECT_EQ(kernel_value(unseen.kernel, Footprint::psi, q),
+                  kernel_value(bump(), Footprint::psi, q));
+    SplatFile facts;
+    const auto renamed = changed(file, "\"bump_of_files\"", "\"bump_in_a_glb\"");
+    const auto other = changed(renamed, "\"support\":7", "\"support\":6");
+    EXPECT_EQ(kernel_name(parse_splats(other, "a", &facts).kernel), "bump_in_a_glb_2");
+    EXPECT_EQ(facts.notes.size(), 1u);
+    for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+             {"\"support\":7", "\"support\":0"},
+             {"\"series\":", "\"serie_\":"},
+             {"\"bump_of_files\"", "\"Bump_of_files\""}})
+        EXPECT_THROW(parse_splats(changed(file, from, to), "a"), Error) << to;
 }
 
 TEST(OwnKernelFile, Other_formats_say_that_they_have_no_place_for_it) {
