@@ -47,4 +47,10 @@ EncodedSplats encode_sog(const SplatModel& model, const std::string& where,
 EncodedSplats encode_sog_parts(const SplatModel& model, const std::string& where,
                                const AssignRows& assign);
 
+/// One level of a streamed SOG scene, 0 the finest, by its lod-meta.json; without splats where it
+/// has no such level. Throws Error as load_splats.
+SplatModel load_streamed_level(const std::filesystem::path& lod_meta, std::size_t level);
+/// The level that a file beside lod-meta.json is of, by the name that darb gives it.
+std::size_t level_of_part(const std::string& name);
+
 }  // namespace darb

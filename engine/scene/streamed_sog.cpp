@@ -10,6 +10,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
@@ -47,8 +48,8 @@ std::size_t lod_number(const json& object, const char* key) {
     return value.get<std::size_t>();
 }
 
-/// The finest level of every leaf, in the order of the tree.
-std::vector<LodRange> finest_ranges(const json& tree) {
+/// The level of every leaf that has it, in the order of the tree; nothing: of each its finest.
+std::vector<LodRange> ranges_of(const json& tree, std::optional<std::size_t> wanted) {
     std::vector<LodRange> ranges;
     std::vector<const json*> stack{&tree};
     while (!stack.empty()) {
@@ -57,17 +58,17 @@ std::vector<LodRange> finest_ranges(const json& tree) {
         if (node.contains("children"))
             for (const json& child : node.at("children")) stack.push_back(&child);
         if (!node.contains("lods")) continue;
-        const json* finest = nullptr;
+        const json* found = nullptr;
         long level = 0;
         for (const auto& [key, lod] : node.at("lods").items()) {
             const long at = std::strtol(key.c_str(), nullptr, 10);
-            if (finest && at >= level) continue;
-            finest = &lod;
+            if (wanted ? at != static_cast<long>(*wanted) : found && at >= level) continue;
+            found = &lod;
             level = at;
         }
-        if (finest)
-            ranges.push_back({lod_number(*finest, "file"), lod_number(*finest, "offset"),
-                              lod_number(*finest, "count")});
+        if (found)
+            ranges.push_back({lod_number(*found, "file"), lod_number(*found, "offset"),
+                              lod_number(*found, "count")});
     }
     return ranges;
 }
@@ -145,7 +146,8 @@ std::map<std::size_t, SplatModel> read_chunks_of(const json& meta, const SplatSo
     return chunks;
 }
 
-SplatModel load_streamed(const SplatSource& source, SplatFile& file) try {
+SplatModel load_level(const SplatSource& source, SplatFile& file,
+                      std::optional<std::size_t> wanted) try {
     const json meta = parse_lod(source);
     file.version = static_cast<int>(
         std::min<std::size_t>(meta.contains("version") ? lod_number(meta, "version") : 1, 1000));
@@ -156,7 +158,7 @@ SplatModel load_streamed(const SplatSource& source, SplatFile& file) try {
     if (source.folder.empty())
         throw Error(source.where, "describes a streamed SOG scene, whose files are not here",
                     "Name its lod-meta.json, or its folder.");
-    const std::vector<LodRange> ranges = finest_ranges(meta.at("tree"));
+    const std::vector<LodRange> ranges = ranges_of(meta.at("tree"), wanted);
     const std::map<std::size_t, SplatModel> chunks = read_chunks_of(meta, source, ranges, file);
     SplatModel model;
     for (const auto& [index, chunk] : chunks) {
@@ -176,10 +178,15 @@ SplatModel load_streamed(const SplatSource& source, SplatFile& file) try {
     set_positions(positions, model);
     const std::size_t levels = lod_number(meta, "lodLevels");
     file.details = fmt::format("{} levels, {} files", levels, meta.at("filenames").size());
-    if (levels > 1) file.notes.push_back("the finest level is read, coarser ones are left out");
+    if (levels > 1 && !wanted)
+        file.notes.push_back("the finest level is read, coarser ones are left out");
     return model;
 } catch (const json::exception& error) {
     throw Error(source.where, error.what(), kCopyAgain);
+}
+
+SplatModel load_streamed(const SplatSource& source, SplatFile& file) {
+    return load_level(source, file, std::nullopt);
 }
 
 /// What is written: the levels, and for each leaf which splats of each level it has.
@@ -330,6 +337,16 @@ EncodedSplats encode_streamed(const SplatModel& model, const std::string& where,
 }
 
 }  // namespace
+
+std::size_t level_of_part(const std::string& name) {
+    return std::stoul(name);
+}
+
+SplatModel load_streamed_level(const fs::path& path, std::size_t level) {
+    const std::vector<std::byte> bytes = read_file(path);
+    SplatFile file;
+    return load_level({bytes, path.string(), path.parent_path(), {}}, file, level);
+}
 
 const SplatFormatRow& streamed_sog_format() {
     static const SplatFormatRow row{.name = "streamed SOG",

@@ -9,6 +9,7 @@
 #include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/merge_splats.h"
+#include "engine/scene/sog.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/run_command.h"
 #include "tests/support/shared_device.h"
@@ -81,6 +82,27 @@ TEST(ConvertLevels, levels_fall_by_half_in_files_of_their_own) {
         darb("convert " + scene + " " + out("s.ply") + " --levels 2 --splats 40 --share 0.1");
     ASSERT_EQ(shares.code, 0) << shares.err;
     EXPECT_EQ(load_splats(out("s.2.ply")).size(), 4u);
+}
+
+TEST(ConvertLevels, streamed_sog_holds_them_below_the_scene) {
+    const std::string scene = scene_file("streamed.ply", 80);
+    const Outcome o =
+        darb("convert " + scene + " " + out("lod/lod-meta.json") + " --levels 2 --share 0.25");
+    ASSERT_EQ(o.code, 0) << o.err;
+    const auto rows = rows_of(o.out);
+    ASSERT_EQ(rows.size(), 3u) << o.out;
+    const double counts[] = {80, 20, 5};
+    for (std::size_t level = 0; level < 3; ++level) {
+        EXPECT_EQ(rows[level][0], counts[level]);
+        EXPECT_GT(rows[level][1], 100);  // bytes
+        EXPECT_EQ(load_streamed_level(out("lod/lod-meta.json"), level).size(), counts[level]);
+        if (level > 0) {
+            EXPECT_LT(rows[level][2], rows[level - 1][2]);
+        }
+    }
+    EXPECT_GT(rows[0][2], 30);  // dB
+    EXPECT_EQ(load_splats(out("lod")).size(), 80u);
+    EXPECT_EQ(load_streamed_level(out("lod/lod-meta.json"), 3).size(), 0u);
 }
 
 TEST(ConvertLevels, contradictions_are_named) {

@@ -45,20 +45,17 @@ void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
          views.size(), d.worst_psnr_db, printable(d.worst_view));
 }
 
-Paths outputs_of(const std::filesystem::path& output, const EncodedSplats& encoded) {
-    Paths outputs{output};
-    for (const auto& one : encoded.beside) outputs.push_back(output.parent_path() / one.first);
-    return outputs;
-}
-
 EncodedSplats write_scene(const std::filesystem::path& output, SplatFormat format,
-                          SplatModel& model, const Paths& inputs, const ConvertFlags& flags) {
+                          SplatModel& model, const Paths& inputs, const ConvertFlags& flags,
+                          std::vector<SplatModel> coarser = {}) {
     for (const std::string& loss : losses_of(format, model, output.string()))
         darb::say("warning: {}: {}\n", output.string(), loss);
     drop_unwritable(format, model);
     PaletteDevice palettes(flags.device);
     EncodeOptions options = flags.encode;
     options.assign_rows = palettes.assign_rows();
+    for (SplatModel& level : coarser) drop_unwritable(format, level);
+    options.coarser = std::move(coarser);
     EncodedSplats encoded = encode_scene(format, model, output.string(), options);
     refuse_to_overwrite_inputs(outputs_of(output, encoded), inputs);
     write_encoded(output, encoded);
@@ -96,8 +93,9 @@ int convert(const ConvertFlags& flags) {
                                flags.device, say);
     }
     if (flags.levels.asked()) {
-        const auto write = [&](const std::filesystem::path& file, SplatModel& level) {
-            return write_scene(file, *format, level, inputs, flags).bytes();
+        const auto write = [&](const std::filesystem::path& file, SplatModel& level,
+                               std::vector<SplatModel> coarser) {
+            return write_scene(file, *format, level, inputs, flags, std::move(coarser));
         };
         const LevelOutput to{flags.output, *format, views_for(model, flags),
                              flags.device, say,     write};

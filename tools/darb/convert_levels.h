@@ -36,15 +36,17 @@ std::vector<std::size_t> level_counts(const LevelFlags& flags, std::size_t splat
 std::filesystem::path level_file(const std::filesystem::path& output, SplatFormat format, int n);
 
 /// Merges the scene and writes its levels; prints a row for each: splats, bytes, PSNR against the
-/// scene in `views` and, with --refine, against the held-out photos before and after. write: the
-/// model to a file, returns its bytes. Returns the names of the files. Throws Error.
+/// scene in `views` and, with --refine, against the held-out photos before and after. --levels as
+/// streamed SOG are one scene: the model itself is its finest level. write: the model, and the
+/// coarser levels of streamed SOG, to a file. Returns the names of the files. Throws Error.
 struct LevelOutput {
     std::filesystem::path output;
     SplatFormat format = SplatFormat::ply;
     std::vector<View> views;
     std::string device;
     std::FILE* say = stdout;
-    std::function<std::size_t(const std::filesystem::path&, SplatModel&)> write;
+    std::function<EncodedSplats(const std::filesystem::path&, SplatModel&, std::vector<SplatModel>)>
+        write;
 };
 Paths write_levels(const LevelFlags& flags, const SplatModel& model, const LevelOutput& to);
 

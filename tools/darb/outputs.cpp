@@ -10,7 +10,6 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
-#include "engine/scene/splat_file.h"
 #include "tools/darb/scene_file.h"
 
 namespace darb {
@@ -89,6 +88,12 @@ Paths files_of(const std::vector<View>& views) {
         files.push_back(view.mask);
     }
     return files;
+}
+
+Paths outputs_of(const fs::path& output, const EncodedSplats& encoded) {
+    Paths outputs{output};
+    for (const auto& one : encoded.beside) outputs.push_back(output.parent_path() / one.first);
+    return outputs;
 }
 
 void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs) {

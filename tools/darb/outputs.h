@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
+#include "engine/scene/splat_file.h"
 
 namespace darb {
 
@@ -18,6 +19,9 @@ using Paths = std::vector<std::filesystem::path>;
 Paths files_of(const std::filesystem::path& input);
 /// Photos and masks.
 Paths files_of(const std::vector<View>& views);
+
+/// What a scene is written to.
+Paths outputs_of(const std::filesystem::path& output, const EncodedSplats& encoded);
 
 /// Throws Error where one of the outputs is one of the inputs, by the file that they come to, links
 /// or not, or where two outputs are one file. Empty paths and "-" do not count. Pipes and devices

@@ -209,7 +209,7 @@ TEST(Sog, wrong_meta_json_says_why) {
     EXPECT_NE(error_of([&] { kRead(zip_of(parts)); }).find("meta.json"), std::string::npos);
 }
 
-TEST(Sog, a_folder_reads_no_file_outside_it) {
+TEST(Sog, a_folder_and_a_zip_read_no_file_outside_them) {
     json meta = sample_meta();
     meta["quats"]["files"][0] = "../quats.webp";
     const fs::path folder = fs::path(testing::TempDir()) / fmt::format("sog_out_{}", ::getpid());
@@ -217,6 +217,14 @@ TEST(Sog, a_folder_reads_no_file_outside_it) {
     EXPECT_NE(error_of([&] { read_sog_folder(folder); }).find("no file of its folder"),
               std::string::npos);
     fs::remove_all(folder);
+    for (const char* name : {"../quats.webp", "/quats.webp", "a/quats.webp", ".."}) {
+        meta["quats"]["files"][0] = name;
+        Parts parts = sample_parts(meta);
+        parts[name] = parts["quats.webp"];  // the zip has such a member
+        EXPECT_NE(error_of([&] { kRead(zip_of(parts)); }).find("no file of its folder"),
+                  std::string::npos)
+            << name;
+    }
 }
 
 TEST(Sog, large_pictures_for_few_splats_are_refused) {
