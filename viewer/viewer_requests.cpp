@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
+#include "engine/publish/device_clusters.h"
 #include "engine/publish/web_page.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
@@ -143,7 +144,10 @@ void Viewer::save_scene() {
     saved_.check(s.save_file);
     SplatModel model = s.edit.apply(s.scene->model);
     if (s.save_upright) transform_splats({.turn = turn_to_up(s.navigation.up)}, model);
-    save_splats(s.save_file, *format, model);
+    DeviceClusters clusters(*device_);
+    EncodeOptions options;
+    options.assign_rows = clusters.assign_rows();
+    write_encoded(s.save_file, encode_scene(*format, model, s.save_file.string(), options));
     saved_.wrote(s.save_file);
     s.edit.mark_saved();
     s.note = fmt::format("saved {} splats to {}", model.size(), s.save_file.string());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -21,6 +22,9 @@ class DeviceClusters {
     /// another one, and the host, may tell centres of nearly one distance apart otherwise.
     void assign(const std::vector<float>& rows, std::size_t dims, const std::vector<float>& centres,
                 const std::vector<ClusterBatch>& batches, std::vector<std::uint32_t>& labels);
+
+    /// For EncodeOptions; this has to outlive it.
+    AssignRows assign_rows() { return std::bind_front(&DeviceClusters::assign, this); }
 
   private:
     const Pipeline& pipeline_for(std::size_t quads);
