@@ -5,7 +5,8 @@
 
 For each scene and kernel it writes a page (the scene is relabelled, not trained again), draws cameras around the scene
 in the page and with darb, and compares. It fails where a page is below --least or --least-exact dB at its worst
-camera, writes to the console, fetches anything, or does not answer mouse, keys and touch.
+camera, writes to the console, or fetches anything; where the first of a scene does not answer mouse, keys and
+touch; and where a damaged page does not say so. 320x180 are the pixels of a slow device in motion.
 """
 
 import argparse
@@ -54,6 +55,7 @@ def parse_arguments():
     parser.add_argument("--least", type=float, default=45, help="dB, rounded values (default 45)")
     parser.add_argument("--least-exact", type=float, default=55, help="dB, float32 values (default 55)")
     parser.add_argument("--only", choices=["rounded", "exact"], help="one kind of page alone")
+    parser.add_argument("--cuts", type=int, default=10, help="lengths that a page is cut off at (default 10)")
     parser.add_argument("--turn", type=int, default=5, metavar="FRAMES", help="of the timing at 1280x720; 0: none")
     parser.add_argument("--out", help="keep pages, pictures and page_check.json in this folder")
     return parser.parse_args()
@@ -124,12 +126,14 @@ def check(failures, fine, text):
 def worst_of_page(page, truths, keep):
     """-> dB of each camera."""
     found = []
+    page.resize(160, 120)  # what it draws for itself between them takes time
     for i, truth in enumerate(truths):
         picture = page.run(f"darb.picture({i})")
         if keep:
             with open(f"{keep}_{i + 1}.png", "wb") as file:
                 file.write(base64.b64decode(picture.partition(",")[2]))
         found.append(page.run(f"{COMPARE}({json.dumps(picture)}, {json.dumps(data_url(truth))})"))
+    page.resize(1280, 720)
     return found
 
 
@@ -163,17 +167,19 @@ def answers(page, name, failures):
     page.resize(1280, 720)
 
 
-def check_page(page, path, truths, least, name, arguments, failures, folder):
+def check_page(page, path, truths, least, name, arguments, failures, folder, checks_answers):
     begun = time.time()
     page.open("file://" + os.path.abspath(path))
     page.run("darb.ready.then(() => new Promise(done => { const wait = () => darb.state.shown ? done() : setTimeout(wait, 5); wait(); }))")
     row = {"name": name, "bytes": os.path.getsize(path), "load_s": page.run("darb.state.loadedAfter") / 1000,
            "open_s": time.time() - begun, "splats": page.run("darb.scene.count")}
-    answers(page, name, failures)
+    if checks_answers:
+        answers(page, name, failures)
     found = worst_of_page(page, truths, arguments.out and os.path.join(folder, name.replace(" ", "_")))
     row.update(db=found, worst_db=min(found), mean_db=sum(found) / len(found), blended=page.run("darb.state.format"))
     if arguments.turn:
         row["frame_ms"] = page.run(f"darb.turn({arguments.turn}, 1280, 720)")
+        row["moving_ms"] = page.run(f"darb.turn({arguments.turn}, 320, 180)")
     check(failures, row["worst_db"] >= least, f"{name}: {row['worst_db']:.2f} dB at worst, {least} are wanted: "
           + " ".join(f"{db:.1f}" for db in found))
     check(failures, not page.said, f"{name}: the console is written to: {page.said[:3]}")
@@ -200,6 +206,30 @@ def check_hostile(page, scene, arguments, failures, folder):
     check(failures, not page.said, f"hostile names: the console is written to: {page.said[:3]}")
 
 
+def check_damaged(page, path, arguments, failures, folder):
+    """Cut off anywhere, or with a letter of its splats changed, a page says so."""
+    with open(path, "rb") as file:
+        whole = file.read()
+    head, payload = whole.index(b"</script>"), whole.index(b'id="part0">') + 11
+    last = whole.rindex(b"</script>")
+    cuts = [head + 9 + (last - head - 20) * i // arguments.cuts for i in range(arguments.cuts + 1)]
+    damaged = [(f"cut off at byte {cut}", whole[:cut]) for cut in cuts]
+    for at in (payload + 40, (payload + last) // 2, last - 8):
+        damaged.append((f"letter {at} changed", whole[:at] + (b"A" if whole[at:at + 1] != b"A" else b"B") + whole[at + 1:]))
+    out = os.path.join(folder, "damaged.html")
+    for what, data in damaged:
+        with open(out, "wb") as file:
+            file.write(data)
+        page.open("file://" + os.path.abspath(out))
+        for _ in range(100):
+            said = page.run("document.body.innerText")
+            if "not whole" in said or "Cannot show this scene" in said:
+                break
+            time.sleep(0.05)
+        else:
+            check(failures, False, f"damaged page, {what}: it says {said!r}")
+
+
 def check_scene(page, name, path, arguments, failures, folder):
     width, height = map(int, arguments.size.split("x"))
     plain = os.path.join(folder, "plain.ply")
@@ -219,11 +249,11 @@ def check_scene(page, name, path, arguments, failures, folder):
             out = os.path.join(folder, f"{name}_{kernel}_{kind}.html")
             said = darb(arguments, "convert", scene, out, "--cameras", cameras, *(["--exact"] if kind == "exact" else []))
             least = arguments.least_exact if kind == "exact" else arguments.least
-            row = check_page(page, out, truths, least, f"{name} {kernel} {kind}", arguments, failures, folder)
+            row = check_page(page, out, truths, least, f"{name} {kernel} {kind}", arguments, failures, folder, not rows)
             row["stated"] = said.strip().rpartition("\n")[2].partition(": ")[2]
             rows.append(row)
             print(f"| {name} | {kernel} | {kind} | {row['splats']:,} | {row['bytes'] / 1e6:.2f} MB | {row['load_s']:.2f} s | "
-                  + (f"{row['frame_ms']:.0f} ms" if "frame_ms" in row else "-")
+                  + (f"{row['frame_ms']:.0f} ms | {row['moving_ms']:.0f} ms" if "frame_ms" in row else "- | -")
                   + f" | {row['worst_db']:.1f} | {row['mean_db']:.1f} |", flush=True)
     return rows
 
@@ -237,14 +267,15 @@ def main():
     with tempfile.TemporaryDirectory() as scratch, browser.Browser() as page:
         folder = arguments.out or scratch
         os.makedirs(folder, exist_ok=True)
-        print("| scene | kernel | values | splats | file | first picture | frame, 1280x720 | dB at worst | dB mean |")
-        print("|---|---|---|---|---|---|---|---|---|")
+        print("| scene | kernel | values | splats | file | first picture | frame, 1280x720 | 320x180 | dB at worst | dB mean |")
+        print("|---|---|---|---|---|---|---|---|---|---|")
         for named in arguments.scenes:
             name, equals, path = named.partition("=")
             if not equals:
                 path, name = named, os.path.basename(named.rstrip("/")).partition(".")[0]
             rows += check_scene(page, name, path, arguments, failures, folder)
         check_hostile(page, os.path.join(folder, "plain.ply"), arguments, failures, folder)
+        check_damaged(page, os.path.join(folder, "hostile.html"), arguments, failures, folder)
         if arguments.out:
             with open(os.path.join(folder, "page_check.json"), "w", encoding="utf-8") as file:
                 json.dump({"rows": rows, "failures": failures}, file, indent=1)

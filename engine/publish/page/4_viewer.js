@@ -1,6 +1,6 @@
 // What is on show: the camera, its order of splats, and a picture whenever either changes. In motion a picture has
 // one of these shares of the window's pixels each way.
-const shares = [1, 0.7, 0.5, 0.35];
+const shares = [1, 0.7, 0.5, 0.35, 0.25];
 
 class Viewer {
   constructor(canvas, renderer) {
@@ -71,12 +71,12 @@ class Viewer {
     this.requested = 0;
     if (this.held) return;
     const moving = this.flight || keysDown.size || now - this.moved < 250;
-    const since = now - this.last;
-    this.last = now;
+    const since = now - this.last;  // not a number after a rest
+    this.last = moving ? now : NaN;
     if (this.flight && !this.flight(now)) this.flight = null;
     if (keysDown.size) flyByKeys(this, Math.min(since || 16, 100) / 1000);
     // Fewer pixels while it moves and frames are slow; all of them at rest.
-    if (moving && since < 1000) this.adapt(since);
+    if (moving && since) this.adapt(since);
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio)), height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     if (this.canvas.width !== width || this.canvas.height !== height) { this.canvas.width = width; this.canvas.height = height; }
@@ -90,8 +90,9 @@ class Viewer {
     if (moving) this.request();
   }
 
-  // One step down after 3 slow frames, one up after 20 quick ones.
+  // One step down after 3 slow frames, or after one of a quarter of a second; one up after 20 quick ones.
   adapt(since) {
+    if (since > 250) this.pace = -2;
     this.pace = since > 50 ? Math.min(this.pace, 0) - 1 : since < 20 ? Math.max(this.pace, 0) + 1 : 0;
     if (this.pace > -3 && this.pace < 20) return;
     this.step = Math.max(0, Math.min(shares.length - 1, this.step + (this.pace < 0 ? 1 : -1)));
