@@ -16,7 +16,7 @@ BASES = {
     "render": ("--cameras in/cameras.json | -o out/frames", ["in/run in/scenes/scene.splat"]),
     "view": ("--screenshot out/s.png | --size 64x48", ["in/run in/scenes/scene.sog in/frames/points.ply"]),
     "convert": ("", ["in/run in/scenes/scene.ply in/scenes/scene.sog",
-                     "out/a.ply out/a.spz out/a.splat out/a.compressed.ply out/a.txt out"]),
+                     "out/a.ply out/a.spz out/a.splat out/a.compressed.ply out/a.glb out/a.sog out/lod/lod-meta.json out/a.html out/a.txt out"]),
     "info": ("", ["in/run in/scenes/scene.ply in/colmap in/cameras.json in/path.json in"]),
     "plan": ("--no-price", ["in/run in/colmap in/scenes/scene.ply"]),
     "compare": ("-o out/c | --kernels gaussian | --iterations 3 | --blending-views 0 | -q",

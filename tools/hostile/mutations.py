@@ -8,7 +8,8 @@ import mutate
 WEIGHT = 5  # share of the day
 
 SCENE = ["info {f}", "info {f} --json out/facts.json", "convert {f} out/a.ply", "convert {f} out/a.splat",
-         "convert {f} out/a.compressed.ply", "convert {f} out/a.spz", "convert {f} out/a.ply --up x --crop -1,-1,-1,1,1,1"]
+         "convert {f} out/a.compressed.ply", "convert {f} out/a.spz", "convert {f} out/a.glb", "convert {f} out/a.sog",
+         "convert {f} out/lod/lod-meta.json", "convert {f} out/a.ply --up x --crop -1,-1,-1,1,1,1"]
 DRAWN = ["render {f} --cameras in/cameras.json -o out", "view {f} --screenshot out/s.png --size 64x48", "plan {f} --no-price"]
 SET = ["info {d}", "info {d} --json out/facts.json", "plan {d} --no-price"]
 TRAINED = ["train {d} -o out/run --iterations 2 -q", "eval in/run {d} --split all", "render in/run --cameras {d} -o out"]
@@ -24,6 +25,9 @@ KINDS = {
     "SPZ": (["cameras.json"], [f"scenes/{n}.spz" for n in ("scene", "version_1", "version_2", "version_3")], SCENE, DRAWN,
             True),
     "SOG": (["cameras.json"], ["scenes/scene.sog"], SCENE, DRAWN, True),
+    "glTF": (["cameras.json", "scenes/gltf.bin"], ["scenes/scene.glb", "scenes/gltf.gltf"], SCENE, DRAWN, False),
+    "streamed SOG": (["cameras.json", "scenes/lod"], ["scenes/lod/lod-meta.json"], SCENE, DRAWN, False),
+    "ksplat": (["cameras.json"], ["scenes/scene.ksplat"], SCENE, DRAWN, False),
     "COLMAP binary": (DATA, [f"colmap/sparse/0/{n}.bin" for n in ("cameras", "images", "points3D")], SET, TRAINED, False),
     "COLMAP text": (DATA + ["text"], [f"text/sparse/0/{n}.txt" for n in ("cameras", "images", "points3D")], SET, TRAINED,
                     False),
@@ -51,7 +55,7 @@ KINDS = {
     "weights": (["colmap", "compared", "weights.safetensors"], ["weights.safetensors"],
                 ["compare in/colmap -o in/compared --kernels gaussian --iterations 4 -q --lpips {f}"], [], False),
 }
-FORMAT_OF = {".json": mutate.damage_json, ".jsonl": mutate.damage_json, ".txt": mutate.damage_text}
+FORMAT_OF = {".json": mutate.damage_json, ".gltf": mutate.damage_json, ".jsonl": mutate.damage_json, ".txt": mutate.damage_text}
 
 
 def data_folder(file):

@@ -115,6 +115,18 @@ def sog():
     return archive.getvalue()
 
 
+def ksplat():
+    """Version 0.1, level 0, degree 0: a section of three splats."""
+    count, data = 3, b""
+    for i in range(count):
+        data += struct.pack("<10f4B", 0.3 * i, -0.2 * i, 1 + 0.1 * i, 0.1, 0.2, 0.3, 1, 0.5 * i, 0, 0, 200, 90 * i, 30, 250)
+    head = bytearray(4096 + 1024)
+    head[1] = 1
+    struct.pack_into("<4I", head, 4, 1, 1, count, count)
+    struct.pack_into("<3I", head, 4096, count, count, 1)
+    return bytes(head) + data
+
+
 def safetensors():
     header = json.dumps({"features.0.weight": {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]},
                          "lin0.model.1.weight": {"dtype": "F16", "shape": [4], "data_offsets": [24, 32]}}).encode()
@@ -152,6 +164,7 @@ def make(folder, run):
     for version in (1, 2, 3):
         write(f"{folder}/scenes/version_{version}.spz", old_spz(version))
     write(f"{folder}/scenes/scene.sog", sog())
+    write(f"{folder}/scenes/scene.ksplat", ksplat())
     write(f"{folder}/path.json", camera_path())
     write(f"{folder}/weights.safetensors", safetensors())
     run(["train", "colmap", "-o", "run", *TRAIN])
@@ -159,7 +172,7 @@ def make(folder, run):
     scene = f"{folder}/run/point_cloud/iteration_6/point_cloud.ply"
     with open(scene, "rb") as file:
         write(f"{folder}/scenes/scene.ply", file.read())
-    for name in ("scene.compressed.ply", "scene.splat", "scene.spz"):
+    for name in ("scene.compressed.ply", "scene.splat", "scene.spz", "scene.glb", "gltf.gltf", "lod/lod-meta.json"):
         run(["convert", "scenes/scene.ply", f"scenes/{name}"])
     with open(f"{folder}/run/cameras.json", "rb") as file:
         write(f"{folder}/cameras.json", file.read())
