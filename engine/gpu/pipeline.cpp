@@ -59,8 +59,9 @@ struct Specialization {
     }
 };
 
-// The subgroup size to require, 0 where the device has only one. SPIR-V 1.6 lets drivers vary the
-// size between pipelines, so one is always required where there is a choice. Full subgroups need a
+// The subgroup size to require of a shader with subgroup operations, 0 where the device has only
+// one. SPIR-V 1.6 lets drivers vary the size between pipelines, so one is always required where
+// there is a choice; other shaders leave it to the driver. Full subgroups need a
 // workgroup that is a multiple of it: a smaller size is taken, or full is cleared.
 std::uint32_t fitting_subgroup_size(const DeviceInfo& info, std::uint32_t threads,
                                     std::uint32_t asked, bool& full) {
@@ -191,8 +192,11 @@ Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants&
     threads_x_ = specialization.threads_x;
     check_device_limits(state, *this, what);
 
-    bool full = require_full_subgroups;
-    const std::uint32_t size = fitting_subgroup_size(state.info, threads_x_, subgroup_size, full);
+    bool full = require_full_subgroups && interface.uses_subgroups;
+    const std::uint32_t size =
+        interface.uses_subgroups
+            ? fitting_subgroup_size(state.info, threads_x_, subgroup_size, full)
+            : 0;
     const VkSpecializationInfo specialization_info = specialization.info();
     try {
         set_layout_ = create_set_layout(state.device, bindings_.size(), what);

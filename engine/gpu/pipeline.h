@@ -23,9 +23,10 @@ class Pipeline {
   public:
     Pipeline() = default;
     /// shader: a name of the embedded table. Compiled here, or at first dispatch on lavapipe.
-    /// require_full_subgroups asks the driver for subgroups without idle lanes; where the workgroup
-    /// is no multiple of the device's subgroup size, a smaller size is asked for if there is one.
-    /// subgroup_size: 0 = the device's own choice; else one between its minimum and maximum.
+    /// Of a shader that uses subgroups: require_full_subgroups asks the driver for subgroups
+    /// without idle lanes; where the workgroup is no multiple of the device's subgroup size, a
+    /// smaller size is asked for if there is one. subgroup_size: 0 = the device's own choice; else
+    /// one between its minimum and maximum.
     Pipeline(Device& device, std::string_view shader, const SpecConstants& constants = {},
              bool require_full_subgroups = true, std::uint32_t subgroup_size = 0);
     ~Pipeline();

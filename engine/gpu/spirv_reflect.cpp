@@ -14,6 +14,7 @@ namespace {
 enum Op : std::uint32_t {
     kOpName = 5,
     kOpExecutionMode = 16,
+    kOpCapability = 17,
     kOpTypeBool = 20,
     kOpTypeInt = 21,
     kOpTypeFloat = 22,
@@ -49,6 +50,7 @@ enum Storage : std::uint32_t {
     kBuffer = 12
 };
 constexpr std::uint32_t kSpirvMagic = 0x07230203, kLocalSize = 17, kLocalSizeId = 38;
+constexpr std::uint32_t kGroupNonUniform = 61;
 constexpr size_t kHeaderWords = 5;
 
 using Operands = std::span<const std::uint32_t>;
@@ -140,6 +142,9 @@ Extent extent_of(const Module& module, std::uint32_t type, std::uint32_t matrix_
 
 void read_instruction(std::uint32_t op, Operands operands, Module& module, ShaderInterface& out) {
     switch (op) {
+        case kOpCapability:
+            out.uses_subgroups = out.uses_subgroups || operands[0] == kGroupNonUniform;
+            break;
         case kOpName:
             module.names[operands[0]] = text_of(operands.subspan(1));
             break;

@@ -26,6 +26,7 @@ struct ShaderInterface {
         std::string name;
     };
 
+    bool uses_subgroups = false;            // asks for the capability GroupNonUniform
     std::vector<Binding> bindings;          // in order of set, binding
     std::vector<Constant> constants;        // in order of id
     std::uint32_t push_constant_bytes = 0;  // of the block, as a C++ struct of that layout

@@ -16,8 +16,9 @@ namespace darb {
 
 namespace {
 
-constexpr std::uint64_t kCopyBytes = 32u << 20;  // beyond the last-level cache of most CPUs
-constexpr int kRuns = 4;                         // the first compiles
+// Beyond the last-level cache: of most CPUs, of GPUs.
+constexpr std::uint64_t kCpuCopyBytes = 32u << 20, kGpuCopyBytes = 512u << 20;
+constexpr int kRuns = 4;  // the first compiles
 
 // Of a splat and an intersection, from the layouts in shaders/shared/render_args.h and Forward.
 constexpr double kProjectedBytes = 4 * 16;               // shape, light, bound, cover
@@ -52,10 +53,16 @@ DeviceRates measure_rates(Device& device) {
     if (device.info().timestamp_period_ns <= 0) return {};
     DeviceRates rates;
     Commands commands(device);
-    const Buffer from(device, "copy source", kCopyBytes), to(device, "copy target", kCopyBytes);
-    rates.bytes_per_s =
-        2e3 * kCopyBytes / best_ms(commands, [&] { commands.copy(from, to, kCopyBytes); });
-    const bool cpu = device.info().type == "cpu";
+    const DeviceInfo& info = device.info();
+    const bool cpu = info.type == "cpu";
+    const std::uint64_t copied =
+        cpu ? kCpuCopyBytes
+            : std::min({kGpuCopyBytes, info.max_allocation_bytes, info.heap_bytes / 8});
+    {
+        const Buffer from(device, "copy source", copied), to(device, "copy target", copied);
+        const double ms = best_ms(commands, [&] { commands.copy(from, to, copied); });
+        rates.bytes_per_s = 2e3 * static_cast<double>(copied) / ms;
+    }
     const std::uint32_t groups = cpu ? 64 : 4096;
     const Pipeline pipeline(device, "fma_rate");
     const Buffer sums(device, "fma sums", std::uint64_t{groups} * MEASURE_THREADS * 4);

@@ -24,12 +24,12 @@ int ceil_divide(int a, int b) {
 }
 
 int cluster_lanes(const Device& device) {
-    const std::uint32_t smallest = device.info().min_subgroup_size;
-    if (smallest < 4) {
+    const std::uint32_t size = device.info().subgroup_size;  // which the pipeline has
+    if (size < 4) {
         throw Error(device.info().name, "its subgroups have fewer than 4 lanes",
                     "training needs subgroup shuffles; choose another device with --device");
     }
-    return static_cast<int>(std::min(32u, std::bit_floor(smallest)));
+    return static_cast<int>(std::min(32u, std::bit_floor(size)));
 }
 
 // Columns a thread on a CPU: the fewest columns computed in all for this width of image.

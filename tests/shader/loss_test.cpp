@@ -311,7 +311,7 @@ TEST(Loss_stripShapes, give_the_same_gradient) {
     const Case c{203, 71};
     const Data data = make_data(c);
     const Output want = run(c, data);
-    const int least = 20 / static_cast<int>(device().info().min_subgroup_size) + 1;
+    const int least = 20 / static_cast<int>(device().info().subgroup_size) + 1;
     for (const auto& [columns, rows] :
          {std::pair{least, 16}, {least + 1, 1}, {11, 7}, {16, 1000}}) {
         Loss loss(device(), c.width, c.height, {.columns = columns, .rows = rows});

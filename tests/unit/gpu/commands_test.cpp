@@ -86,6 +86,13 @@ TEST(ReflectSpirv, scan_apply_has_its_bindings_and_constants) {
     EXPECT_EQ(shader.push_constant_bytes, 0U);
 }
 
+TEST(ReflectSpirv, subgroups_are_asked_for_where_they_are_used) {
+    EXPECT_TRUE(interface_of("blend_backward").uses_subgroups);
+    EXPECT_TRUE(interface_of("project").uses_subgroups);
+    EXPECT_FALSE(interface_of("tile_ranges").uses_subgroups);
+    EXPECT_FALSE(interface_of("adam_update").uses_subgroups);
+}
+
 TEST(ReflectSpirv, every_shader_of_the_table_is_readable) {
     for (const ShaderBinary& shader : shader_table()) {
         const ShaderInterface shader_interface = reflect_spirv(shader.words, shader.name);
