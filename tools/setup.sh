@@ -10,6 +10,7 @@ usage: tools/setup.sh [options]
   --no-tests            leave out what only the tests and the quality checks need
   --with-python         what the Python module is built and used with: -DDARB_PYTHON=ON
   --with-torch          PyTorch too, for the tests of LPIPS and of darb.torch: 0.6 GB on disk
+  --with-packaging      what tools/package.sh and tools/package_test.sh run
   --with-colmap         COLMAP too: training from photos without cameras runs it
   --with-mesa-backport  Debian 12: Mesa 25 from bookworm-backports; on the CPU it blends 1.5-1.7
                         times as fast as Mesa 22.3
@@ -58,6 +59,15 @@ python   python3-dev          the Python module; optional
 python   pybind11-dev         the Python module; optional
 python   python3-numpy        its arrays; optional
 torch    python3-torch        tests of LPIPS and of darb.torch, which skip without it; optional
+packaging dpkg-dev           tools/package.sh: libraries of packages, Debian's sources
+packaging fakeroot           tools/package.sh: owners of files
+packaging python3            tools/package.sh: man pages and completion
+packaging xz-utils           tools/package.sh: the archive
+packaging libxrandr-dev      tools/package.sh: GLFW 3.4
+packaging libxinerama-dev    tools/package.sh: GLFW 3.4
+packaging libxcursor-dev     tools/package.sh: GLFW 3.4
+packaging libxi-dev          tools/package.sh: GLFW 3.4
+packaging debootstrap        tools/package_test.sh: bare systems
 colmap   colmap               cameras from photos; optional
 '
 
@@ -68,6 +78,7 @@ for option in "$@"; do
         --no-tests) groups=${groups/tests/} ;;
         --with-python) groups+=" python" ;;
         --with-torch) groups+=" torch" ;;
+        --with-packaging) groups+=" packaging" ;;
         --with-colmap) groups+=" colmap" ;;
         --with-mesa-backport) backport=1 ;;
         -h | --help) usage; exit 0 ;;

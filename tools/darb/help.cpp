@@ -16,14 +16,6 @@ namespace {
 
 constexpr std::size_t kNames = 30;  // columns of the options' names
 
-bool is_for_all(const std::string& group) {
-    for (const char* few : {help_group::kSaving, help_group::kAccuracy, help_group::kDevice,
-                            option_group::kPhotos, option_group::kRates, option_group::kDensity,
-                            option_group::kLimits, option_group::kStart, option_group::kEffects})
-        if (group == few) return true;
-    return false;
-}
-
 std::size_t terminal_width() {
     winsize size{};
     long columns = 80;
@@ -83,13 +75,13 @@ class HelpFormatter : public CLI::Formatter {
         std::size_t left_out = 0;
         std::vector<std::string> groups = app->get_groups();
         std::stable_sort(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
-            return is_for_all(a) < is_for_all(b);  // those of many users first
+            return is_for_few(a) < is_for_few(b);  // those of many users first
         });
         for (const std::string& group : groups) {
             const auto options = app->get_options(
                 [&](const CLI::Option* option) { return option->get_group() == group; });
             if (group.empty() || options.empty()) continue;
-            if (!all && is_for_all(group)) {
+            if (!all && is_for_few(group)) {
                 left_out += options.size();
                 continue;
             }
@@ -133,6 +125,14 @@ class HelpFormatter : public CLI::Formatter {
 };
 
 }  // namespace
+
+bool is_for_few(const std::string& group) {
+    for (const char* few : {help_group::kSaving, help_group::kAccuracy, help_group::kDevice,
+                            option_group::kPhotos, option_group::kRates, option_group::kDensity,
+                            option_group::kLimits, option_group::kStart, option_group::kEffects})
+        if (group == few) return true;
+    return false;
+}
 
 std::shared_ptr<CLI::Formatter> make_help_formatter() {
     return std::make_shared<HelpFormatter>();

@@ -16,6 +16,9 @@ inline constexpr const char *kInput = "Photos and output", *kSaving = "Saving an
                             *kAccuracy = "Accuracy", *kDevice = "Device and passes";
 }
 
+/// Whether --help leaves the options under this heading to --help-all.
+bool is_for_few(const std::string& group);
+
 /// Options under their headings, wrapped to the terminal's width (COLUMNS, or what the terminal
 /// says, 80 elsewhere, at most 100). --help leaves out the headings of few users.
 std::shared_ptr<CLI::Formatter> make_help_formatter();

@@ -20,6 +20,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/help.h"
 #include "tools/darb/numbers.h"
+#include "tools/darb/options_json.h"
 #include "tools/darb/stop_signals.h"
 
 namespace {
@@ -80,6 +81,10 @@ int run(int argc, char** argv) {
     app.set_help_all_flag("--help-all", "with every option");
     darb::Action action;
     add_commands(app, action, arguments);
+    if (arguments == std::vector<std::string>{"--options-json"}) {
+        darb::tell_text(darb::options_json(app));
+        return 0;
+    }
     if (!arguments.empty() && !arguments[0].starts_with('-') &&
         app.get_subcommands([&](CLI::App* one) { return one->check_name(arguments[0]); }).empty())
         throw darb::unknown_command(app, arguments[0]);

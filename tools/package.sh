@@ -1,0 +1,118 @@
+#!/usr/bin/env bash
+# The packages of darb, for amd64. Run it on Debian 12, as the portable archive takes its libraries from there.
+#   tools/package.sh [OUT] [deb | portable]...      default: OUT is build-portable/out; both
+#     deb        OUT/darb_VERSION_amd64.deb and OUT/libdarb-dev_VERSION_amd64.deb
+#     portable   OUT/darb-VERSION-linux-amd64.tar.xz: any Linux with glibc 2.31 or later and a Vulkan 1.3 driver
+# The archive's libraries are linked statically. Debian has some as shared ones alone: these are built from its source
+# packages, and the Vulkan loader lies beside the command. tools/package_test.sh installs both in bare systems.
+set -euo pipefail
+case ${1:-} in -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+cd "$(dirname "$0")/.."
+
+out=build-portable/out
+[[ $# == 0 || $1 == deb || $1 == portable ]] || { out=$1; shift; }
+mkdir -p "$out"
+out=$(cd "$out" && pwd)
+kinds=${*:-deb portable}
+for kind in $kinds; do
+    [[ $kind == deb || $kind == portable ]] || { echo "package.sh: no such package: $kind (deb, portable)" >&2; exit 2; }
+done
+for tool in dpkg-source:dpkg-dev python3:python3 fakeroot:fakeroot; do
+    command -v "${tool%:*}" >/dev/null || { echo "package.sh: ${tool%:*} is missing (apt install ${tool#*:})" >&2; exit 2; }
+done
+jobs=${JOBS:-$(nproc)}
+common=(-G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=g++ -DCMAKE_UNITY_BUILD=ON -DDARB_TESTS=OFF -DCMAKE_INSTALL_PREFIX=/usr)
+
+# One build folder, so that both are linked from the same objects; the libraries that differ, by their CMake names.
+build=build-portable
+differing=(ZIP_LIBRARY MUPARSER_LIBRARY ZSTD_LIBRARY WEBP_LIBRARY STB_LIBRARY ZLIB_LIBRARY PNG_LIBRARY JPEG_LIBRARY
+    DARB_FMT_LIBRARY DARB_GLFW_LIBRARY)
+
+make_deb() {
+    cmake -S . -B "$build" "${common[@]}" -DDARB_PORTABLE=OFF "${differing[@]/#/-U}" -UZLIB_LIBRARY_* -UPNG_LIBRARY_* -UJPEG_LIBRARY_* >/dev/null
+    cmake --build "$build" -j "$jobs"
+    rm -rf "$build/cpack"
+    (cd "$build" && cpack -G DEB -B cpack >/dev/null)
+    cp "$build"/cpack/*.deb "$out/"
+}
+
+libraries=$PWD/$build/libraries # the prefix of what is built here
+system=/usr/lib/x86_64-linux-gnu
+
+# fetch PACKAGE/SUITE...: Debian's source packages, whatever sources this machine's own apt knows.
+fetch() {
+    local apt=$libraries/apt mirror
+    mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2>/dev/null | grep -m 1 '/debian/*$' || echo http://deb.debian.org/debian)
+    mkdir -p "$apt/lists/partial"
+    printf "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] $mirror %s main\n" bookworm trixie >"$apt/sources.list"
+    local options=(-q -o "Dir::Etc::sourcelist=$apt/sources.list" -o Dir::Etc::sourceparts=- -o "Dir::State::lists=$apt/lists" -o APT::Get::List-Cleanup=0)
+    apt-get "${options[@]}" update >/dev/null
+    (cd "$libraries/source" && apt-get "${options[@]}" source "$@") >"$libraries/source.log" 2>&1 || { tail "$libraries/source.log" >&2; exit 1; }
+}
+
+# library NAME OPTIONS...: builds a source package's static library, without what darb does not use.
+library() {
+    local name=$1 source
+    shift
+    source=$(find "$libraries/source" -mindepth 1 -maxdepth 1 -type d -name "$name-*")
+    if ! { cmake -S "$source" -B "$libraries/build/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_SHARED_LIBS=OFF \
+        -DCMAKE_POSITION_INDEPENDENT_CODE=ON -DCMAKE_INSTALL_PREFIX="$libraries" -DCMAKE_INSTALL_LIBDIR=lib "$@" &&
+        cmake --build "$libraries/build/$name" -j "$jobs" --target install; } >"$libraries/$name.log" 2>&1; then
+        tail -30 "$libraries/$name.log" >&2
+        exit 1
+    fi
+}
+
+make_libraries() {
+    [[ ! -e $libraries/done ]] || return 0
+    rm -rf "$libraries"
+    mkdir -p "$libraries/source"
+    fetch fmtlib/bookworm libzip/bookworm muparser/bookworm glfw3/trixie # GLFW 3.4 looks for X11 when it is used
+    library fmtlib -DFMT_TEST=OFF -DFMT_DOC=OFF
+    library libzip -DENABLE_{COMMONCRYPTO,GNUTLS,MBEDTLS,OPENSSL,BZIP2,LZMA}=OFF -DBUILD_{TOOLS,REGRESS,EXAMPLES,DOC}=OFF
+    library muparser -DENABLE_{SAMPLES,OPENMP,WIDE_CHAR}=OFF
+    library glfw3 -DGLFW_BUILD_{WAYLAND,EXAMPLES,TESTS,DOCS}=OFF
+    touch "$libraries/done"
+}
+
+# newest_glibc FILE: the newest version of glibc that it asks for.
+newest_glibc() { objdump -T "$1" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -1; }
+
+make_portable() {
+    make_libraries
+    cmake -S . -B "$build" "${common[@]}" -DDARB_PORTABLE=ON -DDARB_FMT_LIBRARY="$libraries/lib/libfmt.a" \
+        -DZIP_LIBRARY="$libraries/lib/libzip.a" -DMUPARSER_LIBRARY="$libraries/lib/libmuparser.a" \
+        -DDARB_GLFW_LIBRARY="$libraries/lib/libglfw3.a" -DZSTD_LIBRARY=$system/libzstd.a -DWEBP_LIBRARY=$system/libwebp.a \
+        -DSTB_LIBRARY=$system/libstb.a -DZLIB_LIBRARY=$system/libz.a -DPNG_LIBRARY=$system/libpng16.a \
+        -DJPEG_LIBRARY=$system/libjpeg.a >/dev/null
+    cmake --build "$build" -j "$jobs" --target darb darb_pages
+    local version name stage documents
+    version=$(sed -n 's/^CMAKE_PROJECT_VERSION:STATIC=//p' "$build/CMakeCache.txt")
+    name=darb-$version-linux-amd64
+    stage=$(mktemp -d)
+    cmake --install "$build" --component darb --strip --prefix "$stage/$name" >/dev/null
+    mkdir -p "$stage/$name/lib/darb"
+    cp $system/libvulkan.so.1 "$stage/$name/lib/darb/"
+    chmod u+w "$stage/$name/lib/darb/libvulkan.so.1"
+    tools/portable/lower_versions.py "$stage/$name/lib/darb/libvulkan.so.1"
+    documents=$stage/$name/share/doc/darb
+    for package in libfmt-dev libzip-dev libmuparser-dev libglfw3-dev libimgui-dev libstb-dev libzstd-dev libwebp-dev zlib1g-dev \
+        libpng-dev libjpeg62-turbo libvulkan1 gcc-12-base; do
+        cp "/usr/share/doc/$package/copyright" "$documents/copyright.$package"
+    done
+    for file in "$stage/$name/bin/darb" "$stage/$name/lib/darb/libvulkan.so.1"; do
+        local newest
+        newest=$(newest_glibc "$file")
+        if [[ $(printf '%s\n' GLIBC_2.31 "$newest" | sort -V | tail -1) != GLIBC_2.31 ]]; then
+            echo "package.sh: ${file#"$stage"/} needs $newest:" >&2
+            objdump -T "$file" | grep -E "GLIBC_2\.(3[2-9]|[4-9][0-9])" >&2
+            exit 1
+        fi
+        echo "${file#"$stage"/}: needs $newest and $(objdump -p "$file" | awk '/NEEDED/ { printf "%s ", $2 }')"
+    done
+    tar -C "$stage" --owner=0 --group=0 --sort=name -cJf "$out/$name.tar.xz" "$name"
+    rm -rf "$stage"
+}
+
+for kind in $kinds; do "make_$kind"; done
+ls -l "$out"
