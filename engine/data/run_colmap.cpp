@@ -21,18 +21,6 @@ namespace {
 
 constexpr std::size_t kKeptLines = 8;  // shown when a command fails
 
-/// In single quotes, for the shell.
-std::string quoted(const fs::path& path) {
-    std::string text = "'";
-    for (const char c : path.string()) {
-        if (c == '\'')
-            text += "'\\''";
-        else
-            text += c;
-    }
-    return text + "'";
-}
-
 std::string joined(const auto& lines) {
     std::string text;
     for (const std::string& line : lines) text += "\n    " + line;
@@ -96,8 +84,19 @@ std::string largest_model(const fs::path& sparse,
 
 }  // namespace
 
+std::string shell_quoted(const fs::path& path) {
+    std::string text = "'";
+    for (const char c : path.string()) {
+        if (c == '\'')
+            text += "'\\''";
+        else
+            text += c;
+    }
+    return text + "'";
+}
+
 bool is_installed(const std::string& program) {
-    return std::system(("command -v " + quoted(fs::path(program)) + " > /dev/null 2>&1").c_str()) ==
+    return std::system(("command -v " + shell_quoted(fs::path(program)) + " > /dev/null 2>&1").c_str()) ==
            0;
 }
 
@@ -107,10 +106,10 @@ bool has_new_names(std::string_view help) {
 
 std::vector<std::string> colmap_commands(const ColmapRun& run) {
     const std::string colmap = "QT_QPA_PLATFORM=offscreen colmap ";
-    const std::string database = quoted(run.workspace / "database.db");
-    const std::string photos = quoted(run.photos);
+    const std::string database = shell_quoted(run.workspace / "database.db");
+    const std::string photos = shell_quoted(run.photos);
     const std::string masks =
-        run.masks.empty() ? "" : " --ImageReader.mask_path " + quoted(run.masks);
+        run.masks.empty() ? "" : " --ImageReader.mask_path " + shell_quoted(run.masks);
     const char* part = run.new_names ? "Feature" : "Sift";
     // OPENCV: phones and consumer cameras; the undistorter turns it into a pinhole.
     return {
@@ -121,11 +120,11 @@ std::vector<std::string> colmap_commands(const ColmapRun& run) {
         fmt::format("{}{}_matcher --database_path {} --{}Matching.use_gpu 0", colmap,
                     run.sequential ? "sequential" : "exhaustive", database, part),
         fmt::format("{}mapper --database_path {} --image_path {} --output_path {}", colmap,
-                    database, photos, quoted(run.workspace / "sparse")),
+                    database, photos, shell_quoted(run.workspace / "sparse")),
         fmt::format("{}image_undistorter --image_path {} --input_path {} --output_path {} "
                     "--output_type COLMAP --max_image_size {}",
-                    colmap, photos, quoted(run.workspace / "sparse" / run.model),
-                    quoted(run.workspace / "dense"), run.max_image_size),
+                    colmap, photos, shell_quoted(run.workspace / "sparse" / run.model),
+                    shell_quoted(run.workspace / "dense"), run.max_image_size),
     };
 }
 
@@ -138,7 +137,7 @@ fs::path run_colmap(const ColmapRun& asked, const std::function<void(std::string
         throw Error(
             run.photos.string(), "holds photos without cameras, and colmap is not installed",
             fmt::format("Install it (apt install colmap), or run elsewhere:\n    mkdir -p {}{}",
-                        quoted(run.workspace / "sparse"), joined(commands)));
+                        shell_quoted(run.workspace / "sparse"), joined(commands)));
     std::error_code failure;
     fs::create_directories(run.workspace / "sparse", failure);
     if (failure)

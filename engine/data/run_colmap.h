@@ -33,6 +33,9 @@ bool has_new_names(std::string_view help);
 std::filesystem::path run_colmap(const ColmapRun& run,
                                  const std::function<void(std::string_view line)>& progress);
 
+/// In single quotes, for the shell.
+std::string shell_quoted(const std::filesystem::path& path);
+
 /// Whether the shell finds a program of that name.
 bool is_installed(const std::string& program);
 

@@ -1,0 +1,146 @@
+#include "engine/data/video.h"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/core/text.h"
+#include "engine/data/run_colmap.h"
+
+namespace darb {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::array<std::string_view, 8> kVideoExtensions{".mp4", ".mov",  ".m4v", ".mkv",
+                                                           ".avi", ".webm", ".mpg", ".mts"};
+constexpr int kProbeWidth = 480, kProbeHeight = 270;  // px
+constexpr std::size_t kMostLogChars = 600;
+
+void need_ffmpeg(const fs::path& video) {
+    if (!fs::is_regular_file(video))
+        throw Error(video.string(), "is no video file", "Check the path.");
+    if (!is_installed("ffmpeg"))
+        throw Error(video.string(), "is a video, and ffmpeg is not installed",
+                    fmt::format("Install it (apt install ffmpeg), or take pictures elsewhere and "
+                                "name their folder:\n    ffmpeg -i {} -vf fps=2 -q:v 2 "
+                                "FRAMES/%05d.jpg\n    darb train FRAMES --sequential",
+                                shell_quoted(video)));
+}
+
+// A file for what ffmpeg complains of, gone with it.
+class LogFile {
+  public:
+    LogFile() : path_(fs::temp_directory_path() / fmt::format("darb_ffmpeg_{}.log", ::getpid())) {}
+    LogFile(const LogFile&) = delete;
+    LogFile& operator=(const LogFile&) = delete;
+    ~LogFile() {
+        std::error_code none;
+        fs::remove(path_, none);
+    }
+    std::string redirection() const { return " 2>" + shell_quoted(path_); }
+    std::string text() const {
+        std::error_code none;
+        if (!fs::exists(path_, none)) return {};
+        std::string text = read_text_file(path_);
+        if (text.size() > kMostLogChars) text.erase(0, text.size() - kMostLogChars);
+        while (text.ends_with('\n')) text.pop_back();
+        return text;
+    }
+
+  private:
+    fs::path path_;
+};
+
+[[noreturn]] void ffmpeg_failed(const fs::path& video, const LogFile& log) {
+    const std::string said = log.text();
+    throw Error(video.string(),
+                "ffmpeg cannot read it" + (said.empty() ? std::string() : ":\n    " + said),
+                "Check that it plays; ffmpeg -i shows what it holds.");
+}
+
+}  // namespace
+
+bool is_video_name(const fs::path& path) {
+    const std::string extension = lower(path.extension().string());
+    return std::ranges::find(kVideoExtensions, extension) != kVideoExtensions.end();
+}
+
+double laplacian_variance(const unsigned char* grey, int width, int height) {
+    double sum = 0, squares = 0;
+    for (int y = 1; y + 1 < height; ++y)
+        for (int x = 1; x + 1 < width; ++x) {
+            const unsigned char* at = grey + static_cast<std::ptrdiff_t>(y) * width + x;
+            const double value = 4.0 * at[0] - at[-1] - at[1] - at[-width] - at[width];
+            sum += value;
+            squares += value * value;
+        }
+    const double count = std::max(1.0, double(width - 2) * (height - 2));
+    return squares / count - (sum / count) * (sum / count);
+}
+
+std::vector<double> video_sharpness(const fs::path& video) {
+    need_ffmpeg(video);
+    const LogFile log;
+    const std::string command = fmt::format(
+        "ffmpeg -nostdin -v error -i {} -map 0:v:0 -vf scale={}:{},format=gray "
+        "-vsync passthrough -f rawvideo -{}",
+        shell_quoted(fs::absolute(video)), kProbeWidth, kProbeHeight, log.redirection());
+    const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
+    std::unique_ptr<std::FILE, decltype(close)> pipe(::popen(command.c_str(), "r"), close);
+    if (!pipe) throw Error("ffmpeg", "cannot be started", "Free memory or processes.");
+    std::vector<unsigned char> picture(std::size_t{kProbeWidth} * kProbeHeight);
+    std::vector<double> sharpness;
+    while (std::fread(picture.data(), 1, picture.size(), pipe.get()) == picture.size())
+        sharpness.push_back(laplacian_variance(picture.data(), kProbeWidth, kProbeHeight));
+    const int status = ::pclose(pipe.release());
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || sharpness.empty())
+        ffmpeg_failed(video, log);
+    return sharpness;
+}
+
+std::vector<std::size_t> sharpest_of_intervals(const std::vector<double>& sharpness,
+                                               std::size_t wanted) {
+    const std::size_t count = sharpness.size(), intervals = std::min(wanted, count);
+    std::vector<std::size_t> kept;
+    for (std::size_t i = 0; i < intervals; ++i) {
+        const auto begin = sharpness.begin() + static_cast<std::ptrdiff_t>(i * count / intervals);
+        const auto end =
+            sharpness.begin() + static_cast<std::ptrdiff_t>((i + 1) * count / intervals);
+        kept.push_back(static_cast<std::size_t>(std::max_element(begin, end) - sharpness.begin()));
+    }
+    return kept;
+}
+
+void write_video_frames(const fs::path& video, const std::vector<std::size_t>& pictures,
+                        const fs::path& folder) {
+    need_ffmpeg(video);
+    std::error_code failure;
+    fs::create_directories(folder, failure);
+    if (failure)
+        throw Error(folder.string(), "cannot be made: " + failure.message(),
+                    "Choose another output folder with -o.");
+    std::string chosen;
+    for (const std::size_t picture : pictures)
+        chosen += fmt::format("{}eq(n,{})", chosen.empty() ? "" : "+", picture);
+    const LogFile log;
+    const std::string command = fmt::format(
+        "ffmpeg -nostdin -v error -y -i {} -map 0:v:0 -vf \"select='{}'\" -vsync passthrough "
+        "-q:v 2 {}{}",
+        shell_quoted(fs::absolute(video)), chosen,
+        shell_quoted(fs::absolute(folder) / "frame_%05d.jpg"), log.redirection());
+    std::FILE* pipe = ::popen(command.c_str(), "r");
+    const int status = pipe == nullptr ? -1 : ::pclose(pipe);
+    if (status == -1 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) ffmpeg_failed(video, log);
+}
+
+}  // namespace darb
