@@ -14,6 +14,10 @@ constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 
 }  // namespace
 
+int probe_iterations(const Schedule& schedule) {
+    return 2 * static_cast<int>(std::lround(kArmIterations / std::sqrt(schedule.speedup)));
+}
+
 DegreeProbe::DegreeProbe(const TrainOptions& options, const Schedule& schedule)
     : on_(options.probe_sh),
       highest_degree_(options.sh_degree),
@@ -40,7 +44,7 @@ double DegreeProbe::train_arm(const TrainerState& start, int degree, const Probe
     TrainerState state = start;
     set_degree(state, degree);
     fork.restore(state);
-    const auto iterations = std::lround(kArmIterations / std::sqrt(schedule_.speedup));
+    const long iterations = probe_iterations(schedule_) / 2;
     for (long i = 0; i < iterations; ++i) {
         const int iteration = start.iteration + 1 + static_cast<int>(i);
         const float share =

@@ -31,6 +31,9 @@ struct ProbeFork {
     std::function<double(int view)> photo_psnr;
 };
 
+/// Iterations that one probe takes beside those of the run.
+int probe_iterations(const Schedule& schedule);
+
 class DegreeProbe {
   public:
     DegreeProbe(const TrainOptions& options, const Schedule& schedule);

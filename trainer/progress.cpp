@@ -31,7 +31,12 @@ Progress::Progress(int first_iteration, int last_iteration, bool quiet)
       quiet_(quiet),
       terminal_(::isatty(STDERR_FILENO) == 1),
       start_(Clock::now()),
-      last_print_(start_) {}
+      last_print_(start_),
+      begin_(start_) {}
+
+void Progress::expect(const TrainOptions& options, const PaceForecast& pace) {
+    left_.emplace(options, pace);
+}
 
 void Progress::update(const IterationResult& r, const Device& device) {
     loss_ = any_ ? loss_ + kSmoothing * (r.loss - loss_) : r.loss;
@@ -39,6 +44,8 @@ void Progress::update(const IterationResult& r, const Device& device) {
     any_ = true;
     if (quiet_) return;
     const auto now = Clock::now();
+    if (left_)
+        left_->add(r.iteration, std::chrono::duration<double>(now - begin_).count(), r.splats);
     const double since = std::chrono::duration<double>(now - last_print_).count();
     if (since < (terminal_ ? kTerminalSeconds : kPlainSeconds) && r.iteration < last_) return;
     last_print_ = now;
@@ -49,6 +56,8 @@ std::string Progress::text(const IterationResult& r, const Device& device) const
     const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
     const double done = r.iteration - first_ + 1;
     const double rate = done / std::max(seconds, 1e-6);
+    double left = left_ ? left_->seconds() : 0;
+    if (left <= 0) left = (last_ - r.iteration) / std::max(rate, 1e-9);
     std::string bar;
     if (terminal_) {
         const int filled = static_cast<int>(20.0 * r.iteration / std::max(last_, 1));
@@ -57,8 +66,7 @@ std::string Progress::text(const IterationResult& r, const Device& device) const
     return fmt::format(
         "{}{}/{}  {:.1f} it/s  {:.1f} ms  loss {:.4f}  PSNR {:.2f} dB  {} splats  {}  {} left", bar,
         r.iteration, last_, rate, 1000.0 / rate, loss_, psnr_db_, r.splats,
-        format_bytes(static_cast<double>(device.allocated_bytes())),
-        format_duration((last_ - r.iteration) / std::max(rate, 1e-9)));
+        format_bytes(static_cast<double>(device.allocated_bytes())), format_duration(left));
 }
 
 void Progress::note(const std::string& line) {
@@ -79,7 +87,10 @@ void Progress::restart_rate(int iteration) {
 }
 
 void Progress::leave_out(double seconds) {
-    start_ += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+    const auto left_out =
+        std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+    start_ += left_out;
+    begin_ += left_out;
 }
 
 void Progress::finish() {

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
+#include "trainer/time_left.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -13,6 +15,8 @@ class Progress {
   public:
     Progress(int first_iteration, int last_iteration, bool quiet);
 
+    /// How the pace will change; without, what is left is told by the pace so far.
+    void expect(const TrainOptions& options, const PaceForecast& pace);
     /// After every finished iteration; decides itself when to print.
     void update(const IterationResult& result, const Device& device);
     /// A line of its own (evaluation, saved file), leaving the bar intact.
@@ -33,6 +37,8 @@ class Progress {
     int first_, last_;
     bool quiet_, terminal_;
     Clock::time_point start_, last_print_;
+    Clock::time_point begin_;  // of the whole run, which restart_rate() leaves
+    std::optional<TimeLeft> left_;
     double loss_ = 0, psnr_db_ = 0;  // smoothed
     bool any_ = false;
 };

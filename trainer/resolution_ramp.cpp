@@ -8,10 +8,10 @@
 
 namespace darb {
 
-Camera divided(const Camera& camera, int divisor) {
+Camera divided(const Camera& camera, double divisor) {
     Camera smaller = camera;
-    smaller.width = std::max(1, static_cast<int>(std::lround(double(camera.width) / divisor)));
-    smaller.height = std::max(1, static_cast<int>(std::lround(double(camera.height) / divisor)));
+    smaller.width = std::max(1, static_cast<int>(std::lround(camera.width / divisor)));
+    smaller.height = std::max(1, static_cast<int>(std::lround(camera.height / divisor)));
     const double x = double(smaller.width) / camera.width,
                  y = double(smaller.height) / camera.height;
     smaller.fx *= x;

@@ -11,7 +11,7 @@
 namespace darb {
 
 /// The camera of a photo whose sides are divided and rounded: it sees the same.
-Camera divided(const Camera& camera, int divisor);
+Camera divided(const Camera& camera, double divisor);
 
 class ResolutionRamp {
   public:

@@ -271,7 +271,10 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     // Of where the run was interrupted; it goes on, and its scene is the latest until it has ended.
     std::error_code none;
     std::filesystem::remove(run_.output / "metrics.json", none);
-    log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json);
+    const std::optional<PaceForecast> pace = run_.pace ? run_.pace : log_.pace();
+    if (pace) progress_.expect(options_, *pace);
+    log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json,
+               pace);
     try {
         train(stop);
     } catch (const std::exception& e) {

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "engine/gpu/device.h"
 #include "trainer/options.h"
 #include "trainer/run_report.h"
+#include "trainer/time_left.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -42,10 +44,11 @@ struct RunOptions {
     /// May be empty. Returns the seconds that it held the run up on purpose (a pause), which are
     /// no training time.
     std::function<double(const LiveStep&)> on_step;
-    std::string command;          // of command.json, for --resume; may be empty
-    std::string effects;          // the plan in a line, for the log
-    std::string effects_json;     // the same as JSON, for metrics.json; may be empty
-    std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
+    std::optional<PaceForecast> pace;  // for the time that is left, and for the log
+    std::string command;               // of command.json, for --resume; may be empty
+    std::string effects;               // the plan in a line, for the log
+    std::string effects_json;          // the same as JSON, for metrics.json; may be empty
+    std::vector<ImageU8> photos;       // already loaded, in the order of the views; else empty
 };
 
 struct Evaluation {

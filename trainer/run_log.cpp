@@ -130,7 +130,7 @@ void RunLog::write(const Json& event) {
 
 void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
                    const TrainOptions& options, std::uint32_t splats,
-                   const std::string& effects_json) {
+                   const std::string& effects_json, const std::optional<PaceForecast>& pace) {
     root_ = dataset.root;
     std::vector<std::string> notes;
     for (const std::string& note : dataset.notes) notes.push_back(shared_text(note));
@@ -153,7 +153,17 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
               {"fma_per_s", rates_.fma_per_s},
               {"settings", Json::parse(settings_text(options))}};
     if (!effects_json.empty()) start_["effects"] = Json::parse(effects_json);
+    if (pace) start_["forecast"] = pace_json(*pace);
     write(start_);
+}
+
+std::optional<PaceForecast> RunLog::pace() const {
+    for (const Json& e : events_)
+        if (e.value("event", "") == "start" && e.contains("forecast")) try {
+                return pace_from_json(e["forecast"]);
+            } catch (const Json::exception&) {  // written by something else: as if there were none
+            }
+    return std::nullopt;
 }
 
 namespace {

@@ -37,7 +37,10 @@ class RunLog {
 
     /// rates: of the device, for the roofline.
     void start(const Device& device, const DeviceRates& rates, const Dataset& dataset,
-               const TrainOptions& options, std::uint32_t splats, const std::string& effects_json);
+               const TrainOptions& options, std::uint32_t splats, const std::string& effects_json,
+               const std::optional<PaceForecast>& pace);
+    /// Of the run that goes on, where it had one.
+    std::optional<PaceForecast> pace() const;
     /// Keeps one line in kLogInterval. counters: of the run so far; totals: of the passes, as
     /// Trainer sums them.
     void iteration(const IterationResult& result, const TrainCounters& counters, double seconds,

@@ -77,6 +77,25 @@ Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::ui
     return {static_cast<std::uint32_t>(count), sum / std::max(options.iterations, 1)};
 }
 
+std::vector<double> growth_path(const TrainOptions& options, std::uint32_t start,
+                                std::uint32_t end) {
+    const Schedule schedule(options);
+    const StrategyRow& row = strategy_row(options.strategy);
+    std::vector<double> path;
+    double count = start;
+    for (int i = 0; i <= options.iterations; ++i) {
+        if (!row.grows_to_limit) {
+            count = double(row.forecast_until(schedule, i, start, end));
+        } else if (schedule.refines_after(i) && count < end) {
+            const auto target =
+                row.target(options, schedule, i, static_cast<std::uint32_t>(count), end);
+            count = std::min<double>(2 * count, target);
+        }
+        path.push_back(count);
+    }
+    return path;
+}
+
 std::uint32_t simulated_end(const TrainOptions& options, const GrowthStart& start) {
     return std::max(start.splats, simulate_growth(options, start.splats, start.limit).end);
 }

@@ -68,6 +68,11 @@ struct Growth {
 };
 Growth simulate_growth(const TrainOptions& options, std::uint32_t start, std::uint32_t limit);
 
+/// [iteration, 0 to options.iterations] splats on the way from the start to the end that is
+/// forecast.
+std::vector<double> growth_path(const TrainOptions& options, std::uint32_t start,
+                                std::uint32_t end);
+
 // Forecasts of strategies that have a target.
 std::uint32_t simulated_end(const TrainOptions& options, const GrowthStart& start);
 double simulated_mean(const TrainOptions& options, std::uint32_t start, std::uint32_t end);

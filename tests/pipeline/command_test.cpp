@@ -36,7 +36,7 @@ TEST(Command, bad_usage_is_exit_code_2) {
     expect_refused({{"", "subcommand"},
                     {"no_such", "no_such"},
                     {"train --no-such-option", "--no-such-option"},
-                    {"train " + kScene, "no output folder"},
+                    {"train --resume", "no output folder"},
                     {"train" + out, "no data set"},
                     {train + "--sh_degree 4", "--sh-degree 4: must be a whole number from 0 to 3"},
                     {train + "--kernel no_such", "no such kernel"},

@@ -13,6 +13,7 @@
 #include "engine/data/colmap.h"
 #include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
+#include "engine/data/run_colmap.h"
 
 namespace darb {
 
@@ -58,6 +59,19 @@ Pictures pictures_below(const fs::path& folder) {
     return found;
 }
 
+// The command that makes JPEG files of them, beside them.
+std::string way_round(const std::map<std::string, std::size_t>& foreign, const fs::path& folder) {
+    const std::string in = "cd " + shell_quoted(folder) + " && ";
+    std::string text = "Convert them to PNG or JPEG first:";
+    for (const auto& [extension, count] : foreign) {
+        const bool phone = extension == ".heic" || extension == ".heif";
+        text += fmt::format("\n    {}find . -iname '*{}' -exec {} \\;    ({})", in, extension,
+                            phone ? "heif-convert -q 95 {} {}.jpg" : "convert {} {}.jpg",
+                            phone ? "apt install libheif-examples" : "apt install imagemagick");
+    }
+    return text;
+}
+
 }  // namespace
 
 fs::path photos_without_cameras(const fs::path& path, const std::string& images_folder) {
@@ -73,7 +87,7 @@ fs::path photos_without_cameras(const fs::path& path, const std::string& images_
         list += fmt::format("{}{} {}", list.empty() ? "" : ", ", count, extension);
     if (!list.empty())
         throw Error(path.string(), "holds no PNG or JPEG files, but pictures not read: " + list,
-                    "Convert them to PNG or JPEG first.");
+                    way_round(found.foreign, path));
     return {};
 }
 

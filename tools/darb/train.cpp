@@ -58,7 +58,7 @@ std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
         text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
                             e.splats);
     }
-    if (!quiet) text += passes_text(summary.passes);
+    if (!quiet && flags.verbose) text += passes_text(summary.passes);
     const auto written = [&](const char* what, const std::filesystem::path& path) {
         if (path.empty()) return;
         text += (quiet ? "" : fmt::format("{:<9}", what)) + path.string() + "\n";

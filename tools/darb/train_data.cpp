@@ -15,7 +15,9 @@
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
 #include "engine/data/run_colmap.h"
+#include "engine/data/video.h"
 #include "tools/darb/photo_folder.h"
+#include "tools/darb/video_photos.h"
 
 namespace darb {
 
@@ -55,7 +57,7 @@ std::string masks_note(const ColmapRun& run, const fs::path& project) {
 Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
                             std::optional<RunLock>& lock) {
     check_output(photos, flags.run.output);
-    lock.emplace(flags.run.output);
+    if (!lock) lock.emplace(flags.run.output);
     ColmapRun run;
     run.photos = fs::absolute(photos / "").lexically_normal().parent_path();
     const fs::path project = run.photos.parent_path();
@@ -89,8 +91,10 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
 
 }  // namespace
 
-Dataset load_training_data(const TrainFlags& flags, std::optional<RunLock>& lock) {
-    const fs::path photos = photos_without_cameras(flags.dataset, flags.data.images_folder);
+Dataset load_training_data(TrainFlags& flags, std::optional<RunLock>& lock) {
+    const bool video = is_video_name(flags.dataset) && !fs::is_directory(flags.dataset);
+    const fs::path photos = video ? photos_of_video(flags.dataset, flags, lock)
+                                  : photos_without_cameras(flags.dataset, flags.data.images_folder);
     Dataset dataset = photos.empty() ? load_dataset(flags.dataset, flags.data)
                                      : load_through_colmap(photos, flags, lock);
     if (dataset.points.size() == 0)

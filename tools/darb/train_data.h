@@ -13,7 +13,8 @@ namespace darb {
 /// and JPEG files (itself, or its --images folder) without sparse, sparse/0 or transforms*.json
 /// goes through the installed COLMAP into OUT/colmap first; what is there from an earlier run over
 /// the same photos is used again. Throws Error as load_dataset and run_colmap do, and where OUT
-/// lies among the photos. lock: that of OUT, taken before COLMAP writes there.
-Dataset load_training_data(const TrainFlags& flags, std::optional<RunLock>& lock);
+/// lies among the photos. A video becomes photos first, see video_photos.h. lock: that of OUT,
+/// taken before anything is written there.
+Dataset load_training_data(TrainFlags& flags, std::optional<RunLock>& lock);
 
 }  // namespace darb

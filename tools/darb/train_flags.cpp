@@ -31,34 +31,6 @@ void add_schedule_flag(CLI::App& command, TrainFlags& f) {
         ->group(option_group::kRates);
 }
 
-void add_data_flags(CLI::App& command, TrainFlags& f) {
-    command
-        .add_option("dataset,-s,--source-path", f.dataset,
-                    "COLMAP project, folder with transforms.json, a .json file, or a folder of "
-                    "photos")
-        ->group(help_group::kInput);
-    command.add_option("-o,--output,-m,--model-path", f.run.output, "output folder")
-        ->group(help_group::kInput);
-    command
-        .add_option("-r,--resolution", f.data.resolution,
-                    "1, 2, 4, 8: divide the photos' size; above 8: their width in px; default: as "
-                    "they are, at most 1,600 px wide")
-        ->group(help_group::kInput);
-    command
-        .add_flag("--eval", f.data.hold_out,
-                  "hold out every 8th view, or the source's own test views")
-        ->group(help_group::kInput);
-    command.add_option("-i,--images", f.data.images_folder, "photo folder of a COLMAP project")
-        ->capture_default_str()
-        ->group(option_group::kPhotos);
-    command
-        .add_flag("--sequential", f.sequential,
-                  "photos without cameras: match neighbours in name order only")
-        ->group(option_group::kPhotos);
-    add_lens_flag(command, f.data);
-    command.get_option("--lens")->group(option_group::kPhotos);
-}
-
 void add_scene_flags(CLI::App& command, TrainFlags& f) {
     add_kernel_flags(command, f.kernel,
                      kernel_names() + ", or one of your own: \"expr: (1 - q/9)^3, support 9\"",
@@ -92,6 +64,8 @@ void add_run_flags(CLI::App& command, TrainFlags& f) {
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training")
         ->group(option_group::kRun);
     add_quiet_flag(command, f.run.quiet)->group(option_group::kRun);
+    command.add_flag("--verbose", f.verbose, "print the time of each pass at the end")
+        ->group(help_group::kDevice);
     command.add_option("--device", f.device, "number or part of a name, see `darb devices`")
         ->group(option_group::kRun);
     command.add_flag("--deterministic", f.deterministic)->group("");
@@ -135,6 +109,10 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     add_option_rows(command, f.train, f.of_strategies);
     add_saving_flags(command, f);
     add_removed_options(command);
+    command.parse_complete_callback([&command, &f] {
+        f.length_given = command.count("--iterations") > 0;
+        f.width_given = command.count("--resolution") > 0;
+    });
 }
 
 }  // namespace darb

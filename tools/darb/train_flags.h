@@ -20,14 +20,19 @@ struct TrainFlags {
     std::string effects = "auto", schedule_effects;
     bool antialiasing = false;  // as 3DGS spells +antialias
     bool resume = false;
-    bool view = false;  // follow in a window
-    bool page = false;  // OUT/scene.html at the end
+    bool verbose = false;  // the table of passes at the end
+    bool view = false;     // follow in a window
+    bool page = false;     // OUT/scene.html at the end
     bool sequential = false;
+    int frames = 0;              // of a video; 0: by its length
     bool deterministic = false;  // every run is; the flag only lets scripts say so
     std::filesystem::path start_checkpoint;
     KernelFlags kernel;
     std::string strategy = "adc";
     std::string schedule = "darb";  // or 3dgs
+    std::string preset;             // of trainer/presets.h; empty: none was named
+    bool length_given = false;      // --iterations
+    bool width_given = false;       // -r
     std::string strategy_note;      // what plan_strategy decided, for people
     GivenOfStrategies of_strategies;
     int pulses = 1;
@@ -36,6 +41,9 @@ struct TrainFlags {
     TrainOptions train;
     RunOptions run;
 };
+
+/// --preset, and the photos' options. Before the others: values are taken over in this order.
+void add_data_flags(CLI::App& command, TrainFlags& flags);
 
 /// Adds every option to the subcommand; values land in flags, which must outlive the parse.
 void add_train_flags(CLI::App& command, TrainFlags& flags);

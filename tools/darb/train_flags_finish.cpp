@@ -58,6 +58,13 @@ void finish_strategy(TrainFlags& f) {
                         fmt::format("Leave it out; it goes with --strategy {}.", strategies));
 }
 
+// Where no -o is given: output/NAME, of the folder or the video, or of a .json file's folder.
+std::filesystem::path usual_output(const std::string& dataset) {
+    std::filesystem::path path = std::filesystem::absolute(dataset).lexically_normal();
+    if (path.filename().empty() || path.extension() == ".json") path = path.parent_path();
+    return std::filesystem::path("output") / path.stem();
+}
+
 // Scripts give those of long runs to short ones, too.
 void note_iterations_beyond(const TrainFlags& f) {
     const std::pair<const char*, const std::vector<int>&> lists[] = {
@@ -95,6 +102,12 @@ void finish_train_flags(TrainFlags& f) {
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())
             list->assign(std::begin(kStandardEvaluations), std::end(kStandardEvaluations));
+    if (f.run.output.empty() && f.dataset.empty() && !f.resume)
+        throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
+    if (f.run.output.empty() && !f.resume) {
+        f.run.output = usual_output(f.dataset);
+        if (!f.run.quiet) say("output: {}; -o names another\n", f.run.output.string());
+    }
     if (f.run.output.empty())
         throw Error("darb train", "no output folder", "Name one with -o OUT.");
     // The run's own checkpoint, once there is one, is further than the one that it began with.

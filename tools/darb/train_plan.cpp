@@ -9,6 +9,7 @@
 #include "engine/core/say.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/train_presets.h"
 #include "trainer/forecast.h"
 #include "trainer/progress.h"
 #include "trainer/schedule.h"
@@ -90,7 +91,7 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
         say("hint:{}\n", advice);
 }
 
-void print_forecast(const Device& device, const Dataset& dataset, const TrainFlags& flags) {
+void print_forecast(const Device& device, const Dataset& dataset, TrainFlags& flags) {
     DeviceOptions options = command_device(flags.device);
     Device scratch(options);
     scratch.set_tuning(device.tuning());
@@ -98,6 +99,8 @@ void print_forecast(const Device& device, const Dataset& dataset, const TrainFla
         forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
     say("forecast: {}; {}\n", time_text(f, flags.train), memory_text(device, f));
     print_advice(device, dataset, f);
+    print_presets(scratch, dataset, flags, f);
+    flags.run.pace = pace_of(f);
 }
 
 void print_growth(const TrainOptions& options) {
@@ -112,7 +115,7 @@ void print_growth(const TrainOptions& options) {
 
 }  // namespace
 
-void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags) {
+void print_plan(Device& device, const Dataset& dataset, TrainFlags& flags) {
     if (flags.run.quiet) return;
     size_t held_out = 0;
     for (const View& v : dataset.views) held_out += v.is_test ? 1 : 0;

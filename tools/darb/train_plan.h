@@ -8,7 +8,7 @@
 namespace darb {
 
 /// Prints views, notes, and the forecast of splats, time and memory on this device, which takes a
-/// few seconds; nothing with --quiet.
-void print_plan(Device& device, const Dataset& dataset, const TrainFlags& flags);
+/// few seconds; nothing with --quiet. Leaves the forecast of the pace in flags.run.
+void print_plan(Device& device, const Dataset& dataset, TrainFlags& flags);
 
 }  // namespace darb

@@ -18,9 +18,9 @@ namespace {
 
 constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, of bytes that are no UTF-8
 constexpr const char* kRemedy = "Repeat the whole command with --resume.";
-constexpr std::array<std::string_view, 11> kBeside{
+constexpr std::array<std::string_view, 12> kBeside{
     "--resume", "-o",      "-m",     "--output", "--model-path", "--device",
-    "-q",       "--quiet", "--view", "--tune",   "--retune"};
+    "-q",       "--quiet", "--view", "--tune",   "--retune",     "--verbose"};
 
 void check_typed(const std::vector<std::string>& typed) {
     for (const std::string& word : typed) {

@@ -1,0 +1,103 @@
+// darb train VIDEO, with a program named colmap that notes its calls and takes the scene's own
+// model as its result.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "engine/core/files.h"
+#include "engine/data/run_colmap.h"
+#include "tests/support/run_command.h"
+
+namespace darb {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+
+const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+
+fs::path video() {
+    return scratch() / "a video.mp4";
+}
+
+fs::path program(const std::string& name, const std::string& script) {
+    const fs::path path = scratch() / "bin" / name;
+    write_file_atomic(path, "#!/bin/sh\n" + script);
+    fs::permissions(path, fs::perms::owner_all);
+    return path;
+}
+
+Outcome with_path(const std::string& path, const std::string& arguments) {
+    const std::string before = std::getenv("PATH");
+    ::setenv("PATH", path.c_str(), 1);
+    const Outcome o = darb(arguments);
+    ::setenv("PATH", before.c_str(), 1);
+    return o;
+}
+
+std::string train(const std::string& more = "") {
+    return fmt::format("train '{}' -o {} --iterations 1 {}", video().string(),
+                       (scratch() / "of_video").string(), more);
+}
+
+TEST(VideoCommand, what_is_missing_is_named_with_its_package) {
+    write_file_atomic(video(), std::string("no video"));
+    const Outcome both = with_path("/nowhere", train());
+    EXPECT_EQ(both.code, 2);
+    EXPECT_NE(both.err.find("not installed: ffmpeg colmap"), std::string::npos) << both.err;
+    EXPECT_NE(both.err.find("apt install ffmpeg colmap"), std::string::npos) << both.err;
+    EXPECT_FALSE(fs::exists(scratch() / "of_video"));
+    program("ffmpeg", "exit 0\n");
+    const Outcome one = with_path((scratch() / "bin").string(), train());
+    EXPECT_NE(one.err.find("apt install colmap"), std::string::npos) << one.err;
+    EXPECT_EQ(one.err.find("apt install ffmpeg"), std::string::npos) << one.err;
+    fs::remove(scratch() / "bin" / "ffmpeg");
+}
+
+TEST(VideoCommand, its_sharpest_pictures_go_to_colmap_in_their_order) {
+    if (!is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
+    // Each picture three times: as it is between two blurred ones.
+    const std::string made = fmt::format(
+        "ffmpeg -nostdin -v error -y -framerate 10 -i {}/images/view_%02d.png -frames:v 6 -vf "
+        "\"fps=30,boxblur=3:enable='not(eq(mod(n,3),1))',format=yuv420p\" -c:v mpeg4 -q:v 1 {}",
+        kScene, shell_quoted(video()));
+    ASSERT_EQ(std::system(made.c_str()), 0);
+    program("colmap", fmt::format("echo \"$1\" >> '{0}'\n"
+                                  "command=$1\n"
+                                  "while [ $# -gt 1 ]; do\n"
+                                  "  [ \"$1\" = --output_path ] && out=$2\n"
+                                  "  [ \"$1\" = --image_path ] && ls \"$2\" > '{0}.photos'\n"
+                                  "  shift\n"
+                                  "done\n"
+                                  "case $command in\n"
+                                  "mapper) mkdir -p \"$out/0\"; cp '{1}'/sparse/0/* \"$out/0\" ;;\n"
+                                  "image_undistorter) mkdir -p \"$out/sparse\"\n"
+                                  "  cp '{1}'/sparse/0/* \"$out/sparse\"\n"
+                                  "  cp -r '{1}/images' \"$out\" ;;\n"
+                                  "esac\n",
+                                  (scratch() / "calls").string(), kScene));
+    const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
+    const Outcome o = with_path(path, train("--frames 5"));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("5 of "), std::string::npos) << o.err;
+    EXPECT_NE(read_text_file(scratch() / "calls").find("sequential_matcher"), std::string::npos);
+    EXPECT_EQ(
+        read_text_file(scratch() / "calls.photos"),
+        "frame_00001.jpg\nframe_00002.jpg\nframe_00003.jpg\nframe_00004.jpg\nframe_00005.jpg\n");
+    // It goes on without them, and another number is another set of photos.
+    EXPECT_EQ(
+        with_path("/nowhere", "train -q --resume -o " + (scratch() / "of_video").string()).code, 0);
+    EXPECT_NE(with_path(path, train("--frames 4")).err.find("another number"), std::string::npos);
+    // What ffmpeg cannot read is its own words.
+    write_file_atomic(video(), std::string("no video"));
+    fs::remove_all(scratch() / "of_video");
+    const Outcome bad = with_path(path, train());
+    EXPECT_EQ(bad.code, 2);
+    EXPECT_NE(bad.err.find("ffmpeg cannot read it"), std::string::npos) << bad.err;
+}
+
+}  // namespace
+}  // namespace darb
