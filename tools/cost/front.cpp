@@ -50,6 +50,12 @@ std::vector<size_t> front_of(const std::vector<Row>& rows, const Ms& ms, const K
     return front;
 }
 
+/// Whether measuring again would not turn the two around.
+bool is_faster(const CostRow& row, const CostRow& other) {
+    return std::max(row.ms.high, row.ms.median) <
+           (other.ms.low > 0 ? std::min(other.ms.low, other.ms.median) : other.ms.median);
+}
+
 bool holds(const std::vector<CostRow>& rows, const Accuracy& accuracy) {
     return std::any_of(rows.begin(), rows.end(),
                        [&](const CostRow& row) { return row.accuracy == accuracy; });
@@ -65,10 +71,14 @@ std::string sentence(const CostResult& result, const std::string& condition,
     for (const CostRow& row : result.rows)
         if (fits(row) && (best == nullptr || row.ms.median < best->ms.median)) best = &row;
     if (best == nullptr) return fmt::format("{}: none of the measured ones.", condition);
+    const bool apart = is_faster(*best, result.rows[0]);
+    if (fits(result.rows[0]) && !apart) best = result.rows.data();
     const double gain = result.rows[0].ms.median / best->ms.median;
     std::string text =
         fmt::format("{}: {}, {:.3g} ms a frame", condition, best->name, best->ms.median);
-    if (best != result.rows.data()) text += fmt::format(", {:.2f} times as fast as balanced", gain);
+    if (best != result.rows.data())
+        text += apart ? fmt::format(", {:.2f} times as fast as balanced", gain)
+                      : ", no faster than balanced beyond the spread";
     text += fmt::format(", {:.1f} dB from the truth", best->error.psnr_db);
     if (best->photo_psnr_db)
         text += fmt::format(", {:.2f} dB against the photos", *best->photo_psnr_db);
@@ -105,14 +115,17 @@ std::vector<Accuracy> promising_combinations(const std::vector<CostRow>& rows, s
     return spread;
 }
 
+// On the front is what is faster than all that is better, by more than the spread of the times.
 void mark_fronts(std::vector<CostRow>& rows) {
-    for (const size_t i :
-         front_of(rows, milliseconds, [](const CostRow& r) { return r.error.mse; }))
-        rows[i].on_front = true;
+    const auto mark = [&](const auto& key, bool CostRow::*on) {
+        for (const size_t i : front_of(rows, milliseconds, key))
+            rows[i].*on = std::ranges::all_of(rows, [&](const CostRow& other) {
+                return key(other) >= key(rows[i]) || is_faster(rows[i], other);
+            });
+    };
+    mark([](const CostRow& r) { return r.error.mse; }, &CostRow::on_front);
     if (rows.empty() || !rows[0].photo_psnr_db) return;
-    for (const size_t i :
-         front_of(rows, milliseconds, [](const CostRow& r) { return -*r.photo_psnr_db; }))
-        rows[i].on_photo_front = true;
+    mark([](const CostRow& r) { return -*r.photo_psnr_db; }, &CostRow::on_photo_front);
 }
 
 std::vector<std::string> cost_answers(const CostResult& result) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "engine/core/say.h"
 #include "engine/render/renderer.h"
@@ -110,7 +111,8 @@ EffectPrices price_effects(const EffectPlan& plan, const Measured& base,
         prices[static_cast<std::size_t>(e)] = {
             sign * (base.ms - changed.ms),
             static_cast<std::int64_t>(sign) *
-                (static_cast<std::int64_t>(base.bytes) - static_cast<std::int64_t>(changed.bytes))};
+                (static_cast<std::int64_t>(base.bytes) - static_cast<std::int64_t>(changed.bytes)),
+            std::hypot(base.spread_ms, changed.spread_ms)};
     }
     return prices;
 }
@@ -118,24 +120,30 @@ EffectPrices price_effects(const EffectPlan& plan, const Measured& base,
 nlohmann::json priced_json(const EffectPlan& plan, const EffectPrices& prices) {
     nlohmann::json rows = plan_json(plan);
     for (std::size_t e = 0; e < prices.size(); ++e)
-        if (prices[e]) rows[e]["price"] = {{"ms", prices[e]->ms}, {"bytes", prices[e]->bytes}};
+        if (prices[e])
+            rows[e]["price"] = {{"ms", prices[e]->ms},
+                                {"spread_ms", prices[e]->spread_ms},
+                                {"bytes", prices[e]->bytes}};
     return rows;
 }
 
 void print_priced(std::FILE* out, const EffectPlan& plan, const EffectPrices& prices,
                   bool training) {
     const char* ms_of = training ? "ms/iter" : "ms/frame";
-    tell(out, "{:<10}  {:<3}  {:>9}  {:>9}  reason\n", "effect", "", ms_of, "MB");
+    tell(out, "{:<10}  {:<3}  {:>9} {:>7}  {:>9}  reason\n", "effect", "", ms_of, "spread", "MB");
     for (int e = 0; e < EFFECT_COUNT; ++e) {
         const EffectRow& row = plan.row(e);
-        std::string ms = "-", mb = "-";
+        std::string ms = "-", spread, mb = "-";
         if (const auto at = static_cast<std::size_t>(e); at < prices.size() && prices[at]) {
-            ms = fmt::format("{:+.2f}", prices[at]->ms);
+            const bool apart = std::abs(prices[at]->ms) > prices[at]->spread_ms;
+            ms = apart ? fmt::format("{:+.2f}", prices[at]->ms) : "~0";
+            spread = fmt::format("{:.2f}", prices[at]->spread_ms);
             mb = fmt::format("{:+.2f}", static_cast<double>(prices[at]->bytes) / 1e6);
         }
-        const char* state = row.on ? "on" : "off";
-        tell(out, "{:<10}  {:<3}  {:>9}  {:>9}  {}\n", effect_name(e), state, ms, mb, row.reason);
+        tell(out, "{:<10}  {:<3}  {:>9} {:>7}  {:>9}  {}\n", effect_name(e), row.on ? "on" : "off",
+             ms, spread, mb, row.reason);
     }
+    if (!prices.empty()) tell(out, "~0: no more than what measuring it again changes (spread)\n");
 }
 
 }  // namespace darb

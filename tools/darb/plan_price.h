@@ -16,6 +16,7 @@ namespace darb {
 struct EffectPrice {
     double ms = 0;  // with the effect less without it; a frame, or an iteration of training
     std::int64_t bytes = 0;  // of device memory, likewise
+    double spread_ms = 0;    // of the difference: below it the price is noise
 };
 using EffectPrices = std::vector<std::optional<EffectPrice>>;  // [EFFECT_COUNT]
 

@@ -43,12 +43,9 @@ std::string table_of(const Comparison& c, const ComparedDataset& dataset, int it
     std::vector<Marks> marks;
     std::vector<std::vector<OverSeeds>> values(columns.size());
     for (std::size_t k = 0; k < columns.size(); ++k) {
-        std::vector<std::optional<double>> medians;
-        for (const std::string& kernel : c.kernels) {
+        for (const std::string& kernel : c.kernels)
             values[k].push_back(over_seeds(dataset, kernel, iteration, columns[k]));
-            medians.push_back(values[k].back().median);
-        }
-        marks.push_back(marks_of(medians, columns[k]));
+        marks.push_back(marks_over_seeds(values[k], columns[k]));
     }
     std::string html = head_of("kernel", columns);
     for (std::size_t row = 0; row < c.kernels.size(); ++row) {
@@ -283,7 +280,8 @@ std::string comparison_html(const Comparison& c) {
     body += splat_figure(c);
     body += fmt::format(
         "<h2>How to read it</h2><p>Bold: best; underlined: third best, of the medians of a column "
-        "as they are printed; all that tie are marked. "
+        "as they are printed; all that tie are marked. With several seeds only what no other "
+        "kernel's range overlaps is bold. "
         "Held-out views. Medians over {} seed{}, range in brackets; curves and crops are of the "
         "first. {}</p><p>{}</p><p>Model: the PLY file. Peak: device memory, over the whole run, "
         "whatever the iteration. Training: without evaluation. Splats blended per pixel are those "

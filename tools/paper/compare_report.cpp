@@ -88,6 +88,42 @@ Json paper_json(const std::string& dataset) {
 
 }  // namespace
 
+namespace {
+
+// A line a kernel, with a star where it is the best; below it, over several seeds, the range.
+std::string kernel_lines(const Comparison& c, const ComparedDataset& dataset, int iteration,
+                         const std::vector<Column>& columns) {
+    std::vector<std::vector<OverSeeds>> values(columns.size());
+    std::vector<Marks> marks;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+        for (const std::string& kernel : c.kernels)
+            values[k].push_back(over_seeds(dataset, kernel, iteration, columns[k]));
+        marks.push_back(marks_over_seeds(values[k], columns[k]));
+    }
+    std::string text;
+    for (std::size_t row = 0; row < c.kernels.size(); ++row) {
+        std::string line = fmt::format("{:<26}", c.kernels[row]);
+        std::string ranges = fmt::format("{:<26}", "  lowest to highest");
+        bool several = false;
+        for (std::size_t k = 0; k < columns.size(); ++k) {
+            const OverSeeds& v = values[k][row];
+            const auto number = [&](double value) {
+                return format_number(value, columns[k].decimals);
+            };
+            line += fmt::format(
+                " {:>12}",
+                v.median ? number(*v.median) + (marks[k][row] == Mark::best ? "*" : "") : "-");
+            const bool range = v.count > 1;
+            several |= range;
+            ranges += fmt::format(" {:>12}", range ? number(v.low) + "-" + number(v.high) : "");
+        }
+        text += line + "\n" + (several ? ranges + "\n" : "");
+    }
+    return text;
+}
+
+}  // namespace
+
 std::string comparison_table(const Comparison& c) {
     std::string text;
     const std::vector<Column> columns = shown_columns(c);
@@ -99,16 +135,7 @@ std::string comparison_table(const Comparison& c) {
                 text += fmt::format(
                     " {:>12}", column.unit.empty() ? column.name : column.name + " " + column.unit);
             text += "\n";
-            for (const std::string& kernel : c.kernels) {
-                text += fmt::format("{:<26}", kernel);
-                for (const Column& column : columns) {
-                    const OverSeeds v = over_seeds(dataset, kernel, iteration, column);
-                    text += fmt::format(" {:>12}",
-                                        v.median ? format_number(*v.median, column.decimals) : "-");
-                }
-                text += "\n";
-            }
-            text += "\n";
+            text += kernel_lines(c, dataset, iteration, columns) + "\n";
         }
     for (const ComparedDataset& dataset : c.datasets) text += pulse_lines(c, dataset);
     for (const ComparedDataset& dataset : c.datasets)

@@ -102,6 +102,27 @@ Marks marks_of(const std::vector<Value>& values, const Column& column) {
     return differ ? marks : Marks(values.size(), Mark::none);
 }
 
+Marks marks_over_seeds(const std::vector<OverSeeds>& values, const Column& column) {
+    std::vector<Value> medians;
+    bool ranges = false;
+    for (const OverSeeds& value : values) {
+        medians.push_back(value.median);
+        ranges |= value.count > 1;
+    }
+    Marks marks = marks_of(medians, column);
+    if (!ranges) return marks;
+    const auto overlap = [](const OverSeeds& a, const OverSeeds& b) {
+        return a.low <= b.high && b.low <= a.high;
+    };
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        bool apart = true;
+        for (std::size_t j = 0; j < values.size(); ++j)
+            if (j != i && values[j].median && overlap(values[i], values[j])) apart = false;
+        if (marks[i] == Mark::third || !apart) marks[i] = Mark::none;
+    }
+    return marks;
+}
+
 std::string spread_text(const OverSeeds& value, int decimals) {
     if (!value.median) return "-";
     const std::string median = format_number(*value.median, decimals);

@@ -43,6 +43,10 @@ using Marks = std::vector<Mark>;
 /// One mark a value; none at all where there is one value or where all are the same.
 Marks marks_of(const std::vector<std::optional<double>>& values, const Column& column);
 
+/// The same over seeds: best is what no other overlaps, from its lowest to its highest; third is
+/// left out where seeds have a range.
+Marks marks_over_seeds(const std::vector<OverSeeds>& values, const Column& column);
+
 /// "27.31" or, over several seeds, "27.31 (27.10 to 27.44)"; "-" without a value.
 std::string spread_text(const OverSeeds& value, int decimals);
 

@@ -18,6 +18,7 @@ namespace {
 constexpr int kPoints = 241;    // of a curve
 constexpr int kFieldSize = 96;  // px of a picture of a field
 constexpr double kFieldHalf = 5.2;
+constexpr double kNoResidual = 1e-6;  // largest difference: rounding alone
 // The ellipsoid of the pictures, in units of its parameter: covariance of x, y, z.
 constexpr double kXX = 2.2, kXY = 0.9, kYY = 1.1, kXZ = 0.5, kYZ = -0.3, kZZ = 1.4;
 
@@ -118,14 +119,18 @@ std::string fields(const PsiResult& r, const DerivedKernel& kernel) {
     const auto residual = [&](double x, double y) { return splat(x, y) - projection(x, y); };
     const auto best_residual = [&](double x, double y) { return best(x, y) - projection(x, y); };
     const double limit = std::max(r.by_psi.linf, 1e-9);
+    const auto caption = [&](const std::string& name, double largest, const std::string& colours) {
+        return largest < kNoResidual ? fmt::format("{}: none, the projection is such a splat", name)
+                                     : name + colours;
+    };
     return html_pictures(
         {{grey_field(kFieldSize, 1, field(density)), "3D density, cut through the centre"},
          {grey_field(kFieldSize, 1, field(projection)), "projection along z"},
          {grey_field(kFieldSize, 1, field(splat)), fmt::format("splat, psi {:.4f}", r.exact)},
          {signed_field(kFieldSize, limit, field(residual)),
-          fmt::format("residual of psi, full colour {:.3f}", limit)},
+          caption("residual of psi", r.by_psi.linf, fmt::format(", full colour {:.3f}", limit))},
          {signed_field(kFieldSize, limit, field(best_residual)),
-          fmt::format("residual of {:.4f}, same colours", r.best)}},
+          caption(fmt::format("residual of {:.4f}", r.best), r.by_best.linf, ", same colours")}},
         190);
 }
 
