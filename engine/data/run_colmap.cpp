@@ -96,7 +96,8 @@ std::string shell_quoted(const fs::path& path) {
 }
 
 bool is_installed(const std::string& program) {
-    return std::system(("command -v " + shell_quoted(fs::path(program)) + " > /dev/null 2>&1").c_str()) ==
+    return std::system(
+               ("command -v " + shell_quoted(fs::path(program)) + " > /dev/null 2>&1").c_str()) ==
            0;
 }
 

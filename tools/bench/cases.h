@@ -48,6 +48,14 @@ std::vector<BenchCase> start_cases();
 /// All of them, in this order.
 std::vector<BenchCase> bench_cases(bool full);
 
+/// Of one's own scene: frames of two sizes, or of the data set's cameras; with a data set also
+/// steps of training that go on from the scene.
+std::vector<BenchCase> own_cases(const std::filesystem::path& scene,
+                                 const std::filesystem::path& dataset);
+
+/// A frame with the blend's figures, as the cases of render_cases() have it.
+BenchResult measure_picture(Device& device, const SplatModel& model, const Camera& camera,
+                            const DeviceRates& rates, const BenchOptions& options);
 /// Frame times of a model at one camera, as `darb render` draws it, without blend figures.
 BenchResult measure_frames(Device& device, const SplatModel& model, const Camera& camera,
                            const DeviceRates& rates, const Sampling& sampling);

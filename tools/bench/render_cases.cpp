@@ -30,8 +30,10 @@ Planned planned(const SplatModel& model, const Camera& camera) {
     return p;
 }
 
-BenchResult measure(Device& device, const SplatModel& model, const Camera& camera,
-                    const DeviceRates& rates, const BenchOptions& options) {
+}  // namespace
+
+BenchResult measure_picture(Device& device, const SplatModel& model, const Camera& camera,
+                            const DeviceRates& rates, const BenchOptions& options) {
     BenchResult result = measure_frames(device, model, camera, rates, options.sampling);
     const Planned p = planned(model, camera);
     const BlendFigures blend =
@@ -42,8 +44,6 @@ BenchResult measure(Device& device, const SplatModel& model, const Camera& camer
     rate_passes(rates, result);
     return result;
 }
-
-}  // namespace
 
 BenchResult measure_frames(Device& device, const SplatModel& model, const Camera& camera,
                            const DeviceRates& rates, const Sampling& sampling) {
@@ -94,7 +94,8 @@ std::vector<BenchCase> render_cases() {
              [=](Device& device, const DeviceRates& rates, const BenchOptions& options) {
                  const SplatModel model =
                      file.empty() ? random_scene(kRandomSplats) : load_splats(*options.data / file);
-                 return measure(device, model, camera_of(model, width, height), rates, options);
+                 return measure_picture(device, model, camera_of(model, width, height), rates,
+                                        options);
              }});
     };
     const auto random = [](const SplatModel&, int width, int height) {

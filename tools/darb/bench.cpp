@@ -7,13 +7,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <regex>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "tools/bench/bench_report.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
+#include "tools/darb/bench_choice.h"
 #include "tools/darb/bench_growth.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
@@ -28,42 +28,13 @@ namespace darb {
 namespace {
 
 struct BenchFlags {
-    std::string filter, device, note;
-    std::filesystem::path data, json;
+    std::string filter, device, note;  // filter: or a scene
+    std::filesystem::path data, json, dataset;
     BenchOptions options;
     GrowthFlags growth;
     TuneFlags tune;
     bool list = false, quiet = false, brief = false;
 };
-
-std::vector<BenchCase> chosen_cases(const BenchFlags& flags) {
-    std::vector<BenchCase> cases = bench_cases(flags.options.full);
-    try {
-        const std::regex filter(flags.filter);
-        std::erase_if(cases,
-                      [&](const BenchCase& one) { return !std::regex_search(one.name, filter); });
-    } catch (const std::regex_error& e) {
-        throw Error("darb bench " + flags.filter,
-                    fmt::format("is no regular expression: {}", e.what()),
-                    "Use part of a name; darb bench --list shows them.");
-    }
-    if (cases.empty())
-        throw Error("darb bench " + flags.filter, "fits no case", "darb bench --list shows them.");
-    return cases;
-}
-
-// Those whose scenes are there; a line on stderr for each of the others.
-std::vector<BenchCase> possible_cases(std::vector<BenchCase> cases, const BenchOptions& options) {
-    std::error_code error;
-    std::erase_if(cases, [&](const BenchCase& one) {
-        if (one.file.empty()) return false;
-        if (options.data && std::filesystem::exists(*options.data / one.file, error)) return false;
-        say("warning: {} is left out: no {}; name its folder with --data\n", one.name,
-            ((options.data ? *options.data : "DATA") / one.file).string());
-        return true;
-    });
-    return cases;
-}
 
 void run_cases(Device& device, const DeviceRates& rates, const std::vector<BenchCase>& cases,
                const BenchFlags& flags, const nlohmann::json& context) {
@@ -81,7 +52,7 @@ void run_cases(Device& device, const DeviceRates& rates, const std::vector<Bench
 
 int bench(BenchFlags flags) {
     check_growth(flags.growth, flags.filter);
-    std::vector<BenchCase> cases = chosen_cases(flags);
+    std::vector<BenchCase> cases = chosen_cases(flags.filter, flags.dataset, flags.options.full);
     for (const BenchCase& one : cases)
         if (flags.list) tell("{}\n", one.name);
     if (flags.list) return 0;
@@ -99,7 +70,7 @@ int bench(BenchFlags flags) {
     };
     options.progress = say_note;
     if (!flags.growth.on) cases = possible_cases(std::move(cases), options);
-    Paths read;
+    Paths read = together({files_of(flags.filter), files_of(flags.dataset)});
     for (const BenchCase& one : cases)
         if (options.data) read = together({read, files_of(*options.data / one.file)});
     refuse_to_overwrite_inputs({flags.json, flags.growth.html}, read);
@@ -124,7 +95,8 @@ void add_bench(CLI::App& app, Action& action) {
     auto flags = std::make_shared<BenchFlags>();
     CLI::App* command = app.add_subcommand("bench", "Measure speed: frames, training steps, sorts");
     command->add_option("filter", flags->filter,
-                        "regular expression on the cases' names; without: all");
+                        "a scene of one's own, or a regular expression on the cases' names");
+    command->add_option("dataset", flags->dataset, "photos with cameras for a scene of one's own");
     command->add_flag("--list", flags->list, "only print the names");
     command->add_option("--data", flags->data,
                         "folder of the data sets and of splats/; default: $DARB_TEST_DATA, else "

@@ -1,8 +1,11 @@
 #include "tools/darb/compare_scenes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 #include "engine/data/metrics.h"
 #include "engine/render/renderer.h"
 #include "tools/cost/views.h"
@@ -15,6 +18,11 @@ namespace {
 constexpr double kEqualDb = 100;
 
 }  // namespace
+
+std::string difference_text(const SceneDifference& d, std::size_t views) {
+    return fmt::format("{:.2f} dB mean over {} views, {:.2f} dB at worst ({})", d.mean_psnr_db,
+                       views, d.worst_psnr_db, printable(d.worst_view));
+}
 
 std::vector<View> views_around(const SplatModel& scene) {
     if (scene.size() == 0) throw Error("scene", "there are no splats to look at", "Name another.");

@@ -14,6 +14,9 @@ struct SceneDifference {
     std::string worst_view;
 };
 
+/// "41.20 dB mean over 8 views, 38.10 dB at worst (view 3)".
+std::string difference_text(const SceneDifference& difference, std::size_t views);
+
 /// Eight views around the splats, 480 x 360. Throws Error where there are none.
 std::vector<View> views_around(const SplatModel& scene);
 

@@ -7,7 +7,6 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
-#include "engine/core/text.h"
 #include "engine/scene/gaussian_scene.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_scenes.h"
@@ -40,9 +39,8 @@ std::vector<View> views_for(const SplatModel& scene, const ConvertFlags& flags) 
 void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
                       const SplatModel& other, const ConvertFlags& flags) {
     const std::vector<View> views = views_for(scene, flags);
-    const SceneDifference d = compare_scenes(scene, other, views, flags.device);
-    tell(say, "{}: {:.2f} dB mean over {} views, {:.2f} dB at worst ({})\n", what, d.mean_psnr_db,
-         views.size(), d.worst_psnr_db, printable(d.worst_view));
+    tell(say, "{}: {}\n", what,
+         difference_text(compare_scenes(scene, other, views, flags.device), views.size()));
 }
 
 EncodedSplats write_scene(const std::filesystem::path& output, SplatFormat format,
@@ -102,10 +100,12 @@ int convert(const ConvertFlags& flags) {
         tell_paths(flags.quiet, write_levels(flags.levels, model, to));
         return 0;
     }
+    const auto losses = losses_of(*format, model, flags.output.string());
     const EncodedSplats encoded = write_scene(flags.output, *format, model, inputs, flags);
     tell(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
          model.size(), encoded.bytes());
-    if (flags.compare)
+    // What is lost is said in dB, too.
+    if (flags.compare || (say != nullptr && model.size() > 0 && !losses.empty()))
         print_difference(say, "the file against the scene", model,
                          encoded.beside.empty() ? parse_splats(encoded.file, flags.output.string())
                                                 : load_splats(flags.output),

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <string>
@@ -11,10 +12,15 @@
 #include "engine/check/npy.h"
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/data/image_io.h"
 
 namespace darb {
 
 namespace {
+
+// Viridis, from its near end: five of its colours.
+constexpr std::array<std::array<float, 3>, 5> kDepthColours{
+    {{253, 231, 37}, {93, 201, 99}, {33, 144, 141}, {59, 82, 139}, {68, 1, 84}}};
 
 /// Rounded up to two digits.
 double unit_for(double farthest) {
@@ -39,14 +45,46 @@ void check_depth(const DepthFlags& flags, const Accuracy& accuracy, const Effect
                     "Add --render-scale 1.");
 }
 
-std::filesystem::path depth_file(const DepthFlags& flags, const std::filesystem::path& frame) {
-    std::filesystem::path file = frame;
-    return file.replace_filename(frame.stem().string() +
-                                 (flags.format == "npy" ? "_depth.npy" : "_depth.png"));
+std::vector<std::filesystem::path> depth_files(const DepthFlags& flags,
+                                               const std::filesystem::path& frame) {
+    const std::string stem = frame.stem().string() + "_depth";
+    std::filesystem::path numbers = frame, picture = frame;
+    return {numbers.replace_filename(stem + (flags.format == "npy" ? ".npy" : ".png")),
+            picture.replace_filename(stem + "_colours.png")};
+}
+
+void add_depth_files(const DepthFlags& flags, const std::vector<std::filesystem::path>& frames,
+                     std::vector<std::filesystem::path>& files) {
+    for (const auto& frame : frames)
+        for (auto& file : depth_files(flags, frame)) files.push_back(std::move(file));
+}
+
+ImageU8 depth_picture(const ImageF& depth) {
+    const auto channels = static_cast<size_t>(depth.channels);
+    std::vector<float> seen;
+    for (size_t p = 0; p < depth.data.size(); p += channels)
+        if (depth.data[p] > 0) seen.push_back(depth.data[p]);
+    std::ranges::sort(seen);
+    const float near = seen.empty() ? 0 : seen[seen.size() / 100];
+    const float far = seen.empty() ? 1 : seen[seen.size() - 1 - seen.size() / 100];
+    ImageU8 picture(depth.width, depth.height, 3);
+    for (size_t p = 0; p < depth.data.size() / channels; ++p) {
+        const float value = depth.data[p * channels];
+        if (value <= 0) continue;
+        const float share = std::clamp((value - near) / std::max(far - near, 1e-9f), 0.0f, 1.0f);
+        const float at = share * (std::size(kDepthColours) - 1);
+        const size_t low = std::min(static_cast<size_t>(at), std::size(kDepthColours) - 2);
+        for (size_t c = 0; c < 3; ++c)
+            picture.data[3 * p + c] = static_cast<std::uint8_t>(std::lround(std::lerp(
+                kDepthColours[low][c], kDepthColours[low + 1][c], at - static_cast<float>(low))));
+    }
+    return picture;
 }
 
 void DepthFiles::write(const std::filesystem::path& frame, const ImageF& depth) {
-    const std::filesystem::path file = depth_file(flags_, frame);
+    const std::vector<std::filesystem::path> files = depth_files(flags_, frame);
+    const std::filesystem::path& file = files.front();
+    write_png(files.back(), depth_picture(depth));
     if (flags_.format != "npy") {
         const DepthRange range = write_depth_png(file, depth, flags_.unit);
         range_.clipped += range.clipped;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "engine/core/image.h"
 #include "engine/data/depth_io.h"
@@ -19,14 +20,23 @@ struct DepthFlags {
 /// the effects leave them out.
 void check_depth(const DepthFlags& flags, const Accuracy& accuracy, const EffectChoice& effects);
 
-/// FRAME_depth.png or FRAME_depth.npy.
-std::filesystem::path depth_file(const DepthFlags& flags, const std::filesystem::path& frame);
+/// FRAME_depth.png or FRAME_depth.npy, and FRAME_depth_colours.png, a picture of it for people.
+std::vector<std::filesystem::path> depth_files(const DepthFlags& flags,
+                                               const std::filesystem::path& frame);
+
+/// Those of all frames, behind what else is written.
+void add_depth_files(const DepthFlags& flags, const std::vector<std::filesystem::path>& frames,
+                     std::vector<std::filesystem::path>& files);
+
+/// Near yellow over green to far dark blue, from the 1st to the 99th percentile of what is seen;
+/// black where nothing is. depth: first channel, 0 where nothing is seen.
+ImageU8 depth_picture(const ImageF& depth);
 
 class DepthFiles {
   public:
     explicit DepthFiles(const DepthFlags& flags) : flags_(flags) {}
     /// depth: Renderer::render_depth. FRAME_depth.png in steps of the unit, or FRAME_depth.npy in
-    /// world units.
+    /// world units; beside it the picture.
     void write(const std::filesystem::path& frame, const ImageF& depth);
     /// Says on stderr how many pixels lay beyond the last step, and which unit holds all.
     void print_clipped() const;

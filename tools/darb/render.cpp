@@ -72,7 +72,7 @@ int render(RenderFlags flags) {
     std::set<std::string> used;
     for (const View& view : views) files.push_back(flags.output / picture_name(view.name, used));
     Paths outputs = files;
-    for (const auto& file : files) outputs.push_back(depth_file(flags.depth, file));
+    add_depth_files(flags.depth, files, outputs);
     refuse_to_overwrite_inputs(
         outputs, together({files_of(flags.scene), files_of(flags.cameras), files_of(views)}));
     DeviceOptions device_options = command_device(flags.device);
@@ -135,8 +135,8 @@ void add_render(CLI::App& app, Action& action) {
     add_lens_flag(*command, flags->data);
     command
         ->add_option("--depth", flags->depth.format,
-                     "depth images beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) "
-                     "or npy (float32, world units)")
+                     "depth beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) or npy "
+                     "(float32, world units); NAME_depth_colours.png is for people")
         ->check(CLI::IsMember({"png", "npy"}));
     command->add_option("--depth-unit", flags->depth.unit, "world units of one step of a depth PNG")
         ->capture_default_str()
