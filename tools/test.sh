@@ -16,7 +16,7 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all 
   clang      build with clang, warnings are errors, with ASan and UBSan, and the fuzzers
   sanitize   unit tests and the quick tests of pipelines of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
-  sync       unit tests and the quick device tests under Vulkan synchronization validation
+  sync       the quick device tests under Vulkan synchronization validation
   includes   build all with clang without precompiled headers: a forgotten include is an error
   long       device tests that take minutes
   python     the Python module: installs what it needs, builds it and the command, runs tests/python
@@ -45,7 +45,7 @@ trap 'rm -rf "$logs"' EXIT
 long='_long(/|$)'
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others: not under sanitizers.
-numerics='^every_kernel/KernelGradient|^settings/Every(Choice|Kernel.every_choice)|for_every_kernel$'
+numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases)\.|for_every_kernel$|Accuracy_switch_changes'
 # Of processes and of scripts, seconds each: they run in the steps unit and gpu, and find nothing new in the others.
 once='^scripts\.|^Outputs\.'
 run_ctest() {
@@ -94,7 +94,7 @@ do_sanitize() {
         run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$once|$numerics" --timeout 300
 }
 do_fuzz() { tools/fuzz.sh 0.02; }
-do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(unit|shader|pipeline)$' -E "$gpu_alone|$once" --timeout 300; }
+do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E "$gpu_alone|$once" --timeout 300; }
 
 started=$SECONDS
 for step in $steps; do
