@@ -42,7 +42,8 @@ system=/usr/lib/x86_64-linux-gnu
 # fetch PACKAGE/SUITE...: Debian's source packages, whatever sources this machine's own apt knows.
 fetch() {
     local apt=$libraries/apt mirror
-    mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2>/dev/null | grep -m 1 '/debian/*$' || echo http://deb.debian.org/debian)
+    mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2>/dev/null | grep -m 1 '/debian/*$' || true)
+    [[ -n $mirror ]] || { echo "package.sh: this machine's apt has no source of Debian" >&2; exit 2; }
     mkdir -p "$apt/lists/partial"
     printf "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] $mirror %s main\n" bookworm trixie >"$apt/sources.list"
     local options=(-q -o "Dir::Etc::sourcelist=$apt/sources.list" -o Dir::Etc::sourceparts=- -o "Dir::State::lists=$apt/lists" -o APT::Get::List-Cleanup=0)

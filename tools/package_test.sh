@@ -13,7 +13,8 @@ packages=$(cd "$1" && pwd)
 shift
 source=$(cd "$(dirname "$0")/.." && pwd)
 kinds=${*:-deb dev portable new old}
-mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2>/dev/null | grep -m 1 '/debian/*$' || echo http://deb.debian.org/debian)
+mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2>/dev/null | grep -m 1 '/debian/*$' || true)
+[[ -n $mirror ]] || { echo "package_test.sh: this machine's apt has no source of Debian" >&2; exit 2; }
 work=$(mktemp -d "${TMPDIR:-/var/tmp}/darb_packages.XXXXXX")
 finish() {
     for root in "$work"/*/; do

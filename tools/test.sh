@@ -47,7 +47,7 @@ gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others: not under sanitizers.
 numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases)\.|for_every_kernel$|Accuracy_switch_changes'
 # Of processes and of scripts, seconds each: they run in the steps unit and gpu, and find nothing new in the others.
-once='^scripts\.|^Outputs\.'
+once='^(scripts|pages|Outputs)\.'
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
