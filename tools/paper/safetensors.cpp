@@ -56,9 +56,9 @@ float value_at(const std::string& type, const std::byte* at) {
 Tensor read_tensor(const nlohmann::json& entry, std::span<const std::byte> bytes,
                    const std::string& where) {
     const auto bad = [&](const std::string& what) { return Error(where, what, kWriteAnew); };
-    const std::string type = entry["dtype"];
-    const auto offsets = entry["data_offsets"].get<std::vector<std::uint64_t>>();
-    Tensor tensor{entry["shape"].get<std::vector<std::size_t>>(), {}};
+    const std::string type = entry.at("dtype");
+    const auto offsets = entry.at("data_offsets").get<std::vector<std::uint64_t>>();
+    Tensor tensor{entry.at("shape").get<std::vector<std::size_t>>(), {}};
     if (offsets.size() != 2 || offsets[0] > offsets[1] || offsets[1] > bytes.size())
         throw bad(fmt::format("its offsets lie beyond the {} bytes of data", bytes.size()));
     const std::size_t size = size_of(type), length = offsets[1] - offsets[0];
