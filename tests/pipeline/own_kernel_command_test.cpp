@@ -107,7 +107,7 @@ TEST(OwnKernelFileCommand, A_table_trains_and_draws_another_scene) {
     EXPECT_EQ(plan.code, 0) << plan.err;
 }
 
-TEST_F(OwnKernelCommand, check_runs_its_values_walks_and_hard_cases_slow) {
+TEST_F(OwnKernelCommand, check_runs_its_values_walks_and_hard_cases_long) {
     const fs::path file = scratch() / "check.json";
     const Outcome check = darb("check --kernel " + kCubic + " --json " + file.string());
     EXPECT_EQ(check.code, 0) << check.out << check.err;

@@ -166,7 +166,7 @@ TEST(Cost, every_setting_changes_the_shipped_scene) {
         EXPECT_TRUE(changed.contains(s)) << accuracy_settings()[s].name;
 }
 
-TEST(TrainCost, prices_every_setting_of_training) {
+TEST(TrainCost, prices_every_setting_of_training_long) {
     const Dataset dataset = load_dataset(std::filesystem::path(DARB_SOURCE_DIR) / "assets/scene",
                                          {.resolution = 8, .hold_out = true});
     TrainOptions options;

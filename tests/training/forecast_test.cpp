@@ -121,7 +121,7 @@ TEST(Forecast, measures_on_the_scratch_device) {
     EXPECT_GE(f.demand.intersections, 4U * f.splats);
 }
 
-TEST(Forecast, a_random_start_goes_in_the_first_round) {
+TEST(Forecast, a_random_start_goes_in_the_first_round_long) {
     Dataset dataset = small_scene(1);
     dataset.points = {};
     for (const Strategy strategy : {Strategy::adc, Strategy::budget}) {
@@ -171,7 +171,7 @@ TEST(Forecast, a_random_start_has_no_degree_before_the_first_probe) {
 }
 
 // The colour that comes after the last round of density control is no part of that round.
-TEST(Forecast, the_memory_of_a_given_count_is_met) {
+TEST(Forecast, the_memory_of_a_given_count_is_met_long) {
     const Dataset dataset = small_scene(2);
     for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
         TrainOptions options;
