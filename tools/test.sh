@@ -48,6 +48,8 @@ gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases)\.|for_every_kernel$|Accuracy_switch_changes'
 # Of processes and of scripts, seconds each: they run in the steps unit and gpu, and find nothing new in the others.
 once='^(scripts|pages|Outputs)\.'
+# Passes that other tests also record, with other numbers: not under validation.
+same_passes='^(kernel_gradient|walk|accuracy_walk)_test$'
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
@@ -94,7 +96,7 @@ do_sanitize() {
         run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$once|$numerics" --timeout 300
 }
 do_fuzz() { tools/fuzz.sh 0.02; }
-do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E "$gpu_alone|$once" --timeout 300; }
+do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E "$gpu_alone|$once|$same_passes" --timeout 300; }
 
 started=$SECONDS
 for step in $steps; do
