@@ -2,15 +2,8 @@
 # tools/bench_compare.py on made-up results: what it calls faster, slower and noise.
 set -uo pipefail
 script=$(cd "$(dirname "$0")/../../tools" && pwd)/bench_compare.py
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-failed=0
-check() { # NAME PATTERN TEXT
-    if grep -qE -- "$2" <<<"$3"; then echo "ok      $1"; else
-        printf 'FAILED  %s: expected /%s/ in\n%s\n' "$1" "$2" "$3"
-        failed=1
-    fi
-}
+# shellcheck source=check.sh
+source "$(dirname "$0")/check.sh"
 
 # A case of eight samples around MS, +- 1 %.
 case_json() { # NAME MS BESIDE PAIRS

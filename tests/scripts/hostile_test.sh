@@ -4,16 +4,9 @@
 set -uo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 darb=${DARB:-$root/build/darb}
-[[ -x $darb ]] || { echo "skipped: no $darb"; exit 0; }
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-failed=0
-check() { # NAME PATTERN TEXT
-    if grep -qE -- "$2" <<<"$3"; then echo "ok      $1"; else
-        printf 'FAILED  %s: expected /%s/ in\n%s\n' "$1" "$2" "$3"
-        failed=1
-    fi
-}
+[[ -x $darb ]] || { echo "skipped: no $darb"; exit 77; }
+# shellcheck source=check.sh
+source "$(dirname "$0")/check.sh"
 
 check help 'tools/hostile.sh .*HOURS|hours' "$("$root/tools/hostile.sh" --help)"
 check 'hours are asked for' 'give HOURS' "$("$root/tools/hostile.sh" 2>&1)"

@@ -4,17 +4,10 @@
 set -uo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 darb=${DARB:-$root/build/darb}
-[[ -x $darb ]] || { echo "skipped: no $darb"; exit 0; }
-command -v chromium chromium-browser google-chrome >/dev/null || { echo "skipped: no chromium (tools/setup.sh installs it)"; exit 0; }
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-failed=0
-check() { # NAME PATTERN TEXT
-    if grep -qE -- "$2" <<<"$3"; then echo "ok      $1"; else
-        printf 'FAILED  %s: expected /%s/ in\n%s\n' "$1" "$2" "$3"
-        failed=1
-    fi
-}
+[[ -x $darb ]] || { echo "skipped: no $darb"; exit 77; }
+command -v chromium chromium-browser google-chrome >/dev/null || { echo "skipped: no chromium (tools/setup.sh installs it)"; exit 77; }
+# shellcheck source=check.sh
+source "$(dirname "$0")/check.sh"
 
 check help 'tools/page_check.py SCENE' "$("$root/tools/page_check.py" --help)"
 text=$("$darb" train "$root/assets/scene" -r 8 -q --iterations 60 --html -o "$folder/run" 2>&1) || { echo "$text"; exit 1; }
