@@ -30,14 +30,16 @@ REACHED_BYTES = 0.7              # of the memory's rate, by scattered accesses o
 TILE_PIXELS, TOUCHED = 256, 0.6  # share of a tile's blocks that a splat touches
 LONGEST = 4                      # the longest list over the mean one
 
-# Shader -> instructions of the inner loop for one splat and one subgroup of 64 pixels: (Ada, RDNA 3), read off the
-# compilers' listings. The team's also holds its share of the sums over subgroups.
-LOOPS = {"blend": (98, 42), "blend_backward": (216, 100), "blend_backward_team": (228, 108)}
+# Shader -> instructions of the inner loop for one splat and 64 pixels: (Ada, RDNA 3), read off the listings of Mesa's
+# compilers. The team's 240 are 214 of its loop and 26 of what it does for a chunk, if a splat touches TOUCHED of the
+# blocks; its 107 are in proportion. "version_0.1" reduced each sum over the whole subgroup.
+LOOPS = {"blend": (98, 42), "version_0.1": (364, 161), "blend_backward": (224, 100), "blend_backward_team": (240, 107)}
+ZEROED_BYTES = 36  # of an intersection, before a backward blend that adds to its slots
 # Pass of an iteration -> its shader and what it has a thread for.
 THREADS = {"project": ("project", "splats"), "emit": ("emit", "splats"), "project backward": ("project_backward", "splats"),
            "loss": ("loss", "strips")}
 LOSS_ROWS = 3 * 1.6 / 2  # channels, rows and columns computed twice, columns of a thread
-SUBGROUP_SERIAL = {"blend_backward": 4, "blend_backward_team": 1, "blend": 1}  # blocks that a subgroup walks in turn
+SUBGROUP_SERIAL = {"version_0.1": 4, "blend_backward": 4, "blend_backward_team": 1, "blend": 1}  # blocks that a subgroup walks in turn
 
 
 def instructions(report, shader):
@@ -71,7 +73,8 @@ def pass_time(report, work, row, gpu, backward):
         if count is not None:
             times["issue"] = threads / lanes * count / (cores * rate * clock * 1e6)
     limit = max(times, key=times.get)
-    return times[limit], limit
+    zeroed = name == "blend backward" and backward != "blend_backward_team"
+    return times[limit] + zeroed * work["intersections"] * ZEROED_BYTES / (memory * 1e6 * REACHED_BYTES), limit
 
 
 def estimate(report, gpu, backward):

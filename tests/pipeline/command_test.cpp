@@ -16,6 +16,7 @@
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/scene/ply.h"
+#include "tests/support/fake_programs.h"
 #include "tests/support/run_command.h"
 #include "tests/support/test_data.h"
 
@@ -254,37 +255,13 @@ class PhotosCommand : public testing::Test {
             fs::copy_file(kScene + "/images/" + name, photos() / name,
                           fs::copy_options::overwrite_existing);
         }
-        write_file_atomic(
-            scratch() / "bin" / "colmap",
-            fmt::format("#!/bin/sh\n"
-                        "echo \"$1\" >> '{0}'\n"
-                        "command=$1\n"
-                        "while [ $# -gt 1 ]; do\n"
-                        "  [ \"$1\" = --output_path ] && out=$2\n"
-                        "  shift\n"
-                        "done\n"
-                        "case $command in\n"
-                        "mapper) mkdir -p \"$out/0\"; cp '{1}'/sparse/0/* \"$out/0\" ;;\n"
-                        "image_undistorter) mkdir -p \"$out/sparse\"\n"
-                        "  cp '{1}'/sparse/0/* \"$out/sparse\"\n"
-                        "  cp -r '{1}/images' \"$out\" ;;\n"
-                        "esac\n",
-                        calls().string(), kScene));
-        fs::permissions(scratch() / "bin" / "colmap", fs::perms::owner_all);
+        write_fake_colmap(scratch() / "bin" / "colmap", calls(), kScene);
     }
     static fs::path photos() { return scratch() / "photos"; }
     static fs::path calls() { return scratch() / "calls"; }
     static std::string train() {
         return fmt::format("train {} -o {} --iterations 1 -q", photos().string(),
                            (scratch() / "from_photos").string());
-    }
-    // PATH for the command alone.
-    static Outcome with_path(const std::string& path, const std::string& arguments) {
-        const std::string before = std::getenv("PATH");
-        ::setenv("PATH", path.c_str(), 1);
-        const Outcome o = darb(arguments);
-        ::setenv("PATH", before.c_str(), 1);
-        return o;
     }
 };
 

@@ -9,6 +9,7 @@
 
 #include "engine/core/files.h"
 #include "engine/data/run_colmap.h"
+#include "tests/support/fake_programs.h"
 #include "tests/support/run_command.h"
 
 namespace darb {
@@ -23,19 +24,8 @@ fs::path video() {
     return scratch() / "a video.mp4";
 }
 
-fs::path program(const std::string& name, const std::string& script) {
-    const fs::path path = scratch() / "bin" / name;
-    write_file_atomic(path, "#!/bin/sh\n" + script);
-    fs::permissions(path, fs::perms::owner_all);
-    return path;
-}
-
-Outcome with_path(const std::string& path, const std::string& arguments) {
-    const std::string before = std::getenv("PATH");
-    ::setenv("PATH", path.c_str(), 1);
-    const Outcome o = darb(arguments);
-    ::setenv("PATH", before.c_str(), 1);
-    return o;
+fs::path program(const std::string& name) {
+    return scratch() / "bin" / name;
 }
 
 std::string train(const std::string& more = "") {
@@ -50,7 +40,7 @@ TEST(VideoCommand, what_is_missing_is_named_with_its_package) {
     EXPECT_NE(both.err.find("not installed: ffmpeg colmap"), std::string::npos) << both.err;
     EXPECT_NE(both.err.find("apt install ffmpeg colmap"), std::string::npos) << both.err;
     EXPECT_FALSE(fs::exists(scratch() / "of_video"));
-    program("ffmpeg", "exit 0\n");
+    write_fake_program(program("ffmpeg"), "exit 0\n");
     const Outcome one = with_path((scratch() / "bin").string(), train());
     EXPECT_NE(one.err.find("apt install colmap"), std::string::npos) << one.err;
     EXPECT_EQ(one.err.find("apt install ffmpeg"), std::string::npos) << one.err;
@@ -65,20 +55,7 @@ TEST(VideoCommand, its_sharpest_pictures_go_to_colmap_in_their_order) {
         "\"fps=30,boxblur=3:enable='not(eq(mod(n,3),1))',format=yuv420p\" -c:v mpeg4 -q:v 1 {}",
         kScene, shell_quoted(video()));
     ASSERT_EQ(std::system(made.c_str()), 0);
-    program("colmap", fmt::format("echo \"$1\" >> '{0}'\n"
-                                  "command=$1\n"
-                                  "while [ $# -gt 1 ]; do\n"
-                                  "  [ \"$1\" = --output_path ] && out=$2\n"
-                                  "  [ \"$1\" = --image_path ] && ls \"$2\" > '{0}.photos'\n"
-                                  "  shift\n"
-                                  "done\n"
-                                  "case $command in\n"
-                                  "mapper) mkdir -p \"$out/0\"; cp '{1}'/sparse/0/* \"$out/0\" ;;\n"
-                                  "image_undistorter) mkdir -p \"$out/sparse\"\n"
-                                  "  cp '{1}'/sparse/0/* \"$out/sparse\"\n"
-                                  "  cp -r '{1}/images' \"$out\" ;;\n"
-                                  "esac\n",
-                                  (scratch() / "calls").string(), kScene));
+    write_fake_colmap(program("colmap"), scratch() / "calls", kScene);
     const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
     const Outcome o = with_path(path, train("--frames 5"));
     ASSERT_EQ(o.code, 0) << o.err;
