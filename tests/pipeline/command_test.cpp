@@ -250,6 +250,7 @@ TEST(Command, train_begins_with_a_forecast) {
 class PhotosCommand : public testing::Test {
   protected:
     void SetUp() override {
+        fs::remove_all(scratch());  // of the case before
         for (const char* name : {"view_00.png", "view_01.png", "view_02.png"}) {
             fs::create_directories(photos());
             fs::copy_file(kScene + "/images/" + name, photos() / name,
