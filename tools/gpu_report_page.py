@@ -90,8 +90,8 @@ def main():
     parts = [f"<!doctype html><html lang=en><meta charset=utf-8><title>darb on a GPU</title><style>{STYLE}</style>",
              "<h1>darb on this device</h1>", steps_table(folder), f"<pre>{html.escape(read(folder / 'devices.txt'))}</pre>",
              predicted_and_measured(folder)]
-    pictures = sorted(folder.glob("picture/**/*.png"))[:1]
-    parts += [f"<h2>The shipped scene after 300 iterations</h2><img alt='a view of it' src='{html.escape(str(p.relative_to(folder)))}'>"
+    pictures = sorted(folder.glob("scene/held_out/**/*.png"))[:1]
+    parts += [f"<h2>The shipped scene after 300 iterations, a view held out</h2><img alt='photo and picture' src='{html.escape(str(p.relative_to(folder)))}'>"
               for p in pictures]
     for line in read(folder / "steps.txt").splitlines():
         name, state, _ = line.split("\t")

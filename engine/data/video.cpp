@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <string>
 
@@ -40,7 +41,14 @@ void need_ffmpeg(const fs::path& video) {
 // A file for what ffmpeg complains of, gone with it.
 class LogFile {
   public:
-    LogFile() : path_(fs::temp_directory_path() / fmt::format("darb_ffmpeg_{}.log", ::getpid())) {}
+    LogFile() {
+        std::string name = (fs::temp_directory_path() / "darb_ffmpeg_XXXXXX").string();
+        const int file = ::mkstemp(name.data());  // of this name nothing was there
+        if (file < 0)
+            throw Error(name, "cannot be made", "Free space in the folder of temporary files.");
+        ::close(file);
+        path_ = name;
+    }
     LogFile(const LogFile&) = delete;
     LogFile& operator=(const LogFile&) = delete;
     ~LogFile() {

@@ -50,11 +50,11 @@ TEST(VideoCommand, what_is_missing_is_named_with_its_package) {
 TEST(VideoCommand, its_sharpest_pictures_go_to_colmap_in_their_order) {
     if (!is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
     // Each picture three times: as it is between two blurred ones.
-    const std::string made = fmt::format(
+    const std::string command = fmt::format(
         "ffmpeg -nostdin -v error -y -framerate 10 -i {}/images/view_%02d.png -frames:v 6 -vf "
         "\"fps=30,boxblur=3:enable='not(eq(mod(n,3),1))',format=yuv420p\" -c:v mpeg4 -q:v 1 {}",
         kScene, shell_quoted(video()));
-    ASSERT_EQ(std::system(made.c_str()), 0);
+    ASSERT_EQ(std::system(command.c_str()), 0);
     write_fake_colmap(program("colmap"), scratch() / "calls", kScene);
     const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
     const Outcome o = with_path(path, train("--frames 5"));
@@ -68,12 +68,31 @@ TEST(VideoCommand, its_sharpest_pictures_go_to_colmap_in_their_order) {
     EXPECT_EQ(
         with_path("/nowhere", "train -q --resume -o " + (scratch() / "of_video").string()).code, 0);
     EXPECT_NE(with_path(path, train("--frames 4")).err.find("another number"), std::string::npos);
+    const std::string made = read_text_file(scratch() / "of_video" / "frames.txt");
+    EXPECT_EQ(made.find(scratch().string()), std::string::npos) << made;
+    // A run that was ended while it wrote them goes on.
+    write_file_atomic(scratch() / "of_video" / "frames.txt", made + "not all are written\n");
+    fs::remove(scratch() / "of_video" / "frames" / "frame_00003.jpg");
+    EXPECT_EQ(with_path(path, train("--frames 5")).code, 0);
+    EXPECT_TRUE(fs::exists(scratch() / "of_video" / "frames" / "frame_00003.jpg"));
+    EXPECT_EQ(read_text_file(scratch() / "of_video" / "frames.txt"), made);
     // What ffmpeg cannot read is its own words.
     write_file_atomic(video(), std::string("no video"));
     fs::remove_all(scratch() / "of_video");
     const Outcome bad = with_path(path, train());
     EXPECT_EQ(bad.code, 2);
     EXPECT_NE(bad.err.find("ffmpeg cannot read it"), std::string::npos) << bad.err;
+}
+
+TEST(VideoCommand, a_folder_of_the_users_own_is_left_as_it_is) {
+    write_file_atomic(video(), std::string("no video"));
+    const fs::path mine = scratch() / "mine" / "frames" / "frame_00001.jpg";
+    write_file_atomic(mine, std::string("my picture"));
+    const Outcome o = darb(fmt::format("train '{}' -o {} --iterations 1", video().string(),
+                                       (scratch() / "mine").string()));
+    EXPECT_EQ(o.code, 2);
+    EXPECT_NE(o.err.find("not of this video"), std::string::npos) << o.err;
+    EXPECT_EQ(read_text_file(mine), "my picture");
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ void add_data_flags(CLI::App& command, TrainFlags& f) {
         .add_option("--frames", f.frames,
                     "of a video: so many pictures, the sharpest of as many intervals [two a second "
                     "of 30, 60 to 240]")
-        ->check(CLI::Range(3, 10'000))
+        ->check(CLI::Range(3, 2'000))
         ->group(option_group::kPhotos);
     add_lens_flag(command, f.data);
     command.get_option("--lens")->group(option_group::kPhotos);

@@ -10,6 +10,7 @@
 #include "engine/data/colmap.h"
 #include "engine/data/run_colmap.h"
 #include "engine/data/video.h"
+#include "trainer/portable_path.h"
 
 namespace darb {
 
@@ -33,10 +34,27 @@ void need_programs(const fs::path& video) {
                 fmt::format("apt install {}", missing));
 }
 
-std::string key_of(const fs::path& video, int frames) {
-    return fmt::format("{}\n{} bytes\n--frames {}\n",
-                       fs::absolute(video).lexically_normal().string(), fs::file_size(video),
-                       frames);
+// Which pictures lie in the folder, as frames.txt has it; it names no folder of the machine.
+std::string key_of(const fs::path& video, const fs::path& output, int frames) {
+    return fmt::format("{}\n{} bytes\n--frames {}\n", shared_name(output, video),
+                       fs::file_size(video), frames);
+}
+
+constexpr std::string_view kUnfinished = "not all are written\n";
+
+// Whether the pictures are there. Pictures that others put there are neither taken nor replaced.
+bool has_pictures(const fs::path& folder, const fs::path& made, const std::string& key) {
+    if (!fs::exists(made)) {
+        if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
+            throw Error(folder.string(), "is there, and not of this video",
+                        "Name another output folder with -o.");
+        return false;
+    }
+    const std::string text = read_text_file(made);
+    if (text != key && text != key + std::string(kUnfinished))
+        throw Error(folder.string(), "holds the pictures of another video, or another number",
+                    "Name another output folder with -o.");
+    return text == key;
 }
 
 }  // namespace
@@ -45,13 +63,8 @@ fs::path photos_of_video(const fs::path& video, TrainFlags& flags, std::optional
     flags.sequential = true;
     const fs::path folder = flags.run.output / "frames", made = flags.run.output / "frames.txt";
     if (!fs::is_regular_file(video)) throw Error(video.string(), "is no file", "Check the path.");
-    const std::string key = key_of(video, flags.frames);
-    if (fs::exists(made)) {
-        if (read_text_file(made) != key)
-            throw Error(folder.string(), "holds the pictures of another video, or another number",
-                        "Name another output folder with -o.");
-        return folder;
-    }
+    const std::string key = key_of(video, flags.run.output, flags.frames);
+    if (has_pictures(folder, made, key)) return folder;
     need_programs(video);
     lock.emplace(flags.run.output);
     if (!flags.run.quiet) say("{}: looking for its sharpest pictures\n", video.string());
@@ -60,7 +73,7 @@ fs::path photos_of_video(const fs::path& video, TrainFlags& flags, std::optional
                                    ? static_cast<std::size_t>(flags.frames)
                                    : std::clamp(sharpness.size() / kEvery, kLeast, kMost);
     const std::vector<std::size_t> chosen = sharpest_of_intervals(sharpness, wanted);
-    fs::remove_all(folder);  // of a run that was ended while it wrote them
+    write_file_atomic(made, key + std::string(kUnfinished));  // a run that is ended here goes on
     write_video_frames(video, chosen, folder);
     write_file_atomic(made, key);
     if (!flags.run.quiet)
