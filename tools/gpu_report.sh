@@ -33,6 +33,7 @@ while (($#)); do
 done
 [[ $minutes =~ ^[1-9][0-9]*$ ]] || { echo "gpu_report.sh: --minutes takes a whole number from 1, not '$minutes'" >&2; exit 2; }
 [[ -z $photos || -e $photos ]] || { echo "gpu_report.sh: no folder '$photos' (--photos)" >&2; exit 2; }
+[[ -z $photos ]] || photos=$(realpath "$photos") # so that the page can take it out
 [[ ! -e $out || -e $out/steps.txt ]] || { echo "gpu_report.sh: '$out' is there and no report of before; name another with -o" >&2; exit 2; }
 if [[ -z $darb ]]; then
     if [[ -x $here/build/darb ]]; then darb=$here/build/darb
@@ -83,7 +84,7 @@ if compgen -G '/usr/share/vulkan/explicit_layer.d/*validation*' >/dev/null && [[
     grep -q 'vulkan.validation:' "$out/validation.txt" && sed -i 's/^validation\tok/validation\tFAILED/' "$out/steps.txt"
 fi
 if [[ -s $out/passes.json ]]; then step model 2 python3 -B "$here/tools/gpu_model.py" "$out/passes.json"; fi
-python3 -B "$here/tools/gpu_report_page.py" "$out" || exit 1
+python3 -B "$here/tools/gpu_report_page.py" "$out" ${photos:+"$photos"} || exit 1
 find "$out" -name 'checkpoint*' -delete
 tar -C "$(dirname "$out")" -czf "$out.tar.gz" "$(basename "$out")"
 echo "the page: $out/index.html"

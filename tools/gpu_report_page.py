@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The page of tools/gpu_report.sh: gpu_report_page.py FOLDER writes FOLDER/index.html from what the steps left there.
+"""The page of tools/gpu_report.sh: gpu_report_page.py FOLDER [PHOTOS] writes FOLDER/index.html from what the steps left.
 
 Takes paths of this machine out of the steps' texts. Text from files is escaped.
 """
@@ -12,9 +12,10 @@ import sys
 
 import gpu_model
 
+ROOT = pathlib.Path(__file__).resolve().parent.parent
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:64rem;margin:2rem auto;padding:0 1rem;color:#222}
 table{border-collapse:collapse;margin:1rem 0}td,th{padding:.2rem .8rem;border-bottom:1px solid #ddd;text-align:left}
-td+td{text-align:right}pre{background:#f6f6f6;padding:1rem;overflow:auto;font-size:12px}img{max-width:100%}
+td+td,th+th{text-align:right}pre{background:#f6f6f6;padding:1rem;overflow:auto;font-size:12px}img{max-width:100%}
 .bad{color:#b00020}summary{cursor:pointer;font-weight:600;margin:.6rem 0}"""
 
 
@@ -33,18 +34,14 @@ def steps_table(folder):
     return table(("step", "result", "seconds"), rows)
 
 
-def clean(folder):
+def clean(folder, photos):
     """Folders of the machine become names."""
     for path in (*folder.glob("*.txt"), *folder.glob("*.json")):
         text = read(path)
-        for place, name in ((str(folder), "REPORT"), (str(gpu_model_root()), "DARB"), (os.path.expanduser("~"), "HOME")):
+        for place, name in ((str(folder), "REPORT"), (photos, "PHOTOS"), (str(ROOT), "DARB"), (os.path.expanduser("~"), "HOME")):
             if len(place) > 1:
                 text = text.replace(place, name)
         path.write_text(text, encoding="utf-8")
-
-
-def gpu_model_root():
-    return pathlib.Path(__file__).resolve().parent.parent
 
 
 def measured_passes(folder):
@@ -82,11 +79,11 @@ def predicted_and_measured(folder):
 
 
 def main():
-    if len(sys.argv) != 2 or sys.argv[1] in ("-h", "--help"):
+    if len(sys.argv) not in (2, 3) or sys.argv[1] in ("-h", "--help"):
         print(__doc__)
         return 0 if len(sys.argv) == 2 else 2
     folder = pathlib.Path(sys.argv[1]).resolve()
-    clean(folder)
+    clean(folder, os.path.abspath(sys.argv[2]) if len(sys.argv) > 2 else "")
     parts = [f"<!doctype html><html lang=en><meta charset=utf-8><title>darb on a GPU</title><style>{STYLE}</style>",
              "<h1>darb on this device</h1>", steps_table(folder), f"<pre>{html.escape(read(folder / 'devices.txt'))}</pre>",
              predicted_and_measured(folder)]

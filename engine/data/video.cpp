@@ -69,6 +69,18 @@ class LogFile {
     fs::path path_;
 };
 
+// An expression of ffmpeg's that is not 0 for these pictures. In groups, as it takes no sum of more
+// than about a hundred.
+std::string selection(const std::vector<std::size_t>& pictures) {
+    constexpr std::size_t kGroup = 50;
+    std::string text;
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+        const char* before = i == 0 ? "(" : i % kGroup == 0 ? ")+(" : "+";
+        text += fmt::format("{}eq(n,{})", before, pictures[i]);
+    }
+    return text + ")";
+}
+
 [[noreturn]] void ffmpeg_failed(const fs::path& video, const LogFile& log) {
     const std::string said = log.text();
     throw Error(video.string(),
@@ -137,14 +149,11 @@ void write_video_frames(const fs::path& video, const std::vector<std::size_t>& p
     if (failure)
         throw Error(folder.string(), "cannot be made: " + failure.message(),
                     "Choose another output folder with -o.");
-    std::string chosen;
-    for (const std::size_t picture : pictures)
-        chosen += fmt::format("{}eq(n,{})", chosen.empty() ? "" : "+", picture);
     const LogFile log;
     const std::string command = fmt::format(
         "ffmpeg -nostdin -v error -y -i {} -map 0:v:0 -vf \"select='{}'\" -vsync passthrough "
         "-q:v 2 {}{}",
-        shell_quoted(fs::absolute(video)), chosen,
+        shell_quoted(fs::absolute(video)), selection(pictures),
         shell_quoted(fs::absolute(folder) / "frame_%05d.jpg"), log.redirection());
     std::FILE* pipe = ::popen(command.c_str(), "r");
     const int status = pipe == nullptr ? -1 : ::pclose(pipe);

@@ -84,6 +84,21 @@ TEST(VideoCommand, its_sharpest_pictures_go_to_colmap_in_their_order) {
     EXPECT_NE(bad.err.find("ffmpeg cannot read it"), std::string::npos) << bad.err;
 }
 
+TEST(VideoCommand, as_many_pictures_as_it_takes_unasked_are_written) {
+    if (!is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
+    const std::string command =
+        "ffmpeg -nostdin -v error -y -f lavfi -i testsrc=size=32x24:rate=30:duration=10 -c:v "
+        "mpeg4 " +
+        shell_quoted(video());
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    write_fake_program(program("colmap"), "exit 1\n");
+    const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
+    const Outcome o = with_path(path, fmt::format("train '{}' -o {} --frames 240 --iterations 1",
+                                                  video().string(), (scratch() / "many").string()));
+    EXPECT_NE(o.err.find("240 of 300 pictures"), std::string::npos) << o.err;
+    EXPECT_TRUE(fs::exists(scratch() / "many" / "frames" / "frame_00240.jpg")) << o.err;
+}
+
 TEST(VideoCommand, a_folder_of_the_users_own_is_left_as_it_is) {
     write_file_atomic(video(), std::string("no video"));
     const fs::path mine = scratch() / "mine" / "frames" / "frame_00001.jpg";
