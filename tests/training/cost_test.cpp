@@ -60,6 +60,19 @@ TEST(Front, holds_what_nothing_beats) {
     for (size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(rows[i].on_front, expected[i]) << i;
 }
 
+TEST(Front, leaves_out_what_is_faster_by_less_than_the_spread) {
+    std::vector<CostRow> rows = {row(-1, 0, 10, 1e-6), row(kStorage, 1, 9, 1e-5),
+                                 row(kAlphaCutoff, 2, 5, 1e-4)};
+    for (CostRow& r : rows) {
+        r.ms.low = r.ms.median - 0.8;
+        r.ms.high = r.ms.median + 0.8;
+    }
+    mark_fronts(rows);
+    EXPECT_TRUE(rows[0].on_front);
+    EXPECT_FALSE(rows[1].on_front);
+    EXPECT_TRUE(rows[2].on_front);
+}
+
 TEST(Combinations, join_what_is_fast_and_leave_out_what_is_slow_and_wrong) {
     const std::vector<CostRow> rows = {row(-1, 0, 10, 1e-8), row(kStorage, 1, 8, 2e-8),
                                        row(kAlphaCutoff, 2, 5, 5e-8),

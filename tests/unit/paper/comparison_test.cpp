@@ -188,6 +188,17 @@ TEST(CompareStats, Marks_ofValuesThatPrintAlike_areAlike) {
     EXPECT_EQ(marks_of({27.112, 27.11, 27.114, 20.0}, psnr), (Marks{best, best, best, none}));
 }
 
+TEST(CompareStats, Marks_overSeedsAreOfWhatNoOtherOverlaps) {
+    const Column& psnr = quality_columns()[0];
+    const auto none = Mark::none, best = Mark::best;
+    const OverSeeds far{29.0, 28.8, 29.2, 3}, near{28.9, 28.7, 29.1, 3}, low{27.0, 26.5, 27.5, 3};
+    EXPECT_EQ(marks_over_seeds({far, low, low}, psnr), (Marks{best, none, none}));
+    EXPECT_EQ(marks_over_seeds({far, near, low}, psnr), (Marks{none, none, none}));
+    EXPECT_EQ(marks_over_seeds({{29.0, 29.0, 29.0, 1}, {28.9, 28.9, 28.9, 1}}, psnr),
+              (Marks{best, none}));
+    EXPECT_EQ(marks_over_seeds({far, OverSeeds{}}, psnr), (Marks{none, none}));
+}
+
 TEST(CompareStats, MeansOverDataSets_leaveOutWhereAKernelFailed) {
     Comparison c;
     c.kernels = {"sinc", "gaussian"};
