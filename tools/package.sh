@@ -23,13 +23,16 @@ done
 jobs=${JOBS:-$(nproc)}
 common=(-G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=g++ -DCMAKE_UNITY_BUILD=ON -DDARB_TESTS=OFF -DCMAKE_INSTALL_PREFIX=/usr)
 
-# One build folder, so that both are linked from the same objects; the libraries that differ, by their CMake names.
+# One build folder, so that both are linked from the same objects; what either found of the libraries that differ is
+# forgotten before the other.
 build=build-portable
-differing=(ZIP_LIBRARY MUPARSER_LIBRARY ZSTD_LIBRARY WEBP_LIBRARY STB_LIBRARY ZLIB_LIBRARY PNG_LIBRARY JPEG_LIBRARY
-    DARB_FMT_LIBRARY DARB_GLFW_LIBRARY)
+configure() {
+    local forgotten=(-U'*_LIBRARY' -U'*_LIBRARY_RELEASE' -U'*_LIBRARY_DEBUG')
+    cmake -S . -B "$build" "${common[@]}" "${forgotten[@]}" "$@" >/dev/null
+}
 
 make_deb() {
-    cmake -S . -B "$build" "${common[@]}" -DDARB_PORTABLE=OFF "${differing[@]/#/-U}" -UZLIB_LIBRARY_* -UPNG_LIBRARY_* -UJPEG_LIBRARY_* >/dev/null
+    configure -DDARB_PORTABLE=OFF
     cmake --build "$build" -j "$jobs"
     rm -rf "$build/cpack"
     (cd "$build" && cpack -G DEB -B cpack >/dev/null)
@@ -81,11 +84,11 @@ newest_glibc() { objdump -T "$1" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -1;
 
 make_portable() {
     make_libraries
-    cmake -S . -B "$build" "${common[@]}" -DDARB_PORTABLE=ON -DDARB_FMT_LIBRARY="$libraries/lib/libfmt.a" \
+    configure -DDARB_PORTABLE=ON -DDARB_FMT_LIBRARY="$libraries/lib/libfmt.a" \
         -DZIP_LIBRARY="$libraries/lib/libzip.a" -DMUPARSER_LIBRARY="$libraries/lib/libmuparser.a" \
         -DDARB_GLFW_LIBRARY="$libraries/lib/libglfw3.a" -DZSTD_LIBRARY=$system/libzstd.a -DWEBP_LIBRARY=$system/libwebp.a \
         -DSTB_LIBRARY=$system/libstb.a -DZLIB_LIBRARY=$system/libz.a -DPNG_LIBRARY=$system/libpng16.a \
-        -DJPEG_LIBRARY=$system/libjpeg.a >/dev/null
+        -DJPEG_LIBRARY=$system/libjpeg.a
     cmake --build "$build" -j "$jobs" --target darb darb_pages
     local version name stage documents
     version=$(sed -n 's/^CMAKE_PROJECT_VERSION:STATIC=//p' "$build/CMakeCache.txt")
@@ -109,7 +112,11 @@ make_portable() {
             objdump -T "$file" | grep -E "GLIBC_2\.(3[2-9]|[4-9][0-9])" >&2
             exit 1
         fi
-        echo "${file#"$stage"/}: needs $newest and $(objdump -p "$file" | awk '/NEEDED/ { printf "%s ", $2 }')"
+        local needed foreign
+        needed=$(objdump -p "$file" | awk '/NEEDED/ { printf "%s ", $2 }')
+        foreign=$(tr ' ' '\n' <<<"$needed" | grep -vE '^(lib(c|m|dl|pthread|vulkan|rt)\.so\.[0-9]+|ld-linux-x86-64\.so\.2|)$' || true)
+        [[ -z $foreign ]] || { echo "package.sh: ${file#"$stage"/} needs $foreign, which not every Linux has" >&2; exit 1; }
+        echo "${file#"$stage"/}: needs $newest and $needed"
     done
     tar -C "$stage" --owner=0 --group=0 --sort=name -cJf "$out/$name.tar.xz" "$name"
     rm -rf "$stage"
