@@ -83,15 +83,15 @@ test_portable() {
 
 test_old() {
     bare bullseye old
-    inside old "$unpack; ldd --version | head -1; \$darb --version
+    inside old "$unpack; ldd --version | sed -n 1p; \$darb --version
 \$darb psi --kernel raised_cosine -q --json /tmp/psi.json; test -s /tmp/psi.json
-\$darb info /scene | head -4; code=0; \$darb devices 2>/tmp/devices || code=\$?
+\$darb info /scene | sed -n 1,4p; code=0; \$darb devices 2>/tmp/devices || code=\$?
 test \$code = 2; grep 'no Vulkan device' /tmp/devices"
 }
 
 test_new() {
     bare trixie new
-    inside new "$unpack; apt-get install -y -q --no-install-recommends mesa-vulkan-drivers >/tmp/apt; ldd --version | head -1; $try_it"
+    inside new "$unpack; apt-get install -y -q --no-install-recommends mesa-vulkan-drivers >/tmp/apt; ldd --version | sed -n 1p; $try_it"
 }
 
 for kind in $kinds; do
