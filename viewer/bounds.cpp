@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "engine/core/quantile.h"
+
 namespace darb {
 
 namespace {
@@ -14,12 +16,6 @@ constexpr double kReach = 2.5;  // of the median distance: background farther aw
 constexpr float kLogitOfTenth = -2.2f;
 constexpr double kFramed = 1.35, kUnframed = 0.002;            // radii; share of the splats in them
 constexpr double kStray = 0.005, kFoot = 0.05, kSurely = 1.5;  // of guess_up
-
-double quantile(std::vector<double>& values, double share) {
-    const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-}
 
 std::vector<glm::dvec3> sample(const SplatModel& m, float least_logit) {
     std::vector<glm::dvec3> points;
@@ -60,11 +56,11 @@ Bounds scene_bounds(const SplatModel& model) {
     std::vector<double> values(points.size());
     for (int axis = 0; axis < 3; ++axis) {
         for (size_t i = 0; i < points.size(); ++i) values[i] = points[i][axis];
-        bounds.centre[axis] = (quantile(values, kTail) + quantile(values, 1 - kTail)) / 2;
+        bounds.centre[axis] = (nearest_rank(values, kTail) + nearest_rank(values, 1 - kTail)) / 2;
     }
     for (size_t i = 0; i < points.size(); ++i) values[i] = glm::distance(points[i], bounds.centre);
-    const double middle = quantile(values, 0.5);
-    bounds.radius = std::max(std::min(quantile(values, 1 - kTail), kReach * middle), 1e-3);
+    const double middle = nearest_rank(values, 0.5);
+    bounds.radius = std::max(std::min(nearest_rank(values, 1 - kTail), kReach * middle), 1e-3);
     bounds.centre += model.origin;
     return bounds;
 }
@@ -79,7 +75,7 @@ double framing_distance(const SplatModel& model, const Bounds& bounds, const glm
         if (glm::length(p) > kFramed * bounds.radius) continue;
         distances.push_back(std::max(std::abs(p.x) / tan_x, std::abs(p.y) / tan_y) - p.z);
     }
-    return distances.empty() ? 0 : std::max(quantile(distances, 1 - kUnframed), 0.0);
+    return distances.empty() ? 0 : std::max(nearest_rank(distances, 1 - kUnframed), 0.0);
 }
 
 glm::dvec3 guess_up(const SplatModel& m) {

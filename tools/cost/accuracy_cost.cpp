@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 
+#include "engine/core/quantile.h"
 #include "engine/render/renderer.h"
 #include "trainer/evaluation.h"
 
@@ -183,14 +184,7 @@ void scale(Spread& s, double factor) {
 Spread spread_of(std::vector<double> samples) {
     if (samples.empty()) return {};
     std::sort(samples.begin(), samples.end());
-    const auto quantile = [&](double share) {
-        const double at = share * static_cast<double>(samples.size() - 1);
-        const size_t below = static_cast<size_t>(at);
-        const size_t above = std::min(below + 1, samples.size() - 1);
-        const double t = at - static_cast<double>(below);
-        return (1 - t) * samples[below] + t * samples[above];
-    };
-    return {quantile(0.5), quantile(0.25), quantile(0.75)};
+    return {quantile(samples, 0.5), quantile(samples, 0.25), quantile(samples, 0.75)};
 }
 
 CostResult measure_cost(Device& device, const SplatModel& model, const CostViews& views,

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "engine/core/error.h"
+#include "engine/core/quantile.h"
 #include "engine/core/say.h"
 #include "engine/data/image_io.h"
 #include "engine/raster/frame_limit.h"
@@ -52,11 +53,6 @@ void scale_camera(Camera& camera, int resolution) {
     const int width = std::max(1, static_cast<int>(std::lround(camera.width * scale)));
     const int height = std::max(1, static_cast<int>(std::lround(camera.height * scale)));
     camera = resized(camera, width, height);
-}
-
-double median(std::vector<double> values) {
-    std::ranges::sort(values);
-    return values.empty() ? 0 : values[values.size() / 2];
 }
 
 int render(RenderFlags flags) {

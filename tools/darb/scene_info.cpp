@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/quantile.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "shaders/shared/limits.h"
@@ -25,19 +26,11 @@ constexpr double kNeedleRatio = 100;
 constexpr double kOddShare = 0.01;  // needles and saturated splats below it are not worth a word
 constexpr double kSaturatedLogit = 17;  // the sigmoid is 1 in float32, its gradient 0
 
-// Nearest rank; reorders values.
-double percentile(std::vector<double>& values, double share) {
-    const auto rank =
-        static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
-    std::nth_element(values.begin(), values.begin() + rank, values.end());
-    return values[static_cast<size_t>(rank)];
-}
-
 json percentiles(std::vector<double>& values) {
     json result;
     if (values.empty()) return result;
     for (const int p : {1, 10, 50, 90, 99})
-        result[fmt::format("p{}", p)] = percentile(values, p / 100.0);
+        result[fmt::format("p{}", p)] = nearest_rank(values, p / 100.0);
     return result;
 }
 
@@ -48,8 +41,8 @@ json bounds(const SplatModel& model, double low, double high) {
     for (int axis = 0; axis < 3 && !values.empty(); ++axis) {
         for (size_t i = 0; i < values.size(); ++i)
             values[i] = model.origin[axis] + double{model.position[3 * i + axis]};
-        result["low"].push_back(percentile(values, low));
-        result["high"].push_back(percentile(values, high));
+        result["low"].push_back(nearest_rank(values, low));
+        result["high"].push_back(nearest_rank(values, high));
     }
     return result;
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "engine/core/say.h"
+#include "engine/data/run_colmap.h"
 #include "trainer/presets.h"
 #include "trainer/progress.h"
 #include "trainer/resolution_ramp.h"
@@ -28,7 +29,7 @@ std::string time_of(double seconds) {
 // A word that the shell takes apart stands in quotes.
 std::string typed(const std::string& word) {
     const bool plain = word.find_first_of(" '\"\\$`&|;<>()*?[]#~!{}") == std::string::npos;
-    return plain ? word : "'" + word + "'";
+    return plain ? word : shell_quoted(word);
 }
 
 }  // namespace

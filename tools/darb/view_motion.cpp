@@ -21,12 +21,6 @@ double seconds_since(ViewClock::time_point start) {
     return std::chrono::duration<double>(ViewClock::now() - start).count();
 }
 
-double quantile(std::vector<double> values, double share) {
-    if (values.empty()) return 0;
-    std::sort(values.begin(), values.end());
-    return values[static_cast<size_t>(share * double(values.size() - 1) + 0.5)];
-}
-
 void pump(const Measured& m, double patience_s) {
     ViewerWindow& window = m.window;
     if (m.lost) throw Error("window", "the display is gone", "Try again.");

@@ -12,7 +12,6 @@ namespace darb {
 using ViewClock = std::chrono::steady_clock;
 
 double seconds_since(ViewClock::time_point start);
-double quantile(std::vector<double> values, double share);
 
 /// The window that is measured, and whether its display is gone.
 struct Measured {

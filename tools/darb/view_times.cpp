@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/files.h"
+#include "engine/core/quantile.h"
 #include "engine/core/say.h"
 #include "tools/darb/view_motion.h"
 
@@ -37,12 +38,12 @@ nlohmann::ordered_json rests_json(ViewerWindow& window, const Measured& measured
         whole_s.push_back(times.whole_s);
         rest_ms.push_back(window.viewer().session().times.full_ms);
     }
-    return {{"median_ms", quantile(rest_ms, 0.5)},
-            {"worst_ms", quantile(rest_ms, 1)},
-            {"refined_after_s", quantile(refined_s, 0.5)},
-            {"refined_after_worst_s", quantile(refined_s, 1)},
-            {"whole_after_s", quantile(whole_s, 0.5)},
-            {"whole_after_worst_s", quantile(whole_s, 1)}};
+    return {{"median_ms", nearest_rank(rest_ms, 0.5)},
+            {"worst_ms", nearest_rank(rest_ms, 1)},
+            {"refined_after_s", nearest_rank(refined_s, 0.5)},
+            {"refined_after_worst_s", nearest_rank(refined_s, 1)},
+            {"whole_after_s", nearest_rank(whole_s, 0.5)},
+            {"whole_after_worst_s", nearest_rank(whole_s, 1)}};
 }
 
 }  // namespace
@@ -60,9 +61,10 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
     const auto motion = ViewClock::now();
     move(measured, kMotion_s, moving_ms);
     const double frames_per_s = double(moving_ms.size()) / seconds_since(motion);
+    const double first_ms = moving_ms.front();  // before they are reordered
     const MotionQuality quality = s.times.quality;
     const nlohmann::ordered_json rests = rests_json(window, measured);
-    const std::vector<double> psnr_db = compare_motion(measured);
+    std::vector<double> psnr_db = compare_motion(measured);
     const Canvas& canvas = window.viewer().canvas();
     const nlohmann::ordered_json json = {{"scene", s.scene->file.filename().string()},
                                          {"splats", s.scene->model.size()},
@@ -77,13 +79,13 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
                                          {"motion",
                                           {{"frames", moving_ms.size()},
                                            {"frames_per_s", frames_per_s},
-                                           {"first_ms", moving_ms.front()},
-                                           {"median_ms", quantile(moving_ms, 0.5)},
-                                           {"p95_ms", quantile(moving_ms, 0.95)},
+                                           {"first_ms", first_ms},
+                                           {"median_ms", nearest_rank(moving_ms, 0.5)},
+                                           {"p95_ms", nearest_rank(moving_ms, 0.95)},
                                            {"scale", quality.scale},
                                            {"splat_share", quality.splats},
-                                           {"psnr_db", quantile(psnr_db, 0.5)},
-                                           {"worst_psnr_db", quantile(psnr_db, 0)}}},
+                                           {"psnr_db", nearest_rank(psnr_db, 0.5)},
+                                           {"worst_psnr_db", nearest_rank(psnr_db, 0)}}},
                                          {"rest", rests},
                                          {"peak_memory_bytes", peak_memory_bytes()},
                                          {"device_memory_bytes", device.allocated_bytes()}};
@@ -92,8 +94,8 @@ void write_view_times(ViewerWindow& window, const Device& device, const std::ato
     tell(
         "{}: {:.1f} frames/s in motion ({:.1f} ms, first {:.1f} ms, {:.1f} dB), at rest {:.1f} "
         "ms\n",
-        s.scene->file.filename().string(), frames_per_s, quantile(moving_ms, 0.5),
-        moving_ms.front(), quantile(psnr_db, 0.5), rests["median_ms"].get<double>());
+        s.scene->file.filename().string(), frames_per_s, nearest_rank(moving_ms, 0.5), first_ms,
+        nearest_rank(psnr_db, 0.5), rests["median_ms"].get<double>());
 }
 
 }  // namespace darb

@@ -1,9 +1,9 @@
 #include "tools/paper/blending.h"
 
 #include "engine/core/check.h"
+#include "engine/core/quantile.h"
 #include "engine/reference/reference_render.h"
 #include "engine/render/renderer.h"
-#include "tools/paper/quantile.h"
 
 namespace darb {
 

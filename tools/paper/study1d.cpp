@@ -7,8 +7,8 @@
 #include <mutex>
 
 #include "engine/core/check.h"
+#include "engine/core/quantile.h"
 #include "engine/reference/parallel.h"
-#include "tools/paper/quantile.h"
 
 namespace darb {
 

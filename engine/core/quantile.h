@@ -1,7 +1,8 @@
-// Quantiles of the measurements of an experiment.
+// Quantiles and medians.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -21,6 +22,13 @@ inline double quantile(const std::vector<double>& sorted, double share) {
 inline double median(std::vector<double> values) {
     std::sort(values.begin(), values.end());
     return quantile(values, 0.5);
+}
+
+/// The value whose rank is nearest, of at least one; reorders them.
+inline double nearest_rank(std::vector<double>& values, double share) {
+    const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
 }
 
 }  // namespace darb
