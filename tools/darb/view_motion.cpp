@@ -1,6 +1,5 @@
 #include "tools/darb/view_motion.h"
 
-#include <algorithm>
 #include <glm/gtc/constants.hpp>
 #include <string>
 #include <utility>
