@@ -24,8 +24,12 @@ PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, int width, i
     o.photo = &photos.buffer;
     o.width = photos.width;
     o.height = photos.height;
-    o.split = photos.compare ? photos.split : 0;
     return o;
+}
+
+bool photo_beside(const Photos& photos, const DisplaySettings& display) {
+    return photos.compare && photos.current >= 0 && photos.loaded == photos.current &&
+           display.mode == VIEW_COLOUR;
 }
 
 void load_photo_of_view(Device& device, Photos& photos) {

@@ -5,6 +5,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/buffer.h"
+#include "viewer/display.h"
 #include "viewer/navigation.h"
 
 namespace darb {
@@ -14,8 +15,7 @@ struct PhotoOverlay;
 struct Photos {
     std::vector<View> views;
     int current = -1;      // -1: free camera
-    bool compare = false;  // photo left of the split
-    float split = 0.5f;    // share of the window's width
+    bool compare = false;  // the photo is the first of the panes (panes.h)
     Buffer buffer;         // uint [height][width]
     int width = 0, height = 0;
     int loaded = -1;      // the view that buffer holds
@@ -29,6 +29,8 @@ struct Photos {
 Camera camera_in_window(const Photos& photos, const Navigation& free, int width, int height);
 /// Where the photo lies in a picture by `camera`, which may have fewer px than the window.
 PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, int width, int height);
+/// Whether the photo is shown beside the picture: it is wanted, there, and no error map is.
+bool photo_beside(const Photos& photos, const DisplaySettings& display);
 /// The photo of the camera that is looked through. Throws Error where it has none.
 void load_photo_of_view(Device& device, Photos& photos);
 

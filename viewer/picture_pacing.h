@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <optional>
+#include <vector>
 
 #include "engine/scene/camera.h"
 #include "viewer/display.h"
@@ -17,7 +18,8 @@ struct PictureKey {
     Camera camera;
     DisplaySettings display;
     int photo = -1;
-    float split = 0;
+    bool photo_beside = false;
+    std::vector<int> kernels_beside;
     int version = 0;  // of the scene, its edits, its training
     bool operator==(const PictureKey& other) const;
 };

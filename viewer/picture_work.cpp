@@ -26,14 +26,18 @@ AccuracyMeasure::Frame timed_picture(SplatPicture& picture, const Camera& camera
 
 }  // namespace
 
-ImageU8 read_pixels(const SplatPicture& picture) {
-    ImageU8 image(picture.width(), picture.height(), 3);
-    const size_t pixels = size_t(picture.width()) * size_t(picture.height());
-    const std::vector<std::uint32_t> bgra = picture.pixels().download<std::uint32_t>(pixels);
+ImageU8 read_pixels(const Buffer& buffer, int width, int height) {
+    ImageU8 image(width, height, 3);
+    const size_t pixels = size_t(width) * size_t(height);
+    const std::vector<std::uint32_t> bgra = buffer.download<std::uint32_t>(pixels);
     for (size_t p = 0; p < pixels; ++p)
         for (size_t c = 0; c < 3; ++c)
             image.data[3 * p + c] = static_cast<std::uint8_t>(bgra[p] >> (16 - 8 * c));
     return image;
+}
+
+ImageU8 read_pixels(const SplatPicture& picture) {
+    return read_pixels(picture.pixels(), picture.width(), picture.height());
 }
 
 void PictureWork::start_export(const CameraPath& path, const ExportOptions& options) {

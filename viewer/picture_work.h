@@ -42,6 +42,8 @@ class PictureWork {
     std::optional<AccuracyMeasure> measure_;
 };
 
+/// RGB of B8G8R8A8 [height][width].
+ImageU8 read_pixels(const Buffer& pixels, int width, int height);
 /// RGB of the last rendered picture.
 ImageU8 read_pixels(const SplatPicture& picture);
 

@@ -16,6 +16,7 @@
 #include "viewer/input.h"
 #include "viewer/motion.h"
 #include "viewer/navigation.h"
+#include "viewer/panes.h"
 #include "viewer/photo_compare.h"
 #include "viewer/requests.h"
 #include "viewer/scene.h"
@@ -92,6 +93,7 @@ struct Session {
     DisplaySettings display, own;    // own: as the scene is meant to be shown
     std::optional<EffectPlan> plan;  // of the scene
     Photos photos;
+    Panes panes;
     PathState path;
     TrainingCurves training;
     FrameTimes times;

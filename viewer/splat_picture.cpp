@@ -81,7 +81,7 @@ void SplatPicture::clear() {
     some_.reset();
     drop_levels();
     important_.clear();
-    slots_ = {};
+    slots_.clear();
     live_ = nullptr;
     model_ = nullptr;
 }
@@ -188,10 +188,10 @@ SplatPicture::Key SplatPicture::key_for(const DisplaySettings& display, bool mov
 }
 
 SplatPicture::Slot& SplatPicture::slot_for(const GpuSplats& splats, const DisplaySettings& display,
-                                           bool moving) {
+                                           bool moving, int pane) {
     const Key key = key_for(display, moving);
     const int degree = std::min(display.sh_degree, splats.sh_degree());
-    Slot& slot = slots_[moving ? 1 : 0];
+    Slot& slot = slots_[2 * pane + (moving ? 1 : 0)];
     const bool same = slot.forward && key == slot.key;
     compiled_ |= !same || slot.degree != degree;
     slot.degree = degree;
@@ -204,8 +204,14 @@ SplatPicture::Slot& SplatPicture::slot_for(const GpuSplats& splats, const Displa
     return slot;
 }
 
-bool SplatPicture::ready_to_move(const DisplaySettings& display) const {
-    const Slot& slot = slots_[1];
+void SplatPicture::keep_panes(std::size_t count) {
+    slots_.erase(slots_.lower_bound(2 * static_cast<int>(count)), slots_.end());
+}
+
+bool SplatPicture::ready_to_move(const DisplaySettings& display, int pane) const {
+    const auto kept = slots_.find(2 * pane + 1);
+    if (kept == slots_.end()) return false;
+    const Slot& slot = kept->second;
     const bool some = important_.empty() || !own_ || (some_ && some_as_ == display.style) ||
                       (levels_ended_ && display.style == SplatStyle::splats);
     return some && slot.forward && slot.key == key_for(display, true) &&
@@ -213,7 +219,7 @@ bool SplatPicture::ready_to_move(const DisplaySettings& display) const {
 }
 
 std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const DisplaySettings& display,
-                                             double moving) {
+                                             double moving, int pane) {
     Buffer kept = std::exchange(pixels_, Buffer());
     const auto before = std::tuple(size_.x, size_.y, status_);
     const auto put_back = [&] {
@@ -221,7 +227,7 @@ std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const Display
         std::tie(size_.x, size_.y, status_) = before;
     };
     try {
-        render(camera, display, {}, moving);
+        render(camera, display, {}, moving, pane);
     } catch (...) {
         put_back();
         throw;
@@ -231,10 +237,10 @@ std::vector<PassTime> SplatPicture::rehearse(const Camera& camera, const Display
 }
 
 void SplatPicture::render(const Camera& seen, const DisplaySettings& display,
-                          const PhotoOverlay& photo, std::optional<double> moving) {
+                          const PhotoOverlay& photo, std::optional<double> moving, int pane) {
     compiled_ = false;
     const GpuSplats& shown = moving ? some_styled(display.style, *moving) : styled(display.style);
-    Slot& slot = slot_for(shown, display, moving.has_value());
+    Slot& slot = slot_for(shown, display, moving.has_value(), pane);
     Forward& forward = *slot.forward;
     FrameBuffers& buffers = *slot.buffers;
     Frame& frame = buffers.frame();
@@ -287,25 +293,30 @@ void SplatPicture::record_depth_colours(const ProjectedSplats& projected, const 
     commands_.dispatch(depth_light_, args, {projected.bound, projected.light}, g.x, g.y);
 }
 
-void SplatPicture::record_display(const Frame& frame, const Buffer& image, const Camera& camera,
-                                  const DisplaySettings& display, const PhotoOverlay& photo) {
+gpu::DisplayArgs display_args(int width, int height, const DisplaySettings& display,
+                              const PhotoOverlay& photo) {
     gpu::DisplayArgs args{};
-    args.width = static_cast<std::uint32_t>(camera.width);
-    args.height = static_cast<std::uint32_t>(camera.height);
+    args.width = static_cast<std::uint32_t>(width);
+    args.height = static_cast<std::uint32_t>(height);
     args.tiles_x = (args.width + TILE_SIZE - 1) / TILE_SIZE;
     args.heat_max = display.mode == VIEW_COUNT ? display.count_max : display.error_max;
     args.background_r = display.background.r;
     args.background_g = display.background.g;
     args.background_b = display.background.b;
     if (photo.photo != nullptr) {
-        args.split = static_cast<float>(photo.split * camera.width);
         args.photo_x = static_cast<float>(photo.x);
         args.photo_y = static_cast<float>(photo.y);
         args.photo_scale = static_cast<float>(photo.scale);
         args.photo_width = static_cast<std::uint32_t>(photo.width);
         args.photo_height = static_cast<std::uint32_t>(photo.height);
     }
-    const bool has_photo = photo.photo != nullptr;
+    return args;
+}
+
+void SplatPicture::record_display(const Frame& frame, const Buffer& image, const Camera& camera,
+                                  const DisplaySettings& display, const PhotoOverlay& photo) {
+    const gpu::DisplayArgs args = display_args(camera.width, camera.height, display, photo);
+    const bool has_photo = photo.photo != nullptr && display.mode == VIEW_ERROR;
     Pipeline& pipeline = display_pipelines_[display.mode * 2 + (has_photo ? 1 : 0)];
     compiled_ |= !pipeline;
     if (!pipeline)

@@ -2,9 +2,9 @@
 // engine's Forward, which it builds anew when kernel, footprint or what a mode needs changes.
 #pragma once
 
-#include <array>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/core/image.h"
@@ -22,8 +22,11 @@ struct PhotoOverlay {
     const Buffer* photo = nullptr;  // uint [height][width], R in the low byte
     int width = 0, height = 0;      // px
     double x = 0, y = 0, scale = 1;
-    double split = 0;  // share of the frame's width, left of which the photo is shown
 };
+
+/// What shaders/view take of a frame of this size.
+gpu::DisplayArgs display_args(int width, int height, const DisplaySettings& display,
+                              const PhotoOverlay& photo);
 
 class SplatPicture {
   public:
@@ -53,15 +56,20 @@ class SplatPicture {
 
     /// Renders and waits. camera: at the size of the frame that is wanted. moving: with the fast
     /// accuracy settings and this share of the splats, for a picture that is replaced at once.
+    /// pane: pictures that take turns, each with settings of its own, keep their pipelines so.
     void render(const Camera& camera, const DisplaySettings& display, const PhotoOverlay& photo,
-                std::optional<double> moving = {});
+                std::optional<double> moving = {}, int pane = 0);
+    /// Frees what panes from this one on have kept.
+    void keep_panes(std::size_t count);
+    /// The last picture's pixels for a buffer that is as large.
+    void take_pixels(Buffer& into) { std::swap(pixels_, into); }
 
     /// Whether a picture in motion needs nothing that is not there yet: pipelines, uploads.
-    bool ready_to_move(const DisplaySettings& display) const;
+    bool ready_to_move(const DisplaySettings& display, int pane = 0) const;
     /// Renders in motion; pixels, size and counters stay those of the last render. Returns the
     /// times of the passes.
     std::vector<PassTime> rehearse(const Camera& camera, const DisplaySettings& display,
-                                   double moving);
+                                   double moving, int pane = 0);
     /// The largest share below 1 of the splats that render takes as `moving`.
     double most_moving() const;
 
@@ -101,7 +109,7 @@ class SplatPicture {
         Key key;
         int degree = -1;  // of the last picture: it has a pipeline of its own
     };
-    Slot& slot_for(const GpuSplats& splats, const DisplaySettings& display, bool moving);
+    Slot& slot_for(const GpuSplats& splats, const DisplaySettings& display, bool moving, int pane);
     Key key_for(const DisplaySettings& display, bool moving) const;
     static ForwardOptions options_for(const Key& key);
 
@@ -120,7 +128,7 @@ class SplatPicture {
     bool levels_ended_ = false;
     std::vector<std::uint8_t> removed_;
     Bounds bounds_;
-    std::array<Slot, 2> slots_;  // at rest, moving
+    std::map<int, Slot> slots_;  // of pane p: 2 p at rest, 2 p + 1 moving
     Buffer pixels_, no_photo_;
     glm::ivec2 size_{0};  // px
     bool compiled_ = false;

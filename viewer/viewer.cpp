@@ -32,6 +32,7 @@ Viewer::Viewer(Device& device, ViewerOptions options, GLFWwindow* window)
       canvas_(device),
       gui_(device, canvas_.render_pass(), options_.gui_scale > 0 ? options_.gui_scale : 1, window),
       picture_(device),
+      panes_(device),
       remembered_(options_.up_list) {
     session_.photos.views = options_.views;
     session_.navigation.set_up(start_up(options_));
@@ -69,7 +70,7 @@ bool Viewer::refined() const {
 }
 
 bool Viewer::at_rest() const {
-    return !loading() && pacing_.is_whole() && picture_.ready_to_move(session_.display);
+    return !loading() && pacing_.is_whole() && ready_to_move();
 }
 
 double Viewer::frame(const Input& input, int width, int height, bool full) {
@@ -113,10 +114,7 @@ void Viewer::draw_whole(int width, int height) {
 }
 
 void Viewer::compose() {
-    const BufferPicture picture =
-        picture_.empty() ? BufferPicture()
-                         : BufferPicture{&picture_.pixels(), picture_.width(), picture_.height()};
-    canvas_.compose(picture, session_.display.background,
+    canvas_.compose(shown(), session_.display.background,
                     [this](VkCommandBuffer commands) { gui_.draw(commands); });
 }
 

@@ -10,6 +10,7 @@
 #include "viewer/canvas.h"
 #include "viewer/gui.h"
 #include "viewer/motion_levels.h"
+#include "viewer/pane_pictures.h"
 #include "viewer/picture_pacing.h"
 #include "viewer/picture_work.h"
 #include "viewer/remembered_up.h"
@@ -122,6 +123,11 @@ class Viewer {
     // viewer_picture.cpp: the picture of a frame.
     void load_current_photo();
     void pace_picture(int width, int height, bool full, bool works);
+    std::vector<DisplaySettings> pane_displays() const;
+    void render_shown(const Camera& camera, int width, int height, std::optional<double> moving);
+    void compose_panes();
+    bool ready_to_move() const;
+    BufferPicture shown() const;
     void draw_picture(const PictureKey& key, PictureStep step);
     void rehearse_motion(const PictureKey& key);
     void start_levels();
@@ -136,6 +142,8 @@ class Viewer {
     Canvas canvas_;
     Gui gui_;
     SplatPicture picture_;
+    PanePictures panes_;
+    bool shows_panes_ = false;  // not picture_
     PicturePacing pacing_;
     PictureWork work_;
     RememberedUp remembered_;

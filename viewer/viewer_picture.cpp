@@ -80,9 +80,12 @@ void Viewer::load_current_photo() {
 void Viewer::pace_picture(int width, int height, bool full, bool works) {
     const Photos& photos = session_.photos;
     const PictureKey key{camera_in_window(photos, session_.navigation, width, height),
-                         session_.display, photos.current, photos.compare ? photos.split : 0.0f,
+                         session_.display,
+                         photos.current,
+                         photo_beside(photos, session_.display),
+                         session_.panes.kernels,
                          version_};
-    const bool ready = picture_.ready_to_move(session_.display);
+    const bool ready = ready_to_move();
     const PicturePacing::Frame frame{
         full, works, session_.times.full_ms > kLong_ms && picture_.most_moving() < 1 && ready,
         session_.error.empty() && !ready};
@@ -91,7 +94,45 @@ void Viewer::pace_picture(int width, int height, bool full, bool works) {
         rehearse_motion(key);
     else if (step != PictureStep::none)
         draw_picture(key, step);
+    compose_panes();
     if (!works) start_levels();
+}
+
+// One for each pane of a kernel; the first is the whole picture where there are no more.
+std::vector<DisplaySettings> Viewer::pane_displays() const {
+    std::vector<DisplaySettings> displays{session_.display};
+    for (const int kernel : session_.panes.kernels)
+        displays.emplace_back(session_.display).kernel = kernel;
+    return displays;
+}
+
+bool Viewer::ready_to_move() const {
+    const std::vector<DisplaySettings> displays = pane_displays();
+    for (size_t i = 0; i < displays.size(); ++i)
+        if (!picture_.ready_to_move(displays[i], static_cast<int>(i))) return false;
+    return true;
+}
+
+void Viewer::render_shown(const Camera& camera, int width, int height,
+                          std::optional<double> moving) {
+    const std::vector<DisplaySettings> displays = pane_displays();
+    const PhotoOverlay photo = overlay_of(session_.photos, camera, width, height);
+    const bool photo_first = photo_beside(session_.photos, session_.display);
+    shows_panes_ = photo_first || displays.size() > 1;
+    if (shows_panes_) return panes_.render(picture_, camera, displays, photo, photo_first, moving);
+    picture_.keep_panes(1);
+    picture_.render(camera, displays.front(), photo, moving);
+}
+
+void Viewer::compose_panes() {
+    fit_lines(shows_panes_ ? panes_.count() : 0, session_.panes);
+    if (shows_panes_) attempt([&] { panes_.compose(session_.panes); });
+}
+
+BufferPicture Viewer::shown() const {
+    if (picture_.empty()) return {};
+    if (shows_panes_) return {&panes_.pixels(), panes_.width(), panes_.height()};
+    return {&picture_.pixels(), picture_.width(), picture_.height()};
 }
 
 // All but the whole one are replaced soon.
@@ -105,14 +146,15 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
     const Camera camera = scaled(key.camera, quality.scale);
     pacing_.drew(step, quality);
     const bool drawn = attempt([&] {
-        picture_.render(camera, key.display,
-                        overlay_of(session_.photos, camera, key.camera.width, key.camera.height),
-                        whole ? std::nullopt : std::optional(quality.splats));
+        render_shown(camera, key.camera.width, key.camera.height,
+                     whole ? std::nullopt : std::optional(quality.splats));
     });
+    session_.panes.psnr_db.clear();
     if (!drawn) return pacing_.failed();
     FrameTimes& t = session_.times;
-    t.passes = picture_.pass_times();
+    t.passes = shows_panes_ ? panes_.pass_times() : picture_.pass_times();
     t.picture_ms = milliseconds_since(start);
+    if (whole && shows_panes_) session_.panes.psnr_db = panes_.psnr_db();
     if (whole) t.full_ms = t.picture_ms;
     t.quality = quality;
     t.visible = picture_.status().visible;
@@ -125,6 +167,7 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
 // frames in motion are drawn at a quality that was found before them.
 void Viewer::rehearse_motion(const PictureKey& key) {
     const FrameTimes& t = session_.times;
+    const std::vector<DisplaySettings> displays = pane_displays();
     const double besides_ms = std::max(0.0, t.frame_ms - t.picture_ms);
     attempt([&] {
         for (int i = 0; i <= kRehearsals; ++i) {
@@ -133,9 +176,15 @@ void Viewer::rehearse_motion(const PictureKey& key) {
             const double splats =
                 i == 0 ? std::min(quality.splats, picture_.most_moving()) : quality.splats;
             const auto start = Clock::now();
-            const std::vector<PassTime> passes =
-                picture_.rehearse(scaled(key.camera, quality.scale), key.display, splats);
-            if (picture_.compiled() || splats < quality.splats) continue;
+            std::vector<PassTime> passes;
+            bool compiled = false;
+            for (size_t p = 0; p < displays.size(); ++p) {
+                add_times(picture_.rehearse(scaled(key.camera, quality.scale), displays[p], splats,
+                                            static_cast<int>(p)),
+                          passes);
+                compiled |= picture_.compiled();
+            }
+            if (compiled || splats < quality.splats) continue;
             pacing_.motion().measured(motion_cost(besides_ms + milliseconds_since(start), passes));
         }
     });
@@ -144,7 +193,7 @@ void Viewer::rehearse_motion(const PictureKey& key) {
 void Viewer::presented() {
     FrameTimes& t = session_.times;
     t.frame_ms = milliseconds_since(frame_start_);
-    if (!pacing_.in_motion() || picture_.compiled()) return;
+    if (!pacing_.in_motion() || (shows_panes_ ? panes_.compiled() : picture_.compiled())) return;
     pacing_.motion().measured(motion_cost(t.frame_ms, t.passes));
     t.moving_ms.push_back(t.frame_ms);
     if (t.moving_ms.size() > kTimesKept) t.moving_ms.pop_front();

@@ -204,9 +204,11 @@ void Viewer::take_picture(int width, int height) {
     need_scene("picture");
     const Photos& photos = session_.photos;
     const Camera camera = camera_in_window(photos, session_.navigation, width, height);
-    picture_.render(camera, session_.display, overlay_of(photos, camera, width, height));
+    render_shown(camera, width, height, {});
+    compose_panes();
     const fs::path file = free_picture_name();
-    write_png(file, read_pixels(picture_));
+    const BufferPicture taken = shown();
+    write_png(file, read_pixels(*taken.pixels, taken.width, taken.height));
     session_.note = "picture in " + file.string();
 }
 
@@ -225,7 +227,10 @@ void Viewer::step_export(bool wait) {
 }
 
 void Viewer::step_work() {
-    if (work_.draws()) pacing_.forget();  // the picture is one of its own then
+    if (work_.draws()) {  // the picture is one of its own then
+        pacing_.forget();
+        shows_panes_ = false;
+    }
     if (work_.exports()) attempt([&] { step_export(false); });
     if (work_.measures()) attempt([&] { session_.measured = work_.step_measure(picture_); });
     session_.progress.exporting = work_.export_share();

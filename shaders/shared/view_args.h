@@ -21,7 +21,6 @@ struct DisplayArgs {
     uint height;  // px
     uint tiles_x;
     float heat_max;                  // error or count that gets the hottest colour
-    float split;                     // px; left of it the photo is shown, in VIEW_COLOUR
     float photo_x, photo_y;          // px of the frame at the photo's top left corner
     float photo_scale;               // px of the frame per photo px
     uint photo_width, photo_height;  // px
@@ -35,8 +34,17 @@ struct DepthLightArgs {
     float far_depth;
 };
 
+// panes: one strip of several pictures side by side.
+struct PaneArgs {
+    uint width, height;  // px of the frame
+    uint left, right;    // px, columns that are written
+    uint difference;     // 1: the difference to the other picture, as heat
+    float heat_max;      // that gets the hottest colour
+};
+
 #ifdef __cplusplus
-static_assert(sizeof(DisplayArgs) == 52);
+static_assert(sizeof(DisplayArgs) == 48);
+static_assert(sizeof(PaneArgs) == 24);
 static_assert(sizeof(DepthLightArgs) == 12);
 }  // namespace darb::gpu
 #endif

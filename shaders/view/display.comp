@@ -1,5 +1,5 @@
-// Turns a blended frame into 8-bit pixels for a window: the picture, the photo left of the split, or a heat map of
-// error, depth or work. Place: after blend, in the viewer alone.
+// Turns a blended frame into 8-bit pixels for a window: the picture, or a heat map of error,
+// depth or work. Place: after blend, in the viewer alone.
 // Work: one thread a pixel. Shared memory: none. Reads the frame, the photo, and for VIEW_COUNT where each pixel
 // ended in its tile's list; writes B8G8R8A8.
 #version 460
@@ -23,26 +23,8 @@ layout(set = 0, binding = 4, scalar) writeonly buffer Pixels { uint pixels[]; };
 
 #include "lib/finite.glsl"
 #include "lib/linear_id.glsl"
-
-// Black, violet, red, orange, pale yellow: dark to light, so that it also reads in grey.
-vec3 heat(float t) {
-    const vec3 stops[5] = vec3[](vec3(0.0, 0.0, 0.02), vec3(0.34, 0.06, 0.43), vec3(0.73, 0.21, 0.33),
-                                 vec3(0.98, 0.56, 0.04), vec3(0.99, 1.0, 0.75));
-    const float x = clamp(t, 0.0, 1.0) * 4.0;
-    const int i = min(int(x), 3);
-    return mix(stops[i], stops[i + 1], x - float(i));
-}
-
-// The photo at the frame's pixel, over the background; false outside of it.
-bool photo_at(vec2 pixel, vec3 background, out vec3 colour) {
-    const vec2 at = (pixel - vec2(args.photo_x, args.photo_y)) / args.photo_scale;
-    colour = background;
-    if (at.x < 0.0 || at.y < 0.0 || at.x >= float(args.photo_width) || at.y >= float(args.photo_height))
-        return false;
-    const vec4 texel = unpackUnorm4x8(photo[uint(at.y) * args.photo_width + uint(at.x)]);
-    colour = mix(background, texel.rgb, texel.a);
-    return true;
-}
+#include "view/heat.glsl"
+#include "view/photo.glsl"
 
 void main() {
     const uint i = linear_id();
@@ -53,15 +35,13 @@ void main() {
     const vec3 background = vec3(args.background_r, args.background_g, args.background_b);
     vec3 colour = vec3(image[i], image[plane + i], image[2u * plane + i]);
     vec3 truth = background;
-    if (MODE == VIEW_COLOUR) {
-        if (HAS_PHOTO == 1 && centre.x < args.split && photo_at(centre, background, truth)) colour = truth;
-    } else if (MODE == VIEW_ERROR) {
+    if (MODE == VIEW_ERROR) {
         const bool known = HAS_PHOTO == 1 && photo_at(centre, background, truth);
         const vec3 difference = abs(clamp(colour, 0.0, 1.0) - truth);
         colour = known ? heat(dot(difference, vec3(1.0 / 3.0)) / args.heat_max) : vec3(0.15);
     } else if (MODE == VIEW_DEPTH) {
         colour = colour.g > 0.05 ? heat(1.0 - colour.r / colour.g) : background;
-    } else {
+    } else if (MODE == VIEW_COUNT) {
         const uvec2 tile = at / TILE_SIZE;
         const uint begin = tile_range[tile.y * args.tiles_x + tile.x].x;
         const uint last = last_intersection[i];

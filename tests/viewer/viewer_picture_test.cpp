@@ -90,7 +90,6 @@ TEST_F(ViewerTest, Photo_is_left_of_the_split) {
     const ImageU8 picture = shot();
     Photos& p = viewer_->session().photos;
     p.compare = true;
-    p.split = 0.5f;
     const ImageU8 both = shot();
     for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x)
@@ -98,6 +97,65 @@ TEST_F(ViewerTest, Photo_is_left_of_the_split) {
                 ASSERT_EQ(both.at(x, y, c),
                           x < kWidth / 2 ? photo_.at(x, y, c) : picture.at(x, y, c))
                     << x << ", " << y << ", channel " << c;
+}
+
+TEST_F(ViewerTest, Kernels_are_side_by_side_each_as_it_is_alone) {
+    load(file_);
+    Session& s = viewer_->session();
+    const int own = s.display.kernel;
+    const std::vector<int> kernels{own, KERNEL_RAISED_COSINE, KERNEL_PARABOLIC};
+    std::vector<ImageU8> alone;
+    for (const int kernel : kernels) {
+        s.display.kernel = kernel;
+        alone.push_back(shot());
+    }
+    s.display.kernel = own;
+    s.panes.kernels = {kernels[1], kernels[2]};
+    shot();
+    s.panes.lines = {0.25f, 0.75f};
+    const std::uint32_t drawn = s.times.intersections;
+    const ImageU8 all = shot();
+    EXPECT_EQ(s.times.intersections, drawn);
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x)
+            for (int c = 0; c < 3; ++c)
+                ASSERT_EQ(all.at(x, y, c),
+                          alone[x < kWidth / 4 ? 0 : x < 3 * kWidth / 4 ? 1 : 2].at(x, y, c))
+                    << x << ", " << y << ", channel " << c;
+    ASSERT_EQ(s.panes.psnr_db.size(), 2u);
+    for (size_t i = 0; i < 2; ++i)
+        EXPECT_NEAR(s.panes.psnr_db[i], psnr(to_float(alone[i + 1]), to_float(alone[0])), 1e-3);
+    s.panes.kernels.clear();
+    EXPECT_EQ(largest_difference(shot(), alone[0]), 0);
+    EXPECT_TRUE(s.panes.psnr_db.empty());
+}
+
+TEST_F(ViewerTest, The_error_between_kernels_is_dark_where_they_agree) {
+    load(file_);
+    Session& s = viewer_->session();
+    s.panes.kernels = {KERNEL_RAISED_COSINE};
+    s.panes.difference = true;
+    shot();
+    s.panes.lines = {0};
+    const ImageU8 error = shot();
+    EXPECT_GT(largest_difference(error, ImageU8(kWidth, kHeight, 3)), 60);
+    s.panes.kernels = {s.display.kernel};
+    const ImageU8 same = shot();
+    EXPECT_LE(*std::max_element(same.data.begin(), same.data.end()), 12);
+    EXPECT_TRUE(std::isinf(s.panes.psnr_db.at(0)));
+}
+
+TEST_F(ViewerTest, The_photo_is_what_kernels_are_measured_against) {
+    load(file_);
+    viewer_->choose_camera(0);
+    write_png(folder_ / "photo.png", shot());
+    Session& s = viewer_->session();
+    s.photos.compare = true;
+    s.panes.kernels = {KERNEL_RAISED_COSINE};
+    shot();
+    ASSERT_EQ(s.panes.psnr_db.size(), 2u);
+    EXPECT_GT(s.panes.psnr_db[0], 50);  // the photo is the first kernel's picture
+    EXPECT_LT(s.panes.psnr_db[1], 45);
 }
 
 TEST_F(ViewerTest, Error_map_is_dark_where_the_photo_is_the_picture) {

@@ -1,10 +1,13 @@
 #include "tools/darb/view_flags.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/kernel_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 
@@ -37,6 +40,20 @@ std::vector<View> find_views(const ViewFlags& flags, std::string& note) {
     }
 }
 
+namespace {
+
+std::vector<int> kernels_beside(const ViewFlags& flags) {
+    const std::vector<int> kernels =
+        flags.beside.empty() ? kernels_of_files(flags.kernel_files)
+                             : kernels_from_list("--beside", flags.beside, flags.kernel_files);
+    if (kernels.size() > kMostBeside)
+        throw Error("--beside", fmt::format("{} kernels are too many", kernels.size()),
+                    fmt::format("Up to {} fit beside the scene's own.", kMostBeside));
+    return kernels;
+}
+
+}  // namespace
+
 void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) {
     Session& s = viewer.session();
     const auto choice = [](const std::string& name, std::initializer_list<const char*> names) {
@@ -56,6 +73,9 @@ void apply_flags(Viewer& viewer, const ViewFlags& flags, const PixelSize& size) 
         s.path.path = read_camera_path(flags.path);
         s.path.mark_saved();
     }
+    if (!flags.beside.empty() || !flags.kernel_files.empty())
+        s.panes.kernels = kernels_beside(flags);
+    s.panes.difference = flags.difference;
     if (flags.camera >= 0) viewer.choose_camera(flags.camera);
     if (flags.show == "error" && s.photos.current < 0)
         throw Error("--show error", "needs a photo", "Add --cameras DATASET --camera N.");
@@ -95,6 +115,11 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
         ->check(CLI::IsMember({"splats", "points", "ellipsoids"}))
         ->capture_default_str();
     c.add_flag("--compare", flags.compare, "photo beside the picture, at a camera of the data set");
+    c.add_option("--beside", flags.beside,
+                 "these kernels, with commas, side by side with the scene's own: up to three");
+    add_kernel_file_flag(c, flags.kernel_files);
+    c.add_flag("--difference", flags.difference,
+               "all but the leftmost of what is side by side show their error to it");
     c.add_flag("--no-panels", flags.no_panels, "start with the panels hidden (key H)");
     c.add_option("--gui-scale", flags.gui_scale, "size of the panels (default: the display's)")
         ->check(CLI::Range(0.5, 4.0));

@@ -43,7 +43,6 @@ void data_set(Session& s) {
         return;
     }
     if (ImGui::Checkbox("photo beside the picture", &p.compare)) p.failed = false;
-    if (p.compare) ImGui::SliderFloat("photo up to", &p.split, 0, 1, "%.2f", kClamped);
 }
 
 }  // namespace

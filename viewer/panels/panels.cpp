@@ -130,6 +130,7 @@ void path_field(const char* label, std::filesystem::path& path) {
 void draw_panels(Session& s) {
     const auto [width, height] = ImGui::GetIO().DisplaySize;
     empty_hint(s, width, height);
+    draw_panes(s);
     if (s.panels) {
         if (s.selection.shown) draw_region(s, static_cast<int>(width), static_cast<int>(height));
         side_panel(s, height);

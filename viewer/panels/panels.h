@@ -22,6 +22,11 @@ void edit_panel(Session& session);
 void path_panel(Session& session);
 void training_panel(Session& session);
 
+/// Lines between panes, which can be dragged, and what each pane is; in ImGui's coordinates.
+void draw_panes(Session& session);
+/// Which kernels are side by side.
+void panes_panel(Session& session);
+
 /// The region's outline over the picture, in ImGui's coordinates.
 void draw_region(const Session& session, int width, int height);
 

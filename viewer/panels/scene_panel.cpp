@@ -71,6 +71,7 @@ void display_panel(Session& s) {
             d.style = static_cast<SplatStyle>(style);
     }
     kernel_choice(s);
+    panes_panel(s);
     ImGui::ColorEdit3("background", &d.background.x);
 }
 
