@@ -40,4 +40,8 @@ install(FILES assets/desktop/darb.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/a
 install(FILES assets/desktop/darb.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages COMPONENT darb)
 install(FILES assets/desktop/darb.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT darb)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/darb RENAME copyright COMPONENT darb)
+if(GUI_FONT)  # the command holds it
+  install(FILES /usr/share/doc/fonts-roboto-unhinted/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/darb
+    RENAME copyright.fonts-roboto-unhinted COMPONENT darb)
+endif()
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libdarb-dev RENAME copyright COMPONENT dev)

@@ -41,6 +41,7 @@ build    libeigen3-dev        matrix products of LPIPS
 build    libmuparser-dev      kernels as expressions
 build    libglfw3-dev         window of the viewer
 build    libimgui-dev         panels of the viewer
+build    fonts-roboto-unhinted  their letters
 run      mesa-vulkan-drivers  lavapipe, the CPU device, and the GPU drivers of Mesa
 tests    libgtest-dev         tests
 tests    vulkan-validationlayers  synchronization validation

@@ -43,6 +43,7 @@ void remove_selected(Session& s) {
 void stop_and_close(Session& s) {
     s.path.playing = false;
     s.error.clear();
+    s.help = false;
     s.ask(request::CancelLoad{});
     s.ask(request::CancelWork{});
     s.ask(request::Stay{});
@@ -78,6 +79,7 @@ constexpr KeyRow kKeys[] = {
      }},
     {Key::save, [](Session& s) { s.ask(request::Save{}); }},
     {Key::quit, [](Session& s) { s.ask(request::Quit{}); }},
+    {Key::help, [](Session& s) { s.help = !s.help; }},
     {Key::escape, stop_and_close},
 };
 
@@ -133,7 +135,7 @@ void move_camera(const Input& in, const ControlFrame& frame, Session& s) {
         if (in.wheel != 0) turn_wheel(in, s);
         if (in.double_click && s.scene) {
             const Camera camera =
-                camera_in_window(s.photos, s.navigation, frame.width, frame.height);
+                camera_in_window(s.photos, s.navigation, free_area(s, frame.width, frame.height));
             if (const auto hit = pick(s.scene->model, s.edit.removed(), camera, in.x, in.y))
                 s.navigation.set_pivot_depth(*hit);
         }

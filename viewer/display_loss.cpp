@@ -11,7 +11,8 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kRoom = 1 << 20;  // bytes: requests of a window's end take some hundred
+constexpr std::size_t kRequestRoom = 1
+                                     << 20;  // bytes: requests of a window's end take some hundred
 
 // How Xlib's Display begins (X11/Xlib.h: _XPrivDisplay, with the names of X11/Xlibint.h).
 struct DisplayHead {
@@ -34,11 +35,11 @@ struct DisplayHead {
 // that its own functions do not look for. Nothing of what goes into this room is sent.
 void make_room(void* display) {
     auto* const head = static_cast<DisplayHead*>(display);
-    auto* const room = static_cast<char*>(std::malloc(kRoom));  // XCloseDisplay frees it
+    auto* const room = static_cast<char*>(std::malloc(kRequestRoom));  // XCloseDisplay frees it
     if (room == nullptr) return;
     std::free(head->buffer);
     head->buffer = head->end = head->last_request = room;
-    head->limit = room + kRoom;
+    head->limit = room + kRequestRoom;
 }
 
 void note_loss(void* display, void* user) {

@@ -6,22 +6,50 @@
 #include <backends/imgui_impl_vulkan.h>
 #include <imgui.h>
 
+#include <cmath>
+
 #include "engine/gpu/commands.h"
+#include "viewer/gui_font.h"
+#include "viewer/theme.h"
 
 namespace darb {
 
 namespace {
 
-constexpr float kFontPx = 13;  // ProggyClean, Dear ImGui's own, is sharp at multiples of it
+constexpr float kFontPx = 15;     // at scale 1
+constexpr float kOwnFontPx = 13;  // ProggyClean, Dear ImGui's own, is sharp at multiples of it
+constexpr float kLargePx = 24;    // from here on a px is fine enough for a letter's place
+
+// What names of files may have: Latin with its extensions, Greek, Cyrillic, punctuation.
+constexpr ImWchar kLetters[] = {0x20,   0x17F,  0x370,  0x3FF,  0x400,  0x52F, 0x2010,
+                                0x2027, 0x2030, 0x203A, 0x20AC, 0x20AC, 0};
 
 void check_gui(VkResult result) {
     check_vulkan(result, "panels");
 }
 
+// px: on the screen.
+void make_font(float px) {
+    ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
+    fonts.Clear();
+    const std::span<const unsigned char> file = gui_font();
+    ImFontConfig config;
+    config.SizePixels = px * (file.empty() ? kOwnFontPx / kFontPx : 1);
+    config.FontDataOwnedByAtlas = false;
+    config.OversampleH = px < kLargePx ? 2 : 1;
+    config.RasterizerMultiply = 1.1f;  // light letters on dark look thin
+    if (file.empty())
+        fonts.AddFontDefault(&config);
+    else
+        fonts.AddFontFromMemoryTTF(const_cast<unsigned char*>(file.data()),
+                                   static_cast<int>(file.size()), config.SizePixels, &config,
+                                   kLetters);
+}
+
 }  // namespace
 
 Gui::Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* window)
-    : device_(device.handle()), windowed_(window != nullptr) {
+    : device_(&device), render_pass_(render_pass), window_(window) {
     const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 16};
     VkDescriptorPoolCreateInfo pool{};
     pool.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
@@ -29,40 +57,42 @@ Gui::Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* wind
     pool.maxSets = 16;
     pool.poolSizeCount = 1;
     pool.pPoolSizes = &size;
-    check_vulkan(vkCreateDescriptorPool(device_, &pool, nullptr, &pool_), "panels");
+    check_vulkan(vkCreateDescriptorPool(device.handle(), &pool, nullptr, &pool_), "panels");
 
     ImGui::CreateContext();
     ImGuiIO& io = ImGui::GetIO();
     io.IniFilename = nullptr;  // leaves no file in the current folder
-    ImFontConfig font;
-    font_px_ = kFontPx * scale * (windowed_ ? pixels_per_unit(window) : 1);
-    font.SizePixels = font_px_;
-    io.Fonts->AddFontDefault(&font);
+    if (window_ != nullptr) ImGui_ImplGlfw_InitForVulkan(window_, true);
     set_scale(scale);
-    if (windowed_) ImGui_ImplGlfw_InitForVulkan(window, true);
+}
 
+void Gui::start_backend() {
     ImGui_ImplVulkan_InitInfo info{};
-    info.Instance = device.instance();
-    info.PhysicalDevice = device.physical();
-    info.Device = device_;
-    info.QueueFamily = device.queue_family();
-    info.Queue = device.queue();
-    info.PipelineCache = device.pipeline_cache();
+    info.Instance = device_->instance();
+    info.PhysicalDevice = device_->physical();
+    info.Device = device_->handle();
+    info.QueueFamily = device_->queue_family();
+    info.Queue = device_->queue();
+    info.PipelineCache = device_->pipeline_cache();
     info.DescriptorPool = pool_;
     info.MinImageCount = info.ImageCount = 2;
     info.MSAASamples = VK_SAMPLE_COUNT_1_BIT;
     info.CheckVkResultFn = check_gui;
-    ImGui_ImplVulkan_Init(&info, render_pass);
-    upload_fonts(device);
+    ImGui_ImplVulkan_Init(&info, render_pass_);
 }
 
+// The backend frees the texture of the letters before when it ends, and not before that.
 void Gui::set_scale(float scale) {
-    ImGuiStyle& style = ImGui::GetStyle();
-    style = ImGuiStyle();
-    ImGui::StyleColorsDark();
-    style.WindowRounding = 4;
-    style.ScaleAllSizes(scale);
-    ImGui::GetIO().FontGlobalScale = kFontPx * scale / font_px_;
+    const float density = window_ != nullptr ? pixels_per_unit(window_) : 1;
+    apply_theme(scale);
+    ImGui::GetIO().FontGlobalScale = 1 / density;
+    if (ImGui::GetIO().BackendRendererUserData != nullptr) {
+        vkDeviceWaitIdle(device_->handle());
+        ImGui_ImplVulkan_Shutdown();
+    }
+    make_font(std::round(kFontPx * scale * density));
+    start_backend();
+    upload_fonts();
 }
 
 float pixels_per_unit(GLFWwindow* window) {
@@ -73,9 +103,9 @@ float pixels_per_unit(GLFWwindow* window) {
 }
 
 // From 1.90 on the backend uploads them itself.
-void Gui::upload_fonts([[maybe_unused]] Device& device) {
+void Gui::upload_fonts() {
 #if IMGUI_VERSION_NUM < 19000
-    Commands commands(device);
+    Commands commands(*device_);
     commands.begin();
     ImGui_ImplVulkan_CreateFontsTexture(commands.handle());
     commands.submit_and_wait();
@@ -84,16 +114,16 @@ void Gui::upload_fonts([[maybe_unused]] Device& device) {
 }
 
 Gui::~Gui() {
-    vkDeviceWaitIdle(device_);
+    vkDeviceWaitIdle(device_->handle());
     ImGui_ImplVulkan_Shutdown();
-    if (windowed_) ImGui_ImplGlfw_Shutdown();
+    if (window_ != nullptr) ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();
-    vkDestroyDescriptorPool(device_, pool_, nullptr);
+    vkDestroyDescriptorPool(device_->handle(), pool_, nullptr);
 }
 
 void Gui::begin(int width, int height) {
     ImGui_ImplVulkan_NewFrame();
-    if (windowed_) {
+    if (window_ != nullptr) {
         ImGui_ImplGlfw_NewFrame();
     } else {
         ImGuiIO& io = ImGui::GetIO();

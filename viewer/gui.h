@@ -11,13 +11,13 @@ namespace darb {
 
 class Gui {
   public:
-    /// scale: of the window's coordinates. window: null where there is none.
+    /// scale: of the window's coordinates. window: null where there is none. The render pass stays.
     Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* window);
     ~Gui();
     Gui(const Gui&) = delete;
     Gui& operator=(const Gui&) = delete;
 
-    /// Another scale; letters are sharp at the first.
+    /// Another scale: letters are drawn anew, sharp at the screen's pixels. Not within a frame.
     void set_scale(float scale);
     /// Starts a frame; with a window its input and size are taken from it, else these.
     void begin(int width, int height);
@@ -30,11 +30,12 @@ class Gui {
     bool wants_keys() const;
 
   private:
-    void upload_fonts(Device& device);
-    VkDevice device_;
+    void start_backend();
+    void upload_fonts();
+    Device* device_;
+    VkRenderPass render_pass_;
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
-    bool windowed_;
-    float font_px_ = 0;
+    GLFWwindow* window_;
 };
 
 /// Framebuffer px of one unit of a window's coordinates, in which panels and pointer are: 2 on some

@@ -22,6 +22,7 @@ enum class Key {
     redo,         // Ctrl Y
     save,         // Ctrl S
     quit,         // Ctrl Q
+    help,         // ?
     escape,       // Esc: leaves full screen, stops playing, cancels loading
 };
 

@@ -43,7 +43,8 @@ void PanePictures::render(SplatPicture& picture, const Camera& camera,
 }
 
 void PanePictures::draw_photo(const PhotoOverlay& photo, const DisplaySettings& display) {
-    if (!photo_frame_) photo_frame_.emplace(*device_, "photo_frame", SpecConstants{{"THREADS", VIEW_GROUP}});
+    if (!photo_frame_)
+        photo_frame_.emplace(*device_, "photo_frame", SpecConstants{{"THREADS", VIEW_GROUP}});
     const gpu::DisplayArgs args = display_args(size_.x, size_.y, display, photo);
     const Groups g = groups_for(std::uint64_t(args.width) * args.height, VIEW_GROUP);
     commands_.begin();
@@ -69,7 +70,8 @@ void PanePictures::compose(const Panes& panes) {
                                  static_cast<std::uint32_t>(edges[i + 1]),
                                  difference ? 1u : 0u,
                                  panes.difference_max};
-        const Groups g = groups_for(std::uint64_t(args.right - args.left) * args.height, VIEW_GROUP);
+        const Groups g =
+            groups_for(std::uint64_t(args.right - args.left) * args.height, VIEW_GROUP);
         commands_.dispatch(*strips_, args, {pictures_[i], pictures_[i > 0 ? 0 : 1], pixels_}, g.x,
                            g.y);
     }

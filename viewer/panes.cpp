@@ -14,12 +14,12 @@ constexpr float kNarrowest = 0.01f;  // share of the width between two lines
 
 }  // namespace
 
-void fit_lines(std::size_t panes, Panes& state) {
+void fit_lines(std::size_t panes, Panes& state, float left) {
     const std::size_t wanted = panes > 0 ? panes - 1 : 0;
     if (state.lines.size() == wanted) return;
     state.lines.resize(wanted);
     for (std::size_t i = 0; i < wanted; ++i)
-        state.lines[i] = static_cast<float>(i + 1) / static_cast<float>(panes);
+        state.lines[i] = left + (1 - left) * static_cast<float>(i + 1) / static_cast<float>(panes);
 }
 
 void move_line(std::size_t line, float share, Panes& state) {
@@ -46,8 +46,8 @@ double pixels_psnr_db(std::span<const std::uint32_t> a, std::span<const std::uin
     for (std::size_t i = 0; i < a.size(); ++i) {
         if (a[i] >> 24 == 0 || b[i] >> 24 == 0) continue;
         for (int shift = 0; shift < 24; shift += 8) {
-            const int d = static_cast<int>(a[i] >> shift & 255) -
-                          static_cast<int>(b[i] >> shift & 255);
+            const int d =
+                static_cast<int>(a[i] >> shift & 255) - static_cast<int>(b[i] >> shift & 255);
             squares += static_cast<std::uint64_t>(d * d);
         }
         count += 3;

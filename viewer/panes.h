@@ -19,8 +19,9 @@ struct Panes {
     std::vector<double> psnr_db;
 };
 
-/// Evenly spaced lines where their number is not one less than that of the panes.
-void fit_lines(std::size_t panes, Panes& state);
+/// Lines where their number is not one less than that of the panes: evenly spaced right of `left`,
+/// a share of the width.
+void fit_lines(std::size_t panes, Panes& state, float left = 0);
 /// A line stays between its neighbours.
 void move_line(std::size_t line, float share, Panes& state);
 /// Where the panes begin and end, px: [panes + 1], from 0 to width, ascending.

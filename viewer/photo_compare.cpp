@@ -8,18 +8,18 @@
 
 namespace darb {
 
-Camera camera_in_window(const Photos& photos, const Navigation& free, int width, int height) {
-    if (photos.current < 0) return free.camera(width, height);
-    return fitted(photos.view().camera, width, height);
+Camera camera_in_window(const Photos& photos, const Navigation& free, const WindowArea& area) {
+    if (photos.current < 0) return free.camera(area.width, area.height);
+    return fitted(photos.view().camera, area.width, area.height, area.left);
 }
 
-PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, int width, int height) {
+PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, const WindowArea& area) {
     PhotoOverlay o;
     if (photos.current < 0 || photos.loaded != photos.current) return o;
     const Camera& of = photos.view().camera;
-    const double share = double(camera.width) / width;
-    o.scale = fit_scale(of, width, height) * share;
-    o.x = 0.5 * (camera.width - o.scale * of.width);
+    const double share = double(camera.width) / area.width, left = share * area.left;
+    o.scale = fit_scale(of, area.width - area.left, area.height) * share;
+    o.x = left + 0.5 * (camera.width - left - o.scale * of.width);
     o.y = 0.5 * (camera.height - o.scale * of.height);
     o.photo = &photos.buffer;
     o.width = photos.width;

@@ -24,11 +24,15 @@ struct Photos {
     const View& view() const { return views[static_cast<size_t>(current)]; }
 };
 
-/// The photo's camera fitted into a window of this size; where none is looked through, the free
-/// camera.
-Camera camera_in_window(const Photos& photos, const Navigation& free, int width, int height);
+/// A window, px, and how much of it the panels take from the left.
+struct WindowArea {
+    int width = 0, height = 0, left = 0;
+};
+/// The photo's camera fitted into what is free of the window; where none is looked through, the
+/// free camera.
+Camera camera_in_window(const Photos& photos, const Navigation& free, const WindowArea& area);
 /// Where the photo lies in a picture by `camera`, which may have fewer px than the window.
-PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, int width, int height);
+PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, const WindowArea& area);
 /// Whether the photo is shown beside the picture: it is wanted, there, and no error map is.
 bool photo_beside(const Photos& photos, const DisplaySettings& display);
 /// The photo of the camera that is looked through. Throws Error where it has none.

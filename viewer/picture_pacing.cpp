@@ -21,7 +21,8 @@ bool PictureKey::operator==(const PictureKey& o) const {
     return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
            a.cx == b.cx && a.cy == b.cy && a.rotation == b.rotation &&
            a.translation == b.translation && display == o.display && photo == o.photo &&
-           photo_beside == o.photo_beside && kernels_beside == o.kernels_beside && version == o.version;
+           photo_beside == o.photo_beside && kernels_beside == o.kernels_beside &&
+           version == o.version;
 }
 
 PictureStep PicturePacing::next(const PictureKey& key, const Frame& frame, Time now) {

@@ -108,6 +108,7 @@ struct Session {
     std::vector<MeasuredChoice> measured;
     int sh_degree = 0;  // highest of the scene or the run
     bool panels = true;
+    bool help = false;  // the list of keys
     float gui_scale = 1;
     bool save_upright = false;  // turns what is saved so that up becomes -y
 
@@ -119,5 +120,7 @@ struct Session {
 void draw_panels(Session& session);
 /// px that the side panel takes from the left of the window where it was not moved; 0: hidden.
 float panel_width(const Session& session);
+/// A window of this size, px, without what the panel covers, where enough is left beside it.
+WindowArea free_area(const Session& session, int width, int height);
 
 }  // namespace darb

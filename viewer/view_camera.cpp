@@ -15,12 +15,12 @@ double fit_scale(const Camera& camera, int width, int height) {
     return std::min(double(width) / camera.width, double(height) / camera.height);
 }
 
-Camera fitted(const Camera& camera, int width, int height) {
-    const double s = fit_scale(camera, width, height);
+Camera fitted(const Camera& camera, int width, int height, int left) {
+    const double s = fit_scale(camera, width - left, height);
     Camera c = camera;
     c.fx *= s;
     c.fy *= s;
-    c.cx = c.cx * s + 0.5 * (width - s * camera.width);
+    c.cx = c.cx * s + left + 0.5 * (width - left - s * camera.width);
     c.cy = c.cy * s + 0.5 * (height - s * camera.height);
     c.width = width;
     c.height = height;

@@ -12,8 +12,9 @@ namespace darb {
 
 /// px of the window per px of the photo, such that the whole photo is seen.
 double fit_scale(const Camera& camera, int width, int height);
-/// The photo's camera with its frame centred in the window; what lies beyond it is shown too.
-Camera fitted(const Camera& camera, int width, int height);
+/// The photo's camera with its frame centred in the window, right of `left` px; what lies beyond it
+/// is shown too.
+Camera fitted(const Camera& camera, int width, int height, int left = 0);
 
 /// The nearest of the splats whose mean projects within 8 px of the pointer and that are neither
 /// deleted nor nearly transparent; its mean in the world.

@@ -124,7 +124,7 @@ class Viewer {
     void load_current_photo();
     void pace_picture(int width, int height, bool full, bool works);
     std::vector<DisplaySettings> pane_displays() const;
-    void render_shown(const Camera& camera, int width, int height, std::optional<double> moving);
+    void render_shown(const Camera& camera, const WindowArea& area, std::optional<double> moving);
     void compose_panes();
     bool ready_to_move() const;
     BufferPicture shown() const;

@@ -79,12 +79,13 @@ void Viewer::load_current_photo() {
 
 void Viewer::pace_picture(int width, int height, bool full, bool works) {
     const Photos& photos = session_.photos;
-    const PictureKey key{camera_in_window(photos, session_.navigation, width, height),
-                         session_.display,
-                         photos.current,
-                         photo_beside(photos, session_.display),
-                         session_.panes.kernels,
-                         version_};
+    const PictureKey key{
+        camera_in_window(photos, session_.navigation, free_area(session_, width, height)),
+        session_.display,
+        photos.current,
+        photo_beside(photos, session_.display),
+        session_.panes.kernels,
+        version_};
     const bool ready = ready_to_move();
     const PicturePacing::Frame frame{
         full, works, session_.times.full_ms > kLong_ms && picture_.most_moving() < 1 && ready,
@@ -113,10 +114,10 @@ bool Viewer::ready_to_move() const {
     return true;
 }
 
-void Viewer::render_shown(const Camera& camera, int width, int height,
+void Viewer::render_shown(const Camera& camera, const WindowArea& area,
                           std::optional<double> moving) {
     const std::vector<DisplaySettings> displays = pane_displays();
-    const PhotoOverlay photo = overlay_of(session_.photos, camera, width, height);
+    const PhotoOverlay photo = overlay_of(session_.photos, camera, area);
     const bool photo_first = photo_beside(session_.photos, session_.display);
     shows_panes_ = photo_first || displays.size() > 1;
     if (shows_panes_) return panes_.render(picture_, camera, displays, photo, photo_first, moving);
@@ -125,7 +126,9 @@ void Viewer::render_shown(const Camera& camera, int width, int height,
 }
 
 void Viewer::compose_panes() {
-    fit_lines(shows_panes_ ? panes_.count() : 0, session_.panes);
+    const double left = free_area(session_, canvas_.width(), canvas_.height()).left;
+    fit_lines(shows_panes_ ? panes_.count() : 0, session_.panes,
+              static_cast<float>(left / std::max(canvas_.width(), 1)));
     if (shows_panes_) attempt([&] { panes_.compose(session_.panes); });
 }
 
@@ -146,7 +149,7 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
     const Camera camera = scaled(key.camera, quality.scale);
     pacing_.drew(step, quality);
     const bool drawn = attempt([&] {
-        render_shown(camera, key.camera.width, key.camera.height,
+        render_shown(camera, free_area(session_, key.camera.width, key.camera.height),
                      whole ? std::nullopt : std::optional(quality.splats));
     });
     session_.panes.psnr_db.clear();

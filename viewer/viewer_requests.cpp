@@ -21,8 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLeastFree = 0.4;  // of the width: less room beside the panel is not used alone
-constexpr double kFilled = 0.94;    // of the free area, by what is framed
+constexpr double kFilled = 0.94;  // of the free area, by what is framed
 
 // Not one of a link either, to whatever it leads.
 fs::path free_picture_name() {
@@ -63,8 +62,9 @@ void Viewer::act_on_requests(int width, int height) {
         [&](request::FollowPlan) { follow_plan(); },
         [&](request::Measure) {
             need_scene("measurement");
-            work_.start_measure(camera_in_window(s.photos, s.navigation, width, height), s.display,
-                                s.own);
+            work_.start_measure(
+                camera_in_window(s.photos, s.navigation, free_area(s, width, height)), s.display,
+                s.own);
         },
         [&](request::ShowEdits) {
             if (!s.scene) return;
@@ -104,8 +104,8 @@ void Viewer::frame_all(int width, int height) {
     leave_photo(session_);
     const Bounds bounds = picture_.bounds();
     Navigation& n = session_.navigation;
-    const double panel = panel_width(session_), free = width - panel;
-    const bool beside = free >= kLeastFree * width && draws_every_centre(session_.display.effects);
+    const double panel = free_area(session_, width, height).left, free = width - panel;
+    const bool beside = panel > 0 && draws_every_centre(session_.display.effects);
     n.centre_x = beside ? (panel + free / 2) / width : 0.5;
     const double wide = beside ? free : width;
     const double tan_y = std::tan(n.fov_y / 2), tan_x = tan_y * wide / height;
@@ -167,7 +167,7 @@ void Viewer::save_page(int width, int height) {
     options.views = s.photos.views;
     View shown;
     shown.name = "As it was saved";
-    shown.camera = camera_in_window(s.photos, s.navigation, width, height);
+    shown.camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
     options.views.insert(options.views.begin(), shown);
     WebPageFacts facts;
     write_file_atomic(file, make_web_page(*device_, s.edit.apply(s.scene->model), options, &facts));
@@ -202,9 +202,8 @@ void Viewer::save_and_leave() {
 
 void Viewer::take_picture(int width, int height) {
     need_scene("picture");
-    const Photos& photos = session_.photos;
-    const Camera camera = camera_in_window(photos, session_.navigation, width, height);
-    render_shown(camera, width, height, {});
+    const WindowArea area = free_area(session_, width, height);
+    render_shown(camera_in_window(session_.photos, session_.navigation, area), area, {});
     compose_panes();
     const fs::path file = free_picture_name();
     const BufferPicture taken = shown();

@@ -119,8 +119,10 @@ TEST_F(ViewerTest, Kernels_are_side_by_side_each_as_it_is_alone) {
     for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x)
             for (int c = 0; c < 3; ++c)
-                ASSERT_EQ(all.at(x, y, c),
-                          alone[x < kWidth / 4 ? 0 : x < 3 * kWidth / 4 ? 1 : 2].at(x, y, c))
+                ASSERT_EQ(all.at(x, y, c), alone[x < kWidth / 4       ? 0
+                                                 : x < 3 * kWidth / 4 ? 1
+                                                                      : 2]
+                                               .at(x, y, c))
                     << x << ", " << y << ", channel " << c;
     ASSERT_EQ(s.panes.psnr_db.size(), 2u);
     for (size_t i = 0; i < 2; ++i)

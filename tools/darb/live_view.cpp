@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
@@ -109,6 +110,8 @@ void LiveView::finish(const std::filesystem::path& model) {
     State& s = *state_;
     if (!s.window) return;
     try {
+        if (std::getenv("DARB_VIEW_GAPS") != nullptr)
+            say("longest gap of the window: {:.0f} ms\n", s.window->longest_gap_s() * 1000);
         s.window->viewer().end_live();
         if (!model.empty()) s.window->viewer().open(model);
         while (!s.stop && s.window->pump(kPausedNap_s)) check_display();

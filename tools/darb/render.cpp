@@ -1,4 +1,5 @@
-// darb render SCENE.ply --cameras X -o DIR: a PNG of each camera.
+// darb render SCENE.ply --cameras X -o DIR: a PNG of each camera; without cameras a film of a path
+// or a turn.
 
 #include <fmt/format.h>
 
@@ -22,6 +23,7 @@
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/render_film.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/evaluation.h"
@@ -29,19 +31,6 @@
 namespace darb {
 
 namespace {
-
-struct RenderFlags {
-    std::filesystem::path scene, cameras, output;
-    std::string device;
-    bool white_background = false, quiet = false;
-    float near_plane = static_cast<float>(NEAR_DEFAULT);
-    std::string effects = "auto";
-    DepthFlags depth;
-    DatasetOptions data;
-    KernelFlags kernel;
-    AccuracyFlags accuracy;
-    TuneFlags tune;
-};
 
 // -r of a camera list, which states sizes rather than photos: divisor up to 8, width above.
 void scale_camera(Camera& camera, int resolution) {
@@ -59,6 +48,7 @@ int render(RenderFlags flags) {
     const Accuracy accuracy = chosen_accuracy(flags.accuracy);
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     check_depth(flags.depth, accuracy, choice);
+    if (flags.cameras.empty()) return render_film(flags, accuracy, choice);
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
     std::vector<View> views = open_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
@@ -109,13 +99,15 @@ int render(RenderFlags flags) {
 
 void add_render(CLI::App& app, Action& action) {
     auto flags = std::make_shared<RenderFlags>();
-    CLI::App* command = app.add_subcommand("render", "Render a scene to PNG files");
+    CLI::App* command = app.add_subcommand(
+        "render", "Render a scene to PNG files: of cameras, along a path, or once around it");
     command->add_option("scene", flags->scene, "splat file, or the output folder of darb train")
         ->required();
-    command
-        ->add_option("--cameras", flags->cameras,
-                     "a cameras.json, a transforms.json, or a data set; photos are not needed")
-        ->required();
+    CLI::Option* const cameras =
+        command->add_option("--cameras", flags->cameras,
+                            "a cameras.json, a transforms.json, or a data set; photos are not "
+                            "needed");
+    add_film_flags(*command, flags->film, cameras);
     command->add_option("-o,--output", flags->output, "folder of the frames, made where missing")
         ->required();
     command->add_option("-r,--resolution", flags->data.resolution,

@@ -18,7 +18,8 @@ struct ViewFlags {
     std::string device, up, beside, size = "1280x720", show = "picture", style = "splats";
     int camera = -1, fps = 30;
     float gui_scale = 0;  // of the panels; 0: the display's
-    bool white_background = false, compare = false, difference = false, no_panels = false, quiet = false;
+    bool white_background = false, compare = false, difference = false, no_panels = false,
+         quiet = false;
     std::vector<std::filesystem::path> kernel_files;
     AccuracyFlags accuracy;
     std::string effects = "auto";

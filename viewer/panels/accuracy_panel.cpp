@@ -31,6 +31,8 @@ void choices(Session& s, int row) {
     for (const std::string& name : row_choices(row, s.sh_degree)) {
         if (ImGui::RadioButton(name.c_str(), chosen(row, s.display) == choice))
             choose(row, choice, s.display);
+        tip("time on the device, ms, and PSNR to the exact picture, dB, stand beside it once "
+            "measured");
         const std::string text = measured_text(s, row, choice++);
         if (text.empty()) continue;
         ImGui::SameLine(130 * s.gui_scale);
@@ -41,7 +43,8 @@ void choices(Session& s, int row) {
 
 void measure_button(Session& s) {
     if (ImGui::Button("Measure here")) s.ask(request::Measure{});
-    ImGui::TextWrapped("Time on the device, error of the 8-bit picture against the exact one.");
+    tip("draws the picture with each choice: its time on the device, ms, and the error of the "
+        "8-bit picture against the exact one, dB");
 }
 
 }  // namespace
@@ -61,7 +64,10 @@ void effects_panel(Session& s) {
     if (!ImGui::CollapsingHeader("Effects")) return;
     ImGui::PushID("effects");
     measure_button(s);
-    if (s.plan && ImGui::Button("As planned")) s.ask(request::FollowPlan{});
+    if (s.plan) {
+        if (ImGui::Button("As planned")) s.ask(request::FollowPlan{});
+        tip("each effect on or off as darb plan says");
+    }
     for (int effect = 0; effect < EFFECT_COUNT; ++effect) {
         const int row = effect_row(effect);
         bool has_switch = false;

@@ -68,14 +68,17 @@ void buttons(Session& s) {
     bool changed = false;
     if (ImGui::Button("Delete inside"))
         changed = s.edit.remove(model, s.selection.region, true) > 0;
+    tip("splats whose centre is inside, key Delete");
     ImGui::SameLine();
     if (ImGui::Button("Crop to it")) changed = s.edit.remove(model, s.selection.region, false) > 0;
+    tip("deletes the splats whose centre is outside");
     ImGui::BeginDisabled(!s.edit.can_undo());
     if (ImGui::Button("Undo")) {
         s.edit.undo();
         changed = true;
     }
     ImGui::EndDisabled();
+    tip("Ctrl+Z");
     ImGui::SameLine();
     ImGui::BeginDisabled(!s.edit.can_redo());
     if (ImGui::Button("Redo")) {
@@ -83,6 +86,7 @@ void buttons(Session& s) {
         changed = true;
     }
     ImGui::EndDisabled();
+    tip("Ctrl+Y");
     ImGui::SameLine();
     ImGui::Text("%zu deleted", s.edit.removed_count());
     if (changed) s.ask(request::ShowEdits{});
@@ -91,7 +95,7 @@ void buttons(Session& s) {
 }  // namespace
 
 void draw_region(const Session& s, int width, int height) {
-    const Camera camera = camera_in_window(s.photos, s.navigation, width, height);
+    const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
     if (s.selection.region.shape == Region::Shape::box)
         draw_box(camera, s.selection.region);
     else
@@ -101,31 +105,40 @@ void draw_region(const Session& s, int width, int height) {
 void edit_panel(Session& s) {
     if (!s.scene || !ImGui::CollapsingHeader("Edit")) return;
     ImGui::Checkbox("show the selection", &s.selection.shown);
+    tip("its outline over the picture");
     int shape = s.selection.region.shape == Region::Shape::sphere ? 1 : 0;
     if (ImGui::Combo("shape", &shape, "box\0sphere\0"))
         s.selection.region.shape = shape == 1 ? Region::Shape::sphere : Region::Shape::box;
+    tip("along the axes of the file, or round");
     const float speed = static_cast<float>(s.scene->bounds.radius / 200);
     bool moved = edit_vector("centre", s.selection.region.centre, speed, 3);
+    tip("x, y, z in units of the scene; drag, or Ctrl+click to type");
     moved |= edit_vector(shape == 1 ? "radius" : "half size", s.selection.region.half_size, speed,
                          shape == 1 ? 1 : 3);
+    tip("in units of the scene; drag, or Ctrl+click to type");
     s.selection.region.half_size = glm::max(s.selection.region.half_size, glm::dvec3(1e-6));
     if (ImGui::Button("Centre on the pivot")) {
         s.selection.region.centre = s.navigation.pivot();
         moved = true;
     }
+    tip("what the camera turns around");
     if (moved) s.selection.shown = true;
     if (ImGui::Button("Count")) {
         const size_t inside = count_inside(s.scene->model, s.selection.region, s.edit);
         s.note = std::to_string(inside) + " splats are inside";
     }
+    tip("how many splats have their centre inside");
     ImGui::SameLine();
     buttons(s);
     path_field("file", s.save_file);
+    tip("its ending says in which format");
     ImGui::SameLine();
     if (ImGui::Button("Save")) s.ask(request::Save{});
+    tip("the scene as it is edited, Ctrl+S");
     if (ImGui::Button("Save as web page")) s.ask(request::SavePage{});
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("an .html beside the file, for any browser");
-    ImGui::Checkbox("save upright: up becomes -y", &s.save_upright);
+    tip("an .html beside the file, for any browser");
+    ImGui::Checkbox("save upright", &s.save_upright);
+    tip("turns what is saved so that up is -y, as most programs want it");
 }
 
 }  // namespace darb

@@ -3,14 +3,18 @@
 
 #include <imgui.h>
 
+#include <cmath>
 #include <cstring>
+
+#include "viewer/theme.h"
 
 namespace darb {
 
 namespace {
 
-constexpr float kWidth = 330;  // px at scale 1
-constexpr float kMargin = 8;   // px
+constexpr float kWidth = 340;       // px at scale 1
+constexpr float kMargin = 8;        // px
+constexpr double kLeastFree = 0.4;  // of the width: less room beside the panel is not used alone
 
 void progress_window(Session& s, float width, float height) {
     const WorkProgress& p = s.progress;
@@ -30,14 +34,17 @@ void progress_window(Session& s, float width, float height) {
     ImGui::SameLine();
     if (ImGui::Button("Cancel"))
         s.ask(loads ? Request(request::CancelLoad{}) : Request(request::CancelWork{}));
+    tip("key Esc");
     ImGui::End();
 }
 
 void error_window(Session& s, float width, float height) {
     if (s.error.empty()) return;
     ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
-    ImGui::PushStyleColor(ImGuiCol_TitleBgActive, ImVec4(0.6f, 0.1f, 0.1f, 1));
-    ImGui::PushStyleColor(ImGuiCol_TitleBg, ImVec4(0.6f, 0.1f, 0.1f, 1));
+    const auto& [r, g, b, alpha] = theme::kError;
+    const ImVec4 error_ground(r, g, b, alpha);
+    ImGui::PushStyleColor(ImGuiCol_TitleBgActive, error_ground);
+    ImGui::PushStyleColor(ImGuiCol_TitleBg, error_ground);
     ImGui::Begin("That did not work", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
     ImGui::PopStyleColor(2);
@@ -46,6 +53,7 @@ void error_window(Session& s, float width, float height) {
     if (s.scene) ImGui::TextDisabled("The scene before is still there.");
     ImGui::PopTextWrapPos();
     if (ImGui::Button("Close")) s.error.clear();
+    tip("key Esc");
     ImGui::End();
 }
 
@@ -56,33 +64,17 @@ void leaving_window(Session& s, float width, float height) {
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
     ImGui::Text("%zu splats are deleted and not saved.", s.edit.removed_count());
     path_field("file", s.save_file);
+    tip("its ending says in which format");
     const bool quit = s.leaving->quit;
     if (ImGui::Button(quit ? "Save and quit" : "Save and open")) s.ask(request::SaveAndLeave{});
+    tip("to the file above");
     ImGui::SameLine();
     if (ImGui::Button(quit ? "Quit" : "Open")) s.ask(request::Leave{});
+    tip("what was edited is lost");
     ImGui::SameLine();
-    if (ImGui::Button("Stay (Esc)")) s.ask(request::Stay{});
+    if (ImGui::Button("Stay")) s.ask(request::Stay{});
+    tip("key Esc");
     ImGui::End();
-}
-
-void help(const Session& s) {
-    if (!ImGui::CollapsingHeader("Keys and mouse")) return;
-    ImGui::TextUnformatted(
-        "left drag          orbit\n"
-        "right drag         look around\n"
-        "middle, Shift+left pan\n"
-        "wheel              zoom (flying: speed)\n"
-        "double click       orbit around this\n"
-        "W A S D Q E        fly\n"
-        "F  L               frame all, level\n"
-        "[  ]               camera of the data set\n"
-        "K  space           add key frame, play\n"
-        "space  .           training: pause, step\n"
-        "Delete             delete the selection\n"
-        "Ctrl+Z Y S Q       undo, redo, save, quit\n"
-        "P  H  F11          picture, panels, full screen\n"
-        "Esc                stop, cancel, leave full screen");
-    ImGui::TextDisabled("Drop a file to open it. %s", s.device_name.c_str());
 }
 
 void empty_hint(const Session& s, float width, float height) {
@@ -90,7 +82,7 @@ void empty_hint(const Session& s, float width, float height) {
     const char* text = "Drop a splat file here";
     const ImVec2 size = ImGui::CalcTextSize(text);
     ImGui::GetBackgroundDrawList()->AddText(ImVec2((width - size.x) / 2, (height - size.y) / 2),
-                                            IM_COL32(200, 200, 200, 255), text);
+                                            IM_COL32(220, 222, 226, 255), text);
 }
 
 void side_panel(Session& s, float height) {
@@ -108,7 +100,8 @@ void side_panel(Session& s, float height) {
     effects_panel(s);
     edit_panel(s);
     path_panel(s);
-    help(s);
+    if (ImGui::Button("Keys and mouse (?)")) s.help = !s.help;
+    tip("all keys, key ?");
     if (!s.note.empty()) {
         ImGui::Separator();
         ImGui::TextWrapped("%s", s.note.c_str());
@@ -127,6 +120,15 @@ void path_field(const char* label, std::filesystem::path& path) {
     if (ImGui::InputText(label, text, sizeof text)) path = text;
 }
 
+void tip(const char* text) {
+    if (!ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
+    ImGui::BeginTooltip();
+    ImGui::PushTextWrapPos(ImGui::GetFontSize() * 22);
+    ImGui::TextUnformatted(text);
+    ImGui::PopTextWrapPos();
+    ImGui::EndTooltip();
+}
+
 void draw_panels(Session& s) {
     const auto [width, height] = ImGui::GetIO().DisplaySize;
     empty_hint(s, width, height);
@@ -136,12 +138,18 @@ void draw_panels(Session& s) {
         side_panel(s, height);
     }
     progress_window(s, width, height);
+    help_window(s);
     leaving_window(s, width, height);
     error_window(s, width, height);
 }
 
 float panel_width(const Session& s) {
     return s.panels ? kWidth * s.gui_scale + 2 * kMargin : 0;
+}
+
+WindowArea free_area(const Session& s, int width, int height) {
+    const int left = static_cast<int>(std::lround(panel_width(s)));
+    return {width, height, width - left >= kLeastFree * width ? left : 0};
 }
 
 }  // namespace darb

@@ -21,6 +21,11 @@ void effects_panel(Session& session);
 void edit_panel(Session& session);
 void path_panel(Session& session);
 void training_panel(Session& session);
+/// All keys, where they are asked for.
+void help_window(Session& session);
+
+/// What the control before does, shown where the pointer rests on it.
+void tip(const char* text);
 
 /// Lines between panes, which can be dragged, and what each pane is; in ImGui's coordinates.
 void draw_panes(Session& session);

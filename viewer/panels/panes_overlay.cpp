@@ -12,8 +12,8 @@ namespace darb {
 
 namespace {
 
-constexpr float kGrip = 12;      // px at scale 1, where a line can be taken
-constexpr float kLabelGap = 8;   // px
+constexpr float kGrip = 12;     // px at scale 1, where a line can be taken
+constexpr float kLabelGap = 8;  // px
 constexpr ImU32 kLine = IM_COL32(255, 255, 255, 230), kEdge = IM_COL32(0, 0, 0, 160);
 constexpr ImU32 kLabelBack = IM_COL32(16, 18, 22, 215), kLabel = IM_COL32(240, 240, 240, 255);
 
@@ -64,21 +64,22 @@ void draw_line(const Session& s, float share, const ImVec2& size) {
     list.AddCircleFilled(ImVec2(x, y), 11 * unit, kEdge);
     list.AddCircleFilled(ImVec2(x, y), 9 * unit, kLine);
     for (const float side : {-1.0f, 1.0f})
-        list.AddTriangleFilled(ImVec2(x + side * 6 * unit, y),
-                               ImVec2(x + side * 2 * unit, y - 4 * unit),
-                               ImVec2(x + side * 2 * unit, y + 4 * unit), IM_COL32(40, 40, 40, 255));
+        list.AddTriangleFilled(
+            ImVec2(x + side * 6 * unit, y), ImVec2(x + side * 2 * unit, y - 4 * unit),
+            ImVec2(x + side * 2 * unit, y + 4 * unit), IM_COL32(40, 40, 40, 255));
 }
 
 // At the top of its strip, right of the panel; none where the strip is hidden or too narrow.
-void draw_label(const Session& s, const std::string& text, float left, float right) {
+bool draw_label(const Session& s, const std::string& text, float left, float right) {
     const float gap = kLabelGap * s.gui_scale;
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
     const float x = std::max(left, panel_width(s)) + gap;
-    if (x + size.x + gap > right) return;
+    if (x + size.x + gap > right) return false;
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
     list.AddRectFilled(ImVec2(x - gap / 2, gap), ImVec2(x + size.x + gap / 2, 2 * gap + size.y),
                        kLabelBack, 4 * s.gui_scale);
     list.AddText(ImVec2(x, 1.5f * gap), kLabel, text.c_str());
+    return true;
 }
 
 }  // namespace
@@ -93,7 +94,8 @@ void draw_panes(Session& s) {
     for (size_t i = 0; i < names.size(); ++i) {
         const float left = i == 0 ? 0 : s.panes.lines[i - 1] * size.x;
         const float right = i + 1 == names.size() ? size.x : s.panes.lines[i] * size.x;
-        draw_label(s, pane_label(s, names, i), left, right);
+        if (!draw_label(s, pane_label(s, names, i), left, right))
+            draw_label(s, names[i], left, right);
     }
 }
 
@@ -118,11 +120,15 @@ void panes_panel(Session& s) {
         }
         ImGui::EndCombo();
     }
+    tip("up to three more kernels, each in a strip of the picture; drag the lines between them");
     if (s.panes.lines.empty()) return;
     ImGui::Checkbox("error to the leftmost", &s.panes.difference);
-    if (s.panes.difference)
-        ImGui::SliderFloat("error hottest at", &s.panes.difference_max, 0.005f, 1.0f, "%.3f of white",
-                           kLogarithmic);
+    tip("all strips but the leftmost show their difference to it, as heat");
+    if (s.panes.difference) {
+        ImGui::SliderFloat("error hottest at", &s.panes.difference_max, 0.005f, 1.0f,
+                           "%.3f of white", kLogarithmic);
+        tip("mean absolute difference of the three channels");
+    }
     const std::vector<std::string> names = pane_names(s);
     for (size_t i = 0; i < s.panes.psnr_db.size() && i + 1 < names.size(); ++i)
         ImGui::TextUnformatted(pane_label(s, names, i + 1).c_str());

@@ -8,7 +8,7 @@
 namespace darb {
 
 void performance_panel(Session& s) {
-    if (!ImGui::CollapsingHeader("Performance", ImGuiTreeNodeFlags_DefaultOpen)) return;
+    if (!ImGui::CollapsingHeader("Performance")) return;
     const FrameTimes& t = s.times;
     if (!t.moving_ms.empty()) {
         const double mean = std::accumulate(t.moving_ms.begin(), t.moving_ms.end(), 0.0) /

@@ -20,11 +20,14 @@ void kernel_choice(Session& s) {
         }
         ImGui::EndCombo();
     }
+    tip("the profile that all splats are drawn with");
     int footprint = d.footprint == Footprint::exact ? 1 : 0;
     ImGui::BeginDisabled(!has_exact_footprint(d.kernel));
     if (ImGui::Combo("footprint", &footprint, "psi\0exact\0"))
         d.footprint = footprint == 1 ? Footprint::exact : Footprint::psi;
     ImGui::EndDisabled();
+    tip("how a splat is projected: psi, a fitted Gaussian-like curve, or the exact line integral "
+        "where the kernel has one");
     if (!s.scene) return;
     const SplatModel& m = s.scene->model;
     if (m.kernel == d.kernel && m.footprint == d.footprint) return;
@@ -35,6 +38,7 @@ void kernel_choice(Session& s) {
         d.kernel = m.kernel;
         d.footprint = m.footprint;
     }
+    tip("kernel and footprint of the file");
 }
 
 }  // namespace
@@ -60,19 +64,26 @@ void display_panel(Session& s) {
         }
         ImGui::EndCombo();
     }
-    if (d.mode == VIEW_ERROR)
-        ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f", kLogarithmic);
-    if (d.mode == VIEW_COUNT)
-        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f intersections",
-                           kLogarithmic);
+    tip("the picture; its error to the photo, as heat; depth, near is light; or how many splats "
+        "each pixel takes");
+    if (d.mode == VIEW_ERROR) {
+        ImGui::SliderFloat("hottest at", &d.error_max, 0.02f, 1.0f, "%.2f of white", kLogarithmic);
+        tip("mean absolute difference of the three channels");
+    }
+    if (d.mode == VIEW_COUNT) {
+        ImGui::SliderFloat("hottest at", &d.count_max, 10, 10'000, "%.0f splats", kLogarithmic);
+        tip("of a pixel's list, until it is opaque");
+    }
     if (s.scene) {
         int style = static_cast<int>(d.style);
         if (ImGui::Combo("splats as", &style, "splats\0points\0ellipsoids\0"))
             d.style = static_cast<SplatStyle>(style);
+        tip("as they are; dots at their centres; or hard ellipses of two standard deviations");
     }
     kernel_choice(s);
     panes_panel(s);
     ImGui::ColorEdit3("background", &d.background.x);
+    tip("sRGB, what is seen where no splat is");
 }
 
 }  // namespace darb

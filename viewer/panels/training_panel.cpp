@@ -25,11 +25,13 @@ void training_panel(Session& s) {
     ImGui::Text("iteration %d of %d", t.iteration, t.last_iteration);
     ImGui::BeginDisabled(t.finished);
     if (ImGui::Button(t.paused ? "Go on" : "Pause")) t.paused = !t.paused;
+    tip("the training, key space");
     ImGui::SameLine();
     if (ImGui::Button("Step")) {
         t.paused = true;
         ++t.steps_to_go;
     }
+    tip("one iteration, then a pause, key .");
     ImGui::EndDisabled();
     ImGui::SameLine();
     ImGui::TextDisabled(t.finished ? "finished" : "closing goes on training");

@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "viewer/turntable.h"
 
 namespace darb {
 namespace {
@@ -138,6 +139,41 @@ TEST_F(CameraPathFile, Broken_files_are_errors_that_name_the_file) {
         } catch (const Error& e) {
             EXPECT_NE(std::string(e.what()).find(file_.string()), std::string::npos) << e.what();
         }
+    }
+}
+
+// A bar of splats along x: it is seen whole from every side, from above, and the turn closes.
+TEST(Turntable, The_whole_scene_is_seen_from_every_side) {
+    SplatModel m;
+    m.resize(500);
+    for (size_t i = 0; i < m.size(); ++i) {
+        m.position[3 * i] = 0.01f * static_cast<float>(i);
+        m.rotation[4 * i] = 1;
+        m.opacity_logit[i] = 4;
+    }
+    for (const glm::dvec3& up : {glm::dvec3(0, -1, 0), glm::dvec3(0, 0, 1)}) {
+        TurntableOptions options;
+        options.seconds = 2;
+        options.fps = 12;
+        options.up = up;
+        const CameraPath path = turntable(m, options);
+        ASSERT_EQ(path.keys.size(), 24U);
+        EXPECT_NEAR(path.duration(), 23.0 / 12, 1e-9);
+        for (const KeyFrame& key : path.keys) {
+            Navigation at;
+            apply(key, at);
+            EXPECT_GT(glm::dot(key.eye - glm::dvec3(2.5, 0, 0), up), 0.1);
+            EXPECT_NEAR(glm::dot(at.right(), up), 0, 1e-9);
+            const Camera c = at.camera(options.width, options.height);
+            for (const double x : {0.05, 4.94}) {
+                const glm::dvec3 p = c.rotation * glm::dvec3(x, 0, 0) + c.translation;
+                ASSERT_GT(p.z, 0);
+                EXPECT_LT(std::abs(c.fx * p.x / p.z), options.width / 2.0);
+                EXPECT_LT(std::abs(c.fy * p.y / p.z), options.height / 2.0);
+            }
+        }
+        const double step = glm::distance(path.keys[0].eye, path.keys[1].eye);
+        EXPECT_NEAR(glm::distance(path.keys[23].eye, path.keys[0].eye), step, 1e-6);
     }
 }
 

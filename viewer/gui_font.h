@@ -1,0 +1,11 @@
+// The letters of the panels: Roboto, as the build found it in Debian's fonts-roboto-unhinted.
+#pragma once
+
+#include <span>
+
+namespace darb {
+
+/// A TrueType file; empty where the package was missing: Dear ImGui has letters of its own.
+std::span<const unsigned char> gui_font();
+
+}  // namespace darb
