@@ -79,21 +79,25 @@ void fit_lens_if_possible(View& view, Tally& tally) {
     view = std::move(fitted);
 }
 
+/// The intrinsics of a picture of another size of what `full` sees.
+void set_size(const Camera& full, const PhotoSize& size, Camera& camera) {
+    const double sx = static_cast<double>(size.width) / full.width;
+    const double sy = static_cast<double>(size.height) / full.height;
+    camera.fx = full.fx * sx;
+    camera.fy = full.fy * sy;
+    camera.cx = full.cx * sx;
+    camera.cy = full.cy * sy;
+    camera.width = size.width;
+    camera.height = size.height;
+}
+
 void set_intrinsics(View& view, const UndistortedFrame& frame, int resolution, Tally& tally) {
     const Camera& full = frame.camera;
     const PhotoSize size = size_at_resolution(full.width, full.height, resolution);
     if (size.width != full.width || size.height != full.height) ++tally.downscaled;
     if (resolution > std::max(full.width, 8)) ++tally.narrower;
-    const double sx = static_cast<double>(size.width) / full.width;
-    const double sy = static_cast<double>(size.height) / full.height;
-    Camera& camera = view.camera;
-    camera.width = size.width;
-    camera.height = size.height;
-    camera.fx = full.fx * sx;
-    camera.fy = full.fy * sy;
-    camera.cx = full.cx * sx;
-    camera.cy = full.cy * sy;
-    camera.lens = full.lens;
+    set_size(full, size, view.camera);
+    view.camera.lens = full.lens;
 }
 
 /// The photo as it is, with its lens before the pinhole.
@@ -158,6 +162,29 @@ PhotoSize size_at_resolution(int width, int height, int resolution) {
     if (resolution > 8) return resolution < width ? at_width(resolution) : PhotoSize{width, height};
     throw Error("resolution", fmt::format("{} is no valid value", resolution),
                 "Use 1, 2, 4 or 8 (a divisor), a width in pixels above 8, or -1.");
+}
+
+std::vector<View> scaled_views(std::vector<View> views, double scale) {
+    for (View& view : views) {
+        const Camera now = view.camera;
+        const Camera full = now.lens.active || !view.lens.distorted()
+                                ? pinhole_camera(view.lens)
+                                : undistorted_frame(view.lens, view.name).camera;
+        const double width = scale * now.width;
+        if (width >= full.width + 0.5 + 0.5 * scale)  // half a pixel of what it is now
+            throw Error(view.name,
+                        fmt::format("is {} px wide, and {} times {} px is {:.0f} px", full.width,
+                                    scale, now.width, width),
+                        "Leave that scale out, or name a smaller -r.");
+        PhotoSize size{full.width, full.height};
+        if (width < full.width - 0.5 - 0.5 * scale) {
+            size.width = std::max(1, static_cast<int>(std::lround(width)));
+            size.height = std::max(
+                1, static_cast<int>(std::lround(double(full.height) * size.width / full.width)));
+        }
+        if (scale != 1) set_size(now, size, view.camera);
+    }
+    return views;
 }
 
 void fit_views(Dataset& dataset, const DatasetOptions& options) {

@@ -363,7 +363,30 @@ TEST_F(TrainedCommand, eval_reports_what_training_reported) {
     EXPECT_NEAR(eval["mean"]["ssim"].get<double>(), trained["ssim"].get<double>(), 1e-6);
     ASSERT_EQ(eval["views"].size(), 8U);
     EXPECT_EQ(eval["views"][0]["name"], "view_03.png");
+    ASSERT_EQ(eval.at("off_path").at("views").size(), 16U);
+    EXPECT_EQ(eval["off_path"]["views"][0]["name"], "images/between_0.png");
+    EXPECT_GT(eval["off_path"]["mean"]["psnr_db"].get<double>(), 5.0);
     EXPECT_GT(eval["views"][0]["psnr_db"].get<double>(), 5.0);
+}
+
+TEST_F(TrainedCommand, eval_measures_at_other_sizes) {
+    const std::string command = fmt::format("eval {} {} -w ", ply(), kScene);
+    const std::string file = scratch() / "scales.json", whole = scratch() / "whole.json";
+    const Outcome o = darb(command + "-r 4 --scales 4,0.5,1 --json " + file);
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("1/2       25 x 19"), std::string::npos) << o.out;
+    const json rows = json::parse(read_text_file(file)).at("scales");
+    ASSERT_EQ(rows.size(), 3U);
+    // Four times a quarter is the whole photo, and half of it what -r 8 loads.
+    ASSERT_EQ(darb(command + "-r 1 --json " + whole).code, 0);
+    const json first = json::parse(read_text_file(whole));
+    EXPECT_EQ(rows[0].at("scale"), 4);
+    EXPECT_EQ(rows[0].at("width"), 200);
+    EXPECT_EQ(rows[0].at("mean"), first.at("mean"));
+    EXPECT_EQ(rows[0].at("views"), first.at("views"));
+    ASSERT_EQ(darb(command + "-r 8 --json " + whole).code, 0);
+    EXPECT_EQ(rows[1].at("mean"), json::parse(read_text_file(whole)).at("mean"));
+    expect_refused({{command + "-r 2 --scales 4", "4 times 100 px is 400 px"}});
 }
 
 TEST_F(TrainedCommand, eval_takes_the_split_asked_for) {

@@ -17,8 +17,9 @@ const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
 TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
     const fs::path out = scratch() / "compare";
     const std::string command =
-        "compare " + kScene + " --kernels gaussian,sinc --iterations 10,20 -r 4 -o " +
-        out.string() + " --effects=none --lpips " + (out / "missing.safetensors").string();
+        "compare " + kScene +
+        " --kernels gaussian,sinc --iterations 10,20 -r 4 --scales 0.5,1,2 -o " + out.string() +
+        " --effects=none --lpips " + (out / "missing.safetensors").string();
     const Outcome first = darb(command);
     ASSERT_EQ(first.code, 0) << first.err;
     EXPECT_NE(first.out.find("missing.safetensors does not exist"), std::string::npos) << first.out;
@@ -35,6 +36,10 @@ TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
         EXPECT_GT(row["psnr_db"]["median"].get<double>(), 5);
         EXPECT_GT(row["model_mb"]["median"].get<double>(), 0.1);
         EXPECT_TRUE(row["lpips"].is_null());
+        EXPECT_NEAR(row["psnr_db_at_1"]["median"].get<double>(),
+                    row["psnr_db"]["median"].get<double>(), 1e-6);
+        EXPECT_GT(row["off_path_psnr_db"]["median"].get<double>(), 5);
+        EXPECT_NE(row["psnr_db_at_2"]["median"], row["psnr_db_at_1/2"]["median"]);
     }
     for (const auto& run : a["datasets"][0]["runs"]) {
         EXPECT_EQ(run["failure"], "");
@@ -44,6 +49,7 @@ TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
     }
     const std::string page = read_text_file(out / "compare.html");
     EXPECT_NE(page.find("Where the errors differ most"), std::string::npos);
+    EXPECT_NE(page.find("<th>at 1/2 (dB)</th>"), std::string::npos);
     EXPECT_EQ(page.find("http"), page.find("http://www.w3.org"));  // nothing from outside
 
     const fs::path metrics = out / "scene/sinc/seed0/metrics.json";

@@ -59,11 +59,9 @@ std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
     note = "LPIPS was left out: no weights were given (--lpips FILE).";
     for (const auto& file : flags.lpips)
         if (!std::filesystem::exists(file)) {
-            const auto left_out = [](const std::filesystem::path& name) {
-                return "LPIPS was left out: " + name.string() + " does not exist.";
-            };
-            note = left_out(file.filename());
-            say("warning: {}\n", left_out(file));
+            constexpr const char* left_out = "LPIPS was left out: {} does not exist.";
+            note = fmt::format(left_out, file.filename().string());
+            say("warning: {}\n", fmt::format(left_out, file.string()));
             return std::nullopt;
         }
     if (flags.lpips.empty()) return std::nullopt;
@@ -102,6 +100,7 @@ int compare(CompareFlags flags) {
         train_flags_of(flags, dataset, kernels.front(), 0);
     for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
     comparison.iterations = flags.iterations;
+    comparison.scales = flags.scales;
     comparison.seeds = flags.seeds;
     comparison.settings = settings_of(flags);
     DeviceOptions options = command_device(flags.device);

@@ -9,6 +9,7 @@
 #include "engine/kernels/kernel_family.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/scene_evaluation.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -56,6 +57,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
     command.add_option("--max-splats", flags.max_splats, "growth stops there: equal count")
         ->check(CLI::PositiveNumber);
     forward(command, flags, "-r,--resolution", "--resolution", "as in darb train");
+    add_scales_flag(command, flags.scales);
     forward(command, flags, "-i,--images", "--images", "as in darb train");
     forward(command, flags, "--effects", "--effects", "as in darb train");
     forward(command, flags, "--footprint", "--footprint", "psi or exact");

@@ -20,6 +20,7 @@ struct CompareFlags {
     std::vector<std::filesystem::path> kernel_files;
     std::vector<int> iterations{7'000, 30'000};
     std::vector<int> pulses{1};
+    std::vector<double> scales;  // sizes to measure at, beside that of training
     int seeds = 1;
     std::uint32_t max_splats = 0;        // 0: as many as the threshold makes
     std::vector<std::string> forwarded;  // options of `darb train`, as words

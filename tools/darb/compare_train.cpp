@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <optional>
-#include <set>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
@@ -11,6 +10,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/run_measurer.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_run.h"
 #include "tools/darb/tune_flags.h"
@@ -26,7 +26,7 @@ namespace {
 class Comparer {
   public:
     Comparer(const CompareFlags& flags, const std::string& name, int kernel, const Lpips* lpips)
-        : flags_(flags), name_(name), lpips_(lpips) {
+        : flags_(flags), name_(name) {
         TrainFlags first = train_flags_of(flags, name, kernel, 0);
         std::optional<RunLock> lock;  // while COLMAP writes
         dataset_ = load_training_data(first, lock);
@@ -35,28 +35,22 @@ class Comparer {
             throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
         plan_sees_photos_ = !dataset_.points.seen_begin.empty() || dataset_.has_alpha;
         photos_ = load_photos(dataset_.views);
+        measurer_.emplace(flags, dataset_path(name), dataset_, first, lpips);
     }
 
     const std::vector<View>& views() const { return dataset_.views; }
     ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
 
   private:
-    std::vector<Camera> held_out() const {  // as the effects of the last run have them
-        std::vector<Camera> cameras;
-        for (const View& v : dataset_.views)
-            if (v.is_test) cameras.push_back(v.camera);
-        return cameras;
-    }
+    std::vector<View> held_out() const { return test_views(dataset_); }
     void train(TrainFlags& f, const std::atomic<bool>& stop);
-    void measure(ComparedRun& run);
 
     const CompareFlags& flags_;
     std::string name_;
     Dataset dataset_;
     bool plan_sees_photos_ = false;
     std::vector<ImageU8> photos_;
-    ViewLpips lpips_;
-    std::set<std::string> blended_;  // kernels
+    std::optional<RunMeasurer> measurer_;
 };
 
 void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
@@ -80,20 +74,6 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     run_training(device, dataset_, f.train, f.run, &stop);
 }
 
-/// LPIPS, and blending of the first run of a kernel that came to its end. What fails here leaves
-/// the run as it is.
-void Comparer::measure(ComparedRun& run) {
-    attempt(run, "LPIPS", [&] { lpips_.measure(run); });
-    if (flags_.blending_views == 0 || blended_.contains(run.kernel)) return;
-    attempt(run, "blending", [&] {
-        DeviceOptions options = command_device(flags_.device);
-        Device device(options);
-        settle_tuning(device);
-        measure_blending_of(run, device, held_out(), flags_.blending_views);
-        blended_.insert(run.kernel);
-    });
-}
-
 ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
     TrainFlags f = train_flags_of(flags_, name_, kernel, seed);
     ComparedRun run;
@@ -110,7 +90,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
         say("failed: {}\n", e.what());  // -q hides progress alone
     }
     if (run.failure.empty())
-        measure(run);
+        measurer_->measure(run, held_out());  // as the effects of the run have them
     else
         read_unfinished_run(run, flags_.iterations, settings_text(f.train),
                             format_camera_list(dataset_.views));

@@ -2,16 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "engine/core/text.h"
 #include "engine/data/dataset.h"
-#include "engine/raster/frame_limit.h"
-#include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
@@ -19,10 +15,9 @@
 #include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/scene_evaluation.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
-#include "trainer/evaluation.h"
-#include "trainer/exposure_fit.h"
 
 namespace darb {
 
@@ -33,6 +28,7 @@ struct EvalFlags {
     std::string split = "test", device, effects = "auto";
     bool eval_exposure = false, quiet = false;
     bool white_background = false;
+    std::vector<double> scales;  // none: as the photos are
     DatasetOptions data;
     AccuracyFlags accuracy;
 };
@@ -49,60 +45,52 @@ std::vector<View> views_of(const Dataset& dataset, const EvalFlags& flags) {
     return views;
 }
 
-nlohmann::json to_json(const Evaluation& evaluation) {
-    nlohmann::json views = nlohmann::json::array();
-    for (const ViewMetrics& v : evaluation.views)
-        views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
-    return {{"mean", {{"psnr_db", evaluation.psnr_db}, {"ssim", evaluation.ssim}}},
-            {"views", views}};
-}
-
-void print_table(std::FILE* out, const Evaluation& evaluation) {
-    const std::string mean = fmt::format("mean of {}", evaluation.views.size());
-    size_t width = mean.size();
-    for (const ViewMetrics& v : evaluation.views) width = std::max(width, printable(v.name).size());
-    const auto row = [&](const std::string& name, double psnr_db, double ssim) {
-        tell(out, "{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
-    };
-    tell(out, "{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
-    for (const ViewMetrics& v : evaluation.views) row(printable(v.name), v.psnr_db, v.ssim);
-    row(mean, evaluation.psnr_db, evaluation.ssim);
-}
-
 int eval(EvalFlags flags) {
     refuse_to_overwrite_inputs({flags.json},
                                together({files_of(flags.scene), files_of(flags.dataset)}));
-    const Accuracy accuracy = chosen_accuracy(flags.accuracy);
+    SceneEvaluation options;
+    options.accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
-    const EffectChoice choice = choose_effects(flags.effects, EffectUse::measuring, flags.data);
-    SplatModel model = load_scene(flags.scene);
+    options.effects = choose_effects(flags.effects, EffectUse::measuring, flags.data);
+    options.background = glm::vec3(flags.white_background ? 1.0f : 0.0f);
+    options.fit_exposure = flags.eval_exposure;
+    const SplatModel model = load_scene(flags.scene);
     const Dataset dataset = load_dataset(flags.dataset, flags.data);
+    options.alpha_is_mask = dataset.alpha_is_mask;
     print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
-    std::vector<View> views = views_of(dataset, flags);
+    const std::vector<View> views = views_of(dataset, flags);
+    const std::vector<View> away =
+        flags.split == "train" ? std::vector<View>{} : off_path_views(flags.dataset, flags.data);
+    refuse_to_overwrite_inputs({flags.json}, files_of(away));
+    std::vector<std::vector<View>> sizes;  // before the first picture: a photo may be too small
+    for (const double scale : flags.scales) sizes.push_back(scaled_views(views, scale));
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device);
-    const EffectPlan plan = plan_rendering(model, views, {}, choice);
-    apply_plan(plan, model);
-    apply_plan(plan, views);
-    for (const View& view : views)
-        check_frame(device, view.camera.width, view.camera.height, view.name);
-    Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
-    const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
-    Evaluation evaluation;
-    for (const View& view : views) {
-        const ImageU8 photo = load_photo(view);
-        ImageF image = renderer.render(view.camera, background);
-        if (flags.eval_exposure)
-            image = apply_exposure(fit_exposure(image, photo, background, dataset.alpha_is_mask),
-                                   image);
-        evaluation.views.push_back(
-            compare_view(view.name, image, photo, background, dataset.alpha_is_mask));
+    std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
+    nlohmann::json json;
+    if (flags.scales.empty()) {
+        const Evaluation evaluation = evaluate_scene(device, model, views, options);
+        json = evaluation_json(evaluation);
+        print_evaluation(out, evaluation);
+    } else {
+        std::vector<AtScale> scales;
+        for (size_t i = 0; i < sizes.size(); ++i) {
+            const Camera& camera = sizes[i].front().camera;
+            scales.push_back({flags.scales[i], camera.width, camera.height,
+                              evaluate_scene(device, model, sizes[i], options)});
+        }
+        json = evaluation_json(scales);
+        print_evaluation(out, scales);
     }
-    take_means(evaluation);
-    write_json(flags.json, to_json(evaluation));
-    print_table(stream_beside_json(flags.json, flags.quiet), evaluation);
+    if (!away.empty()) {
+        const Evaluation evaluation = evaluate_scene(device, model, away, options);
+        json["off_path"] = evaluation_json(evaluation);
+        tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", away.size(), evaluation.psnr_db,
+             evaluation.ssim);
+    }
+    write_json(flags.json, json);
     tell_paths(flags.quiet, {flags.json});
     return 0;
 }
@@ -128,6 +116,7 @@ void add_eval(CLI::App& app, Action& action) {
         ->capture_default_str();
     command->add_option("-r,--resolution", flags->data.resolution,
                         "as in training: 1, 2, 4, 8 or a width in px");
+    add_scales_flag(*command, flags->scales);
     command->add_flag("-w,--white-background", flags->white_background,
                       "white behind alpha, not black");
     add_accuracy_flags(*command, flags->accuracy);

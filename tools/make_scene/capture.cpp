@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 namespace darb::make_scene {
 
@@ -87,37 +89,97 @@ PointCloud sample_points(const World& world, const std::vector<View>& views,
 
 }  // namespace
 
+namespace {
+
+/// A view of the middle of the scene; angles in radians.
+View view_from(std::string name, double azimuth, double elevation, double radius, int scale) {
+    const dvec3 eye(radius * std::cos(azimuth) * std::cos(elevation),
+                    radius * std::sin(azimuth) * std::cos(elevation),
+                    0.2 + radius * std::sin(elevation));
+    View view;
+    view.name = std::move(name);
+    view.camera = look_at(eye, {0, 0, 0.24}, scale);
+    return view;
+}
+
+constexpr int kTurns = 3;
+
+// The path, kTurns turns at changing heights, by the share of it that is behind: 0 to 1.
+double path_azimuth(double share) {
+    return kTau * kTurns * share + 0.4;
+}
+double path_elevation(double share) {
+    return glm::radians(31 + 17 * std::sin(kTau * 5 * share + 0.9));
+}
+double path_radius(double share) {
+    return 3.1 + 0.35 * std::sin(kTau * 7 * share);
+}
+
+/// Elevation between the two turns of the path that lie farthest apart at this azimuth.
+double between_turns(double share) {
+    std::array<double, kTurns> heights;
+    for (int t = 0; t < kTurns; ++t) heights[t] = path_elevation(share + double(t) / kTurns);
+    std::sort(heights.begin(), heights.end());
+    const bool lower = heights[1] - heights[0] > heights[2] - heights[1];
+    return lower ? (heights[0] + heights[1]) / 2 : (heights[1] + heights[2]) / 2;
+}
+
+}  // namespace
+
 std::vector<View> camera_path(int scale) {
     std::vector<View> views;
     for (int i = 0; i < kViews; ++i) {
         const double share = static_cast<double>(i) / kViews;
-        const double azimuth = kTau * 3 * share + 0.4;
-        const double height = glm::radians(31 + 17 * std::sin(kTau * 5 * share + 0.9));
-        const double radius = 3.1 + 0.35 * std::sin(kTau * 7 * share);
-        const dvec3 eye(radius * std::cos(azimuth) * std::cos(height),
-                        radius * std::sin(azimuth) * std::cos(height),
-                        0.2 + radius * std::sin(height));
-        View view;
-        view.name = fmt::format("view_{:02d}.png", i);
-        view.camera = look_at(eye, {0, 0, 0.24}, scale);
-        view.is_test = i % kTestEvery == kTestOffset;
-        views.push_back(view);
+        views.push_back(view_from(fmt::format("view_{:02d}.png", i), path_azimuth(share),
+                                  path_elevation(share), path_radius(share), scale));
+        views.back().is_test = i % kTestEvery == kTestOffset;
     }
     return views;
 }
 
-Capture capture_views(const World& world, const std::vector<View>& views) {
-    Capture capture;
-    capture.photos.resize(views.size());
+std::vector<View> off_path_views(int scale) {
+    constexpr double kGoldenAngle = 2.399963229728653;  // spreads them evenly around
+    const struct {
+        const char* name;
+        int count;
+        double elevation, radius;  // degrees; world units. The path has 14 to 48, 2.75 to 3.45
+    } rings[] = {{"closer", 4, 25, 1.7},
+                 {"higher", 3, 72, 3.1},
+                 {"lower", 3, 6, 3.1},
+                 {"outside", 3, 28, 4.8}};
+    std::vector<View> views;
+    for (const auto& ring : rings)
+        for (int i = 0; i < ring.count; ++i)
+            views.push_back(view_from(fmt::format("{}_{}.png", ring.name, i),
+                                      kGoldenAngle * static_cast<double>(views.size()),
+                                      glm::radians(ring.elevation), ring.radius, scale));
+    for (int i = 0; static_cast<int>(views.size()) < kOffPath; ++i) {
+        const double share = (5.0 * i + 2) / kViews;
+        views.push_back(view_from(fmt::format("between_{}.png", i), path_azimuth(share),
+                                  between_turns(share), 3.1, scale));
+    }
+    for (View& view : views) view.is_test = true;
+    return views;
+}
+
+std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& views,
+                                 std::uint64_t seed) {
+    std::vector<ImageU8> photos(views.size());
     std::atomic<std::size_t> next{0};
     const auto work = [&] {
         for (std::size_t i = next++; i < views.size(); i = next++)
-            capture.photos[i] = take_photo(world, views[i].camera, i);
+            photos[i] = take_photo(world, views[i].camera, seed + i);
     };
     std::vector<std::jthread> threads;
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
         threads.emplace_back(work);
     threads.clear();
+    return photos;
+}
+
+Capture capture_views(const World& world, const std::vector<View>& views) {
+    Capture capture;
+    capture.photos = take_photos(world, views, 0);
     capture.points = sample_points(world, views, capture.photos);
     return capture;
 }

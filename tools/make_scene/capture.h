@@ -11,6 +11,7 @@ namespace darb::make_scene {
 constexpr int kViews = 48;
 constexpr int kTestEvery = 6;  // of 6 views one is held out: 8 of 48
 constexpr int kTestOffset = 3;
+constexpr int kOffPath = 16;
 constexpr int kWidth = 200, kHeight = 150;  // px, of the shipped photos
 constexpr int kSamples = 64;                // per pixel of these; larger photos share them out
 constexpr int kPoints = 4000;
@@ -23,6 +24,14 @@ struct Capture {
 /// Three turns around the scene at changing heights; View::is_test marks the held-out ones. scale
 /// >= 1 multiplies the sides of the photos.
 std::vector<View> camera_path(int scale = 1);
+
+/// Views away from that path, all held out, whose pictures show what views along it hide:
+/// closer_N, higher_N, lower_N, outside_N and between_N (its turns), kOffPath in all.
+std::vector<View> off_path_views(int scale = 1);
+
+/// Their pictures (gamma 2.2, 8 bits). Uses all cores; the result does not depend on their number.
+std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& views,
+                                 std::uint64_t seed);
 
 /// Photos (gamma 2.2, 8 bits) and kPoints surface points, evenly spread over the pixels of the
 /// training views, with 1 mm of noise. Uses all cores; the result does not depend on their number.

@@ -67,4 +67,12 @@ void write_scene(const std::filesystem::path& folder, const std::vector<View>& v
     write_file_atomic(folder / "transforms_test.json", transforms_json(views, true));
 }
 
+void write_test_views(const std::filesystem::path& folder, const std::vector<View>& views,
+                      const std::vector<ImageU8>& photos) {
+    refuse_other_photos(folder / "images", views);
+    for (std::size_t i = 0; i < views.size(); ++i)
+        write_png(folder / "images" / views[i].name, photos[i]);
+    write_file_atomic(folder / "transforms_test.json", transforms_json(views, true));
+}
+
 }  // namespace darb::make_scene

@@ -12,4 +12,9 @@ namespace darb::make_scene {
 void write_scene(const std::filesystem::path& folder, const std::vector<View>& views,
                  const Capture& capture);
 
+/// FOLDER/images/NAME and transforms_test.json alone: a data set that is all held out. Throws
+/// Error.
+void write_test_views(const std::filesystem::path& folder, const std::vector<View>& views,
+                      const std::vector<ImageU8>& photos);
+
 }  // namespace darb::make_scene

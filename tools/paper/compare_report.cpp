@@ -25,6 +25,9 @@ Json at_json(const ComparedAt& at) {
                          {"psnr_db", v.psnr_db},
                          {"ssim", v.ssim},
                          {"lpips", optional_json(v.lpips)}});
+    Json scales = Json::array();
+    for (const ComparedScale& s : at.scales)
+        scales.push_back({{"scale", s.scale}, {"psnr_db", s.psnr_db}, {"ssim", s.ssim}});
     return {{"iteration", at.iteration},
             {"training_s", at.seconds},
             {"psnr_db", at.psnr_db},
@@ -32,7 +35,9 @@ Json at_json(const ComparedAt& at) {
             {"lpips", optional_json(at.lpips)},
             {"splats", at.splats},
             {"model_mb", optional_json(at.model_mb)},
-            {"views", views}};
+            {"views", views},
+            {"scales", scales},
+            {"off_path_psnr_db", optional_json(at.off_path_db)}};
 }
 
 Json run_json(const ComparedRun& run) {
@@ -60,7 +65,7 @@ Json summary_json(const Comparison& c, const ComparedDataset& dataset) {
     for (const int iteration : c.iterations)
         for (const std::string& kernel : c.kernels) {
             Json row{{"kernel", kernel}, {"iteration", iteration}};
-            for (const Column& column : quality_columns()) {
+            for (const Column& column : every_column(c)) {
                 const OverSeeds v = over_seeds(dataset, kernel, iteration, column);
                 row[column.json] = v.median ? Json{{"median", *v.median},
                                                    {"low", v.low},

@@ -20,6 +20,11 @@ struct ComparedView {
     std::filesystem::path picture;  // photo | render | error, equal widths
 };
 
+struct ComparedScale {  // pictures of another size than that of training
+    double scale = 1;   // of the sides
+    double psnr_db = 0, ssim = 0;
+};
+
 struct ComparedAt {  // an evaluation of one run
     int iteration = 0;
     double seconds = 0;  // of training
@@ -29,6 +34,8 @@ struct ComparedAt {  // an evaluation of one run
     std::optional<double> model_mb;  // of its PLY file, 10^6 bytes; none where it was not saved
     std::filesystem::path model;     // that file
     std::vector<ComparedView> views;
+    std::vector<ComparedScale> scales;  // of --scales, where the model was saved
+    std::optional<double> off_path_db;  // PSNR there, where the data set has such views
 };
 
 struct CurvePoint {
@@ -59,6 +66,7 @@ struct Comparison {
     std::vector<ComparedDataset> datasets;
     std::vector<std::string> kernels;  // names, in the order of the tables
     std::vector<int> iterations;       // ascending
+    std::vector<double> scales;        // that pictures were measured at beside that of training
     int seeds = 1;
     std::string settings;    // what was asked for, in words
     std::string device;      // name and driver

@@ -42,14 +42,41 @@ const std::vector<Column>& quality_columns() {
     return columns;
 }
 
+std::string scale_text(double scale) {
+    const double inverse = 1 / scale;
+    if (scale < 1 && std::abs(inverse - std::round(inverse)) < 1e-9)
+        return fmt::format("1/{:.0f}", inverse);
+    return fmt::format("{:.4g}", scale);
+}
+
+std::vector<Column> every_column(const Comparison& comparison) {
+    std::vector<Column> columns = quality_columns();
+    auto at = columns.begin() + 1;
+    for (const double scale : comparison.scales)
+        at = 1 +
+             columns.insert(at, {"at " + scale_text(scale), "dB", "psnr_db_at_" + scale_text(scale),
+                                 2, true, [scale](const ComparedRun&, const ComparedAt& run) {
+                                     for (const ComparedScale& s : run.scales)
+                                         if (s.scale == scale) return Value(s.psnr_db);
+                                     return Value();
+                                 }});
+    columns.insert(at, {"off path", "dB", "off_path_psnr_db", 2, true,
+                        [](const ComparedRun&, const ComparedAt& run) { return run.off_path_db; }});
+    return columns;
+}
+
 std::vector<Column> shown_columns(const Comparison& comparison) {
-    bool lpips = false;
+    bool lpips = false, off_path = false;
     for (const ComparedDataset& dataset : comparison.datasets)
         for (const ComparedRun& run : dataset.runs)
-            for (const ComparedAt& at : run.at) lpips |= at.lpips.has_value();
+            for (const ComparedAt& at : run.at) {
+                lpips |= at.lpips.has_value();
+                off_path |= at.off_path_db.has_value();
+            }
     std::vector<Column> columns;
-    for (const Column& column : quality_columns())
-        if (lpips || column.json != "lpips") columns.push_back(column);
+    for (const Column& column : every_column(comparison))
+        if ((lpips || column.json != "lpips") && (off_path || column.json != "off_path_psnr_db"))
+            columns.push_back(column);
     return columns;
 }
 

@@ -10,6 +10,9 @@
 
 namespace darb {
 
+/// "1/2", "2.5": a scale in tables.
+std::string scale_text(double scale);
+
 struct OverSeeds {
     std::optional<double> median;  // none where no run has the value
     double low = 0, high = 0;
@@ -27,7 +30,9 @@ struct Column {
 };
 /// PSNR, SSIM, LPIPS, model MB, splats, peak MB, seconds.
 const std::vector<Column>& quality_columns();
-/// Those of quality_columns that a table shows: without LPIPS where no run has it.
+/// These and, after the first, PSNR at each of the comparison's scales and off the path.
+std::vector<Column> every_column(const Comparison& comparison);
+/// Those that a table shows: without LPIPS and views off the path where no run has them.
 std::vector<Column> shown_columns(const Comparison& comparison);
 /// splats blended per pixel, intersections per splat, ns per splat-pixel, blend ms, frame ms.
 const std::vector<Column>& blending_columns();

@@ -1,0 +1,56 @@
+#include "tools/darb/run_measurer.h"
+
+#include "engine/scene/splat_file.h"
+#include "tools/darb/device_options.h"
+#include "tools/darb/tune_flags.h"
+
+namespace darb {
+
+std::vector<View> test_views(const Dataset& dataset) {
+    std::vector<View> views;
+    for (const View& v : dataset.views)
+        if (v.is_test) views.push_back(v);
+    return views;
+}
+
+RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
+                         const Dataset& dataset, const TrainFlags& first, const Lpips* lpips)
+    : flags_(flags), lpips_(lpips), off_path_(off_path_views(path, dataset.options)) {
+    for (const double scale : flags.scales)
+        scaled_.push_back(scaled_views(test_views(dataset), scale));
+    options_.background = glm::vec3(first.train.white_background ? 1.0f : 0.0f);
+    options_.effects = parse_effects(first.effects);  // as it trains, so it is measured
+    options_.alpha_is_mask = dataset.alpha_is_mask;
+}
+
+void RunMeasurer::measure_models(ComparedRun& run, Device& device) const {
+    for (ComparedAt& at : run.at) {
+        if (at.model.empty()) continue;
+        const SplatModel model = load_splats(at.model);
+        for (std::size_t i = 0; i < scaled_.size(); ++i) {
+            const Evaluation e = evaluate_scene(device, model, scaled_[i], options_);
+            at.scales.push_back({flags_.scales[i], e.psnr_db, e.ssim});
+        }
+        if (!off_path_.empty())
+            at.off_path_db = evaluate_scene(device, model, off_path_, options_).psnr_db;
+    }
+}
+
+void RunMeasurer::measure(ComparedRun& run, const std::vector<View>& held_out) {
+    attempt(run, "LPIPS", [&] { lpips_.measure(run); });
+    const bool blending = flags_.blending_views > 0 && !blended_.contains(run.kernel);
+    if (scaled_.empty() && off_path_.empty() && !blending) return;
+    attempt(run, "measuring on the device", [&] {
+        DeviceOptions options = command_device(flags_.device);
+        Device device(options);
+        settle_tuning(device);
+        measure_models(run, device);
+        if (!blending) return;
+        std::vector<Camera> cameras;
+        for (const View& view : held_out) cameras.push_back(view.camera);
+        measure_blending_of(run, device, cameras, flags_.blending_views);
+        blended_.insert(run.kernel);
+    });
+}
+
+}  // namespace darb

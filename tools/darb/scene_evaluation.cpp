@@ -1,0 +1,103 @@
+#include "tools/darb/scene_evaluation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "engine/core/say.h"
+#include "engine/core/text.h"
+#include "engine/data/compare_view.h"
+#include "engine/raster/frame_limit.h"
+#include "engine/render/renderer.h"
+#include "tools/paper/compare_stats.h"
+#include "trainer/evaluation.h"
+#include "trainer/exposure_fit.h"
+
+namespace darb {
+
+Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<View> views,
+                          const SceneEvaluation& options) {
+    SplatModel planned = model;
+    const EffectPlan plan = plan_rendering(planned, views, {}, options.effects);
+    apply_plan(plan, planned);
+    apply_plan(plan, views);
+    for (const View& view : views)
+        check_frame(device, view.camera.width, view.camera.height, view.name);
+    Renderer renderer(device, planned, options.accuracy, plan.projection(), plan.huge_splat_path());
+    Evaluation evaluation;
+    evaluation.splats = static_cast<std::uint32_t>(model.size());
+    for (const View& view : views) {
+        const ImageU8 photo = load_photo(view);
+        ImageF image = renderer.render(view.camera, options.background);
+        if (options.fit_exposure)
+            image = apply_exposure(
+                fit_exposure(image, photo, options.background, options.alpha_is_mask), image);
+        evaluation.views.push_back(
+            compare_view(view.name, image, photo, options.background, options.alpha_is_mask));
+    }
+    take_means(evaluation);
+    return evaluation;
+}
+
+nlohmann::json evaluation_json(const Evaluation& evaluation) {
+    nlohmann::json views = nlohmann::json::array();
+    for (const ViewMetrics& v : evaluation.views)
+        views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
+    return {{"mean", {{"psnr_db", evaluation.psnr_db}, {"ssim", evaluation.ssim}}},
+            {"views", views}};
+}
+
+nlohmann::json evaluation_json(const std::vector<AtScale>& scales) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (const AtScale& at : scales) {
+        nlohmann::json row = evaluation_json(at.evaluation);
+        row["scale"] = at.scale;
+        row["width"] = at.width;
+        row["height"] = at.height;
+        rows.push_back(std::move(row));
+    }
+    return {{"scales", rows}};
+}
+
+void print_evaluation(std::FILE* out, const Evaluation& evaluation) {
+    const std::string mean = fmt::format("mean of {}", evaluation.views.size());
+    size_t width = mean.size();
+    for (const ViewMetrics& v : evaluation.views) width = std::max(width, printable(v.name).size());
+    const auto row = [&](const std::string& name, double psnr_db, double ssim) {
+        tell(out, "{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
+    };
+    tell(out, "{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
+    for (const ViewMetrics& v : evaluation.views) row(printable(v.name), v.psnr_db, v.ssim);
+    row(mean, evaluation.psnr_db, evaluation.ssim);
+}
+
+void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales) {
+    tell(out, "{:<8}  {:<11}  {:>8}  {:>7}\n", "scale", "size px", "PSNR dB", "SSIM");
+    for (const AtScale& at : scales)
+        tell(out, "{:<8}  {:<11}  {:>8.3f}  {:>7.4f}\n", scale_text(at.scale),
+             fmt::format("{} x {}", at.width, at.height), at.evaluation.psnr_db,
+             at.evaluation.ssim);
+}
+
+std::vector<View> off_path_views(const std::filesystem::path& dataset,
+                                 const DatasetOptions& options) {
+    const std::filesystem::path folder = dataset / "off_path";
+    if (!std::filesystem::exists(folder / "transforms_test.json")) return {};
+    std::vector<View> views;
+    for (View& view : load_dataset(folder, options).views)
+        if (view.is_test) views.push_back(std::move(view));
+    return views;
+}
+
+CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales) {
+    return command
+        .add_option("--scales", scales,
+                    "sizes to measure at, as multiples of that of -r, with commas: 0.5,1,2,4")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->check(CLI::Range(0.01, 100.0));
+}
+
+}  // namespace darb

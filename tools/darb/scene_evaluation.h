@@ -1,0 +1,56 @@
+// A scene's pictures measured against photos, at the photos' size and at others.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
+#include "engine/plan/accuracy.h"
+#include "engine/plan/effect_plan.h"
+#include "engine/scene/splat_model.h"
+#include "trainer/run.h"
+
+namespace darb {
+
+struct SceneEvaluation {
+    Accuracy accuracy = preset_accuracy(kBalanced);
+    EffectChoice effects;
+    glm::vec3 background{0.0f};
+    bool fit_exposure = false;   // of each picture to its photo, before measuring
+    bool alpha_is_mask = false;  // of the data set
+};
+
+/// What a model's pictures of these views have, and their means; views: at the size to measure at.
+/// Throws Error where a picture is too large for the device.
+Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<View> views,
+                          const SceneEvaluation& options);
+
+/// --scales: sizes to measure at, as multiples of that of -r, each above 0.
+CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales);
+
+/// The held-out views of DATASET/off_path, a data set of its own, at the size of -r: pictures away
+/// from the path of the photos. None where that has no transforms_test.json.
+std::vector<View> off_path_views(const std::filesystem::path& dataset,
+                                 const DatasetOptions& options);
+
+/// An evaluation at one of the scales.
+struct AtScale {
+    double scale = 1;
+    int width = 0, height = 0;  // px, of the first view
+    Evaluation evaluation;
+};
+
+/// {"mean": ..., "views": ...}, or {"scales": [the same with scale, width and height]}.
+nlohmann::json evaluation_json(const Evaluation& evaluation);
+nlohmann::json evaluation_json(const std::vector<AtScale>& scales);
+/// A line a view, and their mean.
+void print_evaluation(std::FILE* out, const Evaluation& evaluation);
+/// A line a scale: the means over its views.
+void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales);
+
+}  // namespace darb
