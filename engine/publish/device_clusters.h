@@ -27,6 +27,7 @@ class DeviceClusters {
     AssignRows assign_rows() { return std::bind_front(&DeviceClusters::assign, this); }
 
   private:
+    std::uint32_t rows_of_thread() const;
     const Pipeline& pipeline_for(std::size_t quads);
 
     Device& device_;

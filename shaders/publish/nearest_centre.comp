@@ -1,7 +1,8 @@
 // The centre nearest to each row of numbers: the step of k-means that costs. Squared distances less what all centres
 // of a row share, |c|^2 - 2 x c; the first of equal ones wins.
-// Place: SOG's palette of harmonics, engine/publish. Work: a workgroup takes up to THREADS rows of one batch, a thread
-// a row, which it keeps in registers. Shared memory: none. Reads groups, rows, centres; writes labels.
+// Place: SOG's palette of harmonics, engine/publish. Work: a workgroup takes up to ROWS times THREADS rows of one batch, a
+// thread ROWS of them, which it keeps in registers: on lavapipe a load within a loop costs as much as many products.
+// Shared memory: none. Reads groups, rows, centres; writes labels.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,6 +12,7 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
 layout(constant_id = 1) const uint QUADS = 12;  // of a row, padded with zeros to whole quads
+layout(constant_id = 2) const uint ROWS = 1;    // of a thread
 
 layout(push_constant, scalar) uniform Push { NearestCentreArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Groups { ClusterGroup groups[]; };
@@ -19,24 +21,39 @@ layout(set = 0, binding = 2, scalar) readonly buffer Centres { vec4 centre_value
 layout(set = 0, binding = 3, scalar) readonly buffer Squares { float centre_square[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Labels { uint label[]; };
 
+vec4 x[ROWS * QUADS];  // -2 row
+float best[ROWS];
+uint nearest[ROWS];
+
+void take(uint k, uint centre, vec4 sum) {
+    const float distance = (sum.x + sum.y) + (sum.z + sum.w);
+    nearest[k] = distance < best[k] ? centre : nearest[k];
+    best[k] = min(distance, best[k]);
+}
+
+void search(uint first, uint end) {
+    for (uint c = first; c < end; ++c) {
+        vec4 sum[ROWS];
+        for (uint k = 0; k < ROWS; ++k) sum[k] = vec4(centre_square[c], 0.0, 0.0, 0.0);
+        for (uint d = 0; d < QUADS; ++d)
+            for (uint k = 0; k < ROWS; ++k) sum[k] += x[k * QUADS + d] * centre_values[c * QUADS + d];
+        for (uint k = 0; k < ROWS; ++k) take(k, c, sum[k]);
+    }
+}
+
 void main() {
     const uint at = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (at >= args.groups) return;
     const ClusterGroup group = groups[at];
-    const uint within = min(gl_LocalInvocationID.x, group.rows - 1);
-    const uint row = group.first_row + within;
-    vec4 x[QUADS];
-    for (uint d = 0; d < QUADS; ++d) x[d] = -2.0 * row_values[row * QUADS + d];
-    float best = 1.0 / 0.0;
-    uint nearest = group.first_centre;
-    for (uint c = group.first_centre; c < group.first_centre + group.centres; ++c) {
-        vec4 sum = vec4(centre_square[c], 0.0, 0.0, 0.0);
-        for (uint d = 0; d < QUADS; ++d) sum += x[d] * centre_values[c * QUADS + d];
-        const float distance = (sum.x + sum.y) + (sum.z + sum.w);
-        if (distance < best) {
-            best = distance;
-            nearest = c;
-        }
+    for (uint k = 0; k < ROWS; ++k) {
+        const uint row = group.first_row + min(k * THREADS + gl_LocalInvocationID.x, group.rows - 1);
+        for (uint d = 0; d < QUADS; ++d) x[k * QUADS + d] = -2.0 * row_values[row * QUADS + d];
+        best[k] = 1.0 / 0.0;
+        nearest[k] = group.first_centre;
     }
-    if (gl_LocalInvocationID.x < group.rows) label[row] = nearest;
+    search(group.first_centre, group.first_centre + group.centres);
+    for (uint k = 0; k < ROWS; ++k) {
+        const uint row = k * THREADS + gl_LocalInvocationID.x;
+        if (row < group.rows) label[group.first_row + row] = nearest[k];
+    }
 }
