@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "engine/core/check.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/quantise.h"
@@ -182,12 +183,15 @@ void join_rotations(SplatModel& model) {
 
 }  // namespace
 
-PagePrecision page_precision(int level) {
+PagePrecision page_precision(int level, int kernel) {
     if (level >= kPageLevels) return {.exact = true};
     const double share = std::ldexp(1.0, -level);
+    // Where w ends with a jump, pixels between the true outline and the rounded one are off by all
+    // of it. With these steps the inverse quadratic comes as near at level 0 as other kernels.
+    const bool jumps = ends_with_a_jump(kernel);
     return {.position = share / 8,
-            .log_scale = share / 20,
-            .rotation = share / 100,
+            .log_scale = share / (jumps ? 200 : 20),
+            .rotation = share / (jumps ? 500 : 100),
             .opacity = share / 255,
             .colour = share / 255,
             .harmonics = share / 64};

@@ -23,7 +23,7 @@ struct PagePrecision {
 /// 0 is the coarsest; each level has half the steps of the one before; kPageLevels and above are
 /// exact.
 constexpr int kPageLevels = 4;
-PagePrecision page_precision(int level);
+PagePrecision page_precision(int level, int kernel);
 
 /// value = low + step * integer, or the bits of a float32. A column is `bytes` planes of N bytes,
 /// low bytes first.

@@ -103,7 +103,7 @@ class Measure {
 PageSplats fitting_splats(const SplatModel& model, bool exact, const Measure& measure,
                           WebPageFacts& facts) {
     for (facts.level = exact ? kPageLevels : 0;; ++facts.level) {
-        const PagePrecision precision = page_precision(facts.level);
+        const PagePrecision precision = page_precision(facts.level, model.kernel);
         PageSplats packed = pack_page_splats(model, precision);
         if (packed.count == 0)
             throw Error("web page", "the scene has no splat that is drawn",
@@ -174,7 +174,7 @@ std::string make_web_page(Device& device, const SplatModel& model, const WebPage
     while (options.max_bytes > 0 && page.size() > options.max_bytes) {
         const SplatModel& from = kept.size() > 0 ? kept : model;
         kept = merge_splats(from, count_that_fits(from.size(), page, options.max_bytes));
-        packed = pack_page_splats(kept, page_precision(found.level));
+        packed = pack_page_splats(kept, page_precision(found.level, model.kernel));
         found.splats = packed.count;
         found.merged_from = model.size();
         measure.compare(unpack_page_splats(packed, kept), found);

@@ -14,7 +14,7 @@ namespace {
 
 TEST(PageSplats, exact_keeps_every_bit_and_the_order) {
     const SplatModel model = test::sample_model(3, 300);
-    const PageSplats packed = pack_page_splats(model, page_precision(kPageLevels));
+    const PageSplats packed = pack_page_splats(model, page_precision(kPageLevels, KERNEL_GAUSSIAN));
     const SplatModel back = unpack_page_splats(packed, model);
     ASSERT_EQ(packed.count, 300u);
     EXPECT_EQ(packed.planes.size(), 300u * 59 * 4);
@@ -25,7 +25,7 @@ TEST(PageSplats, exact_keeps_every_bit_and_the_order) {
 TEST(PageSplats, rounded_values_are_within_half_a_step) {
     const SplatModel model = test::sample_model(2, 500);
     for (int level = 0; level < kPageLevels; ++level) {
-        const PagePrecision p = page_precision(level);
+        const PagePrecision p = page_precision(level, KERNEL_GAUSSIAN);
         const PageSplats packed = pack_page_splats(model, p);
         const SplatModel back = unpack_page_splats(packed, model);
         ASSERT_EQ(back.size(), model.size());
@@ -54,6 +54,15 @@ TEST(PageSplats, rounded_values_are_within_half_a_step) {
     }
 }
 
+TEST(PageSplats, outlines_of_kernels_that_end_with_a_jump_are_finer) {
+    const PagePrecision smooth = page_precision(1, KERNEL_RAISED_COSINE),
+                        jumps = page_precision(1, KERNEL_INVERSE_QUADRATIC);
+    EXPECT_LE(10 * jumps.log_scale, 1.001 * smooth.log_scale);
+    EXPECT_LE(5 * jumps.rotation, 1.001 * smooth.rotation);
+    EXPECT_EQ(jumps.harmonics, smooth.harmonics);
+    EXPECT_EQ(jumps.position, smooth.position);
+}
+
 TEST(PageSplats, what_is_never_drawn_is_left_out) {
     SplatModel model = test::sample_model(0, 10);
     for (float& logit : model.opacity_logit) logit = 1;
@@ -61,7 +70,7 @@ TEST(PageSplats, what_is_never_drawn_is_left_out) {
     model.position[3 * 2] = std::numeric_limits<float>::quiet_NaN();
     for (std::size_t k = 0; k < 4; ++k) model.rotation[4 * 3 + k] = 0;
     for (const int level : {0, kPageLevels})
-        EXPECT_EQ(pack_page_splats(model, page_precision(level)).count, 7u);
+        EXPECT_EQ(pack_page_splats(model, page_precision(level, KERNEL_GAUSSIAN)).count, 7u);
 }
 
 TEST(PageSplats, far_splats_and_equal_ones_survive) {
@@ -69,13 +78,14 @@ TEST(PageSplats, far_splats_and_equal_ones_survive) {
     for (float& logit : model.opacity_logit) logit = 2;
     for (float& v : model.position) v = 0.25f;
     model.position[0] = 1e30f;
-    const SplatModel back = unpack_page_splats(pack_page_splats(model, page_precision(0)), model);
+    const SplatModel back =
+        unpack_page_splats(pack_page_splats(model, page_precision(0, KERNEL_GAUSSIAN)), model);
     ASSERT_EQ(back.size(), 64u);
     for (const float v : back.position) EXPECT_TRUE(std::isfinite(v));
 }
 
 TEST(PageSplats, no_splats_are_no_bytes) {
-    const PageSplats packed = pack_page_splats(SplatModel{}, page_precision(0));
+    const PageSplats packed = pack_page_splats(SplatModel{}, page_precision(0, KERNEL_GAUSSIAN));
     EXPECT_EQ(packed.count, 0u);
     EXPECT_TRUE(packed.planes.empty());
 }
