@@ -8,6 +8,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/text.h"
+#include "engine/kernels/second_moment.h"
 #include "engine/publish/page_files.h"
 #include "engine/publish/page_shaders.h"
 #include "engine/publish/page_text.h"
@@ -46,12 +47,19 @@ std::string filled(std::string_view form, const Texts& texts) {
     return out;
 }
 
-std::string script() {
+std::string joined(std::initializer_list<const char*> names) {
     std::string out;
-    for (const char* name : {"1_decode.js", "2_camera.js", "3_renderer.js", "4_viewer.js",
-                             "5_controls.js", "6_main.js"})
-        out += without_comment_lines(page_file(kFolder + name));
+    for (const char* name : names) out += without_comment_lines(page_file(kFolder + name));
     return out;
+}
+
+std::string script() {
+    return joined({"1_decode.js", "2_camera.js", "3_renderer.js", "4_viewer.js", "5_controls.js",
+                   "6_main.js"});
+}
+
+std::string worker() {
+    return joined({"merger.js", "sorter.js"});
 }
 
 Json shaders_of(const SplatModel& model) {
@@ -139,6 +147,7 @@ Json scene_json(const PageDocument& document, const SplatModel& model, const Pag
             {"lowPass", LOW_PASS_DEFAULT},
             {"jacobianMargin", JACOBIAN_MARGIN},
             {"logitLimit", OPACITY_LOGIT_LIMIT},
+            {"secondMoment", rendered_second_moment(model.kernel, model.footprint)},
             {"shaders", shaders_of(model)}};
 }
 
@@ -161,7 +170,7 @@ std::string page_document(const PageDocument& document, const SplatModel& model,
                 {"style", style(document.background)},
                 {"poster", "data:image/jpeg;base64," + base64(document.poster)},
                 {"scene", script_json(scene_json(document, model, packed, payload.size()))},
-                {"sorter", without_comment_lines(page_file(kFolder + "sorter.js"))},
+                {"worker", worker()},
                 {"script", script()}});
     for (std::size_t at = 0, part = 0; at < payload.size(); at += kPayloadPart, ++part)
         page += fmt::format(
@@ -171,8 +180,7 @@ std::string page_document(const PageDocument& document, const SplatModel& model,
 }
 
 std::size_t page_script_bytes() {
-    std::size_t bytes =
-        without_comment_lines(page_file(kFolder + "sorter.js")).size() + script().size();
+    std::size_t bytes = worker().size() + script().size();
     for (const Json& shader : shaders_of(SplatModel{})) bytes += shader.dump().size();
     return bytes;
 }

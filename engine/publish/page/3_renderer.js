@@ -1,4 +1,6 @@
 // WebGL 2: projects all splats into two textures of integers, then blends a quad a splat, front to back.
+const batch = 1024;  // splats an instance
+
 class Renderer {
   constructor(canvas) {
     const gl = canvas.getContext("webgl2", {alpha: false, antialias: false, depth: false, powerPreference: "high-performance"});
@@ -7,8 +9,7 @@ class Renderer {
     this.canvas = canvas;
     const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     this.columns = Math.min(2048, most);
-    this.rows = Math.max(1, Math.ceil(scene.count / this.columns));
-    if (this.rows > most) throw Error(`${scene.count} splats are too many for this device, which takes ${most * this.columns}`);
+    if (scene.count > most * this.columns) throw Error(`${scene.count} splats are too many for this device, which takes ${most * this.columns}`);
     const float = gl.getExtension("EXT_color_buffer_float"), half = float || gl.getExtension("EXT_color_buffer_half_float");
     const whole = float && gl.getExtension("EXT_float_blend");
     this.formats = {float32: whole && gl.RGBA32F, float16: half && gl.RGBA16F, unorm8: gl.RGBA8};
@@ -17,8 +18,10 @@ class Renderer {
     this.project = this.program("corner.vert", "project.frag");
     this.blend = this.program("splat.vert", "splat.frag");
     this.show = this.program("corner.vert", "show.frag");
-    this.count = 0;
+    this.levels = [];  // of splats: all, then fewer
     this.targets = new Map();
+    this.nothing = gl.createVertexArray();
+    this.quads = this.quadsOfBatch();
   }
 
   program(vertex, fragment) {
@@ -61,44 +64,46 @@ class Renderer {
 
   // Whole rows, then what the last one holds.
   fill(values, width, upload) {
-    const rows = Math.floor(scene.count / this.columns), rest = scene.count % this.columns;
+    const count = values.length / width, rows = Math.floor(count / this.columns), rest = count % this.columns;
     if (rows) upload(0, this.columns, rows, values.subarray(0, rows * this.columns * width));
     if (rest) upload(rows, rest, 1, values.subarray(rows * this.columns * width));
   }
 
+  quadsOfBatch() {
+    const gl = this.gl, quads = gl.createVertexArray(), corners = [0, 1, 2, 2, 1, 3];
+    gl.bindVertexArray(quads);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, Uint16Array.from({length: 6 * batch}, (_, i) => 4 * Math.floor(i / 6) + corners[i % 6]), gl.STATIC_DRAW);
+    return quads;
+  }
+
   upload(splats) {
-    const gl = this.gl;
+    const gl = this.gl, rows = Math.max(1, Math.ceil(splats.place.length / 4 / this.columns)), terms = splats.light.length;
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    this.inputs = ["place", "turn", "size", "tint"].map(name => {
-      const texture = this.texture(gl.TEXTURE_2D, gl.RGBA32F, this.columns, this.rows);
+    const level = {rows, count: 0};  // count: of the order
+    level.inputs = ["place", "turn", "size", "tint"].map(name => {
+      const texture = this.texture(gl.TEXTURE_2D, gl.RGBA32F, this.columns, rows);
       this.fill(splats[name], 4, (row, width, height, values) =>
         gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RGBA, gl.FLOAT, values));
       return texture;
     });
-    this.light = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGB16F, splats.light.length ? this.columns : 1, splats.light.length ? this.rows : 1, splats.light.length || 1);
+    level.light = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGB16F, terms ? this.columns : 1, terms ? rows : 1, terms || 1);
     splats.light.forEach((layer, k) => this.fill(layer, 3, (row, width, height, values) =>
       gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, row, k, width, height, 1, gl.RGB, gl.FLOAT, values)));
-    this.projected = [0, 1].map(() => this.texture(gl.TEXTURE_2D, gl.RGBA32UI, this.columns, this.rows));
-    this.projection = this.framebuffer(this.projected);
-    const order = gl.createBuffer();
-    this.quads = gl.createVertexArray();
-    gl.bindVertexArray(this.quads);
-    gl.bindBuffer(gl.ARRAY_BUFFER, order);
-    gl.bufferData(gl.ARRAY_BUFFER, Math.max(4, 4 * scene.count), gl.DYNAMIC_DRAW);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(0, 1);
-    this.order = order;
-    this.nothing = gl.createVertexArray();
+    level.projected = [0, 1].map(() => this.texture(gl.TEXTURE_2D, gl.RGBA32UI, this.columns, rows));
+    level.projection = this.framebuffer(level.projected);
+    level.order = this.texture(gl.TEXTURE_2D, gl.R32UI, this.columns, rows);
     const failure = gl.getError();
     if (failure) throw Error(failure === gl.OUT_OF_MEMORY ? `${scene.count} splats do not fit into the memory of this device` : `WebGL error ${failure}`);
+    this.levels.push(level);
   }
 
-  setOrder(order) {
-    const gl = this.gl;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
-    this.count = order.length;
+  setOrder(order, at) {
+    const gl = this.gl, level = this.levels[at];
+    gl.bindTexture(gl.TEXTURE_2D, level.order);
+    this.fill(order, 1, (row, width, height, values) =>
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, values));
+    level.count = order.length;
   }
 
   // The target that is blended into, of the finest format that the device can blend; at rest in full precision.
@@ -153,14 +158,14 @@ class Renderer {
     program.use();
   }
 
-  draw(camera, fine) {
-    const gl = this.gl, {width, height} = camera, target = this.target(width, height, fine);
+  draw(camera, fine, at = 0) {
+    const gl = this.gl, {width, height} = camera, target = this.target(width, height, fine), level = this.levels[at];
     gl.disable(gl.BLEND);
     gl.bindVertexArray(this.nothing);
-    this.pass(this.projection, this.columns, this.rows, this.project);
+    this.pass(level.projection, this.columns, level.rows, this.project);
     this.setCamera(this.project, camera);
-    this.bind(this.project, ["place", "turn", "size", "tint"], this.inputs);
-    this.bind(this.project, ["light"], [this.light], gl.TEXTURE_2D_ARRAY, 4);
+    this.bind(this.project, ["place", "turn", "size", "tint"], level.inputs);
+    this.bind(this.project, ["light"], [level.light], gl.TEXTURE_2D_ARRAY, 4);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
 
     this.pass(target.framebuffer, width, height, this.blend);
@@ -169,9 +174,11 @@ class Renderer {
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.DST_ALPHA, gl.ONE, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
     gl.bindVertexArray(this.quads);
-    this.bind(this.blend, ["shapes", "lights"], this.projected);
+    this.bind(this.blend, ["shapes", "lights", "order"], [...level.projected, level.order]);
+    gl.uniform1i(this.blend.at("batch"), batch);
+    gl.uniform1i(this.blend.at("count"), level.count);
     gl.uniform2f(this.blend.at("frame"), width, height);
-    if (this.count) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.count);
+    if (level.count) gl.drawElementsInstanced(gl.TRIANGLES, 6 * batch, gl.UNSIGNED_SHORT, 0, Math.ceil(level.count / batch));
 
     gl.disable(gl.BLEND);
     gl.bindVertexArray(this.nothing);

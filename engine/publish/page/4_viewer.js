@@ -1,28 +1,49 @@
 // What is on show: the camera, its order of splats, and a picture whenever either changes. In motion a picture has
-// one of these shares of the window's pixels each way.
-const shares = [1, 0.7, 0.5, 0.35, 0.25];
+// a share of the window's pixels each way, and the splats of a level: about a quarter of those of the one before.
+const paces = [[1, 0], [0.7, 0], [0.5, 0], [0.5, 1], [0.35, 1], [0.25, 1], [0.25, 2]];
+const levelsBelow = 2, fewSplats = 1000;  // which need no levels
+
+const makeWorker = () => new Worker(URL.createObjectURL(new Blob([document.getElementById("worker").textContent], {type: "text/javascript"})));
 
 class Viewer {
   constructor(canvas, renderer) {
     this.canvas = canvas;
     this.renderer = renderer;
-    this.worker = new Worker(URL.createObjectURL(new Blob([document.getElementById("sorter").textContent], {type: "text/javascript"})));
+    this.worker = makeWorker();
     this.worker.onmessage = ({data}) => this.sorted(data);
     this.worker.onerror = event => say("Sorting failed: " + event.message);
     this.number = 0;
     this.camera = copyCamera(scene.cameras[scene.start]);
     this.distance = focusOf(this.camera);
-    this.step = this.pace = 0;
+    this.step = this.pace = this.frames = 0;
     this.flying = false;
     this.moved = -1e9;
     new ResizeObserver(() => this.changed()).observe(canvas);
   }
 
   load(splats) {
-    this.renderer.upload(splats);
-    this.worker.postMessage({position: splats.position}, [splats.position.buffer]);
-    this.loaded = true;
+    this.add(splats);
+    this.splats = {...splats, position: null};
     this.changed();
+  }
+
+  add(splats) {
+    this.renderer.upload(splats);
+    this.worker.postMessage({level: this.renderer.levels.length - 1, position: splats.position}, [splats.position.buffer]);
+  }
+
+  // The splats go to a worker, which merges them; where that fails pictures in motion have all of them.
+  makeLevels() {
+    const splats = this.splats;
+    this.splats = null;
+    if (scene.count < fewSplats) return;
+    const worker = makeWorker();
+    worker.onmessage = ({data}) => {
+      try { this.add(data.splats); } catch { data.level = levelsBelow; }
+      if (data.level === levelsBelow) worker.terminate();
+    };
+    worker.postMessage({merge: splats, levels: levelsBelow, middle: scene.focus, radius: scene.radius, secondMoment: scene.secondMoment},
+      [splats.place, splats.turn, splats.size, splats.tint, ...splats.light].map(a => a.buffer));
   }
 
   get focus() { return add(this.camera.eye, this.camera.axes[2], this.distance); }
@@ -45,26 +66,26 @@ class Viewer {
   }
 
   request() {
-    if (this.loaded && !this.requested && !this.held) this.requested = requestAnimationFrame(now => this.frame(now));
+    if (this.renderer.levels.length && !this.requested && !this.held) this.requested = requestAnimationFrame(now => this.frame(now));
   }
 
   // One order is under way at a time; the camera it is for may have moved on when it comes.
-  sort(camera) {
-    this.sorting = camera;
-    this.worker.postMessage({id: ++this.number, row: camera.axes[2], centre: camera.eye, near: scene.near});
+  sort(camera, level = 0) {
+    this.sorting = {...camera, level};
+    this.worker.postMessage({id: ++this.number, level, row: camera.axes[2], centre: camera.eye, near: scene.near});
   }
 
   sorted({order}) {
-    this.renderer.setOrder(order);
     this.orderOf = this.sorting;
+    this.renderer.setOrder(order, this.orderOf.level);
     this.sorting = null;
     this.wake?.();
     this.request();
   }
 
-  sameOrder(camera) {
+  sameOrder(camera, level) {
     const o = this.orderOf;
-    return o && o.eye.every((x, i) => x === camera.eye[i]) && o.axes[2].every((x, i) => x === camera.axes[2][i]);
+    return o && o.level === level && o.eye.every((x, i) => x === camera.eye[i]) && o.axes[2].every((x, i) => x === camera.axes[2][i]);
   }
 
   frame(now) {
@@ -80,35 +101,40 @@ class Viewer {
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio)), height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     if (this.canvas.width !== width || this.canvas.height !== height) { this.canvas.width = width; this.canvas.height = height; }
-    const scale = moving ? shares[this.step] : 1;
+    const [scale, wanted] = moving ? paces[this.step] : paces[0], level = Math.min(wanted, this.renderer.levels.length - 1);
     const camera = inWindow(this.camera, Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale)));
-    if (!this.sorting && !this.sameOrder(camera)) this.sort(copyCamera(camera));
-    if (this.orderOf) {
-      this.renderer.draw(camera, !moving);
-      if (!this.shown) { this.shown = true; firstPicture(); }
+    const sorted = this.sameOrder(camera, level);
+    if (!this.sorting && !sorted) this.sort(copyCamera(camera), level);
+    // In motion the order of the frame before does; at rest a picture takes too long to draw it twice.
+    if (this.orderOf && (moving || sorted)) {
+      this.renderer.draw(camera, !moving, this.orderOf.level);
+      ++this.frames;
+      if (!this.shown) { this.shown = true; firstPicture(); this.makeLevels(); }
     }
     if (moving) this.request();
   }
 
-  // One step down after 3 slow frames, or after one of a quarter of a second; one up after 20 quick ones.
+  // One step down after 3 slow frames, or after one of a quarter of a second, and three after one of a whole; one up
+  // after 20 quick ones.
   adapt(since) {
     if (since > 250) this.pace = -2;
     this.pace = since > 50 ? Math.min(this.pace, 0) - 1 : since < 20 ? Math.max(this.pace, 0) + 1 : 0;
     if (this.pace > -3 && this.pace < 20) return;
-    this.step = Math.max(0, Math.min(shares.length - 1, this.step + (this.pace < 0 ? 1 : -1)));
+    const step = this.step + (this.pace > 0 ? -1 : since > 1000 ? 3 : 1);
+    this.step = Math.max(0, Math.min(paces.length - 1, step));
     this.pace = 0;
   }
 
   // For tests and for pictures: this camera at its own size, in its own order. -> PNG as a data URL
-  async picture(camera) {
+  async picture(camera, level = 0) {
     this.held = true;
     try {
       while (this.sorting) await new Promise(done => { this.wake = done; });
-      this.sort(copyCamera(camera));
+      this.sort(copyCamera(camera), level);
       while (this.sorting) await new Promise(done => { this.wake = done; });
       this.canvas.width = camera.width;
       this.canvas.height = camera.height;
-      this.format = this.renderer.draw(camera, this.fine ?? true);
+      this.format = this.renderer.draw(camera, this.fine ?? true, level);
       return this.canvas.toDataURL("image/png");
     } finally {
       this.held = false;

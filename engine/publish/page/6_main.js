@@ -81,26 +81,22 @@ ready.catch(fail);
 // For tests. A camera is {width, height, fx, fy, cx, cy, eye, axes}, axes right, down, forward; or a bookmark's number.
 const cameraOf = c => typeof c === "number" ? scene.cameras[c] : c;
 window.darb = {
-  ready, scene,
-  picture: async (camera, fine) => { await ready; viewer.fine = fine; return viewer.picture(cameraOf(camera)); },
-  get state() { return {shown: !!viewer?.shown, loadedAfter, camera: viewer?.camera, distance: viewer?.distance, format: viewer?.format, place, step: viewer?.step}; },
-  // Milliseconds a frame, sorted and finished, of a turn about the focus.
-  turn: async (frames, width, height) => {
+  ready, scene, fewSplats,
+  // level: of splats, 0 has all; fine: at rest
+  picture: async (camera, fine, level) => { await ready; viewer.fine = fine; return viewer.picture(cameraOf(camera), level); },
+  get state() { return {shown: !!viewer?.shown, loadedAfter, camera: viewer?.camera, distance: viewer?.distance, format: viewer?.format, place, step: viewer?.step, levels: viewer?.renderer.levels.length}; },
+  // Frames a second of a turn about the focus, and the step of `paces` it ends at.
+  turn: async seconds => {
     await ready;
-    const camera = inWindow(copyCamera(viewer.camera), width, height), pivot = viewer.focus, pixel = new Uint8Array(4), {gl} = viewer.renderer, start = performance.now();
-    for (let i = 0; i < frames; ++i) {
-      turnCamera(camera, scene.up, 0.02, pivot);
-      viewer.held = true;
-      while (viewer.sorting) await new Promise(done => { viewer.wake = done; });
-      viewer.sort(copyCamera(camera));
-      while (viewer.sorting) await new Promise(done => { viewer.wake = done; });
-      viewer.canvas.width = width;
-      viewer.canvas.height = height;
-      viewer.renderer.draw(camera, false);
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-    }
-    viewer.held = false;
-    viewer.changed();
-    return (performance.now() - start) / frames;
+    const frames = viewer.frames, start = performance.now(), end = start + 1000 * seconds;
+    await new Promise(done => {
+      viewer.flight = now => {
+        turnCamera(viewer.camera, scene.up, 0.02, viewer.focus);
+        if (now >= end) done();
+        return now < end;
+      };
+      viewer.changed();
+    });
+    return {rate: (viewer.frames - frames) / (performance.now() - start) * 1000, step: viewer.step, pace: paces[viewer.step]};
   },
 };

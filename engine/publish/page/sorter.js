@@ -1,8 +1,8 @@
-// The worker: splats by the depth of their centres, front to back, equal depths by their number.
-let position, keys, other, order, otherOrder;
+// The worker: splats by the depth of their centres, front to back, equal depths by their number. Another one merges.
+const levels = [];  // of splats: their positions, and room to sort
 const counts = new Uint32Array(3 << 11);
 
-function sort(row, centre, near) {
+function sort({position, keys, other, order, otherOrder}, row, centre, near) {
   const n = position.length / 3, depth = new Float32Array(keys.buffer);
   const [a, b, c] = row, [x, y, z] = centre;
   let visible = 0;
@@ -36,15 +36,16 @@ function sort(row, centre, near) {
 }
 
 onmessage = ({data}) => {
-  if (data.position) {
-    position = data.position;
-    const n = position.length / 3;
-    keys = new Uint32Array(n);
-    other = new Uint32Array(n);
-    order = new Uint32Array(n);
-    otherOrder = new Uint32Array(n);
-    return;
+  if (data.merge) {
+    for (let level = 1, splats = data.merge; level <= data.levels; ++level) {
+      splats = merged(splats, data);
+      postMessage({level, splats});
+    }
+  } else if (data.position) {
+    const n = data.position.length / 3, room = () => new Uint32Array(n);
+    levels[data.level] = {position: data.position, keys: room(), other: room(), order: room(), otherOrder: room()};
+  } else {
+    const order = sort(levels[data.level], data.row, data.centre, data.near);
+    postMessage({id: data.id, order}, [order.buffer]);
   }
-  const sorted = sort(data.row, data.centre, data.near);
-  postMessage({id: data.id, order: sorted}, [sorted.buffer]);
 };

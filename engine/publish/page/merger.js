@@ -1,0 +1,99 @@
+// For pictures in motion on slow devices: splats that lie side by side on a Morton curve become one that keeps opacity
+// times area, mean, second moment and harmonics, as engine/scene/merge_splats.h has it of better chosen ones.
+const together = 4;  // splats at most
+
+function spread(v) {
+  v = (v | v << 16) & 0x030000ff;
+  v = (v | v << 8) & 0x0300f00f;
+  v = (v | v << 4) & 0x030c30c3;
+  return (v | v << 2) & 0x09249249;
+}
+
+function mortonOrder(place, middle, radius) {
+  const n = place.length / 4, code = new Uint32Array(n);
+  const cell = (i, k) => Math.max(0, Math.min(1023, 512 + 128 * (place[4 * i + k] - middle[k]) / radius));
+  for (let i = 0; i < n; ++i) code[i] = spread(cell(i, 0)) | spread(cell(i, 1)) << 1 | spread(cell(i, 2)) << 2;
+  return Uint32Array.from({length: n}, (_, i) => i).sort((a, b) => code[a] - code[b] || a - b);
+}
+
+// Columns of the rotation of a unit quaternion w x y z.
+const columnsOf = (w, x, y, z) => [
+  [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+  [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+  [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]];
+
+// Root mean square over all directions, but for a factor.
+const areaOf = (a, b, c) => Math.sqrt(a * b + b * c + c * a);  // of variances
+
+// Of a symmetric xx xy xz yy yz zz: variances and the columns of a rotation, by Jacobi's method.
+function axesOf([xx, xy, xz, yy, yz, zz]) {
+  const m = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], v = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  for (let round = 0; round < 5; ++round)
+    for (const [p, q] of [[0, 1], [0, 2], [1, 2]]) {
+      if (m[p][q] === 0) continue;
+      const theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+      const t = Math.sign(theta || 1) / (Math.abs(theta) + Math.sqrt(theta * theta + 1)), c = 1 / Math.sqrt(t * t + 1), s = t * c;
+      for (let k = 0; k < 3; ++k) [m[k][p], m[k][q]] = [c * m[k][p] - s * m[k][q], s * m[k][p] + c * m[k][q]];
+      for (let k = 0; k < 3; ++k) [m[p][k], m[q][k]] = [c * m[p][k] - s * m[q][k], s * m[p][k] + c * m[q][k]];
+      for (let k = 0; k < 3; ++k) [v[p][k], v[q][k]] = [c * v[p][k] - s * v[q][k], s * v[p][k] + c * v[q][k]];
+    }
+  return {variances: [m[0][0], m[1][1], m[2][2]], columns: v};
+}
+
+// Shepperd's method: from the largest of the four.
+function quaternionOf([[a, b, c], [d, e, f], [g, h, k]]) {
+  const squares = [1 + a + e + k, 1 + a - e - k, 1 - a + e - k, 1 - a - e + k], most = squares.indexOf(Math.max(...squares));
+  const s = 2 * Math.sqrt(squares[most]);
+  const q = [
+    [s / 4, (f - h) / s, (g - c) / s, (b - d) / s], [(f - h) / s, s / 4, (b + d) / s, (g + c) / s],
+    [(g - c) / s, (b + d) / s, s / 4, (f + h) / s], [(b - d) / s, (g + c) / s, (f + h) / s, s / 4]][most];
+  const norm = Math.hypot(...q);
+  return q.map(x => x / norm);
+}
+
+function merged(splats, {middle, radius, secondMoment}) {
+  const {place, turn, size, tint, light} = splats, n = place.length / 4, order = mortonOrder(place, middle, radius);
+  const variance = (i, k) => Math.exp(2 * Math.max(-40, Math.min(40, size[4 * i + k])));
+  const far = (i, j) => {
+    const reach = 16 * Math.max(variance(i, 0), variance(i, 1), variance(i, 2), variance(j, 0), variance(j, 1), variance(j, 2));
+    let d = 0;
+    for (let k = 0; k < 3; ++k) d += (place[4 * i + k] - place[4 * j + k]) ** 2;
+    return d > Math.max(reach, (radius / 256) ** 2);
+  };
+  const starts = [];
+  for (let k = 0, first = 0; k < n; ++k)
+    if (k === 0 || k - first === together || far(order[first], order[k])) starts.push(first = k);
+  const count = starts.length, out = {
+    place: new Float32Array(4 * count), turn: new Float32Array(4 * count), size: new Float32Array(4 * count), tint: new Float32Array(4 * count),
+    light: light.map(() => new Float32Array(3 * count)), position: new Float32Array(3 * count)};
+  starts.push(n);
+  for (let g = 0; g < count; ++g) {
+    const group = order.subarray(starts[g], starts[g + 1]);
+    const weights = Array.from(group, i => place[4 * i + 3] * areaOf(variance(i, 0), variance(i, 1), variance(i, 2)) || 1e-30);
+    const all = weights.reduce((a, b) => a + b), mean = [0, 0, 0], moment = [0, 0, 0, 0, 0, 0];
+    group.forEach((i, j) => {
+      const w = weights[j] / all;
+      for (let k = 0; k < 3; ++k) {
+        mean[k] += w * place[4 * i + k];
+        out.tint[4 * g + k] += w * tint[4 * i + k];
+      }
+      light.forEach((layer, l) => { for (let k = 0; k < 3; ++k) out.light[l][3 * g + k] += w * layer[3 * i + k]; });
+    });
+    group.forEach((i, j) => {
+      const w = weights[j] / all, d = mean.map((x, k) => place[4 * i + k] - x), columns = columnsOf(...turn.subarray(4 * i, 4 * i + 4));
+      for (let p = 0, at = 0; p < 3; ++p)
+        for (let q = p; q < 3; ++q, ++at) {
+          moment[at] += w * d[p] * d[q] / secondMoment;
+          for (let k = 0; k < 3; ++k) moment[at] += w * variance(i, k) * columns[k][p] * columns[k][q];
+        }
+    });
+    const {variances, columns} = axesOf(moment), [a, b, c] = variances.map(x => Math.max(x, 1e-30));
+    // More than opaque: larger, as splat_moments.h has it.
+    const opacity = all / areaOf(a, b, c), larger = Math.max(1, opacity / 0.99) ** 0.4;
+    out.place.set([...mean, Math.min(opacity, 0.99)], 4 * g);
+    out.position.set(mean, 3 * g);
+    out.size.set([a, b, c].map(x => 0.5 * Math.log(x * larger)), 4 * g);
+    out.turn.set(quaternionOf(columns), 4 * g);
+  }
+  return out;
+}
