@@ -158,6 +158,11 @@ class Renderer {
     program.use();
   }
 
+  // Waits until all is drawn.
+  finish() {
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
   draw(camera, fine, at = 0) {
     const gl = this.gl, {width, height} = camera, target = this.target(width, height, fine), level = this.levels[at];
     gl.disable(gl.BLEND);

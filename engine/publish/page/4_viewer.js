@@ -107,11 +107,21 @@ class Viewer {
     if (!this.sorting && !sorted) this.sort(copyCamera(camera), level);
     // In motion the order of the frame before does; at rest a picture takes too long to draw it twice.
     if (this.orderOf && (moving || sorted)) {
+      const begun = performance.now();
       this.renderer.draw(camera, !moving, this.orderOf.level);
       ++this.frames;
-      if (!this.shown) { this.shown = true; firstPicture(); this.makeLevels(); }
+      if (!this.shown) this.showFirst(begun);
     }
     if (moving) this.request();
+  }
+
+  // Where the first picture takes long, motion begins some steps down.
+  showFirst(begun) {
+    this.renderer.finish();
+    if (performance.now() - begun > 500) this.step = 4;
+    this.shown = true;
+    firstPicture();
+    this.makeLevels();
   }
 
   // One step down after 3 slow frames, or after one of a quarter of a second, and three after one of a whole; one up
