@@ -224,6 +224,14 @@ def check_hostile(page, scene, arguments, failures, folder):
           f"hostile names: the title is {title!r}")
     check(failures, page.run("document.getElementById('camera').textContent").startswith("</script><img"),
           "hostile names: the camera's name is not shown")
+    page.resize(390, 844, 2, phone=True)
+    check(failures, page.run("""[...document.querySelectorAll('nav > button')].every(b => {
+      const text = document.createRange(), box = b.getBoundingClientRect();
+      text.selectNodeContents(b);
+      return text.getBoundingClientRect().right <= box.right - 8;
+    })"""),
+          "hostile names: a long name squeezes the buttons on a phone")
+    page.resize(1280, 720)
     check(failures, not page.said, f"hostile names: the console is written to: {page.said[:3]}")
 
 
