@@ -133,7 +133,7 @@ void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
         throw_outside(name_, offset, source.size(), bytes_);
     if (source.empty()) return;
     Device::State& state = device_->state();
-    check_vulkan(state.wait_idle(), "upload to " + describe(name_, source.size()));
+    check_vulkan(state.wait_for_submitted(), "upload to " + describe(name_, source.size()));
     if (direct_ != nullptr) {
         std::memcpy(static_cast<std::byte*>(direct_) + offset, source.data(), source.size());
         return;
@@ -151,7 +151,7 @@ void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
         throw_outside(name_, offset, target.size(), bytes_);
     if (target.empty()) return;
     Device::State& state = device_->state();
-    check_vulkan(state.wait_idle(), "download of " + describe(name_, target.size()));
+    check_vulkan(state.wait_for_submitted(), "download of " + describe(name_, target.size()));
     if (state.compile_only) {
         std::memset(target.data(), 0, target.size());
         return;

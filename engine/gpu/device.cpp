@@ -250,13 +250,24 @@ VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence, VkSemaph
     submit_info.signalSemaphoreInfoCount = signal != VK_NULL_HANDLE ? 1 : 0;
     submit_info.pSignalSemaphoreInfos = &semaphores[1];
     const std::lock_guard lock(queue_mutex);
+    submitted = true;
     return vkQueueSubmit2(queue, 1, &submit_info, fence);
 }
 
 VkResult Device::State::wait_idle() {
     if (compile_only) return VK_SUCCESS;
     const std::lock_guard lock(queue_mutex);
-    return vkQueueWaitIdle(queue);
+    const VkResult result = vkQueueWaitIdle(queue);
+    if (result == VK_SUCCESS) submitted = false;
+    return result;
+}
+
+VkResult Device::State::wait_for_submitted() {
+    {
+        const std::lock_guard lock(queue_mutex);
+        if (!submitted) return VK_SUCCESS;
+    }
+    return wait_idle();
 }
 
 Device::Device(const DeviceOptions& options)
