@@ -24,33 +24,34 @@ IterateAverage::IterateAverage(Device& device)
 
 void IterateAverage::add(const GpuSplats& splats) {
     for (int a = 0; count_ > 0 && a < kAttributeCount; ++a)
-        if (const std::uint64_t bytes = std::uint64_t{splats.count()} * splats.stride(a) * 4;
+        if (const std::uint64_t bytes = splats.rows(a).bytes(splats.count());
             bytes > 0 && mean_[a].bytes() != bytes)
             throw Error(mean_name(a),
                         fmt::format("holds {} bytes, the splats {}", mean_[a].bytes(), bytes),
                         "Call clear() where the splats became others.");
     if (count_ == 0)
         for (int a = 0; a < kAttributeCount; ++a)
-            mean_[a] = Buffer(*device_, mean_name(a),
-                              std::uint64_t{splats.count()} * splats.stride(a) * 4);
+            mean_[a] = Buffer(*device_, mean_name(a), splats.rows(a).bytes(splats.count()));
     const float share = 1.0f / static_cast<float>(++count_);
     commands_.begin();
     commands_.pass("average");
     for (int a = 0; a < kAttributeCount; ++a) {
         const Buffer& value = splats.parameters(a);
-        const std::uint64_t stride = splats.stride(a), floats = splats.count() * stride;
-        if (floats == 0) continue;
+        const AttributeRows rows = splats.rows(a);
+        const std::uint64_t bytes = rows.bytes(splats.count());
+        if (bytes == 0) continue;
         if (count_ == 1) {
-            commands_.copy(value, mean_[a], floats * 4);
+            commands_.copy(value, mean_[a], bytes);
             continue;
         }
         for (const SplatRange& range : splats.ranges()) {
-            const std::uint64_t first = range.first * stride * 4, bytes = range.count * stride * 4;
-            const gpu::AverageArgs args{static_cast<std::uint32_t>(range.count * stride), share};
+            const gpu::AverageArgs args{static_cast<std::uint32_t>(rows.bytes(range.count) / 4),
+                                        share};
             const Groups g = groups_for(args.count);
-            commands_.dispatch(average_, args,
-                               {BufferRange{value, first, bytes}, {mean_[a], first, bytes}}, g.x,
-                               g.y);
+            commands_.dispatch(
+                average_, args,
+                {range_of_rows(value, rows, range), range_of_rows(mean_[a], rows, range)}, g.x,
+                g.y);
         }
     }
     commands_.submit_and_wait();
@@ -69,20 +70,19 @@ void IterateAverage::clear() {
 std::vector<std::vector<float>> IterateAverage::state(const GpuSplats& splats) const {
     std::vector<std::vector<float>> state;
     if (count_ == 0) return state;
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const size_t floats = size_t{splats.count()} * splats.stride(a);
-        state.push_back(floats ? mean_[a].download<float>(floats) : std::vector<float>{});
-    }
+    for (int a = 0; a < kAttributeCount; ++a)
+        state.push_back(download_rows(mean_[a], splats.rows(a), splats.count()));
     return state;
 }
 
-void IterateAverage::restore(const std::vector<std::vector<float>>& state, std::uint32_t count) {
+void IterateAverage::restore(const std::vector<std::vector<float>>& state, std::uint32_t count,
+                             const GpuSplats& splats) {
     clear();
     if (state.empty()) return;
     count_ = count;
     for (int a = 0; a < kAttributeCount; ++a) {
-        mean_[a] = Buffer(*device_, mean_name(a), state[a].size() * sizeof(float));
-        if (!state[a].empty()) mean_[a].upload(state[a]);
+        mean_[a] = Buffer(*device_, mean_name(a), splats.rows(a).bytes(splats.count()));
+        upload_rows(mean_[a], splats.rows(a), state[a]);
     }
 }
 

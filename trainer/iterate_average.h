@@ -29,7 +29,9 @@ class IterateAverage {
 
     /// [attribute][N stride], or empty; with count() what a checkpoint holds.
     std::vector<std::vector<float>> state(const GpuSplats& splats) const;
-    void restore(const std::vector<std::vector<float>>& state, std::uint32_t count);
+    /// splats: of the same count and degree.
+    void restore(const std::vector<std::vector<float>>& state, std::uint32_t count,
+                 const GpuSplats& splats);
 
   private:
     Device* device_;

@@ -38,8 +38,9 @@ FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
 
 std::uint64_t moment_bytes(std::uint64_t splats, int sh_degree, bool largest) {
     std::uint64_t sum = 0, most = 0;
-    for (const std::uint64_t stride : GpuSplats::strides(sh_degree)) {
-        const std::uint64_t bytes = Buffer::charged_bytes(2 * splats * stride * sizeof(float));
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const AttributeRows rows = attribute_rows(a, attribute_floats(a, sh_degree), 2);
+        const std::uint64_t bytes = Buffer::charged_bytes(rows.bytes(splats));
         sum += bytes;
         most = std::max(most, bytes);
     }

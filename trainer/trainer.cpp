@@ -305,13 +305,8 @@ Trainer::State Trainer::state() {
     if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
     if (step_.exposure()) s.exposure = step_.exposure()->state();
     s.error_shares = strategy_->state(splats_.count());
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const size_t floats = size_t{splats_.count()} * splats_.stride(a) * 2;
-        s.moments.push_back(floats ? splats_.moments(a).download<float>(floats)
-                                   : std::vector<float>{});
-    }
-    const size_t rest = size_t{splats_.count()} * splats_.stride(kShRest);
-    if (splats_.has_rest_sum() && rest > 0) s.rest_sum = splats_.rest_sum().download<float>(rest);
+    for (int a = 0; a < kAttributeCount; ++a) s.moments.push_back(splats_.download_moments(a));
+    s.rest_sum = splats_.download_rest_sum();
     s.gradient_sum = step_.gradient_sum_values();
     s.mean = average_.state(splats_);
     s.averaged = average_.count();
@@ -331,10 +326,10 @@ void Trainer::restore(const State& s) {
         if (!s.smoothing.empty()) splats_.smoothing().upload(s.smoothing);
     }
     for (int a = 0; a < kAttributeCount; ++a)
-        if (!s.moments[a].empty()) splats_.moments(a).upload(s.moments[a]);
-    if (!s.rest_sum.empty()) splats_.rest_sum().upload(s.rest_sum);
+        if (!s.moments[a].empty()) splats_.upload_moments(a, s.moments[a]);
+    if (!s.rest_sum.empty()) splats_.upload_rest_sum(s.rest_sum);
     step_.restore_gradient_sum(s.gradient_sum);
-    average_.restore(s.mean, s.averaged);
+    average_.restore(s.mean, s.averaged, splats_);
     iteration_ = s.iteration;
     opened_ = s.iteration > 0 ? -1 : 0;
     totals_.counters = s.counters;

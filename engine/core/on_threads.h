@@ -1,6 +1,8 @@
 // Work on several threads, as many as the system starts.
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <system_error>
 #include <thread>
@@ -20,6 +22,18 @@ void on_threads(std::size_t threads, const Work& work) {
     } catch (const std::bad_alloc&) {
     }
     work();
+}
+
+/// work(first, count) for pieces of [0, size), in any order: for loops that memory bounds, so on
+/// four threads at most, which take what it gives. work() must not throw.
+template <class Work>
+void in_pieces(std::size_t size, std::size_t piece, const Work& work) {
+    const std::size_t threads = std::min(std::thread::hardware_concurrency(), 4u);
+    std::atomic<std::size_t> next{0};
+    on_threads(std::min(threads, (size + piece - 1) / piece), [&] {
+        for (std::size_t first = 0; (first = next.fetch_add(piece)) < size;)
+            work(first, std::min(piece, size - first));
+    });
 }
 
 }  // namespace darb

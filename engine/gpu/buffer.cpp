@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <utility>
+#include <vector>
 
 #include "engine/core/error.h"
 #include "engine/gpu/device_memory.h"
@@ -144,6 +146,17 @@ void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
         std::memcpy(staging.direct_, source.data() + done, piece);
         state.copy_now(staging.buffer_, 0, buffer_, offset + done, piece, "upload to " + name_);
     }
+}
+
+void Buffer::upload_by(std::uint64_t size, const std::function<void(std::byte*)>& write) {
+    if (size > bytes_) throw_outside(name_, 0, size, bytes_);
+    if (direct_ != nullptr) {
+        check_vulkan(device_->state().wait_for_submitted(), "upload to " + describe(name_, size));
+        return write(static_cast<std::byte*>(direct_));
+    }
+    std::vector<std::byte> bytes(size);
+    write(bytes.data());
+    upload(bytes);
 }
 
 void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {

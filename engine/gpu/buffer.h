@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -47,6 +48,10 @@ class Buffer {
     /// Blocking copies through staging; the queue is idle afterwards. offset and size in bytes.
     void upload(std::span<const std::byte> bytes, std::uint64_t offset = 0);
     void download(std::span<std::byte> bytes, std::uint64_t offset = 0) const;
+    /// An upload of the first `size` bytes, which write(to) puts there: into the buffer itself
+    /// where the host may, else into memory that is copied then. It may throw: these bytes are
+    /// undefined then.
+    void upload_by(std::uint64_t size, const std::function<void(std::byte* to)>& write);
 
     template <class T>
     void upload(const std::vector<T>& values, std::uint64_t offset = 0) {

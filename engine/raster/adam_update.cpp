@@ -17,10 +17,6 @@ float weight_of(const AdamStep& step, int rule, std::uint32_t splats) {
     return rule == STEP_SCALE ? step.scale_weight / (3.0f * n) : 0.0f;
 }
 
-BufferRange rows(const Buffer& buffer, const SplatRange& range, std::uint64_t floats) {
-    return {buffer, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
-}
-
 }  // namespace
 
 AdamUpdate::AdamUpdate(Device& device)
@@ -73,13 +69,15 @@ void AdamUpdate::record(Commands& commands, GpuSplats& splats, const GradientBuf
         for (const SplatRange& range : splats.ranges()) {
             args.first_splat = range.first;
             args.splat_count = range.count;
-            const BufferRange gradient = rows(gradients.of(a), range, floats);
-            const Groups g = groups_for(std::uint64_t{range.count} * floats);
+            const AttributeRows rows = splats.rows(a);
+            const BufferRange gradient = range_of_rows(gradients.of(a), rows, range);
+            const std::uint64_t held = rows.rows_held(range.count);
+            const Groups g = groups_for(held * (rows.columns > 0 ? rows.columns : floats));
             commands.dispatch(
                 pipeline(a, floats, rest), args,
-                {rows(splats.parameters(a), range, floats),
-                 rows(splats.moments(a), range, 2ull * floats), gradient, gradients.views(),
-                 rest == REST_EACH ? gradient : splats.rest_sum(range), status},
+                {range_of_rows(splats.parameters(a), rows, range),
+                 range_of_rows(splats.moments(a), splats.rows(a, 2), range), gradient,
+                 gradients.views(), rest == REST_EACH ? gradient : splats.rest_sum(range), status},
                 g.x, g.y);
         }
     }

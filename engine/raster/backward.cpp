@@ -145,8 +145,7 @@ void Backward::record_gradients(Commands& commands, const FrameView& view, const
         args.splat_end = range.first + range.count;
         // In place of a sum of harmonics, which is not touched.
         const BufferRange rest =
-            camera ? BufferRange(*camera)
-                   : bound_rows(to.of(kShRest), kShRest, range, to.stride(kShRest));
+            camera ? BufferRange(*camera) : bound_rows(to.of(kShRest), to.rows(kShRest), range);
         ProjectBuffers extra{{}, to.views(), rest};
         to.bind(range, extra.state);
         record_project(commands, view, frame, splats, pipeline, args, extra);

@@ -15,8 +15,9 @@ std::array<std::uint32_t, kAttributeCount> GpuSplats::strides(int sh_degree) {
 
 std::uint64_t GpuSplats::parameter_bytes(std::uint64_t count, int sh_degree) {
     std::uint64_t bytes = 0;
-    for (const std::uint32_t stride : strides(sh_degree))
-        bytes += Buffer::charged_bytes(count * stride * sizeof(float));
+    const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree);
+    for (int a = 0; a < kAttributeCount; ++a)
+        bytes += Buffer::charged_bytes(attribute_rows(a, all[a]).bytes(count));
     return bytes;
 }
 
@@ -32,53 +33,59 @@ GpuSplats::GpuSplats(Device& device, const SplatModel& model, bool with_moments,
     smoothing_ = Buffer(device, "smoothing", 4);
     check_splat_shapes(model);
     for (int a = 0; a < kAttributeCount; ++a) {
-        const std::vector<float>& values = attribute_values(model, a);
         strides_[a] = model.floats(a);
-        const std::uint64_t bytes = values.size() * sizeof(float);
-        parameters_[a] = Buffer(device, attribute_name(a), bytes);
-        if (bytes > 0) parameters_[a].upload(values);
+        parameters_[a] = Buffer(device, attribute_name(a), rows(a).bytes(count_));
+        upload_rows(parameters_[a], rows(a), attribute_values(model, a));
         if (!with_moments) continue;
-        moments_[a] = Buffer(device, std::string("moments of ") + attribute_name(a), 2 * bytes);
-        if (bytes > 0) moments_[a].upload(std::vector<float>(2 * values.size(), 0.0f));
+        const std::uint64_t bytes = rows(a, 2).bytes(count_);
+        moments_[a] = Buffer(device, std::string("moments of ") + attribute_name(a), bytes);
+        moments_[a].upload(std::vector<std::byte>(bytes));
     }
     if (!with_moments) return;
-    const size_t sums = with_rest_sum ? model.sh_rest.size() : 0;
-    rest_sum_ = Buffer(device, "sum of sh_rest", sums * sizeof(float));
-    if (sums > 0) rest_sum_.upload(std::vector<float>(sums, 0.0f));
+    const std::uint64_t bytes = with_rest_sum ? rows(kShRest).bytes(count_) : 0;
+    rest_sum_ = Buffer(device, "sum of sh_rest", bytes);
+    rest_sum_.upload(std::vector<std::byte>(bytes));
 }
 
 SplatModel GpuSplats::download() const {
     SplatModel model = header_;
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const size_t floats = size_t{count_} * strides_[a];
-        if (floats > 0) attribute_values(model, a) = parameters_[a].download<float>(floats);
-    }
+    for (int a = 0; a < kAttributeCount; ++a)
+        attribute_values(model, a) = download_rows(parameters_[a], rows(a), count_);
     return model;
 }
 
-std::vector<SplatRange> GpuSplats::ranges() const {
-    return splat_ranges(count_, strides_[kShRest] * (has_moments() ? 2 : 1), binding_bytes_);
+std::vector<float> GpuSplats::download_moments(int attribute) const {
+    return download_rows(moments_[attribute], rows(attribute, 2), count_);
 }
 
-BufferRange bound_rows(const Buffer& buffer, int attribute, const SplatRange& range,
-                       std::uint64_t floats) {
-    if (!kSplatAttributes[static_cast<size_t>(attribute)].per_coefficient || floats == 0)
-        return buffer;
-    return {buffer, range.first * floats * sizeof(float), range.count * floats * sizeof(float)};
+void GpuSplats::upload_moments(int attribute, const std::vector<float>& values) {
+    upload_rows(moments_[attribute], rows(attribute, 2), values);
+}
+
+std::vector<float> GpuSplats::download_rest_sum() const {
+    return has_rest_sum_ ? download_rows(rest_sum_, rows(kShRest), count_) : std::vector<float>{};
+}
+
+void GpuSplats::upload_rest_sum(const std::vector<float>& values) {
+    upload_rows(rest_sum_, rows(kShRest), values);
+}
+
+std::vector<SplatRange> GpuSplats::ranges() const {
+    return splat_ranges(count_, rows(kShRest, has_moments() ? 2 : 1).floats_held(), binding_bytes_);
 }
 
 void GpuSplats::bind_parameters(const SplatRange& range, std::vector<BufferRange>& to) const {
     for (int a = 0; a < kAttributeCount; ++a)
-        to.push_back(bound_rows(parameters_[a], a, range, strides_[a]));
+        to.push_back(bound_rows(parameters_[a], rows(a), range));
 }
 
 void GpuSplats::bind_moments(const SplatRange& range, std::vector<BufferRange>& to) const {
     for (int a = 0; a < kAttributeCount; ++a)
-        to.push_back(bound_rows(moments_[a], a, range, strides_[a] * 2));
+        to.push_back(bound_rows(moments_[a], rows(a, 2), range));
 }
 
 BufferRange GpuSplats::rest_sum(const SplatRange& range) const {
-    return bound_rows(rest_sum_, kShRest, range, has_rest_sum_ ? strides_[kShRest] : 0);
+    return has_rest_sum_ ? bound_rows(rest_sum_, rows(kShRest), range) : BufferRange(rest_sum_);
 }
 
 // Rotations are the widest of what is bound whole, beside four words a splat of a frame; the
@@ -86,10 +93,12 @@ BufferRange GpuSplats::rest_sum(const SplatRange& range) const {
 std::uint32_t GpuSplats::max_count(const Device& device, int sh_degree, bool with_moments) {
     const std::uint64_t word = (with_moments ? 2 : 1) * sizeof(float);
     const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree);
-    const std::uint32_t widest = *std::max_element(all.begin(), all.end());
-    return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>({device.info().max_storage_buffer_bytes / (4 * word),
-                                 device.info().max_allocation_bytes / (widest * word), 1u << 30}));
+    std::uint32_t widest = 0;
+    for (int a = 0; a < kAttributeCount; ++a)
+        widest = std::max(widest, attribute_rows(a, all[a]).floats_held());
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(
+        {device.info().max_storage_buffer_bytes / (4 * word),
+         device.info().max_allocation_bytes / (widest * word) / ROW_BLOCK * ROW_BLOCK, 1u << 30}));
 }
 
 }  // namespace darb

@@ -1,5 +1,5 @@
-// GpuSplats: the parameters of N splats in device memory, one buffer an attribute, in SplatModel's
-// layout; with the optimiser's moments beside them where they are trained.
+// GpuSplats: the parameters of N splats in device memory, one buffer an attribute, in the layout of
+// attribute_rows.h; with the optimiser's moments beside them where they are trained.
 #pragma once
 
 #include <array>
@@ -7,15 +7,10 @@
 #include <vector>
 
 #include "engine/gpu/buffer.h"
-#include "engine/raster/splat_ranges.h"
+#include "engine/raster/attribute_rows.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
-
-/// What a pass over a range of splats binds of an attribute's buffer of so many floats a splat:
-/// the range's rows of harmonics, the others whole, as what a frame holds of a splat is wider.
-BufferRange bound_rows(const Buffer& buffer, int attribute, const SplatRange& range,
-                       std::uint64_t floats);
 
 class GpuSplats {
   public:
@@ -39,12 +34,16 @@ class GpuSplats {
     /// Floats per splat of an attribute (0 for kShRest at degree 0, and of an optional attribute
     /// that the model has not).
     std::uint32_t stride(int attribute) const { return strides_[attribute]; }
+    /// Where a splat's lie in the attribute's buffer; of_each: 2 in that of the moments.
+    AttributeRows rows(int attribute, std::uint32_t of_each = 1) const {
+        return attribute_rows(attribute, strides_[attribute], of_each);
+    }
     Buffer& parameters(int attribute) { return parameters_[attribute]; }
     const Buffer& parameters(int attribute) const { return parameters_[attribute]; }
     Buffer& moments(int attribute) { return moments_[attribute]; }
     const Buffer& moments(int attribute) const { return moments_[attribute]; }
 
-    /// [N][stride of kShRest], where has_rest_sum(): gradients since their last step.
+    /// As kShRest, where has_rest_sum(): gradients since their last step.
     Buffer& rest_sum() { return rest_sum_; }
     bool has_rest_sum() const { return has_rest_sum_; }
 
@@ -52,6 +51,13 @@ class GpuSplats {
     /// it.
     Buffer& smoothing() { return smoothing_; }
     const Buffer& smoothing() const { return smoothing_; }
+
+    /// In SplatModel's layout: moments as [N][stride][2], first and second, the sum as
+    /// [N][stride of kShRest]. Blocking copies.
+    std::vector<float> download_moments(int attribute) const;
+    void upload_moments(int attribute, const std::vector<float>& values);
+    std::vector<float> download_rest_sum() const;
+    void upload_rest_sum(const std::vector<float>& values);
 
     /// After an attribute's buffers were replaced by ones of another count (density control).
     void set_count(std::uint32_t count) { count_ = count; }
@@ -81,7 +87,7 @@ class GpuSplats {
     std::uint64_t binding_bytes_ = 0;  // the most that one binding holds
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> parameters_;
-    std::array<Buffer, kAttributeCount> moments_;  // [N][stride][2]: first, second
+    std::array<Buffer, kAttributeCount> moments_;  // of each float first, second
     bool has_rest_sum_ = false;
     Buffer rest_sum_;
     Buffer smoothing_;

@@ -21,8 +21,8 @@ GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats)
       add_(device, "add_gradients", {{"THREADS", SPLAT_GROUP}}) {
     for (int a = 0; a < kAttributeCount; ++a) {
         strides_[a] = splats.stride(a);
-        gradients_[a] = Buffer(device, std::string("gradients of ") + attribute_name(a),
-                               std::uint64_t{count_} * strides_[a] * sizeof(float));
+        gradients_[a] =
+            Buffer(device, std::string("gradients of ") + attribute_name(a), rows(a).bytes(count_));
     }
     views_ = Buffer(device, "views of gradients", count_ * kViewBytes);
     Commands commands(device);
@@ -37,7 +37,7 @@ std::uint64_t GradientBuffers::device_bytes(std::uint64_t count, int sh_degree) 
 
 void GradientBuffers::bind(const SplatRange& range, std::vector<BufferRange>& to) const {
     for (int a = 0; a < kAttributeCount; ++a)
-        to.push_back(bound_rows(gradients_[a], a, range, strides_[a]));
+        to.push_back(bound_rows(gradients_[a], rows(a), range));
 }
 
 void GradientBuffers::record_clear(Commands& commands) const {
@@ -53,21 +53,21 @@ void GradientBuffers::record_add(Commands& commands, const GradientBuffers& othe
             "gradients",
             fmt::format("of {} splats are to be added to those of {}", other.count_, count_),
             "Both must be of the same splats.");
-    const auto add = [&](const Buffer& from, const Buffer& to, std::uint64_t stride) {
-        for (const SplatRange& range : splat_ranges(count_, static_cast<std::uint32_t>(stride),
-                                                    device_->info().max_storage_buffer_bytes)) {
-            const std::uint64_t first = range.first * stride * 4, bytes = range.count * stride * 4;
-            const gpu::AddArgs args{static_cast<std::uint32_t>(range.count * stride)};
+    const auto add = [&](const Buffer& from, const Buffer& to, const AttributeRows& rows) {
+        for (const SplatRange& range :
+             splat_ranges(count_, rows.floats_held(), device_->info().max_storage_buffer_bytes)) {
+            const gpu::AddArgs args{
+                static_cast<std::uint32_t>(rows.bytes(range.count) / sizeof(float))};
             const Groups g = groups_for(args.count);
             commands.dispatch(add_, args,
-                              {BufferRange{from, first, bytes}, BufferRange{to, first, bytes}}, g.x,
-                              g.y);
+                              {range_of_rows(from, rows, range), range_of_rows(to, rows, range)},
+                              g.x, g.y);
         }
     };
     commands.pass("add gradients");
     for (int a = 0; a < kAttributeCount; ++a)
-        if (strides_[a] > 0) add(other.gradients_[a], gradients_[a], strides_[a]);
-    add(other.views_, views_, 2);
+        if (strides_[a] > 0) add(other.gradients_[a], gradients_[a], rows(a));
+    add(other.views_, views_, {2, 0});
 }
 
 void GradientBuffers::upload(int attribute, const std::vector<float>& values) {
@@ -82,12 +82,11 @@ void GradientBuffers::upload(int attribute, const std::vector<float>& values) {
         if (!std::isfinite(values[i]))
             throw Error(where, fmt::format("value {} is {}", i, values[i]),
                         "Gradients must be finite.");
-    if (!values.empty()) gradients_[attribute].upload(values);
+    upload_rows(gradients_[attribute], rows(attribute), values);
 }
 
 std::vector<float> GradientBuffers::download(int attribute) const {
-    const std::size_t floats = std::size_t{count_} * strides_[attribute];
-    return floats > 0 ? gradients_[attribute].download<float>(floats) : std::vector<float>{};
+    return download_rows(gradients_[attribute], rows(attribute), count_);
 }
 
 }  // namespace darb

@@ -22,7 +22,10 @@ class GradientBuffers {
     std::uint32_t count() const { return count_; }
     /// Floats per splat, as GpuSplats has them.
     std::uint32_t stride(int attribute) const { return strides_[attribute]; }
-    /// [N][stride]; zero beyond the degree of harmonics in use.
+    AttributeRows rows(int attribute) const {
+        return attribute_rows(attribute, strides_[attribute]);
+    }
+    /// In rows(); zero beyond the degree of harmonics in use.
     Buffer& of(int attribute) { return gradients_[attribute]; }
     const Buffer& of(int attribute) const { return gradients_[attribute]; }
     /// [N][2]: sum over the views of |dL/dmean| in NDC units, and how many showed the splat;

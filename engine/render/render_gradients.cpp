@@ -166,8 +166,7 @@ struct GradientRenderer::State {
     }
     void upload(const SplatModel& model) {
         for (int a = 0; a < kAttributeCount; ++a)
-            if (const std::vector<float>& values = attribute_values(model, a); !values.empty())
-                splats.parameters(a).upload(values);
+            upload_rows(splats.parameters(a), splats.rows(a), attribute_values(model, a));
         image = {};
     }
 };
@@ -207,16 +206,22 @@ bool GradientRenderer::holds(std::size_t count, int sh_degree) const {
            state_->header.origin == glm::dvec3(0.0);
 }
 
+namespace {
+
+void check_count(const char* name, std::size_t given, std::size_t splats, std::size_t floats) {
+    if (given == splats * floats) return;
+    throw Error(name, fmt::format("{} values, {} splats need {}", given, splats, splats * floats),
+                "Give the values of all splats.");
+}
+
+}  // namespace
+
 void GradientRenderer::set_values(int attribute, std::span<const float> values) {
     State& s = *state_;
-    const std::size_t wanted = std::size_t{s.splats.count()} * s.splats.stride(attribute);
-    if (values.size() != wanted)
-        throw Error(
-            attribute_name(attribute),
-            fmt::format("{} values, {} splats need {}", values.size(), s.splats.count(), wanted),
-            "Give the values of all splats.");
+    check_count(attribute_name(attribute), values.size(), s.splats.count(),
+                s.splats.stride(attribute));
     s.image = {};
-    s.splats.parameters(attribute).upload(std::as_bytes(values));
+    upload_rows(s.splats.parameters(attribute), s.splats.rows(attribute), values);
 }
 
 void GradientRenderer::set_view(int sh_degree, float near_plane) {

@@ -25,27 +25,28 @@ layout(constant_id = 4) const int REST = REST_EACH;
 #define STATE_BINDING (1 + ATTRIBUTES)
 #define FRAME_BINDING (1 + 2 * ATTRIBUTES)
 layout(push_constant, scalar) uniform Push { ProjectBackwardArgs args; };
+#include "optim/adam.glsl"
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
-layout(set = 0, binding = 1 + ATTRIBUTE_POSITION, scalar) buffer Position { float position[]; };
-layout(set = 0, binding = 1 + ATTRIBUTE_LOG_SCALE, scalar) buffer LogScale { float log_scale[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_POSITION, scalar) buffer Position { vec3 position[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_LOG_SCALE, scalar) buffer LogScale { vec3 log_scale[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_ROTATION, scalar) buffer Rotation { vec4 rotation[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer OpacityLogit { float opacity_logit[]; };
-layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) buffer ShDc { float sh_dc[]; };
-layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) buffer ShRest { float sh_rest[]; };  // from first_splat on, as m_sh_rest and d_sh_rest
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) buffer ShDc { vec3 sh_dc[]; };
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) buffer ShRest { vec4 sh_rest[]; };  // from first_splat on, as m_sh_rest and d_sh_rest
 
 // Moments with UPDATE_ADAM, else gradients.
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer MPosition { vec2 m_position[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_LOG_SCALE, scalar) buffer MLogScale { vec2 m_log_scale[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer MRotation { vec2 m_rotation[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer MPosition { Moments3 m_position[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_LOG_SCALE, scalar) buffer MLogScale { Moments3 m_log_scale[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer MRotation { mat2x4 m_rotation[]; };
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer MOpacityLogit { vec2 m_opacity_logit[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer MShDc { vec2 m_sh_dc[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer MShRest { vec2 m_sh_rest[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer DPosition { float d_position[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_LOG_SCALE, scalar) buffer DLogScale { float d_log_scale[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer DRotation { float d_rotation[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer MShDc { Moments3 m_sh_dc[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer MShRest { vec4 m_sh_rest[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer DPosition { vec3 d_position[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_LOG_SCALE, scalar) buffer DLogScale { vec3 d_log_scale[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer DRotation { vec4 d_rotation[]; };
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer DOpacityLogit { float d_opacity_logit[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer DShDc { float d_sh_dc[]; };
-layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer DShRest { float d_sh_rest[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer DShDc { vec3 d_sh_dc[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer DShRest { vec4 d_sh_rest[]; };
 
 layout(set = 0, binding = FRAME_BINDING, scalar) readonly buffer IntersectionCount { uint intersection_count[]; };
 layout(set = 0, binding = FRAME_BINDING + 1, scalar) readonly buffer FirstIntersection { uint first_intersection[]; };
@@ -53,11 +54,8 @@ layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer PartialRest
 layout(set = 0, binding = FRAME_BINDING + 8, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // norms, views
 layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = FRAME_BINDING + 10, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world
-layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { float rest_sum[]; };  // as sh_rest, but with REST_EACH
+layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { vec4 rest_sum[]; };  // as sh_rest, but with REST_EACH
 layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer CameraGradient { float camera_gradient[]; };  // [N][13] with CAMERA_GRADIENT
-
-const int SH_USED = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
-const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 
 #define PARTIALS_BINDING (FRAME_BINDING + 2)
 #include "effects/constants.glsl"
@@ -69,7 +67,7 @@ const uint SH_STRIDE = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
 #include "lib/linear_id.glsl"
 #include "lib/partials.glsl"
 #include "lib/sh.glsl"
-#include "optim/adam.glsl"
+#include "lib/rest.glsl"
 #include "optim/fading.glsl"
 #include "backward/camera_gradient.glsl"
 #include "backward/project_gradient.glsl"
@@ -97,61 +95,84 @@ bool finite(SplatGradient g) {
     return below(max(ellipsoid, light), GRADIENT_LIMIT);
 }
 
-// What becomes of a float's gradient.
-#define UPDATE_FLOAT(value, moment, stored, gradient, rate)                   \
-    if (UPDATE == UPDATE_ADAM) {                                              \
-        vec2 m = moment;                                                      \
-        value = adam_step(value, m, gradient, rate);                          \
-        moment = m;                                                           \
-    } else {                                                                  \
-        stored = UPDATE == UPDATE_ADD ? stored + (gradient) : (gradient);     \
+// What becomes of an attribute's gradient.
+#define UPDATE_ATTRIBUTE(Moments, value, moments, stored, gradient, attribute) \
+    if (UPDATE == UPDATE_ADAM) {                                               \
+        Moments m = moments;                                                   \
+        value = adam_step(value, m, gradient, args.rate[attribute]);           \
+        moments = m;                                                           \
+    } else {                                                                   \
+        stored = UPDATE == UPDATE_ADD ? stored + (gradient) : (gradient);      \
     }
+
+// Column c of the harmonics. Beyond the degree in use nothing changes; a column that is in use in part is with its x.
+void step_column(uint row, int c, vec4 gradient) {
+    const bool whole = 4 * c + 4 <= 3 * SH_USED;
+    const uint at = column_at(row, uint(c), COLUMNS), moments_at = column_at(row, uint(2 * c), 2u * COLUMNS);
+    const float rate = args.rate[ATTRIBUTE_SH_REST];
+    vec4 value = sh_rest[at], moments = m_sh_rest[moments_at];
+    value.x = adam_step(value.x, moments.xy, gradient.x, rate);
+    if (whole) value.y = adam_step(value.y, moments.zw, gradient.y, rate);
+    m_sh_rest[moments_at] = moments;
+    if (whole) {
+        moments = m_sh_rest[moments_at + ROW_BLOCK];
+        value.z = adam_step(value.z, moments.xy, gradient.z, rate);
+        value.w = adam_step(value.w, moments.zw, gradient.w, rate);
+        m_sh_rest[moments_at + ROW_BLOCK] = moments;
+    }
+    sh_rest[at] = value;
+}
+
+// The gradient of column c, 0 beyond the degree in use.
+void update_column(uint row, int c, vec4 gradient) {
+    if (4 * c >= 3 * SH_USED) return;
+    const uint at = column_at(row, uint(c), COLUMNS);
+    if (UPDATE != UPDATE_ADAM) {
+        d_sh_rest[at] = UPDATE == UPDATE_ADD ? d_sh_rest[at] + gradient : gradient;
+        return;
+    }
+    if (REST != REST_EACH) {
+        const vec4 sum = rest_sum[at];
+        const bool whole = 4 * c + 4 <= 3 * SH_USED;
+        gradient = sum + gradient * args.rest_share;
+        rest_sum[at] = REST == REST_GATHER ? gradient : whole ? vec4(0.0) : vec4(0.0, sum.yzw);
+    }
+    if (REST != REST_GATHER) step_column(row, c, gradient);
+}
 
 void update_rest(uint i, SplatGradient g) {
     float basis[SH_REST_MAX];
     sh_basis(g.direction, basis);
-    const uint row = (i - args.first_splat) * SH_STRIDE;
-    for (int k = 0; k < SH_USED; ++k) {
-        for (uint c = 0u; c < 3u; ++c) {
-            const uint at = row + uint(k) * 3u + c;
-            float gradient = basis[k] * g.colour[c];
-            if (UPDATE == UPDATE_ADAM && REST != REST_EACH) {
-                gradient = rest_sum[at] + gradient * args.rest_share;
-                rest_sum[at] = REST == REST_GATHER ? gradient : 0.0;
-            }
-            if (REST != REST_GATHER)
-                UPDATE_FLOAT(sh_rest[at], m_sh_rest[at], d_sh_rest[at], gradient,
-                             args.rate[ATTRIBUTE_SH_REST])
-        }
+    const uint row = i - args.first_splat;
+    for (int t = 0; t < FOURS; ++t) {
+        const vec3 d0 = basis[4 * t] * g.colour, d1 = basis[4 * t + 1] * g.colour, d2 = basis[4 * t + 2] * g.colour;
+        const vec3 d3 = 4 * t + 3 < SH_USED ? basis[4 * t + 3] * g.colour : vec3(0.0);
+        update_column(row, 3 * t, vec4(d0, d1.x));
+        update_column(row, 3 * t + 1, vec4(d1.yz, d2.xy));
+        update_column(row, 3 * t + 2, vec4(d2.z, d3));
     }
 }
 
 void update_splat(uint i, SplatGradient g) {
-    for (uint c = 0u; c < 3u; ++c) {
-        const uint at = 3u * i + c;
-        UPDATE_FLOAT(position[at], m_position[at], d_position[at], g.position[c],
-                     args.rate[ATTRIBUTE_POSITION])
-        const float before = log_scale[at], largest = max(before, args.largest_log_scale);
-        UPDATE_FLOAT(log_scale[at], m_log_scale[at], d_log_scale[at], g.log_scale[c],
-                     args.rate[ATTRIBUTE_LOG_SCALE])
-        if (UPDATE == UPDATE_ADAM && log_scale[at] > largest) log_scale[at] = largest;
-        UPDATE_FLOAT(sh_dc[at], m_sh_dc[at], d_sh_dc[at], (DIRECT_COLOUR == 1 ? 1.0 : SH_C0) * g.colour[c],
-                     args.rate[ATTRIBUTE_SH_DC])
+    UPDATE_ATTRIBUTE(Moments3, position[i], m_position[i], d_position[i], g.position, ATTRIBUTE_POSITION)
+    const vec3 scale_before = log_scale[i];
+    vec3 scale = scale_before;
+    UPDATE_ATTRIBUTE(Moments3, scale, m_log_scale[i], d_log_scale[i], g.log_scale, ATTRIBUTE_LOG_SCALE)
+    if (UPDATE == UPDATE_ADAM) {
+        const vec3 largest = max(scale_before, vec3(args.largest_log_scale));
+        log_scale[i] = mix(scale, largest, greaterThan(scale, largest));
     }
-    for (uint c = 0u; c < 4u; ++c) {
-        const uint at = 4u * i + c;
-        UPDATE_FLOAT(rotation[i][c], m_rotation[at], d_rotation[at], g.rotation[c],
-                     args.rate[ATTRIBUTE_ROTATION])
-    }
-    UPDATE_FLOAT(opacity_logit[i], m_opacity_logit[i], d_opacity_logit[i], g.opacity_logit,
-                 args.rate[ATTRIBUTE_OPACITY_LOGIT])
+    UPDATE_ATTRIBUTE(Moments3, sh_dc[i], m_sh_dc[i], d_sh_dc[i], (DIRECT_COLOUR == 1 ? 1.0 : SH_C0) * g.colour,
+                     ATTRIBUTE_SH_DC)
+    UPDATE_ATTRIBUTE(mat2x4, rotation[i], m_rotation[i], d_rotation[i], g.rotation, ATTRIBUTE_ROTATION)
+    UPDATE_ATTRIBUTE(vec2, opacity_logit[i], m_opacity_logit[i], d_opacity_logit[i], g.opacity_logit,
+                     ATTRIBUTE_OPACITY_LOGIT)
     if (UPDATE == UPDATE_ADAM && stands_near(cameras[args.camera_index], i, args.clearance))
         opacity_logit[i] -= FADING;
     if (SH_DEGREE > 0 && (REST != REST_GATHER || intersection_count[i] > 0u)) update_rest(i, g);
-    if (UPDATE == UPDATE_STORE) {  // the bands beyond the degree in use
-        const uint row = (i - args.first_splat) * SH_STRIDE;
-        for (uint c = uint(SH_USED) * 3u; c < SH_STRIDE; ++c) d_sh_rest[row + c] = 0.0;
-    }
+    if (UPDATE == UPDATE_STORE)  // the bands beyond the degree in use
+        for (uint c = 3u * uint(FOURS); c < COLUMNS; ++c)
+            d_sh_rest[column_at(i - args.first_splat, c, COLUMNS)] = vec4(0.0);
 }
 
 SplatGradient no_gradient() {
@@ -166,8 +187,9 @@ SplatGradient no_gradient() {
 void regularise(uint i, inout SplatGradient g) {
     const float o = 1.0 / (1.0 + exp(-opacity_logit[i]));
     g.opacity_logit += args.opacity_weight * o * (1.0 - o);
+    const vec3 raw_scale = log_scale[i];
     for (uint c = 0u; c < 3u; ++c) {
-        const float raw = log_scale[3u * i + c];
+        const float raw = raw_scale[c];
         if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c] += args.scale_weight * exp(raw);
     }
 }

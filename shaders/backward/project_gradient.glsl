@@ -1,5 +1,5 @@
 // From the summed partials of one splat to the gradients of its parameters: the exact derivative of project.comp.
-// Source: docs/math.md, Gradients. Needs camera data, covariance.glsl, sh.glsl and the parameter buffers.
+// Source: docs/math.md, Gradients. Needs camera data, covariance.glsl, rest.glsl and the parameter buffers.
 
 struct SplatGradient {
     vec3 position, log_scale;  // with LINEAR_VALUES of scale and, below, opacity
@@ -64,10 +64,9 @@ vec3 outside_is_zero(vec3 gradient, vec3 value, float limit) {
 
 SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     SplatGradient g;
-    const vec3 to_splat =
-        from_centre(camera, vec3(position[3 * i], position[3 * i + 1], position[3 * i + 2]));
+    const vec3 to_splat = from_centre(camera, position[i]);
     const vec3 p = to_camera(camera, to_splat);
-    const vec3 raw_scale = vec3(log_scale[3 * i], log_scale[3 * i + 1], log_scale[3 * i + 2]);
+    const vec3 raw_scale = log_scale[i];
     vec3 s = scale_of(raw_scale), share = vec3(1.0);
     const vec3 scale = s;
     float kept = 1.0;  // of the opacity, by the filters
@@ -112,20 +111,21 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
 
     const float range = length(to_splat);
     g.direction = to_splat / range;
-    vec3 colour = first_band(vec3(sh_dc[3 * i], sh_dc[3 * i + 1], sh_dc[3 * i + 2]));
+    vec3 colour = first_band(sh_dc[i]);
     float basis[SH_REST_MAX], along[SH_REST_MAX];
+    vec3 coefficient[SH_REST_MAX];
     sh_basis(g.direction, basis);
-    for (int k = 0; k < SH_USED; ++k) {
-        const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u;
-        colour += basis[k] * vec3(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]);
+    for (int t = 0; t < FOURS; ++t) {
+        vec3 four[4];
+        load_four(i - args.first_splat, t, four);
+        for (int k = 0; k < 4; ++k)
+            if (4 * t + k < SH_USED) coefficient[4 * t + k] = four[k];
     }
+    for (int k = 0; k < SH_USED; ++k) colour += basis[k] * coefficient[k];
     g.colour = sums.d_colour;
     if (DIRECT_COLOUR == 0) g.colour = mix(g.colour, vec3(0.0), lessThan(colour, vec3(0.0)));
     if (SH_DEGREE > 0) {
-        for (int k = 0; k < SH_USED; ++k) {
-            const uint at = (i - args.first_splat) * SH_STRIDE + uint(k) * 3u;
-            along[k] = dot(g.colour, vec3(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]));
-        }
+        for (int k = 0; k < SH_USED; ++k) along[k] = dot(g.colour, coefficient[k]);
         const vec3 d = sh_direction_gradient(g.direction, along);
         g.position += (d - g.direction * dot(g.direction, d)) / range;
     }

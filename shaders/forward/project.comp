@@ -34,7 +34,7 @@ layout(set = 0, binding = 1 + ATTRIBUTE_LOG_SCALE, scalar) readonly buffer LogSc
 layout(set = 0, binding = 1 + ATTRIBUTE_ROTATION, scalar) readonly buffer Rotation { vec4 rotation[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_OPACITY_LOGIT, scalar) readonly buffer Opacity { float opacity_logit[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) readonly buffer ShDc { vec3 sh_dc[]; };
-layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) readonly buffer ShRest { float sh_rest[]; };  // from first_splat on
+layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) readonly buffer ShRest { vec4 sh_rest[]; };  // from first_splat on
 layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape { vec4 splat_shape[]; };  // mean, l11, l21
 layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShapeHalf { uvec4 splat_shape_half[]; };
 layout(set = 0, binding = FRAME_BINDING + 1, scalar) writeonly buffer SplatLight { vec4 splat_light[]; };  // rgb, opacity
@@ -46,17 +46,19 @@ layout(set = 0, binding = FRAME_BINDING + 5, scalar) writeonly buffer Visible { 
 layout(set = 0, binding = FRAME_BINDING + 6, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
 
+#include "lib/rest.glsl"
+
 // Not clamped: max may drop NaN.
 vec3 splat_colour(uint i, vec3 direction) {
     vec3 colour = first_band(sh_dc[i]);
     if (SH_DEGREE > 0) {
         float basis[SH_REST_MAX];
         sh_basis(direction, basis);
-        const int used = (SH_DEGREE + 1) * (SH_DEGREE + 1) - 1;
-        const uint stride = uint((SH_STORED + 1) * (SH_STORED + 1) - 1) * 3u;
-        for (int k = 0; k < used; ++k) {
-            const uint o = (i - args.first_splat) * stride + uint(k) * 3u;
-            colour += basis[k] * vec3(sh_rest[o], sh_rest[o + 1u], sh_rest[o + 2u]);
+        for (int t = 0; t < FOURS; ++t) {
+            vec3 rest[4];
+            load_four(i - args.first_splat, t, rest);
+            for (int k = 0; k < 4; ++k)
+                if (4 * t + k < SH_USED) colour += basis[4 * t + k] * rest[k];
         }
     }
     return colour;

@@ -16,3 +16,19 @@ float adam_step(float parameter, inout vec2 moment, float gradient, float rate) 
            rate * moment.x / (sqrt(moment.y) * args.inverse_sqrt_correction2 + ADAM_EPSILON);
 }
 
+// Of several parameters at once, whose moments are as many pairs.
+struct Moments3 { vec4 first; vec2 last; };
+vec3 adam_step(vec3 parameter, inout Moments3 moments, vec3 gradient, float rate) {
+    parameter.x = adam_step(parameter.x, moments.first.xy, gradient.x, rate);
+    parameter.y = adam_step(parameter.y, moments.first.zw, gradient.y, rate);
+    parameter.z = adam_step(parameter.z, moments.last, gradient.z, rate);
+    return parameter;
+}
+vec4 adam_step(vec4 parameter, inout mat2x4 moments, vec4 gradient, float rate) {
+    parameter.x = adam_step(parameter.x, moments[0].xy, gradient.x, rate);
+    parameter.y = adam_step(parameter.y, moments[0].zw, gradient.y, rate);
+    parameter.z = adam_step(parameter.z, moments[1].xy, gradient.z, rate);
+    parameter.w = adam_step(parameter.w, moments[1].zw, gradient.w, rate);
+    return parameter;
+}
+

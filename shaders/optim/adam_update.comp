@@ -1,7 +1,7 @@
 // The Adam step of one attribute, of gradients that stand in buffers: of several views, or the caller's own.
 // The same step as project_backward.comp makes of one view, with its regularisers and limits.
 // Place: once an attribute and range, after the gradients of all views. Source: Kingma and Ba 2015.
-// Work: one thread a float. Shared memory: none. Does nothing when a frame overflowed its intersection buffers.
+// Work: one thread a float, of harmonics above the first band a column (lib/rows.glsl). Shared memory: none. Does nothing when a frame overflowed its intersection buffers.
 // A splat with a gradient that was not finite is left as it is; a float whose own is not is counted and left.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -23,8 +23,12 @@ layout(set = 0, binding = 0, scalar) buffer Value { float value[]; };  // of the
 layout(set = 0, binding = 1, scalar) buffer Moment { vec2 moment[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Gradient { float gradient[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Views { vec2 views[]; };  // [N] sum of norms, views
-layout(set = 0, binding = 4, scalar) buffer RestSum { float rest_sum[]; };
 layout(set = 0, binding = 5, scalar) buffer Status { FrameStatus status; };
+// With STEP_REST, in columns.
+layout(set = 0, binding = 0, scalar) buffer ValueColumn { vec4 value_column[]; };
+layout(set = 0, binding = 1, scalar) buffer MomentColumn { vec4 moment_column[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer GradientColumn { vec4 gradient_column[]; };
+layout(set = 0, binding = 4, scalar) buffer RestSum { vec4 rest_sum[]; };
 
 #define ADAM_BETA1 args.beta1
 #define ADAM_BETA2 args.beta2
@@ -32,6 +36,7 @@ layout(set = 0, binding = 5, scalar) buffer Status { FrameStatus status; };
 #define ADAM_SHARE2 args.share2
 #include "lib/finite.glsl"
 #include "lib/linear_id.glsl"
+#include "lib/rows.glsl"
 #include "optim/adam.glsl"
 
 float regulariser(float x) {
@@ -40,7 +45,46 @@ float regulariser(float x) {
     return args.weight * o * (1.0 - o);
 }
 
+// Two floats of a column: their values, gradients and moments; all that is in use and sound.
+void step_pair(bvec2 used, inout vec2 values, vec2 gradients, uint moments_at) {
+    if (!any(used)) return;
+    vec4 m = moment_column[moments_at];
+    if (used.x) values.x = adam_step(values.x, m.xy, gradients.x, args.rate);
+    if (used.y) values.y = adam_step(values.y, m.zw, gradients.y, args.rate);
+    moment_column[moments_at] = m;
+}
+
+void step_rest() {
+    const uint at = linear_id(), columns = (FLOATS + 3u) / 4u;
+    const uint splat = at / (columns * ROW_BLOCK) * ROW_BLOCK + at % ROW_BLOCK, c = at / ROW_BLOCK % columns;
+    if (splat >= args.splat_count || 4u * c >= args.floats_in_use || status.overflow != 0u) return;
+    const float shown = views[args.first_splat + splat].y;
+    if (shown < 0.0) return;
+    vec4 g = gradient_column[at] * args.gradient_scale;
+    bvec4 used = lessThan(4u * c + uvec4(0u, 1u, 2u, 3u), uvec4(args.floats_in_use));
+    for (int j = 0; j < 4; ++j)
+        if (used[j] && !magnitude_below(g[j], GRADIENT_LIMIT)) {
+            atomicAdd(status.bad_gradients, 1u);
+            used[j] = false;
+        }
+    if (REST != REST_EACH) {
+        if (REST == REST_GATHER && shown == 0.0) return;
+        const vec4 sum = rest_sum[at];
+        g = sum + g * args.rest_share;
+        rest_sum[at] = mix(sum, REST == REST_GATHER ? g : vec4(0.0), used);
+        if (REST == REST_GATHER) return;
+    }
+    vec4 value = value_column[at];
+    step_pair(used.xy, value.xy, g.xy, column_at(splat, 2u * c, 2u * columns));
+    step_pair(used.zw, value.zw, g.zw, column_at(splat, 2u * c + 1u, 2u * columns));
+    value_column[at] = value;
+}
+
 void main() {
+    if (STEP == STEP_REST) {
+        step_rest();
+        return;
+    }
     const uint at = linear_id(), splat = at / FLOATS;
     if (splat >= args.splat_count || at % FLOATS >= args.floats_in_use || status.overflow != 0u) return;
     const float shown = views[args.first_splat + splat].y;
@@ -52,12 +96,6 @@ void main() {
     }
     if ((STEP == STEP_SCALE || STEP == STEP_OPACITY) && (shown > 0.0 || args.regularise_unseen == 1u))
         g += regulariser(value[at]);
-    if (STEP == STEP_REST && REST != REST_EACH) {
-        if (REST == REST_GATHER && shown == 0.0) return;
-        g = rest_sum[at] + g * args.rest_share;
-        rest_sum[at] = REST == REST_GATHER ? g : 0.0;
-        if (REST == REST_GATHER) return;
-    }
     const float before = value[at];
     vec2 m = moment[at];
     float after = adam_step(before, m, g, args.rate);

@@ -13,7 +13,7 @@ layout(constant_id = 0) const uint THREADS = 64;
 
 layout(push_constant, scalar) uniform Push { FadeNearArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Cameras { CameraData cameras[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer Position { float position[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Position { vec3 position[]; };
 layout(set = 0, binding = 2, scalar) buffer OpacityLogit { float opacity_logit[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Views { vec2 views[]; };  // [N] sum of norms, views
 layout(set = 0, binding = 4, scalar) readonly buffer Status { FrameStatus status; };

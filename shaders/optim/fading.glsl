@@ -3,6 +3,5 @@
 const float FADING = 1.0;  // of a logit, in a frame: what Adam adds in 20 at most, so what many photos hold up stays
 
 bool stands_near(CameraData camera, uint i, float clearance) {
-    const vec3 at = vec3(position[3u * i], position[3u * i + 1u], position[3u * i + 2u]);
-    return length(from_centre(camera, at)) < clearance;
+    return length(from_centre(camera, position[i])) < clearance;
 }

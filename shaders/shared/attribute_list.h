@@ -11,6 +11,10 @@
 #define ATTRIBUTE_SH_REST 5
 #define ATTRIBUTES 6
 
+// The rows of an attribute of each coefficient, on the device: blocks of so many splats, in each a
+// column of as many vec4 after the other (shaders/lib/rows.glsl).
+#define ROW_BLOCK 8u
+
 // What a step of the optimizer does beside Adam.
 #define STEP_PLAIN 0
 #define STEP_SCALE 1    // the regulariser of scales, and none grows beyond the largest

@@ -88,7 +88,7 @@ struct DensifyArgs {
 struct GatherArgs {
     uint to_first, to_count;
     uint from_first, from_count;
-    uint stride;     // floats per splat of this attribute
+    uint stride;     // floats per splat of this attribute, or columns of what lies in blocks
     uint clear_new;  // 1: zero for new splats (moments), 0: copy
 };
 

@@ -94,13 +94,13 @@ TEST_P(KernelGradient, matches_differences_of_the_devices_own_images) {
         for (float& value : values) {
             const float kept = value, above = kept + kStep, below = kept - kStep;
             value = above;
-            splats.parameters(a).upload(values);
+            upload_rows(splats.parameters(a), splats.rows(a), values);
             const double loss_above = loss();
             value = below;
-            splats.parameters(a).upload(values);
+            upload_rows(splats.parameters(a), splats.rows(a), values);
             const double loss_below = loss();
             value = kept;
-            splats.parameters(a).upload(values);
+            upload_rows(splats.parameters(a), splats.rows(a), values);
             differences.push_back((loss_above - loss_below) / (double(above) - double(below)));
         }
         EXPECT_TRUE(compare_scaled(attribute_name(a), differences, walk.d[a],

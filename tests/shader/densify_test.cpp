@@ -49,18 +49,17 @@ struct Population {
                    int kernel = KERNEL_GAUSSIAN, std::uint32_t max_splats = kNoLimit) const {
         Device& device = shared_device();
         GpuSplats splats(device, model, true, true);
-        for (int a = 0; a < kAttributeCount; ++a) splats.moments(a).upload(moments_before(a));
+        for (int a = 0; a < kAttributeCount; ++a) splats.upload_moments(a, moments_before(a));
         const std::vector<float> ones(model.sh_rest.size(), 1.0f);
-        if (!ones.empty()) splats.rest_sum().upload(ones);
+        if (!ones.empty()) splats.upload_rest_sum(ones);
         Buffer sums(device, "gradient sum", std::max<size_t>(model.size(), 1) * 8);
         if (!gradient_sum.empty()) sums.upload(gradient_sum);
         DensityControl density(device, kernel);
         result = density.run(splats, sums, args, max_splats);
         Generation g{splats.download(), {}, {}};
         const size_t rest = g.model.size() * stride(kShRest);
-        if (rest > 0) g.rest_sum = splats.rest_sum().download<float>(rest);
-        for (int a = 0; a < kAttributeCount; ++a)
-            g.moments[a] = splats.moments(a).download<float>(g.model.size() * stride(a) * 2);
+        if (rest > 0) g.rest_sum = splats.download_rest_sum();
+        for (int a = 0; a < kAttributeCount; ++a) g.moments[a] = splats.download_moments(a);
         return g;
     }
     size_t stride(int attribute) const {
@@ -293,7 +292,7 @@ TEST(ResetOpacity, opacities_come_down_and_moments_are_zero) {
     Device& device = shared_device();
     GpuSplats splats(device, population.model, true);
     for (int a = 0; a < kAttributeCount; ++a)
-        splats.moments(a).upload(population.moments_before(a));
+        splats.upload_moments(a, population.moments_before(a));
     DensityControl density(device, KERNEL_GAUSSIAN);
     density.reset_opacity(splats, static_cast<float>(reference::kResetOpacity));
     const SplatModel after = splats.download();
@@ -305,8 +304,8 @@ TEST(ResetOpacity, opacities_come_down_and_moments_are_zero) {
     }
     EXPECT_GT(lowered, 100);
     EXPECT_LT(lowered, 300);
-    EXPECT_EQ(splats.moments(kOpacityLogit).download<float>(600), std::vector<float>(600, 0.0f));
-    EXPECT_EQ(splats.moments(kShDc).download<float>(1800), population.moments_before(kShDc));
+    EXPECT_EQ(splats.download_moments(kOpacityLogit), std::vector<float>(600, 0.0f));
+    EXPECT_EQ(splats.download_moments(kShDc), population.moments_before(kShDc));
     EXPECT_EQ(after.position, population.model.position);
 }
 

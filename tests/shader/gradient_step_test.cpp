@@ -36,11 +36,11 @@ PassState step_from_buffers(const SplatModel& model, const Camera& camera, int d
     GradientBuffers gradients(device, splats);
     for (int a = 0; a < kAttributeCount; ++a) {
         if (before.moments[a].empty()) continue;
-        splats.moments(a).upload(before.moments[a]);
+        splats.upload_moments(a, before.moments[a]);
         gradients.upload(a, stored.d[a]);
     }
     gradients.views().upload(stored.gradient_sum);
-    if (step.rest_every > 1 && !before.rest_sum.empty()) splats.rest_sum().upload(before.rest_sum);
+    if (step.rest_every > 1 && !before.rest_sum.empty()) splats.upload_rest_sum(before.rest_sum);
     Buffer status(device, "status", sizeof(gpu::FrameStatus)),
         sums(device, "sums", model.size() * 8);
     status.upload(std::vector{stored.status});
@@ -62,11 +62,9 @@ PassState step_from_buffers(const SplatModel& model, const Camera& camera, int d
     const SplatModel moved = splats.download();
     for (int a = 0; a < kAttributeCount; ++a) {
         after.parameters[a] = attribute_values(moved, a);
-        if (!after.moments[a].empty())
-            after.moments[a] = splats.moments(a).download<float>(after.moments[a].size());
+        if (!after.moments[a].empty()) after.moments[a] = splats.download_moments(a);
     }
-    if (step.rest_every > 1 && !after.rest_sum.empty())
-        after.rest_sum = splats.rest_sum().download<float>(after.rest_sum.size());
+    if (step.rest_every > 1 && !after.rest_sum.empty()) after.rest_sum = splats.download_rest_sum();
     after.gradient_sum = sums.download<glm::vec2>(model.size());
     after.status = status.download<gpu::FrameStatus>(1)[0];
     return after;
@@ -230,7 +228,7 @@ struct ExposedStep {
         const SplatModel model = splats.download();
         for (int a = 0; a < kAttributeCount; ++a) {
             s.parameters[a] = attribute_values(model, a);
-            s.moments[a] = splats.moments(a).download<float>(2 * s.parameters[a].size());
+            s.moments[a] = splats.download_moments(a);
         }
         s.gradient_sum = backward.gradient_sum().download<glm::vec2>(splats.count());
         s.status = buffers.frame().read_status();
@@ -239,8 +237,8 @@ struct ExposedStep {
     void copy_from(ExposedStep& other) {
         const PassState s = other.state();
         for (int a = 0; a < kAttributeCount; ++a) {
-            splats.parameters(a).upload(s.parameters[a]);
-            splats.moments(a).upload(s.moments[a]);
+            upload_rows(splats.parameters(a), splats.rows(a), s.parameters[a]);
+            splats.upload_moments(a, s.moments[a]);
         }
         backward.gradient_sum().upload(s.gradient_sum);
         exposure.restore(other.exposure.state());

@@ -74,7 +74,7 @@ TEST(IterateAverage, goes_on_from_what_it_held) {
     IterateAverage whole(shared_device()), second(shared_device());
     EXPECT_TRUE(whole.state(one).empty());
     whole.add(one);
-    second.restore(whole.state(one), whole.count());
+    second.restore(whole.state(one), whole.count(), one);
     whole.add(two);
     second.add(two);
     EXPECT_EQ(second.count(), 2U);

@@ -215,15 +215,13 @@ Round run_round(const SplatModel& model, std::uint32_t grown, std::uint32_t seed
     Device& d = shared_device();
     GpuSplats splats(d, model, true);
     for (int a = 0; a < kAttributeCount; ++a)
-        splats.moments(a).upload(std::vector<float>(attribute_values(model, a).size() * 2, 1.0f));
+        splats.upload_moments(a, std::vector<float>(attribute_values(model, a).size() * 2, 1.0f));
     DensityControl density(d, model.kernel);
     Relocation relocation(d, model.kernel, model.footprint);
     Round round;
     round.result = relocation.run(splats, density, kDead, grown, seed);
     round.model = splats.download();
-    for (int a = 0; a < kAttributeCount; ++a)
-        round.moments[a] =
-            splats.moments(a).download<float>(round.model.size() * splats.stride(a) * 2);
+    for (int a = 0; a < kAttributeCount; ++a) round.moments[a] = splats.download_moments(a);
     return round;
 }
 

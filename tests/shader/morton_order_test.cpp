@@ -71,13 +71,13 @@ TEST(MortonOrder, everything_of_a_splat_moves_as_a_stable_sort_says) {
     model.position[3 * 6 + 1] = std::numeric_limits<float>::quiet_NaN();
     GpuSplats splats(shared_device(), model, true, true);
     for (int a = 0; a < kAttributeCount; ++a)
-        splats.moments(a).upload(numbered(model.size() * splats.stride(a) * 2));
+        splats.upload_moments(a, numbered(model.size() * splats.stride(a) * 2));
     const size_t rest = splats.stride(kShRest);
     ASSERT_GT(rest, 0U);
-    splats.rest_sum().upload(numbered(model.size() * rest));
+    splats.upload_rest_sum(numbered(model.size() * rest));
     put_in_order(splats);
     ASSERT_EQ(splats.count(), model.size());
-    const auto sums = splats.rest_sum().download<float>(model.size() * rest);
+    const auto sums = splats.download_rest_sum();
     const SplatModel got = splats.download();
     const std::vector<size_t> order = expected_order(model);
     ASSERT_FALSE(std::is_sorted(order.begin(), order.end()));
@@ -85,7 +85,7 @@ TEST(MortonOrder, everything_of_a_splat_moves_as_a_stable_sort_says) {
         const std::vector<float>&before = attribute_values(model, a),
               &after = attribute_values(got, a);
         const size_t stride = splats.stride(a);
-        const auto moments = splats.moments(a).download<float>(model.size() * stride * 2);
+        const auto moments = splats.download_moments(a);
         for (size_t i = 0; i < order.size(); ++i)
             for (size_t c = 0; c < stride; ++c) {
                 const float wanted = before[order[i] * stride + c], value = after[i * stride + c];

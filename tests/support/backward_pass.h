@@ -108,16 +108,22 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     }
     const auto& b = before;
     const GuardedBuffer cameras(device, "cameras", std::vector{camera_data(camera, model.origin)});
+    std::vector<AttributeRows> rows, state_rows;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        rows.push_back(attribute_rows(a, model.floats(a)));
+        state_rows.push_back(attribute_rows(a, model.floats(a), update == UPDATE_ADAM ? 2 : 1));
+    }
     std::vector<GuardedBuffer> p, held;  // held: moments or gradients
     for (int a = 0; a < kAttributeCount; ++a) {
-        p.emplace_back(device, attribute_name(a), b.parameters[a]);
-        held.emplace_back(device, "state", update == UPDATE_ADAM ? b.moments[a] : b.d[a]);
+        p.emplace_back(device, attribute_name(a), held_rows(rows[a], b.parameters[a]));
+        held.emplace_back(device, "state",
+                          held_rows(state_rows[a], update == UPDATE_ADAM ? b.moments[a] : b.d[a]));
     }
     const GuardedBuffer count(device, "intersection count", partials.count),
         begin(device, "first intersection", partials.begin), sum(device, "partials", sums),
         rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
         status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters),
-        rest_sum(device, "rest sum", b.rest_sum);
+        rest_sum(device, "rest sum", held_rows(rows[kShRest], b.rest_sum));
     std::vector<BufferRange> buffers{cameras};
     for (const GuardedBuffer& buffer : p) buffers.emplace_back(buffer);
     for (const GuardedBuffer& buffer : held) buffers.emplace_back(buffer);
@@ -133,12 +139,13 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     for (int a = 0; a < kAttributeCount; ++a) {
         EXPECT_TRUE(p[a].intact());
         EXPECT_TRUE(held[a].intact());
-        after.parameters[a] = p[a].read<float>();
-        (update == UPDATE_ADAM ? after.moments : after.d)[a] = held[a].read<float>();
+        after.parameters[a] = values_of_rows(rows[a], p[a].read<float>(), n);
+        (update == UPDATE_ADAM ? after.moments : after.d)[a] =
+            values_of_rows(state_rows[a], held[a].read<float>(), n);
     }
     EXPECT_TRUE(gradient.intact() && status.intact() && sum.intact() && rests.intact());
     EXPECT_TRUE(rest_sum.intact());
-    after.rest_sum = rest_sum.read<float>();
+    after.rest_sum = values_of_rows(rows[kShRest], rest_sum.read<float>(), n);
     after.gradient_sum = gradient.read<glm::vec2>();
     after.status = status.read<gpu::FrameStatus>()[0];
     return after;

@@ -39,7 +39,9 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
         log_scale(device, "log_scale", model.log_scale),
         rotation(device, "rotation", model.rotation),
         opacity(device, "opacity", model.opacity_logit), sh_dc(device, "sh_dc", model.sh_dc),
-        sh_rest(device, "sh_rest", model.sh_rest), smoothing(device, "smoothing", filters);
+        sh_rest(device, "sh_rest",
+                held_rows(attribute_rows(kShRest, model.floats(kShRest)), model.sh_rest)),
+        smoothing(device, "smoothing", filters);
     const GuardedBuffer shape(device, "shape", n * 16), light(device, "light", n * 16),
         bound(device, "bound", n * 16), cover(device, "cover", n * 16),
         intersection_count(device, "intersection count", n * 4), visible(device, "visible", n * 4),

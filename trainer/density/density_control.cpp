@@ -39,6 +39,8 @@ DensityControl::DensityControl(Device& device, int kernel) : device_(&device), c
     decide_ = Pipeline(device, "densify_decide", threads);
     sources_ = Pipeline(device, "densify_sources", threads);
     gather_ = Pipeline(device, "gather_attribute", threads);
+    gather_columns_ =
+        Pipeline(device, "gather_attribute", {{"THREADS", SPLAT_GROUP}, {"COLUMNS", 1}});
     split_ =
         Pipeline(device, "densify_split", {{"THREADS", SPLAT_GROUP}, {"QUANTILES", kQuantiles}});
     reset_ = Pipeline(device, "reset_opacity", threads);
@@ -112,37 +114,35 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
 }
 
 void DensityControl::move(GpuSplats& splats, const Buffer& sources, std::uint32_t count) {
+    const Move all{sources, splats.count(), count};
     for (int a = 0; a < kAttributeCount; ++a) {
-        const std::uint32_t stride = splats.stride(a);
-        if (stride == 0) continue;
+        if (splats.stride(a) == 0) continue;
         const bool copied = kSplatAttributes[static_cast<std::size_t>(a)].copied_to_new;
-        gather(sources, count, stride, !copied, splats.parameters(a));
-        if (splats.has_moments()) gather(sources, count, stride * 2, true, splats.moments(a));
+        gather(all, splats.rows(a), !copied, splats.parameters(a));
+        if (splats.has_moments()) gather(all, splats.rows(a, 2), true, splats.moments(a));
         if (a == kShRest && splats.has_rest_sum())
-            gather(sources, count, stride, true, splats.rest_sum());
+            gather(all, splats.rows(a), true, splats.rest_sum());
     }
     splats.set_count(count);
 }
 
-void DensityControl::gather(const Buffer& sources, std::uint32_t count, std::uint32_t stride,
-                            bool clear_new, Buffer& buffer) {
-    const std::uint64_t floats = std::uint64_t(count) * stride;
-    Buffer next(*device_, buffer.name(), floats * sizeof(float));
-    const auto row = std::uint64_t{stride} * sizeof(float);
+void DensityControl::gather(const Move& all, const AttributeRows& rows, bool clear_new,
+                            Buffer& buffer) {
+    Buffer next(*device_, buffer.name(), rows.bytes(all.after));
     const std::uint64_t most = device_->info().max_storage_buffer_bytes;
-    const auto before = static_cast<std::uint32_t>(buffer.bytes() / row);
-    if (count > 0) {
+    const bool columns = rows.columns > 0;
+    const std::uint32_t stride = columns ? rows.columns : rows.floats;
+    if (all.after > 0) {
         commands_.begin();
         commands_.pass("gather");
-        for (const SplatRange& to : splat_ranges(count, stride, most)) {
-            const Groups g = groups_for(std::uint64_t{to.count} * stride);
-            for (const SplatRange& from : splat_ranges(before, stride, most))
+        for (const SplatRange& to : splat_ranges(all.after, rows.floats_held(), most)) {
+            const Groups g = groups_for(rows.rows_held(to.count) * stride);
+            for (const SplatRange& from : splat_ranges(all.before, rows.floats_held(), most))
                 commands_.dispatch(
-                    gather_,
+                    columns ? gather_columns_ : gather_,
                     gpu::GatherArgs{to.first, to.count, from.first, from.count, stride,
                                     clear_new ? 1u : 0u},
-                    {sources, BufferRange(buffer, from.first * row, from.count * row),
-                     BufferRange(next, to.first * row, to.count * row)},
+                    {all.sources, range_of_rows(buffer, rows, from), range_of_rows(next, rows, to)},
                     g.x, g.y);
         }
         commands_.submit_and_wait();

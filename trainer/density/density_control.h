@@ -41,12 +41,15 @@ class DensityControl {
     void move(GpuSplats& splats, const Buffer& sources, std::uint32_t count);
 
   private:
-    void gather(const Buffer& sources, std::uint32_t count, std::uint32_t stride, bool clear_new,
-                Buffer& buffer);
+    struct Move {
+        const Buffer& sources;
+        std::uint32_t before, after;  // splats
+    };
+    void gather(const Move& all, const AttributeRows& rows, bool clear_new, Buffer& buffer);
 
     Device* device_;
     Commands commands_;
-    Pipeline decide_, sources_, gather_, split_, reset_, decay_;
+    Pipeline decide_, sources_, gather_, gather_columns_, split_, reset_, decay_;
     Buffer quantile_;
 };
 

@@ -19,23 +19,25 @@ BufferList<RoundBuffers> RoundBuffers::list(std::uint64_t splats) {
 }
 
 std::uint64_t rest_sum_bytes(std::uint64_t splats, int sh_degree, bool rest_sum) {
-    const std::uint64_t stride = rest_sum ? GpuSplats::strides(sh_degree)[kShRest] : 0;
-    return Buffer::charged_bytes(splats * stride * sizeof(float));
+    const std::uint32_t floats = rest_sum ? attribute_floats(kShRest, sh_degree) : 0;
+    return Buffer::charged_bytes(attribute_rows(kShRest, floats).bytes(splats));
 }
 
 std::uint64_t round_bytes(std::uint32_t before, std::uint32_t after, int sh_degree, bool rest_sum) {
-    std::vector<std::uint64_t> floats;  // of a splat in each buffer that is replaced
-    for (const std::uint64_t stride : GpuSplats::strides(sh_degree))
-        floats.insert(floats.end(), {stride, 2 * stride});
-    floats.push_back(rest_sum ? GpuSplats::strides(sh_degree)[kShRest] : 0);
-    const auto bytes = [](std::uint64_t splats, std::uint64_t each) {
-        return Buffer::charged_bytes(splats * each * sizeof(float));
+    std::vector<AttributeRows> replaced;  // in each buffer
+    for (int a = 0; a < kAttributeCount; ++a)
+        for (const std::uint32_t of_each : {1u, 2u})
+            replaced.push_back(attribute_rows(a, attribute_floats(a, sh_degree), of_each));
+    replaced.push_back(
+        attribute_rows(kShRest, rest_sum ? attribute_floats(kShRest, sh_degree) : 0));
+    const auto bytes = [](std::uint64_t splats, const AttributeRows& each) {
+        return Buffer::charged_bytes(each.bytes(splats));
     };
     std::uint64_t held = 0;
-    for (const std::uint64_t each : floats) held += bytes(before, each);
+    for (const AttributeRows& each : replaced) held += bytes(before, each);
     std::uint64_t most = held;
-    for (const std::uint64_t each : floats) {
-        if (each == 0) continue;
+    for (const AttributeRows& each : replaced) {
+        if (each.floats == 0) continue;
         held += bytes(after, each);
         most = std::max(most, held);
         held -= bytes(before, each);

@@ -1,0 +1,51 @@
+// How the rows of an attribute lie in a buffer of the device: row by row, as in SplatModel, but
+// those of each coefficient in blocks of ROW_BLOCK splats, in each a column of as many vec4 after
+// the other, so that neighbouring threads read neighbouring words (shaders/lib/rows.glsl).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/gpu/buffer.h"
+#include "engine/raster/splat_ranges.h"
+
+namespace darb {
+
+struct AttributeRows {
+    std::uint32_t floats = 0;   // of a splat, in SplatModel's order
+    std::uint32_t columns = 0;  // vec4 of a splat that lies in blocks; 0: row by row
+
+    /// What a splat takes, padding included.
+    std::uint32_t floats_held() const { return columns > 0 ? 4 * columns : floats; }
+    /// Whole blocks of splats.
+    std::uint64_t rows_held(std::uint64_t splats) const;
+    std::uint64_t bytes(std::uint64_t splats) const;
+};
+
+/// Of an attribute of so many floats a splat; of_each: 2 for moments, first and second of each.
+AttributeRows attribute_rows(int attribute, std::uint32_t floats, std::uint32_t of_each = 1);
+
+/// The rows of a range of splats, which begins as splat_ranges() has it.
+BufferRange range_of_rows(const Buffer& buffer, const AttributeRows& rows, const SplatRange& range);
+/// The same of what lies in blocks, the others whole, as what a frame holds of a splat is wider.
+BufferRange bound_rows(const Buffer& buffer, const AttributeRows& rows, const SplatRange& range);
+
+/// Writes the rows [first, first + count) of [N][floats], whose rows are `pitch` floats apart, to
+/// where they lie in a buffer of N splats that begins at `to`; first: a multiple of ROW_BLOCK, as
+/// count is but where N ends there. What is padding becomes 0.
+void put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
+              std::size_t count, std::byte* to);
+
+/// What a buffer holds of [N][floats], and back.
+std::vector<float> held_rows(const AttributeRows& rows, std::span<const float> values);
+std::vector<float> values_of_rows(const AttributeRows& rows, std::span<const float> held,
+                                  std::size_t splats);
+
+/// Blocking copies of [N][floats] in SplatModel's order; the queue is idle afterwards.
+void upload_rows(Buffer& buffer, const AttributeRows& rows, std::span<const float> values);
+std::vector<float> download_rows(const Buffer& buffer, const AttributeRows& rows,
+                                 std::size_t splats);
+
+}  // namespace darb
