@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
 
 #include "engine/core/error.h"
+#include "engine/core/on_threads.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
@@ -214,6 +216,8 @@ void check_count(const char* name, std::size_t given, std::size_t splats, std::s
                 "Give the values of all splats.");
 }
 
+constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK;  // of their 400 kB a cache holds all
+
 }  // namespace
 
 void GradientRenderer::set_values(int attribute, std::span<const float> values) {
@@ -222,6 +226,22 @@ void GradientRenderer::set_values(int attribute, std::span<const float> values) 
                 s.splats.stride(attribute));
     s.image = {};
     upload_rows(s.splats.parameters(attribute), s.splats.rows(attribute), values);
+}
+
+void GradientRenderer::set_harmonics(std::span<const float> values) {
+    State& s = *state_;
+    const AttributeRows first = s.splats.rows(kShDc), others = s.splats.rows(kShRest);
+    const std::size_t n = s.splats.count(), all = first.floats + others.floats;
+    check_count("harmonics", values.size(), n, all);
+    s.image = {};
+    s.splats.parameters(kShDc).upload_by(first.bytes(n), [&](std::byte* to_first) {
+        s.splats.parameters(kShRest).upload_by(others.bytes(n), [&](std::byte* to_others) {
+            in_pieces(n, kSplatsOfPiece, [&](std::size_t begin, std::size_t count) {
+                put_rows(first, values.data(), all, begin, count, to_first);
+                put_rows(others, values.data() + first.floats, all, begin, count, to_others);
+            });
+        });
+    });
 }
 
 void GradientRenderer::set_view(int sh_degree, float near_plane) {

@@ -67,6 +67,8 @@ class GradientRenderer {
     /// Other values of one attribute for the same splats, from where the caller has them. Throws
     /// Error for another number of them.
     void set_values(int attribute, std::span<const float> values);
+    /// The same of all bands of harmonics, [N][K][3].
+    void set_harmonics(std::span<const float> values);
     /// From the next picture on, in place of what the options say.
     void set_view(int sh_degree, float near_plane);
 

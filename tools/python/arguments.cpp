@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+
+#include "engine/core/on_threads.h"
 
 namespace darb::python {
 
@@ -65,12 +68,19 @@ void check_shape(const py::array& array, const char* name,
 }
 
 // Of a fixed length, and without a way out, so that compilers take several at once.
-constexpr std::size_t kBlock = 1024;
+constexpr std::size_t kBlock = 1024, kBlocksOfPiece = 256;
 bool block_is_within(const float* values, float least, float most) {
     int inside = 1;
     for (std::size_t i = 0; i < kBlock; ++i)
         inside &= int(values[i] >= least) & int(values[i] <= most);
     return inside != 0;
+}
+
+bool blocks_are_within(const float* values, std::size_t blocks, float least, float most) {
+    bool all = true;
+    for (std::size_t b = 0; b < blocks && all; ++b)
+        all = block_is_within(values + b * kBlock, least, most);
+    return all;
 }
 
 void check_layout(const py::array& array, const char* name) {
@@ -158,9 +168,11 @@ std::vector<double> take_doubles(const py::object& value, const char* name,
 void check_values(const Floats& values, const char* name, float least, float most,
                   const char* hint) {
     const std::size_t size = values.size();
-    for (std::size_t i = 0; i < size; ++i) {
-        while (i + kBlock <= size && block_is_within(values.data + i, least, most)) i += kBlock;
-        if (i == size) return;
+    std::atomic<bool> all{true};
+    in_pieces(size / kBlock, kBlocksOfPiece, [&](std::size_t first, std::size_t count) {
+        if (!blocks_are_within(values.data + first * kBlock, count, least, most)) all = false;
+    });
+    for (std::size_t i = all ? size / kBlock * kBlock : 0; i < size; ++i) {
         const float v = values.data[i];
         if (v >= least && v <= most) continue;  // false for NaN
         std::string place;

@@ -40,7 +40,7 @@ KeptRenderer& Renderers::make(Device& device, const RendererKey& key, const Spla
     options.linear_values = key.linear;
     options.direct_colour = key.direct_colour;
     options.camera = key.camera;
-    kept_.push_front(KeptRenderer{key, GradientRenderer(device, model, options), 0, {}, {}});
+    kept_.push_front(KeptRenderer{key, GradientRenderer(device, model, options), 0});
     return kept_.front();
 }
 

@@ -31,8 +31,7 @@ struct RendererKey {
 struct KeptRenderer {
     RendererKey key;
     GradientRenderer renderer;
-    std::uint64_t picture = 0;          // number of the picture that it drew last; 0: none
-    std::vector<float> sh_dc, sh_rest;  // of the last call with `sh`: their memory is used again
+    std::uint64_t picture = 0;  // number of the picture that it drew last; 0: none
 };
 
 /// The renderers of one owner, the latest used first; at most a few.

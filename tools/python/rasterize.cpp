@@ -48,9 +48,7 @@ void put(KeptRenderer& kept, const SplatArraysGiven& given) {
     renderer.set_values(ATTRIBUTE_LOG_SCALE, given.scales.values());
     renderer.set_values(ATTRIBUTE_OPACITY_LOGIT, given.opacities.values());
     if (given.direct_colour) return renderer.set_values(ATTRIBUTE_SH_DC, given.colours.values());
-    split_harmonics(given.colours, kept.sh_dc, kept.sh_rest);
-    renderer.set_values(ATTRIBUTE_SH_DC, kept.sh_dc);
-    renderer.set_values(ATTRIBUTE_SH_REST, kept.sh_rest);
+    renderer.set_harmonics(given.colours.values());
 }
 
 // The renderer with the splats that a call is of, on the device. drawn: the number of a picture of
