@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -228,20 +229,25 @@ void GradientRenderer::set_values(int attribute, std::span<const float> values) 
     upload_rows(s.splats.parameters(attribute), s.splats.rows(attribute), values);
 }
 
-void GradientRenderer::set_harmonics(std::span<const float> values) {
+bool GradientRenderer::set_harmonics(std::span<const float> values,
+                                     const std::function<bool(std::span<const float>)>& accept) {
     State& s = *state_;
     const AttributeRows first = s.splats.rows(kShDc), others = s.splats.rows(kShRest);
     const std::size_t n = s.splats.count(), all = first.floats + others.floats;
     check_count("harmonics", values.size(), n, all);
     s.image = {};
+    std::atomic<bool> accepted{true};
     s.splats.parameters(kShDc).upload_by(first.bytes(n), [&](std::byte* to_first) {
         s.splats.parameters(kShRest).upload_by(others.bytes(n), [&](std::byte* to_others) {
             in_pieces(n, kSplatsOfPiece, [&](std::size_t begin, std::size_t count) {
+                if (!accept(values.subspan(begin * all, count * all))) accepted = false;
+                if (!accepted) return;
                 put_rows(first, values.data(), all, begin, count, to_first);
                 put_rows(others, values.data() + first.floats, all, begin, count, to_others);
             });
         });
     });
+    return accepted;
 }
 
 void GradientRenderer::set_view(int sh_degree, float near_plane) {

@@ -67,8 +67,11 @@ class GradientRenderer {
     /// Other values of one attribute for the same splats, from where the caller has them. Throws
     /// Error for another number of them.
     void set_values(int attribute, std::span<const float> values);
-    /// The same of all bands of harmonics, [N][K][3].
-    void set_harmonics(std::span<const float> values);
+    /// The same of all bands of harmonics, [N][K][3], a piece at a time: each is written where
+    /// accept(piece) says so. It is called by several threads and must not throw. False where a
+    /// piece was not: the harmonics are undefined until they are set again.
+    bool set_harmonics(std::span<const float> values,
+                       const std::function<bool(std::span<const float>)>& accept);
     /// From the next picture on, in place of what the options say.
     void set_view(int sh_degree, float near_plane);
 

@@ -159,6 +159,16 @@ class Scenes(unittest.TestCase):
         arrays = splats(count=60, sh=4)
         return darb.Scene.from_arrays(**arrays, **options)
 
+    def test_other_arrays_of_as_many_splats_are_drawn_as_given(self):
+        for coefficients in (1, 4, 9, 16):
+            for count in (1, 23, 4100):  # beyond a piece of what one thread writes
+                for seed in (1, 2):
+                    arrays = splats(count, seed, sh=coefficients)
+                    drawn = darb.rasterize(**arrays, **camera())
+                    of_model = darb.rasterize(darb.Scene.from_arrays(**arrays), **camera())
+                    self.assertLess(relative(drawn[0], of_model[0]), 1e-3,
+                                    f"{coefficients} coefficients, {count} splats, call {seed}")
+
     def test_a_scene_is_drawn_as_its_arrays_and_stays_on_the_device(self):
         scene, pictures = self.scene(), camera(count=2)
         image, alpha, _ = scene.render(**pictures)

@@ -68,19 +68,12 @@ void check_shape(const py::array& array, const char* name,
 }
 
 // Of a fixed length, and without a way out, so that compilers take several at once.
-constexpr std::size_t kBlock = 1024, kBlocksOfPiece = 256;
+constexpr std::size_t kBlock = 1024, kFloatsOfPiece = 256 * kBlock;
 bool block_is_within(const float* values, float least, float most) {
     int inside = 1;
     for (std::size_t i = 0; i < kBlock; ++i)
         inside &= int(values[i] >= least) & int(values[i] <= most);
     return inside != 0;
-}
-
-bool blocks_are_within(const float* values, std::size_t blocks, float least, float most) {
-    bool all = true;
-    for (std::size_t b = 0; b < blocks && all; ++b)
-        all = block_is_within(values + b * kBlock, least, most);
-    return all;
 }
 
 void check_layout(const py::array& array, const char* name) {
@@ -165,14 +158,23 @@ std::vector<double> take_doubles(const py::object& value, const char* name,
     return values;
 }
 
+bool are_within(std::span<const float> values, float least, float most) {
+    std::size_t i = 0;
+    for (; i + kBlock <= values.size(); i += kBlock)
+        if (!block_is_within(values.data() + i, least, most)) return false;
+    return std::all_of(values.begin() + static_cast<std::ptrdiff_t>(i), values.end(),
+                       [&](float v) { return v >= least && v <= most; });
+}
+
 void check_values(const Floats& values, const char* name, float least, float most,
                   const char* hint) {
     const std::size_t size = values.size();
     std::atomic<bool> all{true};
-    in_pieces(size / kBlock, kBlocksOfPiece, [&](std::size_t first, std::size_t count) {
-        if (!blocks_are_within(values.data + first * kBlock, count, least, most)) all = false;
+    in_pieces(size, kFloatsOfPiece, [&](std::size_t first, std::size_t count) {
+        if (!are_within(values.values().subspan(first, count), least, most)) all = false;
     });
-    for (std::size_t i = all ? size / kBlock * kBlock : 0; i < size; ++i) {
+    if (all) return;
+    for (std::size_t i = 0; i < size; ++i) {
         const float v = values.data[i];
         if (v >= least && v <= most) continue;  // false for NaN
         std::string place;

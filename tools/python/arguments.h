@@ -41,6 +41,8 @@ Floats take_floats(const py::object& value, const char* name,
 std::vector<double> take_doubles(const py::object& value, const char* name,
                                  std::initializer_list<py::ssize_t> shape,
                                  std::vector<py::ssize_t>* lengths = nullptr);
+/// Whether none is NaN, infinite, below least or above most. Needs no GIL.
+bool are_within(std::span<const float> values, float least, float most);
 /// Throws Error with the place of the first that is NaN or infinite, below least or above most.
 void check_values(const Floats& values, const char* name, float least, float most,
                   const char* hint);

@@ -47,8 +47,16 @@ void put(KeptRenderer& kept, const SplatArraysGiven& given) {
     renderer.set_values(ATTRIBUTE_ROTATION, given.quats.values());
     renderer.set_values(ATTRIBUTE_LOG_SCALE, given.scales.values());
     renderer.set_values(ATTRIBUTE_OPACITY_LOGIT, given.opacities.values());
-    if (given.direct_colour) return renderer.set_values(ATTRIBUTE_SH_DC, given.colours.values());
-    renderer.set_harmonics(given.colours.values());
+    if (given.direct_colour) {
+        given.check_colours();
+        return renderer.set_values(ATTRIBUTE_SH_DC, given.colours.values());
+    }
+    const auto finite = [](std::span<const float> values) {
+        return are_within(values, -kMostFloat, kMostFloat);
+    };
+    if (renderer.set_harmonics(given.colours.values(), finite)) return;
+    given.check_colours();
+    throw Error("sh", "changed while it was read", "Do not write to it during a call.");
 }
 
 // The renderer with the splats that a call is of, on the device. drawn: the number of a picture of

@@ -37,7 +37,12 @@ void split_harmonics(const Floats& sh, std::vector<float>& first, std::vector<fl
     }
 }
 
+void SplatArraysGiven::check_colours() const {
+    check_values(colours, direct_colour ? "colors" : "sh", -kMost, kMost, kFinite);
+}
+
 SplatModel SplatArraysGiven::model() const {
+    check_colours();
     SplatModel model = header;
     model.position = means.copy();
     model.rotation = quats.copy();
@@ -77,7 +82,6 @@ SplatArraysGiven take_splats(const py::dict& options) {
     check_values(given.scales, "scales", 0, kMost,
                  "Scales are standard deviations, not logarithms.");
     check_values(given.opacities, "opacities", 0, 1, "Opacities are from 0 to 1, not logits.");
-    check_values(given.colours, given.direct_colour ? "colors" : "sh", -kMost, kMost, kFinite);
     if (!given.direct_colour) header.sh_degree = degree_of_coefficients(given.colours.shape[1]);
     return given;
 }

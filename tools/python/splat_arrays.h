@@ -14,6 +14,8 @@ struct SplatArraysGiven {
     bool direct_colour = false;  // colours is `colors`, not `sh`
 
     std::size_t count() const { return opacities.size(); }
+    /// Of colours, the largest array, which take_splats leaves to whoever takes it to the device.
+    void check_colours() const;
     /// A copy with all; sh_dc holds `colors` where these are given.
     SplatModel model() const;
 };
