@@ -16,7 +16,6 @@
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/scene/ply.h"
-#include "tests/support/fake_programs.h"
 #include "tests/support/run_command.h"
 #include "tests/support/test_data.h"
 
@@ -245,91 +244,6 @@ TEST(Command, train_begins_with_a_forecast) {
     EXPECT_NE(o.err.find("forecast: 1 iterations, 4000 splats at the end; "), std::string::npos)
         << o.err;
     EXPECT_NE(o.err.find("of device memory"), std::string::npos) << o.err;
-}
-
-// Photos without cameras, and a program named colmap that notes its calls and takes the scene's own
-// model as its result.
-class PhotosCommand : public testing::Test {
-  protected:
-    void SetUp() override {
-        fs::remove_all(scratch());  // of the case before
-        for (const char* name : {"view_00.png", "view_01.png", "view_02.png"}) {
-            fs::create_directories(photos());
-            fs::copy_file(kScene + "/images/" + name, photos() / name,
-                          fs::copy_options::overwrite_existing);
-        }
-        write_fake_colmap(scratch() / "bin" / "colmap", calls(), kScene);
-    }
-    static fs::path photos() { return scratch() / "photos"; }
-    static fs::path calls() { return scratch() / "calls"; }
-    static std::string train() {
-        return fmt::format("train {} -o {} --iterations 1 -q", photos().string(),
-                           (scratch() / "from_photos").string());
-    }
-};
-
-TEST_F(PhotosCommand, without_colmap_the_commands_are_shown) {
-    const Outcome o = with_path("/nowhere", train());
-    EXPECT_EQ(o.code, 2);
-    for (const char* part : {"apt install colmap", "feature_extractor", "exhaustive_matcher",
-                             "mapper", "image_undistorter"})
-        EXPECT_NE(o.err.find(part), std::string::npos) << part << " in\n" << o.err;
-    EXPECT_NE(with_path("/nowhere", train() + " --sequential").err.find("sequential_matcher"),
-              std::string::npos);
-}
-
-TEST_F(PhotosCommand, colmap_runs_once_for_the_same_photos) {
-    const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
-    const Outcome first = with_path(path, train() + " --sequential");
-    ASSERT_EQ(first.code, 0) << first.err;
-    // The first call asks for the names of options.
-    const std::string all =
-        "feature_extractor\nfeature_extractor\nsequential_matcher\nmapper\nimage_undistorter\n";
-    EXPECT_EQ(read_text_file(calls()), all);
-    EXPECT_EQ(with_path(path, train()).code, 0);
-    EXPECT_EQ(
-        with_path("/nowhere", "train --resume -o " + (scratch() / "from_photos").string()).code, 0);
-    EXPECT_EQ(read_text_file(calls()), all);
-    fs::copy_file(photos() / "view_00.png", photos() / "view_03.png");
-    const Outcome other = with_path(path, train());
-    EXPECT_EQ(other.code, 2);
-    EXPECT_NE(other.err.find("other photos"), std::string::npos) << other.err;
-}
-
-TEST_F(PhotosCommand, photos_are_found_in_folders_below_and_files_of_a_dot_are_not) {
-    fs::create_directories(photos() / "left");
-    for (const char* name : {"view_00.png", "view_01.png", "view_02.png"})
-        fs::rename(photos() / name, photos() / "left" / name);
-    write_file_atomic(photos() / "left/._view_00.png", std::string("no PNG"));
-    const Outcome o = with_path("/nowhere", train());
-    EXPECT_NE(o.err.find("apt install colmap"), std::string::npos) << o.err;
-    fs::create_directories(photos() / "set/sparse");
-    expect_refused({{train(), "set/sparse is below"}});
-}
-
-TEST_F(PhotosCommand, pictures_that_are_not_read_are_counted) {
-    fs::remove_all(photos());
-    for (const char* name : {"a.HEIC", "b.heic", "images/c.webp"})
-        write_file_atomic(photos() / name, std::string("picture"));
-    expect_refused({{train(), "2 .heic, 1 .webp"}, {train(), "Convert them to PNG or JPEG"}});
-}
-
-TEST_F(PhotosCommand, masks_beside_the_photos_go_to_colmap_with_a_note) {
-    write_file_atomic(scratch() / "masks/view_00.png.png", std::string("mask"));
-    const std::string masks = (scratch() / "masks").string();
-    EXPECT_NE(with_path("/nowhere", train()).err.find("--ImageReader.mask_path '" + masks + "'"),
-              std::string::npos);
-    const Outcome o = with_path((scratch() / "bin").string() + ":/usr/bin:/bin",
-                                fmt::format("train {}/ -o {} --iterations 1", photos().string(),
-                                            (scratch() / "with_masks").string()));
-    EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_NE(o.err.find("The masks in " + masks), std::string::npos) << o.err;
-    EXPECT_NE(o.err.find("--images photos"), std::string::npos) << o.err;
-}
-
-TEST_F(PhotosCommand, output_among_the_photos_is_refused) {
-    expect_refused({{"train " + photos().string() + " -o " + (photos() / "out").string(),
-                     "lies among the photos"}});
 }
 
 // A scene of 20 iterations. 3DGS's names of the options, with underscores.
