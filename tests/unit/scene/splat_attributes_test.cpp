@@ -124,7 +124,6 @@ TEST(SplatAttributes, what_only_carries_them_names_none) {
                              "engine/raster/adam_update.cpp",
                              "engine/raster/gradient_buffers.h",
                              "engine/raster/gradient_buffers.cpp",
-                             "engine/render/render_gradients.cpp",
                              "engine/plan/roofline.cpp",
                              "engine/reference/splats.h",
                              "trainer/checkpoint.cpp",
