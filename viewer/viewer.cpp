@@ -57,7 +57,7 @@ void Viewer::choose_camera(int n) {
     session_.photos.failed = false;
     take_back<request::FrameAll>(session_.requests);  // of a load before
     session_.navigation.take(session_.photos.view().camera);
-    if (!picture_.empty()) set_pivot(picture_.bounds());
+    if (!shows_nothing()) set_pivot(shown_bounds());
 }
 
 void Viewer::set_gui_scale(float scale) {
@@ -96,10 +96,13 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     step_work();
     load_current_photo();
     pacing_.skip();
-    if (!picture_.empty()) pace_picture(width, height, full, works);
+    if (live_ != nullptr)
+        follow_live(width, height);
+    else if (!picture_.empty())
+        pace_picture(width, height, full, works);
 
     const double look_s = work_.exports() ? kLook_s : std::numeric_limits<double>::infinity();
-    continuous_ = session_.path.playing || (!picture_.empty() && (works || holds_a_key(input)));
+    continuous_ = session_.path.playing || (!shows_nothing() && (works || holds_a_key(input)));
     if (continuous_) return 0;
     const double refine_s = pacing_.seconds_to_refine(frame_start_);
     if (!picture_.empty() && std::isfinite(refine_s)) return std::min(look_s, refine_s);

@@ -9,6 +9,7 @@
 
 #include "viewer/canvas.h"
 #include "viewer/gui.h"
+#include "viewer/live_picture.h"
 #include "viewer/motion_levels.h"
 #include "viewer/pane_pictures.h"
 #include "viewer/picture_pacing.h"
@@ -52,10 +53,11 @@ class Viewer {
     bool loading() const { return loader_.loading(); }
     /// Waits for the load. Throws its Error.
     void finish_loading();
-    /// Follows splats that someone else changes; see TrainingCurves for the rest.
-    /// The splats must stay where they are until end_live.
-    void show_live(const GpuSplats& splats, const Bounds& bounds);
-    /// A scene that is opened next is shown where the user looked at the run.
+    /// Shows the pictures of a training run, which stay where they are until end_live; see
+    /// TrainingCurves for the rest.
+    void show_live(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene);
+    /// The last picture stays until a scene is opened, which is shown where the user looked at the
+    /// run.
     void end_live();
 
     /// Looks through camera n of the data set. Throws Error where there is no such camera.
@@ -102,6 +104,11 @@ class Viewer {
     void first_look(bool of_run);
     void remember_up();
     void lose_scene(const char* why);
+    void show_as_trained(const LiveScene& scene, bool first);
+    void follow_live(int width, int height);
+    void take_live(const LiveMade& made);
+    bool shows_nothing() const { return live_ == nullptr && picture_.empty(); }
+    const Bounds& shown_bounds() const { return live_ ? live_bounds_ : picture_.bounds(); }
 
     // viewer_requests.cpp: what is asked for.
     void act_on_requests(int width, int height);
@@ -144,6 +151,12 @@ class Viewer {
     SplatPicture picture_;
     PanePictures panes_;
     bool shows_panes_ = false;  // not picture_
+    LivePicture* live_ = nullptr;
+    Bounds live_bounds_;
+    LiveScene live_scene_;
+    std::optional<LiveWish> wished_;
+    Buffer live_pixels_;       // of the run's last picture
+    glm::ivec2 live_size_{0};  // px
     PicturePacing pacing_;
     PictureWork work_;
     RememberedUp remembered_;

@@ -95,6 +95,8 @@ void Viewer::act_on_requests(int width, int height) {
 }
 
 void Viewer::need_scene(const char* what) const {
+    if (live_ != nullptr)
+        throw Error(what, "a run is shown", "Wait for its end: its scene is opened then.");
     if (picture_.empty())
         throw Error(what, "there is no scene",
                     "Open one: name it on the command line, or drop it on the window.");
@@ -102,7 +104,7 @@ void Viewer::need_scene(const char* what) const {
 
 void Viewer::frame_all(int width, int height) {
     leave_photo(session_);
-    const Bounds bounds = picture_.bounds();
+    const Bounds bounds = shown_bounds();
     Navigation& n = session_.navigation;
     const double panel = free_area(session_, width, height).left, free = width - panel;
     const bool beside = panel > 0 && draws_every_centre(session_.display.effects);
@@ -201,12 +203,15 @@ void Viewer::save_and_leave() {
 }
 
 void Viewer::take_picture(int width, int height) {
-    need_scene("picture");
-    const WindowArea area = free_area(session_, width, height);
-    render_shown(camera_in_window(session_.photos, session_.navigation, area), area, {});
-    compose_panes();
-    const fs::path file = free_picture_name();
+    if (live_ == nullptr) {
+        need_scene("picture");
+        const WindowArea area = free_area(session_, width, height);
+        render_shown(camera_in_window(session_.photos, session_.navigation, area), area, {});
+        compose_panes();
+    }
     const BufferPicture taken = shown();
+    if (taken.pixels == nullptr || taken.width == 0) return;  // of a run that has drawn none
+    const fs::path file = free_picture_name();
     write_png(file, read_pixels(*taken.pixels, taken.width, taken.height));
     session_.note = "picture in " + file.string();
 }

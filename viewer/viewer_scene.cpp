@@ -66,6 +66,7 @@ void Viewer::take_loaded() {
 void Viewer::show(LoadedScene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded.scene));
     picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
+    live_size_ = {0, 0};
     lose_scene("another scene was opened");
     shares_ = picture_.most_moving() < 1
                   ? motion_shares(picture_.splat_count(), picture_.most_moving())
@@ -185,34 +186,82 @@ void Viewer::follow_plan() {
     d.sh_degree = plan.row(EFFECT_VIEW_COLOUR).degree;
 }
 
-void Viewer::show_live(const GpuSplats& splats, const Bounds& bounds) {
-    const bool first = !session_.training.live;
-    if (first) picture_.set_live(splats, bounds);
+void Viewer::show_live(LivePicture& pictures, const Bounds& bounds, const LiveScene& scene) {
+    live_ = &pictures;
+    live_bounds_ = bounds;
     session_.training.live = true;
-    ++version_;
-    if (first || session_.display.sh_degree == session_.sh_degree)
-        session_.display.sh_degree = splats.sh_degree();  // grows with the training
-    session_.sh_degree = splats.sh_degree();
-    session_.own.sh_degree = splats.sh_degree();
-    const bool smoothing = splats.smoothing().bytes() == std::uint64_t{splats.count()} * 4;
-    session_.display.effects.smoothing = session_.own.effects.smoothing =
-        splats.antialias() && smoothing;
-    if (!first) return;
     shares_.clear();
     pacing_.motion().start({});
-    session_.display.kernel = splats.kernel();
-    session_.display.footprint = splats.footprint();
-    session_.display.effects.antialias = splats.antialias();
-    session_.display.effects.lens = any_lens(session_.photos.views);
-    session_.own = session_.display;
+    show_as_trained(scene, true);
     session_.fly_speed = bounds.radius / 2;
     if (session_.photos.current < 0) session_.ask(request::FrameAll{});
     set_pivot(bounds);
 }
 
+void Viewer::show_as_trained(const LiveScene& scene, bool first) {
+    live_scene_ = scene;
+    DisplaySettings& d = session_.display;
+    if (first || d.sh_degree == session_.sh_degree) d.sh_degree = scene.sh_degree;  // it grows
+    session_.sh_degree = session_.own.sh_degree = scene.sh_degree;
+    d.effects.smoothing = session_.own.effects.smoothing = scene.antialias && scene.smoothing;
+    if (!first) return;
+    d.kernel = scene.kernel;
+    d.footprint = scene.footprint;
+    d.effects.antialias = scene.antialias;
+    d.effects.lens = any_lens(session_.photos.views);
+    session_.own = d;
+}
+
+// The run draws what is wished for when it comes to it; until then its last picture is there.
+void Viewer::follow_live(int width, int height) {
+    Session& s = session_;
+    attempt([&] {
+        while (const std::optional<LiveMade> made = live_->take()) take_live(*made);
+    });
+    const WindowArea area = free_area(s, width, height);
+    const std::size_t panes = s.panes.kernels.size() + (photo_beside(s.photos, s.display) ? 2 : 1);
+    fit_lines(panes, s.panes, static_cast<float>(area.left) / static_cast<float>(width));
+    LiveWish wish{{camera_in_window(s.photos, s.navigation, area), s.display, s.photos.current,
+                   false, s.panes.kernels, 0},
+                  area,
+                  s.photos.compare,
+                  s.panes};
+    if (wished_ == wish) return;
+    live_->wish(wish);
+    wished_ = std::move(wish);
+}
+
+void Viewer::take_live(const LiveMade& made) {
+    if (!(made.scene == live_scene_)) show_as_trained(made.scene, false);
+    if (!made.error.empty()) {
+        session_.error = made.error;
+        session_.photos.compare = false;
+        if (session_.display.mode == VIEW_ERROR) session_.display.mode = VIEW_COLOUR;
+    }
+    session_.photos.loaded = made.photo;
+    if (made.pixels.empty()) return;
+    if (live_pixels_.bytes() < made.pixels.size() * 4)
+        live_pixels_ = Buffer(*device_, "live picture", made.pixels.size() * 4);
+    live_pixels_.upload(made.pixels);
+    live_size_ = {made.width, made.height};
+    session_.panes.psnr_db = made.psnr_db;
+    FrameTimes& t = session_.times;
+    t.passes = made.passes;
+    t.picture_ms = made.ms;
+    t.quality = made.quality;
+    if (made.quality == MotionQuality()) t.full_ms = made.ms;
+    t.visible = made.visible;
+    t.intersections = made.intersections;
+}
+
 void Viewer::end_live() {
-    lose_scene("the run is over");
-    picture_.clear();
+    if (live_ != nullptr)
+        attempt([&] {
+            while (const std::optional<LiveMade> made = live_->take()) take_live(*made);
+        });
+    live_ = nullptr;
+    wished_.reset();
+    session_.photos.loaded = -1;  // on another device
     session_.training.finished = true;
 }
 

@@ -345,6 +345,11 @@ void ViewerWindow::redraw() {
     state_->dirty = true;
 }
 
+void ViewerWindow::wake() {
+    state_->woken = true;
+    glfwPostEmptyEvent();
+}
+
 double ViewerWindow::longest_gap_s() const {
     return state_->longest_gap_s;
 }

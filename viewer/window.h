@@ -37,6 +37,8 @@ class ViewerWindow {
     /// Handles what happened and draws a frame where one is wanted; sleeps up to patience_s (may be
     /// infinity) until there is something to do. False once the window is closed.
     bool pump(double patience_s);
+    /// As `wake` of the options; from any thread.
+    void wake();
     /// The longest time between two looks at what the user did, s, of pumps that did not sleep.
     double longest_gap_s() const;
 

@@ -129,28 +129,68 @@ TEST_F(ViewerWork, A_request_that_fails_leaves_an_export_alone) {
     EXPECT_GE(session().progress.exporting, 0);
 }
 
-// Pictures of a run while an export and a measurement of it go on; then its scene.
-TEST_F(ViewerWork, A_run_that_ends_takes_its_work_along_and_keeps_the_view) {
+// The window asks, the run draws when it comes to it; then its scene.
+TEST_F(ViewerWork, A_run_is_followed_by_its_pictures_and_the_last_one_stays) {
     const GpuSplats splats(shared_device(), scene_.model, false);
-    viewer_->show_live(splats, {{0, 0, 0}, 2});
-    make_path(3);
-    session().ask(request::ExportPath{});
+    int woken = 0;
+    LivePicture pictures([&] { ++woken; });
+    LiveDrawer drawer(shared_device(), options_.views, {{0, 0, 0}, 2});
+    EXPECT_FALSE(drawer.draw(splats, LiveChange::at_once, pictures)) << "nobody has asked";
+    viewer_->show_live(pictures, {{0, 0, 0}, 2}, live_scene(splats));
+    frame();
+    EXPECT_TRUE(drawer.draw(splats, LiveChange::none, pictures));
+    EXPECT_EQ(woken, 1);
+    const ImageU8 shown = shot();
+    EXPECT_GT(largest_difference(shown, ImageU8(kWidth, kHeight, 3)), 50);
+    drawer.draw(splats, LiveChange::at_once, pictures);
+    const ImageU8 first = shot();
     session().ask(request::Measure{});
     frame();
-    EXPECT_GE(session().progress.exporting, 0);
+    EXPECT_NE(session().error.find("a run is shown"), std::string::npos) << session().error;
+    session().error.clear();
+    session().navigation.orbit(0.5, 0.1);
+    EXPECT_EQ(largest_difference(shot(), first), 0) << "the run is busy: its last picture stays";
+    EXPECT_TRUE(drawer.draw(splats, LiveChange::none, pictures));
+    drawer.draw(splats, LiveChange::at_once, pictures);
+    const ImageU8 turned = shot();
+    EXPECT_GT(largest_difference(turned, first), 20);
     drop(file_);
     EXPECT_FALSE(viewer_->loading()) << "dropped on a run";
     EXPECT_FALSE(session().note.empty());
     viewer_->end_live();
-    frame();
-    EXPECT_LT(session().progress.exporting, 0);
-    EXPECT_LT(session().progress.measuring, 0);
-    EXPECT_TRUE(session().error.empty()) << session().error;
+    EXPECT_EQ(largest_difference(shot(), turned), 0) << "at the end the last picture stays";
     session().navigation.orbit(0.3, 0.1);
     const glm::dvec3 eye = session().navigation.eye;
     load(file_);
     frame();
     EXPECT_EQ(session().navigation.eye, eye);
+    EXPECT_GT(largest_difference(shot(), turned), 20);
+}
+
+TEST_F(ViewerWork, A_run_shows_photo_and_kernels_beside_its_picture) {
+    const GpuSplats splats(shared_device(), scene_.model, false);
+    LivePicture pictures({});
+    LiveDrawer drawer(shared_device(), options_.views, {{0, 0, 0}, 2});
+    viewer_->choose_camera(0);
+    viewer_->show_live(pictures, {{0, 0, 0}, 2}, live_scene(splats));
+    session().photos.compare = true;
+    session().panes.kernels = {KERNEL_RAISED_COSINE};
+    for (int i = 0; i < 3; ++i) {
+        frame();
+        drawer.draw(splats, LiveChange::at_once, pictures);
+    }
+    frame();
+    EXPECT_EQ(session().panes.lines.size(), 2u);
+    EXPECT_EQ(session().panes.psnr_db.size(), 2u);
+    const ImageU8 all = shot();
+    for (int y = 0; y < kHeight; ++y)
+        for (int c = 0; c < 3; ++c) ASSERT_EQ(all.at(3, y, c), photo_.at(3, y, c)) << y;
+    viewer_->choose_camera(1);  // has no photo
+    frame();
+    drawer.draw(splats, LiveChange::none, pictures);
+    frame();
+    EXPECT_NE(session().error.find("no photo"), std::string::npos) << session().error;
+    EXPECT_FALSE(session().photos.compare);
 }
 
 TEST_F(ViewerWork, Unsaved_edits_are_asked_about_before_another_scene_and_the_end) {

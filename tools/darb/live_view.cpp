@@ -2,18 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
-#include <cstdio>
-#include <cstdlib>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "tools/darb/live_curves.h"
+#include "tools/darb/live_window.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
 #include "viewer/display_loss.h"
-#include "viewer/window.h"
 
 namespace darb {
 
@@ -21,114 +17,99 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kShare = 0.1;       // of the time that pictures may take from training
-constexpr double kShortest_s = 0.2;  // between two pictures
-constexpr double kPausedNap_s = 0.1;
+constexpr auto kPausedNap = std::chrono::milliseconds(20);
+
+double seconds_after(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 }  // namespace
 
 struct LiveSystem::System {
     std::atomic<bool> lost{false};  // the display; before what it outlives
     WindowSystem windows;
-};
-
-struct LiveView::State {
-    State(Device& device, ViewerOptions options, const Dataset& dataset,
-          const std::atomic<bool>& stop_, const std::atomic<bool>& lost_)
-        : window(std::make_unique<ViewerWindow>(device, std::move(options), 1280, 720)),
-          bounds(bounds_of(dataset)),
-          stop(stop_),
-          lost(lost_) {
-        window->set_title("training - darb");
-        if (!dataset.views.empty()) window->viewer().choose_camera(0);
-    }
-
-    Session& session() { return window->viewer().session(); }
-
-    std::unique_ptr<ViewerWindow> window;  // null once closed
-    Bounds bounds;
-    const std::atomic<bool>& stop;
-    const std::atomic<bool>& lost;  // the display
-    Clock::time_point next_picture{};
-    LiveCurves curves;
+    DeviceOptions device;  // of windows
 };
 
 LiveView::LiveView(std::unique_ptr<State> state) : state_(std::move(state)) {}
 LiveView::~LiveView() = default;
 
 // The run matters more than its window.
-void LiveView::warn(const std::exception& error) {
-    const auto* known = dynamic_cast<const Error*>(&error);
-    say("warning: the window is closed: {}; the run goes on\n", state_->lost ? "the display is gone"
-                                                                : known != nullptr ? known->reason
-                                                                                   : error.what());
-    state_->window.reset();
-}
-
-void LiveView::check_display() const {
-    if (state_->lost) throw Error("window", "the display is gone");
+void LiveView::warn(const std::string& reason) {
+    say("warning: the window is closed: {}; the run goes on\n", reason);
+    state_.reset();
 }
 
 double LiveView::show(const LiveStep& step) {
-    if (!state_->window) return 0;
-    try {
-        return pump(step);
-    } catch (const std::exception& e) {
-        warn(e);
-        return 0;
-    }
-}
-
-double LiveView::pump(const LiveStep& step) {
+    if (!state_) return 0;
     State& s = *state_;
-    TrainingCurves& training = s.session().training;
-    s.curves.add(step, training);
-    const auto now = Clock::now();
-    if (now >= s.next_picture || training.paused) {
-        s.window->viewer().show_live(step.splats, s.bounds);
-        s.window->redraw();
-        const double cost_s = s.session().times.frame_ms / 1000;
-        s.next_picture =
-            now + std::chrono::duration_cast<Clock::duration>(
-                      std::chrono::duration<double>(std::max(kShortest_s, cost_s / kShare)));
-    }
-    bool open = s.window->pump(0);
-    check_display();
-    training.steps_to_go = std::max(0, training.steps_to_go - 1);
-    const auto paused = Clock::now();
+    std::unique_lock lock(s.mutex);
+    s.curves.add(step, s.training);
+    s.scene = live_scene(step.splats);
+    ++s.version;
+    const LiveChange change = s.training.paused ? LiveChange::at_once : LiveChange::seldom;
+    lock.unlock();
     double paused_s = 0;
-    while (open && training.paused && training.steps_to_go == 0 && !s.stop) {
-        open = s.window->pump(kPausedNap_s);
-        check_display();
-        paused_s = std::chrono::duration<double>(Clock::now() - paused).count();
+    std::string failure;
+    try {
+        s.drawer.draw(step.splats, change, s.picture);
+        paused_s = wait_while_paused(step);
+    } catch (const std::exception& e) {
+        failure = e.what();
     }
-    if (!open) s.window.reset();
+    lock.lock();
+    const bool closed = s.closed;
+    if (closed) failure = s.failure;
+    lock.unlock();
+    if (!failure.empty())
+        warn(failure);
+    else if (closed)
+        state_.reset();
     return paused_s;
 }
 
-void LiveView::finish(const std::filesystem::path& model) {
+// Pictures go on: the user may look around.
+double LiveView::wait_while_paused(const LiveStep& step) {
     State& s = *state_;
-    if (!s.window) return;
-    try {
-        if (std::getenv("DARB_VIEW_GAPS") != nullptr)
-            say("longest gap of the window: {:.0f} ms\n", s.window->longest_gap_s() * 1000);
-        s.window->viewer().end_live();
-        if (!model.empty()) s.window->viewer().open(model);
-        while (!s.stop && s.window->pump(kPausedNap_s)) check_display();
-        s.window.reset();
-    } catch (const std::exception& e) {
-        warn(e);
+    const auto start = Clock::now();
+    for (bool waited = false;; waited = true) {
+        std::unique_lock lock(s.mutex);
+        const bool steps = s.training.steps_to_go > 0;
+        if (s.closed || s.stop || !s.training.paused || steps) {
+            if (steps) --s.training.steps_to_go;
+            return waited ? seconds_after(start) : 0;
+        }
+        lock.unlock();
+        const bool drew = s.drawer.draw(step.splats, LiveChange::none, s.picture);
+        lock.lock();
+        if (!drew) s.changed.wait_for(lock, kPausedNap);
     }
 }
 
-LiveSystem::LiveSystem(bool on, DeviceOptions& options) {
+void LiveView::finish(const std::filesystem::path& model) {
+    if (!state_) return;
+    State& s = *state_;
+    {
+        const std::lock_guard lock(s.mutex);
+        s.finished = true;
+        s.model = model;
+    }
+    s.wake();
+    s.thread.join();
+    if (!s.failure.empty()) warn(s.failure);
+    state_.reset();
+}
+
+LiveSystem::LiveSystem(bool on, const DeviceOptions& options) {
     if (!on) return;
     try {
         system_ = std::make_unique<System>();
     } catch (const Error& e) {
         throw Error(e.where, e.reason, "Start it inside a desktop session, or leave out --view.");
     }
-    system_->windows.require(options);
+    system_->device = options;
+    system_->device.faults = {};
+    system_->windows.require(system_->device);
     survive_display_loss(system_->lost);
 }
 
@@ -141,10 +122,8 @@ std::unique_ptr<LiveView> LiveSystem::open(Device& device, const Dataset& datase
     options.views = dataset.views;
     options.resolve = find_scene;
     options.find_cameras = cameras_beside;
-    auto state =
-        std::make_unique<LiveView::State>(device, std::move(options), dataset, stop, system_->lost);
-    if (white) state->session().display.background = glm::vec3(1.0f);
-    return std::make_unique<LiveView>(std::move(state));
+    return std::make_unique<LiveView>(std::make_unique<LiveView::State>(
+        device, std::move(options), dataset, system_->device, stop, system_->lost, white));
 }
 
 }  // namespace darb

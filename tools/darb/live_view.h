@@ -1,11 +1,12 @@
-// darb train --view: a window that follows a training run. The run calls it between two iterations,
-// on its own thread, so device and queue are never shared between threads.
+// darb train --view: a window that follows a training run. It has a thread and a device of its own,
+// so no iteration, evaluation or compilation holds it up; the run draws its pictures between two
+// iterations, on its own thread and device.
 #pragma once
 
 #include <atomic>
-#include <exception>
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
@@ -19,7 +20,7 @@ class LiveView {
     explicit LiveView(std::unique_ptr<State> state);
     ~LiveView();
 
-    /// Handles the window's events and, now and then, shows the splats; blocks while paused and
+    /// Hands over what is new and, where a picture is due, draws it; blocks while paused and
     /// returns how long that was, in s. Does nothing once the window is closed; it is, with a
     /// warning, where it fails: the run goes on.
     double show(const LiveStep& step);
@@ -27,9 +28,8 @@ class LiveView {
     void finish(const std::filesystem::path& model);
 
   private:
-    double pump(const LiveStep& step);
-    void warn(const std::exception& error);
-    void check_display() const;  // throws Error once it is gone
+    double wait_while_paused(const LiveStep& step);
+    void warn(const std::string& reason);
     std::unique_ptr<State> state_;
 };
 
@@ -37,7 +37,8 @@ class LiveView {
 /// there is no display, or no viewer in this build.
 class LiveSystem {
   public:
-    LiveSystem(bool on, DeviceOptions& options);
+    /// options: of the run's device; the window's is the same.
+    LiveSystem(bool on, const DeviceOptions& options);
     ~LiveSystem();
     /// Null where it is off. stop: set by Ctrl-C, ends a pause. white: what is behind the splats;
     /// else black.

@@ -14,7 +14,7 @@ double LiveView::show(const LiveStep&) {
 }
 void LiveView::finish(const std::filesystem::path&) {}
 
-LiveSystem::LiveSystem(bool on, DeviceOptions&) {
+LiveSystem::LiveSystem(bool on, const DeviceOptions&) {
     if (on)
         throw Error("--view", "this darb was built without the viewer",
                     "Install libglfw3-dev and libimgui-dev (tools/setup.sh) and build again.");

@@ -1,0 +1,99 @@
+// Pictures of a training run in a window of another thread. The window says what it wants to see;
+// the run draws that on its own device between two iterations and hands the pixels over. So what
+// holds the run up for seconds (compiling, a probe, an evaluation) leaves the window alive: it
+// shows the last picture. A LivePicture may be used from both threads; a LiveDrawer is the run's.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/pane_pictures.h"
+#include "viewer/photo_compare.h"
+#include "viewer/picture_pacing.h"
+
+namespace darb {
+
+/// What a window wants to see.
+struct LiveWish {
+    PictureKey key;  // the camera has the window's size
+    WindowArea area;
+    bool compare = false;  // the photo of key.photo, where it can be read
+    Panes panes;
+    bool operator==(const LiveWish& other) const;
+};
+
+/// Of the splats that are trained; how they are meant to be shown.
+struct LiveScene {
+    int kernel = 0, sh_degree = 0;
+    Footprint footprint = Footprint::psi;
+    bool antialias = false, smoothing = false;
+    bool operator==(const LiveScene&) const = default;
+};
+LiveScene live_scene(const GpuSplats& splats);
+
+/// What the run made of it.
+struct LiveMade {
+    std::vector<std::uint32_t> pixels;  // B8G8R8A8 [height][width]
+    int width = 0, height = 0;          // px
+    LiveScene scene;
+    MotionQuality quality;
+    std::vector<PassTime> passes;
+    double ms = 0;
+    std::uint32_t visible = 0, intersections = 0;
+    int photo = -1;     // that was read; -1: none
+    std::string error;  // why there is no photo, or no picture
+    std::vector<double> psnr_db;
+};
+
+class LivePicture {
+  public:
+    /// wake: called by the run's thread when there is something new.
+    explicit LivePicture(std::function<void()> wake) : wake_(std::move(wake)) {}
+    void wish(const LiveWish& wish);
+    std::optional<LiveMade> take();
+
+    std::optional<LiveWish> wished() const;
+    void give(LiveMade made);
+
+  private:
+    std::function<void()> wake_;
+    mutable std::mutex mutex_;
+    std::optional<LiveWish> wish_;
+    std::optional<LiveMade> made_;
+};
+
+/// Of the splats since the last picture; seldom: they change all the time, and not each change is
+/// to be drawn.
+enum class LiveChange { none, seldom, at_once };
+
+class LiveDrawer {
+  public:
+    LiveDrawer(Device& device, std::vector<View> views, const Bounds& bounds);
+
+    /// A picture where one is due: a lesser one at once where the wish changed, the whole one when
+    /// it stays, and again as the splats change. Returns whether it drew.
+    bool draw(const GpuSplats& splats, LiveChange change, LivePicture& to);
+
+  private:
+    using LiveClock = std::chrono::steady_clock;
+    LiveMade make(const GpuSplats& splats, const LiveWish& wish, const MotionQuality& quality);
+    void read_photo(const LiveWish& wish, LiveMade& made);
+
+    Device* device_;
+    Bounds bounds_;
+    SplatPicture picture_;
+    PanePictures panes_;
+    Photos photos_;
+    MotionControl motion_;
+    const GpuSplats* shown_ = nullptr;
+    std::optional<LiveWish> drawn_;
+    bool whole_ = false;
+    LiveClock::time_point drawn_at_, next_;
+};
+
+}  // namespace darb
