@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "viewer/tools.h"
 #include "viewer/view_camera.h"
 
 namespace darb {
@@ -35,15 +36,29 @@ void step_training(Session& s) {
     ++s.training.steps_to_go;
 }
 
+// What is selected; else what is in the box or sphere that is shown.
 void remove_selected(Session& s) {
-    if (s.scene && s.selection.shown && s.edit.remove(s.scene->model, s.selection.region, true) > 0)
-        s.ask(request::ShowEdits{});
+    if (!s.scene || s.edit.transforms()) return;
+    if (s.edit.selected_count() > 0)
+        show_edit(s.edit.remove_selected(), s);
+    else if (s.selection.shown)
+        show_edit(s.edit.remove(s.scene->model, s.selection.region, true), s);
+}
+
+void edit_by_key(Session& s, std::size_t (*edit)(Edit&)) {
+    if (s.scene && !s.edit.transforms()) show_edit(edit(s.edit), s);
+}
+
+SplatMask all_of(const Edit& edit, std::uint8_t value) {
+    return SplatMask(edit.removed().size(), value);
 }
 
 void stop_and_close(Session& s) {
     s.path.playing = false;
     s.error.clear();
     s.help = false;
+    s.open_dialog.shown = false;
+    choose_tool(Tool::navigate, s);
     s.ask(request::CancelLoad{});
     s.ask(request::CancelWork{});
     s.ask(request::Stay{});
@@ -67,16 +82,21 @@ constexpr KeyRow kKeys[] = {
     {Key::play, play_or_pause},
     {Key::step, step_training},
     {Key::remove, remove_selected},
-    {Key::undo,
+    {Key::undo, undo_edit},
+    {Key::redo, redo_edit},
+    {Key::select_all,
      [](Session& s) {
-         s.edit.undo();
-         s.ask(request::ShowEdits{});
+         edit_by_key(s, [](Edit& e) { return e.select(all_of(e, 1), Combine::replace); });
      }},
-    {Key::redo,
+    {Key::select_none,
      [](Session& s) {
-         s.edit.redo();
-         s.ask(request::ShowEdits{});
+         edit_by_key(s, [](Edit& e) { return e.select(all_of(e, 0), Combine::replace); });
      }},
+    {Key::select_others,
+     [](Session& s) { edit_by_key(s, [](Edit& e) { return e.invert_selection(); }); }},
+    {Key::hide, [](Session& s) { edit_by_key(s, [](Edit& e) { return e.hide_selected(); }); }},
+    {Key::show_hidden, [](Session& s) { edit_by_key(s, [](Edit& e) { return e.show_hidden(); }); }},
+    {Key::open, [](Session& s) { s.ask(request::ShowOpen{}); }},
     {Key::save, [](Session& s) { s.ask(request::Save{}); }},
     {Key::quit, [](Session& s) { s.ask(request::Quit{}); }},
     {Key::help, [](Session& s) { s.help = !s.help; }},
@@ -116,6 +136,8 @@ void turn_wheel(const Input& in, Session& s) {
 }  // namespace
 
 void press(Key key, Session& s) {
+    const int tool = static_cast<int>(key) - static_cast<int>(Key::tool_navigate);
+    if (tool >= 0 && tool < kToolCount) choose_tool(static_cast<Tool>(tool), s);
     for (const KeyRow& row : kKeys)
         if (row.key == key) row.act(s);
 }
@@ -136,7 +158,7 @@ void move_camera(const Input& in, const ControlFrame& frame, Session& s) {
         if (in.double_click && s.scene) {
             const Camera camera =
                 camera_in_window(s.photos, s.navigation, free_area(s, frame.width, frame.height));
-            if (const auto hit = pick(s.scene->model, s.edit.removed(), camera, in.x, in.y))
+            if (const auto hit = pick(s.scene->model, s.edit.unseen(), camera, in.x, in.y))
                 s.navigation.set_pivot_depth(*hit);
         }
     }
@@ -144,6 +166,12 @@ void move_camera(const Input& in, const ControlFrame& frame, Session& s) {
     if (direction == glm::dvec3(0.0) || in.control || frame.panels_want_keys) return;
     leave_photo(s);
     s.navigation.fly(glm::normalize(direction) * s.fly_speed * std::min(frame.seconds, 0.25));
+}
+
+void Session::tell(const std::string& text) {
+    constexpr auto kShown = std::chrono::seconds(4);
+    note = text;
+    toasts.push_back({text, std::chrono::steady_clock::now() + kShown});
 }
 
 void play_path(double seconds, Session& s) {

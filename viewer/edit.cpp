@@ -1,58 +1,281 @@
 #include "viewer/edit.h"
 
-#include <cmath>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
 
 #include "engine/core/check.h"
-#include "engine/scene/edit_splats.h"
+#include "engine/core/error.h"
 
 namespace darb {
 
-bool Region::contains(const glm::dvec3& p) const {
-    const glm::dvec3 d = p - centre;
-    if (shape == Shape::sphere) return glm::dot(d, d) <= half_size.x * half_size.x;
-    return std::abs(d.x) <= half_size.x && std::abs(d.y) <= half_size.y &&
-           std::abs(d.z) <= half_size.z;
+namespace {
+
+std::string counted(const char* verb, std::size_t count) {
+    return fmt::format("{} {} splat{}", verb, count, count == 1 ? "" : "s");
 }
 
-size_t Edit::remove(const SplatModel& model, const Region& region, bool inside) {
-    DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
-    std::vector<std::uint32_t> step;
-    for (size_t i = 0; i < removed_.size(); ++i)
-        if (removed_[i] == 0 && region.contains(position_of(model, i)) == inside)
-            step.push_back(static_cast<std::uint32_t>(i));
-    const size_t count = step.size();
-    if (count == 0) return 0;
+// The splats of `part` take the place of these in the model.
+void put_back(const std::vector<std::uint32_t>& splats, const SplatModel& part, SplatModel& model) {
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float>& from = attribute_values(part, a);
+        std::vector<float>& to = attribute_values(model, a);
+        const std::size_t floats = model.floats(a);
+        for (std::size_t i = 0; i < splats.size(); ++i)
+            std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(i * floats), floats,
+                        to.begin() + static_cast<std::ptrdiff_t>(splats[i] * floats));
+    }
+}
+
+void count_from(const glm::dvec3& origin, SplatModel& model) {
+    const glm::dvec3 shift = model.origin - origin;
+    model.origin = origin;
+    if (shift == glm::dvec3(0.0)) return;
+    for (std::size_t i = 0; i < model.position.size(); ++i)
+        model.position[i] =
+            static_cast<float>(double{model.position[i]} + shift[static_cast<int>(i % 3)]);
+}
+
+// Zeros for the bands above.
+void raise_sh_degree(int degree, SplatModel& model) {
+    if (degree <= model.sh_degree) return;
+    const std::size_t before = static_cast<std::size_t>(model.rest_count());
+    model.sh_degree = degree;
+    const std::size_t after = static_cast<std::size_t>(model.rest_count());
+    std::vector<float> rest(model.size() * after, 0.0f);
+    for (std::size_t i = 0; i < model.size(); ++i)
+        std::copy_n(model.sh_rest.begin() + static_cast<std::ptrdiff_t>(i * before), before,
+                    rest.begin() + static_cast<std::ptrdiff_t>(i * after));
+    model.sh_rest = std::move(rest);
+}
+
+}  // namespace
+
+void Edit::flip(const Marks& marks) {
+    const auto turn = [](const std::vector<std::uint32_t>& splats, SplatMask& mask,
+                         std::size_t& count) {
+        for (const std::uint32_t i : splats) {
+            mask[i] ^= 1;
+            count += mask[i] != 0 ? 1 : -std::size_t{1};
+        }
+    };
+    turn(marks.removed, removed_, removed_count_);
+    turn(marks.hidden, hidden_, hidden_count_);
+    turn(marks.selected, selected_, selected_count_);
+}
+
+void Edit::push(Step step) {
     steps_.resize(done_);
-    if (saved_ && *saved_ > done_) saved_.reset();
-    mark(step, 1);
     steps_.push_back(std::move(step));
     done_ = steps_.size();
+}
+
+std::size_t Edit::mark(const char* verb, Marks marks, bool content) {
+    const std::size_t changed =
+        std::max({marks.removed.size(), marks.hidden.size(), marks.selected.size()});
+    if (changed == 0) return 0;
+    flip(marks);
+    const bool selects = marks.removed.empty() && marks.hidden.empty();
+    const std::size_t told = selects ? selected_count_ : changed;
+    push({counted(verb, told), content ? ++last_id_ : 0, std::move(marks)});
+    return changed;
+}
+
+std::size_t Edit::select(const SplatMask& mask, Combine how) {
+    DARB_CHECK(mask.size() == selected_.size(), "{} splats, {}", mask.size(), selected_.size());
+    Marks marks;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+        const bool free = removed_[i] == 0 && hidden_[i] == 0, was = selected_[i] != 0;
+        const bool hit = mask[i] != 0 && free;
+        const bool is = how == Combine::replace ? hit
+                        : how == Combine::add   ? was || hit
+                                                : was && !hit;
+        if (is != was) marks.selected.push_back(static_cast<std::uint32_t>(i));
+    }
+    return mark("selected", std::move(marks), false);
+}
+
+std::size_t Edit::invert_selection() {
+    SplatMask mask(selected_.size());
+    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = selected_[i] ^ 1;
+    return select(mask, Combine::replace);
+}
+
+std::size_t Edit::remove(const SplatMask& mask) {
+    DARB_CHECK(mask.size() == removed_.size(), "{} splats, {}", mask.size(), removed_.size());
+    Marks marks;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+        if (mask[i] == 0 || removed_[i] != 0) continue;
+        marks.removed.push_back(static_cast<std::uint32_t>(i));
+        if (selected_[i] != 0) marks.selected.push_back(static_cast<std::uint32_t>(i));
+    }
+    return mark("deleted", std::move(marks), true);
+}
+
+std::size_t Edit::remove(const SplatModel& model, const Region& region, bool inside) {
+    SplatMask mask = in_region(model, region);
+    for (std::uint8_t& hit : mask) hit = (hit != 0) == inside ? 1 : 0;
+    return remove(mask);
+}
+
+std::size_t Edit::hide_selected() {
+    Marks marks;
+    for (std::size_t i = 0; i < selected_.size(); ++i)
+        if (selected_[i] != 0) marks.selected.push_back(static_cast<std::uint32_t>(i));
+    marks.hidden = marks.selected;
+    return mark("hid", std::move(marks), false);
+}
+
+std::size_t Edit::show_hidden() {
+    Marks marks;
+    for (std::size_t i = 0; i < hidden_.size(); ++i)
+        if (hidden_[i] != 0) marks.hidden.push_back(static_cast<std::uint32_t>(i));
+    return mark("showed", std::move(marks), false);
+}
+
+std::vector<std::uint32_t> Edit::moved_splats() const {
+    std::vector<std::uint32_t> splats;
+    for (std::size_t i = 0; i < removed_.size(); ++i)
+        if (selected_count_ > 0 ? selected_[i] != 0 : removed_[i] == 0 && hidden_[i] == 0)
+            splats.push_back(static_cast<std::uint32_t>(i));
+    return splats;
+}
+
+void Edit::begin_transform(const SplatModel& model) {
+    DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
+    Moved moved;
+    moved.splats = moved_splats();
+    moved.before = pick_splats(model, moved.splats);
+    dragged_ = std::move(moved);
+}
+
+void Edit::drag_transform(const Similarity& total, SplatModel& model) {
+    if (!dragged_) return;
+    dragged_->after = dragged_->before;
+    transform_splats(total, dragged_->after);
+    count_from(model.origin, dragged_->after);
+    put_back(dragged_->splats, dragged_->after, model);
+    ++model_version_;
+}
+
+std::size_t Edit::end_transform(const SplatModel& model) {
+    if (!dragged_) return 0;
+    Moved moved = *std::exchange(dragged_, std::nullopt);
+    const std::size_t count = moved.splats.size();
+    if (count == 0 || moved.after.size() != count) return 0;  // was not moved
+    DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
+    push({counted("moved", count), ++last_id_, std::move(moved)});
     return count;
 }
 
-void Edit::undo() {
-    if (can_undo()) mark(steps_[--done_], 0);
+std::size_t Edit::transform(const Similarity& similarity, SplatModel& model) {
+    begin_transform(model);
+    drag_transform(similarity, model);
+    return end_transform(model);
 }
 
-void Edit::redo() {
-    if (can_redo()) mark(steps_[done_++], 1);
+void Edit::append(const SplatModel& added, SplatModel& model) {
+    raise_sh_degree(added.sh_degree, model);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float>& more = attribute_values(added, a);
+        std::vector<float>& values = attribute_values(model, a);
+        values.insert(values.end(), more.begin(), more.end());
+    }
+    for (SplatMask* mask : {&removed_, &hidden_, &selected_}) mask->resize(model.size(), 0);
+    ++model_version_;
 }
 
-void Edit::mark(const std::vector<std::uint32_t>& splats, std::uint8_t value) {
-    for (const std::uint32_t i : splats) removed_[i] = value;
-    removed_count_ += value != 0 ? splats.size() : -splats.size();
+void Edit::cut(const Merged& merged, SplatModel& model) {
+    const std::size_t left = model.size() - merged.added.size();
+    for (SplatMask* mask : {&removed_, &hidden_, &selected_}) mask->resize(left);
+    model.resize(left);
+    limit_sh_degree(merged.degree, model);
+    ++model_version_;
+}
+
+std::size_t Edit::merge(SplatModel added, SplatModel& model) {
+    if (added.kernel != model.kernel || added.footprint != model.footprint ||
+        added.antialias != model.antialias)
+        throw Error("the scene to merge",
+                    fmt::format("is of the kernel {}, this one of {}, or differs in footprint or "
+                                "antialiasing",
+                                kernel_name(added.kernel), kernel_name(model.kernel)),
+                    "One scene has one of each: train or convert both alike.");
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (kSplatAttributes[static_cast<std::size_t>(a)].optional && added.size() > 0 &&
+            model.size() > 0 && (added.floats(a) == 0) != (model.floats(a) == 0))
+            throw Error("the scene to merge", "has an attribute that this one lacks, or lacks one",
+                        "Merge scenes that were trained alike.");
+    raise_sh_degree(model.sh_degree, added);
+    count_from(model.origin, added);
+    const std::size_t count = added.size();
+    if (count == 0) return 0;
+    Merged merged{std::move(added), model.sh_degree};
+    append(merged.added, model);
+    push({counted("merged", count), ++last_id_, std::move(merged)});
+    return count;
+}
+
+void Edit::apply_step(const Step& step, bool forward, SplatModel& model) {
+    if (const auto* marks = std::get_if<Marks>(&step.change)) {
+        flip(*marks);
+    } else if (const auto* moved = std::get_if<Moved>(&step.change)) {
+        put_back(moved->splats, forward ? moved->after : moved->before, model);
+        ++model_version_;
+    } else if (const auto* merged = std::get_if<Merged>(&step.change)) {
+        if (forward)
+            append(merged->added, model);
+        else
+            cut(*merged, model);
+    }
+}
+
+std::string Edit::undo(SplatModel& model) {
+    if (!can_undo()) return "";
+    apply_step(steps_[--done_], false, model);
+    return steps_[done_].what;
+}
+
+std::string Edit::redo(SplatModel& model) {
+    if (!can_redo()) return "";
+    apply_step(steps_[done_++], true, model);
+    return steps_[done_ - 1].what;
+}
+
+const std::string& Edit::last() const {
+    static const std::string none;
+    return done_ > 0 ? steps_[done_ - 1].what : none;
+}
+
+SplatMask Edit::unseen() const {
+    SplatMask mask = removed_;
+    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] |= hidden_[i];
+    return mask;
+}
+
+int Edit::content() const {
+    for (std::size_t i = done_; i > 0; --i)
+        if (steps_[i - 1].id != 0) return steps_[i - 1].id;
+    return 0;
+}
+
+bool Edit::unsaved() const {
+    const int now = content();
+    return now != 0 && now != saved_;
 }
 
 SplatModel Edit::apply(const SplatModel& model) const {
     SplatModel out = model;
-    keep_splats([&](size_t i) { return removed_[i] == 0; }, out);
+    keep_splats([&](std::size_t i) { return removed_[i] == 0; }, out);
     return out;
 }
 
-size_t count_inside(const SplatModel& model, const Region& region, const Edit& edit) {
-    size_t count = 0;
-    for (size_t i = 0; i < model.size(); ++i)
-        if (edit.removed()[i] == 0 && region.contains(position_of(model, i))) ++count;
+std::size_t count_inside(const SplatModel& model, const Region& region, const Edit& edit) {
+    const SplatMask mask = in_region(model, region);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < mask.size(); ++i)
+        count += mask[i] != 0 && edit.removed()[i] == 0 ? 1 : 0;
     return count;
 }
 

@@ -1,55 +1,112 @@
-// Edit: which splats of a scene were deleted, by box or sphere, with undo and redo. The scene's
-// arrays stay as they are until a copy without the deleted splats is asked for.
+// Edit: what was done to a scene since it was opened, step by step, with undo and redo: splats
+// selected, hidden, deleted, moved, and scenes merged into it. Marks lie beside the model; moves
+// and merges change the model, which the caller keeps and hands over, always the same.
 #pragma once
 
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <optional>
+#include <string>
+#include <variant>
 #include <vector>
 
+#include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_model.h"
+#include "viewer/select.h"
 
 namespace darb {
 
-/// A box along the world's axes, or a sphere.
-struct Region {
-    enum class Shape { box, sphere };
-    Shape shape = Shape::box;
-    glm::dvec3 centre{0.0};     // world
-    glm::dvec3 half_size{1.0};  // world; of a sphere x is the radius
-    bool contains(const glm::dvec3& p) const;
-};
+/// How a new selection goes with the one before.
+enum class Combine { replace, add, subtract };
 
 class Edit {
   public:
-    explicit Edit(size_t splats = 0) : removed_(splats, 0) {}
+    explicit Edit(std::size_t splats = 0)
+        : removed_(splats, 0), hidden_(splats, 0), selected_(splats, 0) {}
 
-    /// Deletes the splats whose mean is inside the region (or outside: a crop). Returns how many;
-    /// an edit that deletes nothing is not remembered. model: the scene, with as many splats.
-    size_t remove(const SplatModel& model, const Region& region, bool inside);
+    // Each is a step; one that changes nothing is none. They return how many splats changed.
+    // What is hidden or deleted is never selected.
+    std::size_t select(const SplatMask& mask, Combine how);
+    std::size_t invert_selection();
+    std::size_t remove(const SplatMask& mask);
+    std::size_t remove_selected() { return remove(selected_); }
+    std::size_t hide_selected();
+    std::size_t show_hidden();
+    /// Deletes the splats whose mean is inside the region (or outside: a crop).
+    std::size_t remove(const SplatModel& model, const Region& region, bool inside);
+
+    /// Moves what is selected, or, where nothing is, all that is there; bit by bit as the model was
+    /// after an undo.
+    std::size_t transform(const Similarity& similarity, SplatModel& model);
+    /// The same while a hand moves it: `total` since begin_transform. end_transform makes it one
+    /// step.
+    void begin_transform(const SplatModel& model);
+    void drag_transform(const Similarity& total, SplatModel& model);
+    std::size_t end_transform(const SplatModel& model);
+    bool transforms() const { return dragged_.has_value(); }
+    /// Appends the splats of another scene. Throws Error where one model cannot hold both: another
+    /// kernel, or attributes that only one has. Harmonics of the lesser degree get zeros.
+    std::size_t merge(SplatModel added, SplatModel& model);
+
     bool can_undo() const { return done_ > 0; }
     bool can_redo() const { return done_ < steps_.size(); }
-    void undo();
-    void redo();
+    /// What was undone or redone, "deleted 12 splats"; "" where there was nothing to do.
+    std::string undo(SplatModel& model);
+    std::string redo(SplatModel& model);
+    /// Of the last step.
+    const std::string& last() const;
+    /// Grows with each change of the model itself, undone ones too.
+    int model_version() const { return model_version_; }
 
-    const std::vector<std::uint8_t>& removed() const { return removed_; }  // [N] 0 or 1
-    size_t removed_count() const { return removed_count_; }
-    /// Some splats are deleted, and not as they were at the last mark_saved().
-    bool unsaved() const { return removed_count_ > 0 && saved_ != done_; }
-    void mark_saved() { saved_ = done_; }
+    const SplatMask& removed() const { return removed_; }    // [N]
+    const SplatMask& selected() const { return selected_; }  // [N]
+    /// Deleted or hidden, [N].
+    SplatMask unseen() const;
+    std::size_t removed_count() const { return removed_count_; }
+    std::size_t hidden_count() const { return hidden_count_; }
+    std::size_t selected_count() const { return selected_count_; }
+    /// What would be saved differs from the file and from the last mark_saved(). Selections and
+    /// what is hidden are not saved.
+    bool unsaved() const;
+    void mark_saved() { saved_ = content(); }
     /// The scene without the deleted splats, in the same order.
     SplatModel apply(const SplatModel& model) const;
 
   private:
-    void mark(const std::vector<std::uint32_t>& splats, std::uint8_t value);
-    std::vector<std::uint8_t> removed_;
-    std::vector<std::vector<std::uint32_t>> steps_;  // splats that each step deleted
-    size_t done_ = 0;                                // of steps_
-    size_t removed_count_ = 0;
-    std::optional<size_t> saved_;  // done_ when it was saved; none once that step is gone
+    struct Marks {  // each mask's splats change theirs
+        std::vector<std::uint32_t> removed, hidden, selected;
+    };
+    struct Moved {
+        std::vector<std::uint32_t> splats;
+        SplatModel before, after;  // of these
+    };
+    struct Merged {
+        SplatModel added;
+        int degree = 0;  // of the model before
+    };
+    struct Step {
+        std::string what;
+        int id = 0;  // of the content from here on; 0: as before
+        std::variant<Marks, Moved, Merged> change;
+    };
+    void push(Step step);
+    std::size_t mark(const char* verb, Marks marks, bool content);
+    void flip(const Marks& marks);
+    void apply_step(const Step& step, bool forward, SplatModel& model);
+    void append(const SplatModel& added, SplatModel& model);
+    void cut(const Merged& merged, SplatModel& model);
+    std::vector<std::uint32_t> moved_splats() const;
+    int content() const;
+
+    SplatMask removed_, hidden_, selected_;
+    std::vector<Step> steps_;
+    std::size_t done_ = 0;  // of steps_
+    std::size_t removed_count_ = 0, hidden_count_ = 0, selected_count_ = 0;
+    std::optional<Moved> dragged_;
+    int last_id_ = 0, model_version_ = 0;
+    int saved_ = 0;  // content when it was saved; 0: of the file
 };
 
 /// Splats of the region that are not deleted yet.
-size_t count_inside(const SplatModel& model, const Region& region, const Edit& edit);
+std::size_t count_inside(const SplatModel& model, const Region& region, const Edit& edit);
 
 }  // namespace darb

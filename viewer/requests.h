@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <filesystem>
 #include <variant>
 #include <vector>
 
@@ -18,9 +19,16 @@ struct ChooseCamera {
 struct LeavePhoto {};
 struct FollowPlan {};  // the effects as they are planned
 struct Measure {};     // accuracy settings and effects
-struct ShowEdits {};   // other splats are deleted now
-struct Save {};        // the edited scene
-struct SavePage {};    // the same as a web page
+struct ShowOpen {
+    bool merges = false;
+};  // the dialog
+struct Open {
+    std::filesystem::path file;
+    bool merges = false;  // into the scene that is there
+};
+struct ShowEdits {};  // other splats are deleted, selected or moved now
+struct Save {};       // the edited scene
+struct SavePage {};   // the same as a web page
 struct LoadPath {};
 struct SavePath {};
 struct ExportPath {};
@@ -39,11 +47,11 @@ struct LeaveFullScreen {};
 
 using Request =
     std::variant<request::FrameAll, request::TakePicture, request::ChooseCamera,
-                 request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowEdits,
-                 request::Save, request::SavePage, request::LoadPath, request::SavePath,
-                 request::ExportPath, request::CancelLoad, request::CancelWork, request::Quit,
-                 request::SaveAndLeave, request::Leave, request::Stay, request::ToggleFullScreen,
-                 request::LeaveFullScreen>;
+                 request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowOpen,
+                 request::Open, request::ShowEdits, request::Save, request::SavePage,
+                 request::LoadPath, request::SavePath, request::ExportPath, request::CancelLoad,
+                 request::CancelWork, request::Quit, request::SaveAndLeave, request::Leave,
+                 request::Stay, request::ToggleFullScreen, request::LeaveFullScreen>;
 using RequestQueue = std::vector<Request>;
 
 template <class Kind>

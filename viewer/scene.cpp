@@ -60,6 +60,12 @@ std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
 
 }  // namespace
 
+void measure_scene(Scene& scene) {
+    scene.bounds = scene_bounds(scene.model);
+    scene.important =
+        most_important(scene.model, scene.bounds, std::min(scene.model.size() / 2, kMostMoving));
+}
+
 Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
@@ -85,9 +91,7 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
             fmt::format("{} splats with NaN or infinity were dropped.", facts.dropped));
     if (scene.is_points) scene.notes.emplace_back("Points are shown as opaque balls.");
     if (progress) progress(0.95, "measuring");
-    scene.bounds = scene_bounds(scene.model);
-    scene.important =
-        most_important(scene.model, scene.bounds, std::min(scene.model.size() / 2, kMostMoving));
+    measure_scene(scene);
     scene.load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return scene;
 }

@@ -27,6 +27,9 @@ struct Scene {
     std::vector<std::string> notes;  // what was dropped or cannot be shown, a sentence each
 };
 
+/// Bounds, and what is important of the model.
+void measure_scene(Scene& scene);
+
 /// A file that load_splats reads, or a PLY point cloud, which becomes small opaque splats.
 /// `progress` is called with 0..1 and what is being done; it throws to cancel. Throws Error naming
 /// the file.

@@ -9,11 +9,12 @@ namespace darb {
 SceneLoader::SceneLoader(Resolve resolve, std::function<void()> wake)
     : resolve_(std::move(resolve)), wake_(std::move(wake)) {}
 
-void SceneLoader::start(const std::filesystem::path& path, bool dropped) {
+void SceneLoader::start(const std::filesystem::path& path, bool dropped, bool merges) {
     const std::filesystem::path file = resolve_ ? resolve_(path) : path;
     cancel();
     asked_for_ = path;
     dropped_ = dropped;
+    merges_ = merges;
     job_ = std::make_unique<LoadJob>(file, wake_);
 }
 
@@ -38,7 +39,7 @@ std::optional<LoadedScene> SceneLoader::wait() {
     if (!job_) return {};
     std::optional<Scene> scene = std::exchange(job_, nullptr)->take();
     if (!scene) return {};
-    return LoadedScene{std::move(*scene), asked_for_, dropped_};
+    return LoadedScene{std::move(*scene), asked_for_, dropped_, merges_};
 }
 
 }  // namespace darb

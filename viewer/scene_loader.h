@@ -17,6 +17,7 @@ struct LoadedScene {
     Scene scene;
     std::filesystem::path asked_for;  // before it was resolved to a file
     bool dropped = false;             // on the window, rather than named
+    bool merges = false;              // into the scene that is there
 };
 
 class SceneLoader {
@@ -27,7 +28,7 @@ class SceneLoader {
     SceneLoader(Resolve resolve, std::function<void()> wake);
 
     /// An earlier load is cancelled. Throws Error where the path means no scene.
-    void start(const std::filesystem::path& path, bool dropped);
+    void start(const std::filesystem::path& path, bool dropped, bool merges = false);
     void cancel();
     bool loading() const { return job_ != nullptr; }
     double share() const { return job_ ? job_->share() : -1; }  // below 0: nothing is loaded
@@ -42,7 +43,7 @@ class SceneLoader {
     std::function<void()> wake_;
     std::unique_ptr<LoadJob> job_;
     std::filesystem::path asked_for_;
-    bool dropped_ = false;
+    bool dropped_ = false, merges_ = false;
     std::vector<std::unique_ptr<LoadJob>> cancelled_;
 };
 

@@ -1,6 +1,7 @@
 // Session: everything that the panels show and edit. Panels change it and ask, the viewer acts.
 #pragma once
 
+#include <chrono>
 #include <deque>
 #include <filesystem>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "viewer/camera_path.h"
 #include "viewer/display.h"
 #include "viewer/edit.h"
+#include "viewer/folder_list.h"
 #include "viewer/input.h"
 #include "viewer/motion.h"
 #include "viewer/navigation.h"
@@ -20,6 +22,7 @@
 #include "viewer/photo_compare.h"
 #include "viewer/requests.h"
 #include "viewer/scene.h"
+#include "viewer/tools.h"
 
 namespace darb {
 
@@ -71,7 +74,20 @@ struct WorkProgress {
     std::string load_stage;
 };
 
-/// Splats that the next edit deletes.
+/// Said over the picture for some seconds.
+struct Toast {
+    std::string text;
+    std::chrono::steady_clock::time_point until;
+};
+
+struct OpenDialog {
+    bool shown = false, merges = false;
+    std::filesystem::path folder;
+    std::vector<FolderEntry> entries;           // of the folder
+    std::vector<std::filesystem::path> recent;  // latest first
+};
+
+/// A box or a sphere, whose splats an edit selects or deletes.
 struct Selection {
     Region region;
     bool shown = false;
@@ -87,6 +103,8 @@ struct Session {
     std::unique_ptr<Scene> scene;  // null: none yet, or a training run is shown
     Edit edit;
     Selection selection;
+    ToolState tools;
+    OpenDialog open_dialog;
     std::filesystem::path save_file;
     Navigation navigation;
     double fly_speed = 1;            // world units a second
@@ -103,6 +121,7 @@ struct Session {
     std::string title;                      // of what is shown, for a window
     std::string error;                      // shown until dismissed
     std::string note;                       // shown in the status line
+    std::deque<Toast> toasts;               // latest last
     std::string device_name;
     WorkProgress progress;
     std::vector<MeasuredChoice> measured;
@@ -113,6 +132,8 @@ struct Session {
     bool save_upright = false;  // turns what is saved so that up becomes -y
 
     void ask(const Request& request) { requests.push_back(request); }
+    /// In the status line and over the picture.
+    void tell(const std::string& text);
 };
 
 /// The panels of one frame; progress, errors and questions also where session.panels is off. Needs

@@ -15,6 +15,9 @@ namespace {
 constexpr float kRemovedLogit = -100;  // clamped to -30: far below any cut-off
 constexpr float kOpaqueLogit = 8;
 constexpr float kTransparentLogit = -2.2f;  // an opacity of a tenth
+// Orange, (colour - 0.5) / 0.2821 of each channel, over what is selected.
+constexpr float kHighlightDc[3] = {1.77f, 0.71f, -1.6f};
+constexpr float kHighlightShare = 0.65f;
 // Ellipsoids: cut where alpha falls below 0.9. A Gaussian is there at sqrt(2 ln(1/0.9)) = 0.459
 // standard deviations, so they are drawn 2 / 0.459 times as large.
 constexpr float kEllipsoidCutoff = 0.9f;
@@ -65,7 +68,9 @@ void SplatPicture::set_scene(const SplatModel& model, const Bounds& bounds,
     live_ = nullptr;
     model_ = &model;
     bounds_ = bounds;
-    removed_.clear();
+    unseen_.clear();
+    selected_.clear();
+    tinted_ = false;
     important_ = std::move(important);
 }
 
@@ -86,13 +91,42 @@ void SplatPicture::clear() {
     model_ = nullptr;
 }
 
-void SplatPicture::set_removed(const std::vector<std::uint8_t>& removed) {
+void SplatPicture::set_marks(const std::vector<std::uint8_t>& unseen,
+                             const std::vector<std::uint8_t>& selected) {
     if (!own_) return;
-    removed_ = removed;
-    std::vector<float> opacity_logit = model_->opacity_logit;
-    for (size_t i = 0; i < removed_.size(); ++i)
-        if (removed_[i] != 0) opacity_logit[i] = kRemovedLogit;
-    if (!opacity_logit.empty()) own_->parameters(kOpacityLogit).upload(opacity_logit);
+    unseen_ = unseen;
+    selected_ = selected;
+    SplatModel marked;
+    marked.opacity_logit = model_->opacity_logit;
+    const bool tints = std::find(selected.begin(), selected.end(), 1) != selected.end();
+    if (tints || tinted_) marked.sh_dc = model_->sh_dc;
+    apply_marks({}, marked);
+    if (!marked.opacity_logit.empty()) {
+        own_->parameters(kOpacityLogit).upload(marked.opacity_logit);
+        if (!marked.sh_dc.empty()) own_->parameters(kShDc).upload(marked.sh_dc);
+    }
+    tinted_ = tints;
+    styled_.reset();
+    some_.reset();
+    drop_levels();
+}
+
+void SplatPicture::apply_marks(const std::vector<std::uint32_t>& splats, SplatModel& copy) const {
+    const size_t count = copy.opacity_logit.size();
+    for (size_t i = 0; i < count; ++i) {
+        const size_t of = splats.empty() ? i : splats[i];
+        if (of < unseen_.size() && unseen_[of] != 0) copy.opacity_logit[i] = kRemovedLogit;
+        if (of >= selected_.size() || selected_[of] == 0 || copy.sh_dc.empty()) continue;
+        for (size_t c = 0; c < 3; ++c)
+            copy.sh_dc[3 * i + c] =
+                glm::mix(copy.sh_dc[3 * i + c], kHighlightDc[c], kHighlightShare);
+    }
+}
+
+void SplatPicture::update_scene() {
+    if (!own_) return;
+    own_ = GpuSplats(*device_, *model_, false);
+    tinted_ = false;
     styled_.reset();
     some_.reset();
     drop_levels();
@@ -120,8 +154,7 @@ const GpuSplats& SplatPicture::styled(SplatStyle style) {
     if (style == SplatStyle::splats || !own_) return *splats();
     if (styled_ && styled_as_ == style) return *styled_;
     SplatModel model = in_style(*model_, style);
-    for (size_t i = 0; i < removed_.size(); ++i)
-        if (removed_[i] != 0) model.opacity_logit[i] = kRemovedLogit;
+    apply_marks({}, model);
     styled_.reset();
     styled_.emplace(*device_, model, false);
     styled_as_ = style;
@@ -134,8 +167,7 @@ const GpuSplats& SplatPicture::some_styled(SplatStyle style, double share) {
     if (const GpuSplats* level = level_of(style, share)) return *level;
     if (!some_ || some_as_ != style) {
         SplatModel model = in_style(pick_splats(*model_, important_), style);
-        for (size_t i = 0; i < important_.size() && !removed_.empty(); ++i)
-            if (removed_[important_[i]] != 0) model.opacity_logit[i] = kRemovedLogit;
+        apply_marks(important_, model);
         compiled_ = true;
         some_.reset();
         some_.emplace(*device_, model, false);

@@ -51,8 +51,12 @@ class SplatPicture {
     const Bounds& bounds() const { return bounds_; }
     std::uint32_t splat_count() const { return splats() ? splats()->count() : 0; }
 
-    /// Deleted splats (1) vanish, the others are as in the model. Levels go.
-    void set_removed(const std::vector<std::uint8_t>& removed);
+    /// Splats that are not to be seen (1) vanish, those that are selected (1) are highlighted, the
+    /// others are as in the model. Levels go.
+    void set_marks(const std::vector<std::uint8_t>& unseen,
+                   const std::vector<std::uint8_t>& selected);
+    /// The model's values changed, not their number. Throws Error.
+    void update_scene();
 
     /// Renders and waits. camera: at the size of the frame that is wanted. moving: with the fast
     /// accuracy settings and this share of the splats, for a picture that is replaced at once.
@@ -126,7 +130,10 @@ class SplatPicture {
     std::vector<std::uint32_t> important_;
     std::vector<GpuSplats> levels_;  // fewer and fewer
     bool levels_ended_ = false;
-    std::vector<std::uint8_t> removed_;
+    // Changes what is marked of a copy; splats: whose, all where there are none.
+    void apply_marks(const std::vector<std::uint32_t>& splats, SplatModel& copy) const;
+    std::vector<std::uint8_t> unseen_, selected_;  // [N], or none
+    bool tinted_ = false;                          // colours of own_ are not the model's
     Bounds bounds_;
     std::map<int, Slot> slots_;  // of pane p: 2 p at rest, 2 p + 1 moving
     Buffer pixels_, no_photo_;

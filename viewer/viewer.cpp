@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "viewer/controls.h"
+#include "viewer/tools.h"
 
 namespace darb {
 
@@ -33,7 +34,8 @@ Viewer::Viewer(Device& device, ViewerOptions options, GLFWwindow* window)
       gui_(device, canvas_.render_pass(), options_.gui_scale > 0 ? options_.gui_scale : 1, window),
       picture_(device),
       panes_(device),
-      remembered_(options_.up_list) {
+      remembered_(options_.up_list),
+      recent_(options_.recent_list) {
     session_.photos.views = options_.views;
     session_.navigation.set_up(start_up(options_));
     session_.device_name = device.info().name;
@@ -86,7 +88,10 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     gui_.begin(width, height);  // now it knows whether the pointer is on a panel
     if (!gui_.wants_keys())
         for (const Key key : input.pressed) press(key, session_);
-    move_camera(input, {width, height, seconds, gui_.wants_mouse(), gui_.wants_keys()}, session_);
+    const ControlFrame control{width, height, seconds, gui_.wants_mouse(), gui_.wants_keys()};
+    Input moves = input;
+    if (use_tool(input, control, session_)) moves.left = moves.double_click = false;
+    move_camera(moves, control, session_);
     play_path(seconds, session_);
     draw_panels(session_);
     gui_.end();
@@ -101,12 +106,28 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     else if (!picture_.empty())
         pace_picture(width, height, full, works);
 
-    const double look_s = work_.exports() ? kLook_s : std::numeric_limits<double>::infinity();
+    const double look_s = std::min(
+        work_.exports() ? kLook_s : std::numeric_limits<double>::infinity(), expire_toasts());
     continuous_ = session_.path.playing || (!shows_nothing() && (works || holds_a_key(input)));
     if (continuous_) return 0;
     const double refine_s = pacing_.seconds_to_refine(frame_start_);
     if (!picture_.empty() && std::isfinite(refine_s)) return std::min(look_s, refine_s);
     return std::min(look_s, pacing_.count_still_frame());
+}
+
+// What a panel or a request has noted is a toast, too. Returns seconds until the next one goes.
+double Viewer::expire_toasts() {
+    Session& s = session_;
+    if (s.note != told_ && !s.note.empty() &&
+        (s.toasts.empty() || s.toasts.back().text != s.note)) {
+        s.tell(s.note);
+        pacing_.unsettle();
+    }
+    told_ = s.note;
+    const auto now = Clock::now();
+    while (!s.toasts.empty() && s.toasts.front().until <= now) s.toasts.pop_front();
+    if (s.toasts.empty()) return std::numeric_limits<double>::infinity();
+    return std::chrono::duration<double>(s.toasts.front().until - now).count() + 0.001;
 }
 
 void Viewer::draw_whole(int width, int height) {

@@ -14,6 +14,7 @@
 #include "viewer/pane_pictures.h"
 #include "viewer/picture_pacing.h"
 #include "viewer/picture_work.h"
+#include "viewer/recent_files.h"
 #include "viewer/remembered_up.h"
 #include "viewer/saved_files.h"
 #include "viewer/scene_loader.h"
@@ -36,7 +37,8 @@ struct ViewerOptions {
     std::function<std::vector<View>(const std::filesystem::path&)> find_cameras;
     /// Scenes with cameras open at the first, with its photo where there is one.
     bool start_at_camera = false;
-    std::filesystem::path up_list;  // of RememberedUp
+    std::filesystem::path up_list;      // of RememberedUp
+    std::filesystem::path recent_list;  // of RecentFiles
     /// Called from other threads when there is something to show.
     std::function<void()> wake;
 };
@@ -93,7 +95,7 @@ class Viewer {
     using Clock = std::chrono::steady_clock;
 
     // viewer_scene.cpp: what is shown.
-    void start_load(const std::filesystem::path& path, bool dropped);
+    void start_load(const std::filesystem::path& path, bool dropped, bool merges = false);
     void take_loaded();
     void drop(const std::filesystem::path& path);
     void show(LoadedScene loaded);
@@ -118,6 +120,11 @@ class Viewer {
     void load_path();
     void save_path();
     void save_scene();
+    void show_edits();
+    void show_open(bool merges);
+    void open_file(const std::filesystem::path& file, bool merges);
+    void merge(LoadedScene loaded);
+    double expire_toasts();
     void save_page(int width, int height);
     void quit();
     void leave();
@@ -160,6 +167,9 @@ class Viewer {
     PicturePacing pacing_;
     PictureWork work_;
     RememberedUp remembered_;
+    RecentFiles recent_;
+    std::string told_;                      // the note that is a toast already
+    int shown_model_ = 0;                   // Edit::model_version of the picture
     glm::dvec3 known_up_{0.0};              // of the scene, as it was opened or last remembered
     std::vector<double> shares_;            // of the splats, below all
     std::unique_ptr<MotionLevels> levels_;  // of the scene; null: none asked for

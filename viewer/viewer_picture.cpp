@@ -32,6 +32,7 @@ Camera scaled(const Camera& camera, double scale) {
 // Where a picture in motion cannot have all splats. Another scene and edits end them.
 void Viewer::start_levels() {
     if (levels_ || !session_.scene || shares_.empty() || !pacing_.is_whole()) return;
+    if (session_.edit.selected_count() > 0 || session_.edit.transforms()) return;  // they have none
     if (pacing_.motion().quality().splats == 1 || session_.times.full_ms < kQuick_ms) return;
     const Scene& s = *session_.scene;
     if (s.model.size() < kFewSplats) return;
@@ -39,7 +40,7 @@ void Viewer::start_levels() {
     for (const double share : shares_)
         counts.push_back(static_cast<std::size_t>(share * static_cast<double>(s.model.size())));
     levels_ =
-        std::make_unique<MotionLevels>(s.model, session_.edit.removed(), counts, options_.wake);
+        std::make_unique<MotionLevels>(s.model, session_.edit.unseen(), counts, options_.wake);
 }
 
 void Viewer::take_levels() {

@@ -66,11 +66,9 @@ void Viewer::act_on_requests(int width, int height) {
                 camera_in_window(s.photos, s.navigation, free_area(s, width, height)), s.display,
                 s.own);
         },
-        [&](request::ShowEdits) {
-            if (!s.scene) return;
-            lose_scene("the scene was edited");
-            picture_.set_removed(s.edit.removed());
-        },
+        [&](request::ShowOpen open) { show_open(open.merges); },
+        [&](const request::Open& open) { open_file(open.file, open.merges); },
+        [&](request::ShowEdits) { show_edits(); },
         [&](request::Save) { save_scene(); },
         [&](request::SavePage) { save_page(width, height); },
         [&](request::LoadPath) { load_path(); },
@@ -118,6 +116,37 @@ void Viewer::frame_all(int width, int height) {
         n.look_from(bounds.centre, distance);
     else
         n.frame(bounds.centre, bounds.radius, wide / height);
+}
+
+void Viewer::show_open(bool merges) {
+    OpenDialog& dialog = session_.open_dialog;
+    dialog.shown = !dialog.shown || dialog.merges != merges;
+    dialog.merges = merges;
+    dialog.recent = recent_.read();
+    if (!dialog.folder.empty()) dialog.entries = list_folder(dialog.folder);
+}
+
+// While a hand moves splats, only they are made anew; all else follows when it lets go.
+void Viewer::show_edits() {
+    Session& s = session_;
+    if (!s.scene) return;
+    lose_scene("the scene was edited");
+    if (s.edit.model_version() != shown_model_) {
+        shown_model_ = s.edit.model_version();
+        Scene& scene = *s.scene;
+        if (s.edit.transforms()) {
+            picture_.update_scene();
+        } else {
+            measure_scene(scene);
+            picture_.set_scene(scene.model, scene.bounds, scene.important);
+            shares_ = picture_.most_moving() < 1
+                          ? motion_shares(picture_.splat_count(), picture_.most_moving())
+                          : std::vector<double>();
+            pacing_.motion().start(shares_);
+            session_.sh_degree = scene.model.sh_degree;
+        }
+    }
+    picture_.set_marks(s.edit.unseen(), s.edit.selected());
 }
 
 void Viewer::load_path() {

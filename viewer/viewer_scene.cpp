@@ -7,6 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/scene/splat_file.h"
 #include "viewer/controls.h"
 #include "viewer/viewer.h"
 
@@ -21,26 +22,53 @@ bool any_lens(const std::vector<View>& views) {
                        [](const View& v) { return v.camera.lens.active; });
 }
 
+// Beside the scene, in its format where that is written.
+fs::path edited_name(const fs::path& file) {
+    const std::string name = file.filename().string();
+    const std::size_t dot = name.find('.');
+    const std::string stem = name.substr(0, dot);
+    if (dot != std::string::npos && dot > 0) {
+        const fs::path same = fs::path(file).replace_filename(stem + "_edited" + name.substr(dot));
+        if (format_to_write(same)) return same;
+    }
+    return fs::path(file).replace_filename(file.stem().string() + "_edited.ply");
+}
+
 }  // namespace
 
 void Viewer::open(const std::filesystem::path& path) {
     start_load(path, false);
 }
 
+void Viewer::open_file(const std::filesystem::path& file, bool merges) {
+    if (!merges) return drop(file);
+    need_scene("merging");
+    start_load(file, true, true);
+}
+
+void Viewer::merge(LoadedScene loaded) {
+    Session& s = session_;
+    const std::string from = loaded.scene.file.filename().string();
+    if (s.edit.transforms()) choose_tool(Tool::navigate, s);
+    const std::size_t count = s.edit.merge(std::move(loaded.scene.model), s.scene->model);
+    show_edits();
+    s.tell(fmt::format("merged {} splats of {}", count, from));
+}
+
 // What a user drops: not on a run, and not over unsaved edits without a question.
 void Viewer::drop(const std::filesystem::path& path) {
     Session& s = session_;
     if (s.training.live && !s.training.finished)
-        s.note = "A run is shown: files can be dropped when it is over.";
+        s.note = "A run is shown: files can be opened when it is over.";
     else if (s.scene && s.edit.unsaved())
         s.leaving = Leaving{false, path};
     else
         start_load(path, true);
 }
 
-void Viewer::start_load(const std::filesystem::path& path, bool dropped) {
+void Viewer::start_load(const std::filesystem::path& path, bool dropped, bool merges) {
     attempt([&] {
-        loader_.start(path, dropped);
+        loader_.start(path, dropped, merges);
         session_.error.clear();
         if (dropped) session_.note.clear();
     });
@@ -56,7 +84,12 @@ void Viewer::finish_loading() {
 
 void Viewer::take_loaded() {
     attempt([&] {
-        if (std::optional<LoadedScene> loaded = loader_.poll()) show(std::move(*loaded));
+        if (std::optional<LoadedScene> loaded = loader_.poll()) {
+            if (loaded->merges && session_.scene)
+                merge(std::move(*loaded));
+            else
+                show(std::move(*loaded));
+        }
     });
     session_.progress.load = loader_.share();
     session_.progress.load_stage = loader_.stage();
@@ -84,9 +117,14 @@ void Viewer::show(LoadedScene loaded) {
     const Scene& s = *session_.scene;
     session_.sh_degree = s.model.sh_degree;
     session_.edit = Edit(s.model.size());
+    session_.tools = {};
+    session_.tools.grow = static_cast<float>(s.bounds.radius / 50);
+    session_.tools.scale[1] = static_cast<float>(s.bounds.radius / 10);
+    shown_model_ = 0;
+    attempt([&] { recent_.opened(asked); });
     session_.selection.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
     session_.save_file = s.file;
-    session_.save_file.replace_filename(s.file.stem().string() + "_edited.ply");
+    session_.save_file = edited_name(s.file);
     session_.fly_speed = s.bounds.radius / 2;
     show_as_meant(s, first);
     tell(options_.quiet ? nullptr : stdout, "loaded {}: {} splats in {:.2f} s\neffects: {}\n",

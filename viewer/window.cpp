@@ -35,9 +35,23 @@ std::optional<Key> key_for(int key, bool control) {
                 return Key::save;
             case GLFW_KEY_Q:
                 return Key::quit;
+            case GLFW_KEY_A:
+                return Key::select_all;
+            case GLFW_KEY_D:
+                return Key::select_none;
+            case GLFW_KEY_I:
+                return Key::select_others;
+            case GLFW_KEY_H:
+                return Key::hide;
+            case GLFW_KEY_U:
+                return Key::show_hidden;
+            case GLFW_KEY_O:
+                return Key::open;
             default:
                 return {};
         }
+    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_8)
+        return static_cast<Key>(static_cast<int>(Key::tool_navigate) + key - GLFW_KEY_1);
     switch (key) {
         case GLFW_KEY_F:
             return Key::frame_all;
@@ -140,6 +154,7 @@ struct ViewerWindow::State {
     void install_callbacks();
     void collect();
     void drag(double x, double y);
+    glm::dvec2 pointer() const;  // px
     void note_buttons();
     bool* held_key(int key);  // its flag in input, or null
     void draw();
@@ -178,6 +193,8 @@ void ViewerWindow::State::install_callbacks() {
         State& s = of(from);
         s.dirty = true;
         if (button != GLFW_MOUSE_BUTTON_LEFT || action != GLFW_PRESS) return;
+        s.input.left = true;
+        s.input.trail.push_back(s.pointer());
         const double now = glfwGetTime();
         s.input.double_click = now - s.last_click < kDoubleClick_s;
         s.last_click = s.input.double_click ? -1 : now;
@@ -243,6 +260,7 @@ void ViewerWindow::State::drag(double x, double y) {
     glfwGetWindowSize(window.handle, &window_width, &window_height);
     glfwGetFramebufferSize(window.handle, &width, &height);
     const auto down = [&](int b) { return glfwGetMouseButton(window.handle, b) == GLFW_PRESS; };
+    if (down(GLFW_MOUSE_BUTTON_LEFT)) input.trail.push_back(pointer());
     if (down(GLFW_MOUSE_BUTTON_LEFT) || down(GLFW_MOUSE_BUTTON_MIDDLE) ||
         down(GLFW_MOUSE_BUTTON_RIGHT)) {
         note_buttons();
@@ -253,16 +271,20 @@ void ViewerWindow::State::drag(double x, double y) {
     last_y = y;
 }
 
+glm::dvec2 ViewerWindow::State::pointer() const {
+    int window_width = 1, window_height = 1, width = 1, height = 1;
+    glfwGetWindowSize(window.handle, &window_width, &window_height);
+    glfwGetFramebufferSize(window.handle, &width, &height);
+    double x = 0, y = 0;
+    glfwGetCursorPos(window.handle, &x, &y);
+    return {x * width / std::max(window_width, 1), y * height / std::max(window_height, 1)};
+}
+
 // What is a state rather than an event: pointer, buttons, held keys.
 void ViewerWindow::State::collect() {
     GLFWwindow* w = window.handle;
-    int window_width = 1, window_height = 1, width = 1, height = 1;
-    glfwGetWindowSize(w, &window_width, &window_height);
-    glfwGetFramebufferSize(w, &width, &height);
-    double x = 0, y = 0;
-    glfwGetCursorPos(w, &x, &y);
-    input.x = x * width / std::max(window_width, 1);
-    input.y = y * height / std::max(window_height, 1);
+    input.x = pointer().x;
+    input.y = pointer().y;
     const auto key = [&](int k) { return glfwGetKey(w, k) == GLFW_PRESS; };
     input.shift = key(GLFW_KEY_LEFT_SHIFT) || key(GLFW_KEY_RIGHT_SHIFT);
     input.control = key(GLFW_KEY_LEFT_CONTROL) || key(GLFW_KEY_RIGHT_CONTROL);

@@ -55,8 +55,6 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {"eval", "scene"},
                     {"eval a.ply b --split no_such", "--split"},
                     {"render a.ply -o b --depth png", "--depth"},
-                    {"render a.ply -o b -r 2", "--size"},
-                    {render + "--path c.json", "--cameras"},
                     {render + "--render-scale 1/2 --depth png", "Add --render-scale 1."},
                     {render + "--render-scale 1/2 --effects +depth", "Add --render-scale 1."},
                     {render + "--accuracy fast --effects +depth", "Add --storage float32."},
@@ -351,25 +349,6 @@ TEST_F(TrainedCommand, render_takes_every_kind_of_cameras) {
         EXPECT_EQ(count_png(foreign), 97U);
         EXPECT_EQ(read_image_info(foreign + "/20240212_003919.png").width, 64);
     }
-}
-
-TEST_F(TrainedCommand, render_without_cameras_makes_a_film) {
-    const std::string turn = scratch() / "turn", film = scratch() / "film";
-    const std::string size = " --size 64x48 --fps 2";
-    const Outcome o = darb(fmt::format("render {} -o {}{} --seconds 2", ply(), turn, size));
-    ASSERT_EQ(o.code, 0) << o.err;
-    EXPECT_EQ(count_png(turn), 4U) << o.out;
-    const ImageU8 first = read_image(turn + "/frame_00000.png");
-    EXPECT_EQ(first.width, 64);
-    EXPECT_NE(first.data, read_image(turn + "/frame_00002.png").data);
-    EXPECT_EQ(fs::exists(turn + "/video.mp4"), o.out.find("video.mp4") != std::string::npos);
-    const std::string path = scratch() / "path.json";
-    write_file_atomic(path, R"({"key_frames": [
-        {"seconds": 0, "eye": [0, 0, -4], "orientation": [1, 0, 0, 0], "fov_y_degrees": 50},
-        {"seconds": 1, "eye": [0, 0, -3], "orientation": [1, 0, 0, 0], "fov_y_degrees": 50}]})");
-    const Outcome p = darb(fmt::format("render {} --path {} -o {}{}", ply(), path, film, size));
-    ASSERT_EQ(p.code, 0) << p.err;
-    EXPECT_EQ(count_png(film), 3U) << p.out;
 }
 
 TEST_F(TrainedCommand, frames_of_equal_names_are_kept_apart) {

@@ -253,7 +253,7 @@ TEST_F(ViewerTest, Motion_shows_the_important_splats_and_no_deleted_ones) {
     EXPECT_GT(half, 0.5 * all);
     EXPECT_LT(few, half);
     EXPECT_GT(few, 0);
-    picture.set_removed(std::vector<std::uint8_t>(s.model.size(), 1));
+    picture.set_marks(std::vector<std::uint8_t>(s.model.size(), 1), {});
     EXPECT_EQ(light(0.5), 0);
 }
 

@@ -31,6 +31,7 @@ void LiveView::State::show_window() {
         shown.set_title("training - darb");
         Session& session = shown.viewer().session();
         if (!session.photos.views.empty()) shown.viewer().choose_camera(0);
+        session.training.live = true;  // nothing may be opened from now on
         if (white) session.display.background = glm::vec3(1.0f);
         {
             const std::lock_guard lock(mutex);
@@ -40,8 +41,6 @@ void LiveView::State::show_window() {
             follow_run(shown);
             check_display();
         } while (!(ended && stop) && !leave && shown.pump(kNap_s));
-        if (std::getenv("DARB_VIEW_GAPS") != nullptr)
-            say("longest gap of the window: {:.0f} ms\n", shown.longest_gap_s() * 1000);
         const std::lock_guard lock(mutex);
         window = nullptr;
     } catch (const std::exception& e) {
@@ -60,7 +59,8 @@ void LiveView::State::follow_run(ViewerWindow& shown) {
     Viewer& viewer = shown.viewer();
     TrainingCurves& seen = viewer.session().training;
     std::unique_lock lock(mutex);
-    if (scene && !seen.live) viewer.show_live(picture, bounds, *scene);
+    if (scene && !begun) viewer.show_live(picture, bounds, *scene);
+    begun |= scene.has_value();
     if (seen.paused != training.paused || seen.steps_to_go > 0) {
         training.paused = seen.paused;
         training.steps_to_go += std::exchange(seen.steps_to_go, 0);
@@ -79,6 +79,8 @@ void LiveView::State::follow_run(ViewerWindow& shown) {
     }
     if (!finished || ended) return;
     ended = true;
+    if (std::getenv("DARB_VIEW_GAPS") != nullptr)
+        say("longest gap of the window: {:.0f} ms\n", shown.longest_gap_s() * 1000);
     const std::filesystem::path scene_file = model;
     lock.unlock();
     viewer.end_live();

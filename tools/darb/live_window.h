@@ -64,7 +64,7 @@ struct LiveView::State {
 
     int followed = 0;  // of the window's thread: the version that it shows
     std::chrono::steady_clock::time_point redrawn;
-    bool ended = false;
+    bool begun = false, ended = false;
     std::thread thread;  // the last member: it uses all others
 };
 

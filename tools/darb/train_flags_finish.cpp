@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/train_flags.h"

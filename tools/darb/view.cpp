@@ -98,7 +98,10 @@ int view(ViewFlags flags) {
     if (!note.empty()) say("warning: {}\n", note);
     options.resolve = find_scene;
     options.start_at_camera = true;
-    if (const auto kept = state_folder(); !kept.empty()) options.up_list = kept / "up.json";
+    if (const auto kept = state_folder(); !kept.empty()) {
+        options.up_list = kept / "up.json";
+        options.recent_list = kept / "recent.json";
+    }
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())
         return without_window(flags, options, size, note);

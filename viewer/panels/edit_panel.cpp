@@ -1,9 +1,11 @@
-// Selection by box or sphere, delete, crop, undo, save.
+// Tools, selection, undo, merge, save.
 #include <imgui.h>
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "engine/scene/splat_file.h"
 #include "viewer/panels/panels.h"
 
 namespace darb {
@@ -63,48 +65,115 @@ void draw_sphere(const Camera& camera, const Region& r) {
         }
 }
 
-void buttons(Session& s) {
-    const SplatModel& model = s.scene->model;
-    bool changed = false;
-    if (ImGui::Button("Delete inside"))
-        changed = s.edit.remove(model, s.selection.region, true) > 0;
-    tip("splats whose centre is inside, key Delete");
-    ImGui::SameLine();
-    if (ImGui::Button("Crop to it")) changed = s.edit.remove(model, s.selection.region, false) > 0;
-    tip("deletes the splats whose centre is outside");
-    ImGui::BeginDisabled(!s.edit.can_undo());
-    if (ImGui::Button("Undo")) {
-        s.edit.undo();
-        changed = true;
+void tool_choice(Session& s) {
+    constexpr const char* kNames[kToolCount] = {"orbit",  "rectangle", "lasso", "brush",
+                                                "sphere", "move",      "turn",  "scale"};
+    constexpr float kColumns[] = {0, 88, 186, 262};  // px at scale 1
+    constexpr const char* kTips[kToolCount] = {
+        "left drag orbits, key 1",
+        "select by a rectangle, also what others hide; Shift adds, Ctrl takes away; key 2",
+        "select by an outline; Shift adds, Ctrl takes away; key 3",
+        "select by painting; Shift adds, Ctrl takes away; key 4",
+        "select around the splat where the drag begins; Shift adds, Ctrl takes away; key 5",
+        "drag an arrow: what is selected moves, or all where nothing is; key 6",
+        "drag a ring: what is selected turns, harmonics with it; key 7",
+        "drag the ring: what is selected grows or shrinks; key 8"};
+    for (int i = 0; i < kToolCount; ++i) {
+        if (i % 4 != 0) ImGui::SameLine(kColumns[i % 4] * s.gui_scale);
+        if (ImGui::RadioButton(kNames[i], static_cast<int>(s.tools.tool) == i))
+            choose_tool(static_cast<Tool>(i), s);
+        tip(kTips[i]);
     }
+    if (s.tools.tool != Tool::brush) return;
+    ImGui::SliderFloat("brush", &s.tools.brush_px, 4, 300, "%.0f px", kLogarithmic);
+    tip("radius on the screen");
+}
+
+void select(const SplatMask& mask, Session& s) {
+    const ImGuiIO& io = ImGui::GetIO();
+    show_edit(s.edit.select(mask, io.KeyShift  ? Combine::add
+                                  : io.KeyCtrl ? Combine::subtract
+                                               : Combine::replace),
+              s);
+}
+
+void selection_buttons(Session& s) {
+    const SplatModel& model = s.scene->model;
+    ImGui::Text("%zu selected, %zu hidden, %zu deleted", s.edit.selected_count(),
+                s.edit.hidden_count(), s.edit.removed_count());
+    if (ImGui::Button("All")) select(SplatMask(model.size(), 1), s);
+    tip("Ctrl+A");
+    ImGui::SameLine();
+    if (ImGui::Button("None")) select(SplatMask(model.size(), 0), s);
+    tip("Ctrl+D");
+    ImGui::SameLine();
+    if (ImGui::Button("Invert")) show_edit(s.edit.invert_selection(), s);
+    tip("Ctrl+I");
+    ImGui::SameLine();
+    if (ImGui::Button("Grow"))
+        show_edit(
+            s.edit.select(grown(model, s.edit.selected(), double{s.tools.grow}), Combine::add), s);
+    tip("adds the splats that are nearer to a selected one than the distance beside");
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(70 * s.gui_scale);
+    ImGui::DragFloat("##grow", &s.tools.grow, s.tools.grow / 100, 1e-6f, 1e6f, "%.3g units",
+                     kClamped);
+    tip("in units of the scene; drag, or Ctrl+click to type");
+    if (ImGui::Button("Hide")) show_edit(s.edit.hide_selected(), s);
+    tip("what is selected, Ctrl+H; it is saved all the same");
+    ImGui::SameLine();
+    if (ImGui::Button("Show")) show_edit(s.edit.show_hidden(), s);
+    tip("what is hidden, Ctrl+U");
+    ImGui::SameLine();
+    if (ImGui::Button("Delete")) show_edit(s.edit.remove_selected(), s);
+    tip("what is selected, key Delete");
+}
+
+void undo_buttons(Session& s) {
+    ImGui::BeginDisabled(!s.edit.can_undo());
+    if (ImGui::Button("Undo")) undo_edit(s);
     ImGui::EndDisabled();
     tip("Ctrl+Z");
     ImGui::SameLine();
     ImGui::BeginDisabled(!s.edit.can_redo());
-    if (ImGui::Button("Redo")) {
-        s.edit.redo();
-        changed = true;
-    }
+    if (ImGui::Button("Redo")) redo_edit(s);
     ImGui::EndDisabled();
     tip("Ctrl+Y");
+}
+
+void select_by_value(Session& s) {
+    if (!ImGui::TreeNode("Select by value")) return;
+    ToolState& t = s.tools;
+    const SplatModel& m = s.scene->model;
+    const float top = static_cast<float>(s.scene->bounds.radius);
+    ImGui::DragFloatRange2("##opacity", &t.opacity[0], &t.opacity[1], 0.005f, 0, 1, "%.3f", "%.3f",
+                           kClamped);
+    tip("opacity from and to, 0 to 1");
     ImGui::SameLine();
-    ImGui::Text("%zu deleted", s.edit.removed_count());
-    if (changed) s.ask(request::ShowEdits{});
+    if (ImGui::Button("opacity"))
+        select(by_opacity(m, double{t.opacity[0]}, double{t.opacity[1]}), s);
+    tip("select these; Shift adds, Ctrl takes away");
+    ImGui::DragFloatRange2("##scale", &t.scale[0], &t.scale[1], top / 500, 0, 100 * top, "%.3g",
+                           "%.3g", kClamped);
+    tip("largest standard deviation from and to, units of the scene");
+    ImGui::SameLine();
+    if (ImGui::Button("size")) select(by_scale(m, double{t.scale[0]}, double{t.scale[1]}), s);
+    tip("select these; Shift adds, Ctrl takes away");
+    ImGui::ColorEdit3("##colour", &t.colour.x, ImGuiColorEditFlags_NoInputs);
+    tip("sRGB");
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(110 * s.gui_scale);
+    ImGui::SliderFloat("##tolerance", &t.tolerance, 0, 1, "within %.2f", kClamped);
+    tip("of each channel, 0 to 1");
+    ImGui::SameLine();
+    if (ImGui::Button("colour")) select(by_colour(m, glm::dvec3(t.colour), double{t.tolerance}), s);
+    tip("select these, by their colour without harmonics; Shift adds, Ctrl takes away");
+    ImGui::TreePop();
 }
 
-}  // namespace
-
-void draw_region(const Session& s, int width, int height) {
-    const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
-    if (s.selection.region.shape == Region::Shape::box)
-        draw_box(camera, s.selection.region);
-    else
-        draw_sphere(camera, s.selection.region);
-}
-
-void edit_panel(Session& s) {
-    if (!s.scene || !ImGui::CollapsingHeader("Edit")) return;
-    ImGui::Checkbox("show the selection", &s.selection.shown);
+void select_by_region(Session& s) {
+    if (!ImGui::TreeNode("Select by box or sphere")) return;
+    ImGui::Checkbox("show it", &s.selection.shown);
     tip("its outline over the picture");
     int shape = s.selection.region.shape == Region::Shape::sphere ? 1 : 0;
     if (ImGui::Combo("shape", &shape, "box\0sphere\0"))
@@ -123,22 +192,63 @@ void edit_panel(Session& s) {
     }
     tip("what the camera turns around");
     if (moved) s.selection.shown = true;
-    if (ImGui::Button("Count")) {
-        const size_t inside = count_inside(s.scene->model, s.selection.region, s.edit);
-        s.note = std::to_string(inside) + " splats are inside";
-    }
-    tip("how many splats have their centre inside");
+    if (ImGui::Button("Select")) select(in_region(s.scene->model, s.selection.region), s);
+    tip("splats whose centre is inside; Shift adds, Ctrl takes away");
     ImGui::SameLine();
-    buttons(s);
+    if (ImGui::Button("Crop to it"))
+        show_edit(s.edit.remove(s.scene->model, s.selection.region, false), s);
+    tip("deletes the splats whose centre is outside");
+    ImGui::TreePop();
+}
+
+void format_choice(Session& s) {
+    constexpr const char* kEndings[] = {".ply", ".compressed.ply", ".splat", ".spz", ".sog",
+                                        ".glb"};
+    if (!ImGui::BeginCombo("format", "as ...")) {
+        tip("another ending for the file, and so another format");
+        return;
+    }
+    const std::string name = s.save_file.filename().string();
+    for (const char* ending : kEndings) {
+        const std::filesystem::path other =
+            std::filesystem::path(s.save_file)
+                .replace_filename(name.substr(0, name.find('.')) + ending);
+        if (format_to_write(other) && ImGui::Selectable(ending)) s.save_file = other;
+    }
+    ImGui::EndCombo();
+}
+
+}  // namespace
+
+void draw_region(const Session& s, int width, int height) {
+    const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
+    if (s.selection.region.shape == Region::Shape::box)
+        draw_box(camera, s.selection.region);
+    else
+        draw_sphere(camera, s.selection.region);
+}
+
+void edit_panel(Session& s) {
+    if (!s.scene || !ImGui::CollapsingHeader("Edit")) return;
+    ImGui::PushID("edit");
+    tool_choice(s);
+    selection_buttons(s);
+    undo_buttons(s);
+    select_by_value(s);
+    select_by_region(s);
+    if (ImGui::Button("Merge a scene ...")) s.ask(request::ShowOpen{true});
+    tip("its splats come into this one, in the place that their file gives them");
     path_field("file", s.save_file);
     tip("its ending says in which format");
     ImGui::SameLine();
     if (ImGui::Button("Save")) s.ask(request::Save{});
     tip("the scene as it is edited, Ctrl+S");
+    format_choice(s);
     if (ImGui::Button("Save as web page")) s.ask(request::SavePage{});
     tip("an .html beside the file, for any browser");
     ImGui::Checkbox("save upright", &s.save_upright);
     tip("turns what is saved so that up is -y, as most programs want it");
+    ImGui::PopID();
 }
 
 }  // namespace darb

@@ -62,7 +62,7 @@ void leaving_window(Session& s, float width, float height) {
     ImGui::SetNextWindowPos(ImVec2(width / 2, height / 2), 0, ImVec2(0.5f, 0.5f));
     ImGui::Begin("Not saved", nullptr,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
-    ImGui::Text("%zu splats are deleted and not saved.", s.edit.removed_count());
+    ImGui::TextUnformatted("The scene was edited and is not saved.");
     path_field("file", s.save_file);
     tip("its ending says in which format");
     const bool quit = s.leaving->quit;
@@ -79,7 +79,7 @@ void leaving_window(Session& s, float width, float height) {
 
 void empty_hint(const Session& s, float width, float height) {
     if (s.scene || s.training.live || s.progress.load >= 0) return;
-    const char* text = "Drop a splat file here";
+    const char* text = "Drop a splat file here, or press Ctrl+O";
     const ImVec2 size = ImGui::CalcTextSize(text);
     ImGui::GetBackgroundDrawList()->AddText(ImVec2((width - size.x) / 2, (height - size.y) / 2),
                                             IM_COL32(220, 222, 226, 255), text);
@@ -134,13 +134,16 @@ void draw_panels(Session& s) {
     empty_hint(s, width, height);
     draw_panes(s);
     if (s.panels) {
+        draw_tools(s, static_cast<int>(width), static_cast<int>(height));
         if (s.selection.shown) draw_region(s, static_cast<int>(width), static_cast<int>(height));
         side_panel(s, height);
     }
     progress_window(s, width, height);
+    open_window(s);
     help_window(s);
     leaving_window(s, width, height);
     error_window(s, width, height);
+    if (s.panels) draw_toasts(s);
 }
 
 float panel_width(const Session& s) {

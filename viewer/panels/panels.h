@@ -29,6 +29,11 @@ void tip(const char* text);
 
 /// Lines between panes, which can be dragged, and what each pane is; in ImGui's coordinates.
 void draw_panes(Session& session);
+/// The tool's stroke and gizmo.
+void draw_tools(const Session& session, int width, int height);
+/// What happened, for some seconds.
+void draw_toasts(const Session& session);
+void open_window(Session& session);
 /// Which kernels are side by side.
 void panes_panel(Session& session);
 

@@ -44,6 +44,10 @@ void kernel_choice(Session& s) {
 }  // namespace
 
 void scene_panel(Session& s) {
+    if (!s.training.live || s.training.finished) {
+        if (ImGui::Button("Open ...")) s.ask(request::ShowOpen{});
+        tip("a scene of a folder, or one that was opened before, Ctrl+O");
+    }
     if (!s.scene || !ImGui::CollapsingHeader("Scene", ImGuiTreeNodeFlags_DefaultOpen)) return;
     const Scene& scene = *s.scene;
     ImGui::TextWrapped("%s", scene.file.filename().string().c_str());

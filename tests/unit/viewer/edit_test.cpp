@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/core/error.h"
 #include "viewer/bounds.h"
 #include "viewer/view_camera.h"
 
@@ -49,30 +50,30 @@ TEST(Edit, Delete_inside_and_crop_mark_the_right_splats) {
 }
 
 TEST(Edit, Undo_and_redo_walk_the_steps) {
-    const SplatModel m = row(10);
+    SplatModel m = row(10);
     Edit edit(10);
     edit.remove(m, box(-0.5, 1.5), true);
     edit.remove(m, box(0.5, 3.5), true);  // 1 is gone already: 2, 3
     EXPECT_EQ(edit.removed_count(), 4u);
-    edit.undo();
+    edit.undo(m);
     EXPECT_EQ(edit.removed_count(), 2u);
     EXPECT_EQ(edit.removed()[1], 1);  // of the first step, stays deleted
     EXPECT_EQ(edit.removed()[2], 0);
-    edit.undo();
+    edit.undo(m);
     EXPECT_EQ(edit.removed_count(), 0u);
     EXPECT_FALSE(edit.can_undo());
-    edit.undo();  // nothing left: no harm
-    edit.redo();
-    edit.redo();
+    edit.undo(m);  // nothing left: no harm
+    edit.redo(m);
+    edit.redo(m);
     EXPECT_EQ(edit.removed_count(), 4u);
     EXPECT_FALSE(edit.can_redo());
 }
 
 TEST(Edit, A_new_step_drops_what_was_undone) {
-    const SplatModel m = row(10);
+    SplatModel m = row(10);
     Edit edit(10);
     edit.remove(m, box(-0.5, 1.5), true);
-    edit.undo();
+    edit.undo(m);
     edit.remove(m, box(7.5, 9.5), true);
     EXPECT_FALSE(edit.can_redo());
     EXPECT_EQ(edit.removed()[0], 0);
@@ -80,7 +81,7 @@ TEST(Edit, A_new_step_drops_what_was_undone) {
 }
 
 TEST(Edit, Unsaved_until_marked_and_again_after_another_step) {
-    const SplatModel m = row(10);
+    SplatModel m = row(10);
     Edit edit(10);
     EXPECT_FALSE(edit.unsaved());
     edit.remove(m, box(-0.5, 1.5), true);
@@ -89,9 +90,9 @@ TEST(Edit, Unsaved_until_marked_and_again_after_another_step) {
     EXPECT_FALSE(edit.unsaved());
     edit.remove(m, box(7.5, 9.5), true);
     EXPECT_TRUE(edit.unsaved());
-    edit.undo();
+    edit.undo(m);
     EXPECT_FALSE(edit.unsaved());  // as saved
-    edit.undo();
+    edit.undo(m);
     EXPECT_FALSE(edit.unsaved());  // as in the file that was opened
     edit.remove(m, box(2.5, 3.5), true);
     EXPECT_TRUE(edit.unsaved());  // as many steps as were saved, but another one
@@ -112,6 +113,106 @@ TEST(Edit, Sphere_and_origin_are_in_world_coordinates) {
     EXPECT_EQ(count_inside(m, sphere, edit), 3u);
     EXPECT_EQ(edit.remove(m, sphere, true), 3u);
     EXPECT_EQ(count_inside(m, sphere, edit), 0u);
+}
+
+SplatMask only(size_t n, std::initializer_list<size_t> splats) {
+    SplatMask mask(n, 0);
+    for (const size_t i : splats) mask[i] = 1;
+    return mask;
+}
+
+TEST(Edit, Selections_combine_and_leave_what_is_not_seen) {
+    SplatModel m = row(6);
+    Edit edit(6);
+    edit.select(only(6, {0, 1}), Combine::replace);
+    edit.select(only(6, {2, 3}), Combine::add);
+    edit.select(only(6, {1}), Combine::subtract);
+    EXPECT_EQ(edit.selected(), only(6, {0, 2, 3}));
+    EXPECT_EQ(edit.hide_selected(), 3u);
+    EXPECT_EQ(edit.selected_count(), 0u);
+    EXPECT_EQ(edit.select(SplatMask(6, 1), Combine::replace), 3u) << "hidden ones are not";
+    EXPECT_EQ(edit.invert_selection(), 3u);
+    EXPECT_EQ(edit.selected_count(), 0u);
+    EXPECT_EQ(edit.apply(m).size(), 6u) << "hidden ones are saved";
+    EXPECT_FALSE(edit.unsaved()) << "nothing that is saved has changed";
+    EXPECT_EQ(edit.show_hidden(), 3u);
+    EXPECT_EQ(edit.unseen(), SplatMask(6, 0));
+    while (edit.can_undo()) EXPECT_NE(edit.undo(m), "");
+    EXPECT_EQ(edit.selected_count() + edit.hidden_count(), 0u);
+    EXPECT_EQ(edit.redo(m), "selected 2 splats");
+}
+
+TEST(Edit, A_move_is_of_the_selection_and_its_undo_exact) {
+    SplatModel m = row(5, 3);
+    for (size_t i = 0; i < 5; ++i) m.rotation[4 * i] = 1 + static_cast<float>(i);
+    m.origin = {10, 0, 0};
+    const SplatModel before = m;
+    Edit edit(5);
+    edit.select(only(5, {1, 3}), Combine::replace);
+    const Similarity quarter{2, glm::dmat3(0, 1, 0, -1, 0, 0, 0, 0, 1), {0, 0, 7}};
+    EXPECT_EQ(edit.transform(quarter, m), 2u);
+    EXPECT_TRUE(edit.unsaved());
+    EXPECT_NEAR(position_of(m, 1).y, 22, 1e-5);  // (11, 0, 0), turned and twice as far
+    EXPECT_NEAR(position_of(m, 1).z, 7, 1e-5);
+    EXPECT_EQ(m.position[0], before.position[0]);
+    SplatModel whole = before;  // as the whole scene is turned, harmonics too
+    transform_splats(quarter, whole);
+    const size_t rest = static_cast<size_t>(m.rest_count());
+    for (size_t c = 0; c < rest; ++c) {
+        EXPECT_EQ(m.sh_rest[rest * 3 + c], whole.sh_rest[rest * 3 + c]) << c;
+        EXPECT_EQ(m.sh_rest[rest * 2 + c], before.sh_rest[rest * 2 + c]) << c;
+    }
+    const SplatModel after = m;
+    EXPECT_EQ(edit.undo(m), "moved 2 splats");
+    for (int a = 0; a < kAttributeCount; ++a)
+        EXPECT_EQ(attribute_values(m, a), attribute_values(before, a)) << a;
+    edit.redo(m);
+    for (int a = 0; a < kAttributeCount; ++a)
+        EXPECT_EQ(attribute_values(m, a), attribute_values(after, a)) << a;
+}
+
+TEST(Edit, Drags_are_from_the_start_and_one_step) {
+    SplatModel m = row(3);
+    Edit edit(3);
+    edit.begin_transform(m);
+    edit.drag_transform({1, glm::dmat3(1.0), {5, 0, 0}}, m);
+    edit.drag_transform({1, glm::dmat3(1.0), {1, 0, 0}}, m);
+    EXPECT_EQ(m.position[6], 3);
+    EXPECT_EQ(edit.end_transform(m), 3u);
+    edit.undo(m);
+    EXPECT_EQ(m.position[6], 2);
+    EXPECT_FALSE(edit.can_undo());
+    edit.begin_transform(m);
+    EXPECT_EQ(edit.end_transform(m), 0u) << "was not moved";
+}
+
+TEST(Edit, A_merge_appends_in_the_world_and_goes_again) {
+    SplatModel m = row(4, 1), other = row(3, 2);
+    m.origin = {100, 0, 0};
+    other.origin = {0, 0, 50};
+    const SplatModel before = m;
+    Edit edit(4);
+    edit.remove(only(4, {0}));
+    EXPECT_EQ(edit.merge(other, m), 3u);
+    ASSERT_EQ(m.size(), 7u);
+    EXPECT_EQ(m.sh_degree, 2);
+    EXPECT_EQ(m.sh_rest.size(), 7u * 24);
+    EXPECT_EQ(m.sh_rest[24 * 3 + 8], 3);
+    EXPECT_EQ(m.sh_rest[24 * 3 + 9], 0) << "a band that it had not";
+    EXPECT_EQ(position_of(m, 6), glm::dvec3(2, 0, 50));
+    EXPECT_EQ(edit.select(only(7, {6}), Combine::replace), 1u);
+    EXPECT_EQ(edit.apply(m).size(), 6u);
+    edit.undo(m);
+    EXPECT_EQ(edit.undo(m), "merged 3 splats");
+    for (int a = 0; a < kAttributeCount; ++a)
+        EXPECT_EQ(attribute_values(m, a), attribute_values(before, a)) << a;
+    EXPECT_EQ(edit.removed().size(), 4u);
+    edit.redo(m);
+    edit.redo(m);
+    EXPECT_EQ(edit.selected_count(), 1u);
+    other.kernel = KERNEL_RAISED_COSINE;
+    EXPECT_THROW(edit.merge(other, m), Error);
+    EXPECT_EQ(m.size(), 7u);
 }
 
 TEST(Bounds, Far_background_does_not_shrink_the_scene) {

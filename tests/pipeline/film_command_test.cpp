@@ -1,0 +1,50 @@
+// darb render without cameras: a turn around a scene, and a camera path of the viewer.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "engine/data/image_io.h"
+#include "engine/scene/ply.h"
+#include "tests/support/run_command.h"
+#include "tests/support/test_scene.h"
+
+namespace darb::test {
+namespace {
+
+size_t count_png(const fs::path& folder) {
+    return static_cast<size_t>(
+        std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
+                      [](const auto& entry) { return entry.path().extension() == ".png"; }));
+}
+
+TEST(FilmCommand, Render_without_cameras_turns_or_follows_a_path) {
+    const std::string ply = scratch() / "scene.ply", turn = scratch() / "turn",
+                      film = scratch() / "film", path = scratch() / "path.json";
+    SceneOptions options;
+    options.count = 60;
+    write_ply(ply, random_scene(options).model);
+    const std::string size = " --size 64x48 --fps 2";
+    const Outcome o = darb(fmt::format("render {} -o {}{} --seconds 2", ply, turn, size));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(count_png(turn), 4U) << o.out;
+    const ImageU8 first = read_image(turn + "/frame_00000.png");
+    EXPECT_EQ(first.width, 64);
+    EXPECT_NE(first.data, read_image(turn + "/frame_00002.png").data);
+    EXPECT_EQ(fs::exists(turn + "/video.mp4"), o.out.find("video.mp4") != std::string::npos);
+    write_file_atomic(path, R"({"key_frames": [
+        {"seconds": 0, "eye": [0, 0, -4], "orientation": [1, 0, 0, 0], "fov_y_degrees": 50},
+        {"seconds": 1, "eye": [0, 0, -3], "orientation": [1, 0, 0, 0], "fov_y_degrees": 50}]})");
+    const Outcome p = darb(fmt::format("render {} --path {} -o {}{}", ply, path, film, size));
+    ASSERT_EQ(p.code, 0) << p.err;
+    EXPECT_EQ(count_png(film), 3U) << p.out;
+}
+
+TEST(FilmCommand, What_goes_with_cameras_alone_is_refused) {
+    expect_refused({{"render a.ply -o b -r 2", "--size"},
+                    {"render a.ply -o b --depth png", "--depth"},
+                    {"render a.ply -o b --cameras c --path d.json", "--cameras"}});
+}
+
+}  // namespace
+}  // namespace darb::test
