@@ -20,14 +20,14 @@ MOST_FILES = 8
 
 # file, text, with the attribute
 CHANGES = [
-    ("shaders/shared/attribute_list.h", "#define ATTRIBUTES 6", "#define ATTRIBUTE_GLOW 6\n#define ATTRIBUTES 7"),
-    ("engine/scene/splat_attributes.h", "    kShRest = ATTRIBUTE_SH_REST,\n",
-     "    kShRest = ATTRIBUTE_SH_REST,\n    kGlow = ATTRIBUTE_GLOW,\n"),
+    ("shaders/shared/attribute_list.h", "#define ATTRIBUTES 7", "#define ATTRIBUTE_GLOW 7\n#define ATTRIBUTES 8"),
+    ("engine/scene/splat_attributes.h", "    kShape = ATTRIBUTE_SHAPE,\n",
+     "    kShape = ATTRIBUTE_SHAPE,\n    kGlow = ATTRIBUTE_GLOW,\n"),
     ("engine/scene/splat_attributes.h", "    std::vector<T> sh_rest; ",
      "    std::vector<T> glow;       // [N]\n    std::vector<T> sh_rest; "),
-    ("engine/scene/splat_attributes.h", "&Arrays::sh_rest};", "&Arrays::sh_rest, &Arrays::glow};"),
-    ("engine/scene/splat_attributes.h", "STEP_REST, nullptr},\n",
-     "STEP_REST, nullptr},\n    {\"glow\", \"glow\", 6, 1, false, false, true, STEP_PLAIN, nullptr},\n"),
+    ("engine/scene/splat_attributes.h", "&Arrays::shape};", "&Arrays::shape, &Arrays::glow};"),
+    ("engine/scene/splat_attributes.h", "true, true, STEP_PLAIN, nullptr},\n",
+     "true, true, STEP_PLAIN, nullptr},\n    {\"glow\", \"glow\", 7, 1, false, false, true, STEP_PLAIN, nullptr},\n"),
     ("shaders/forward/project.comp", "layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape {",
      "layout(set = 0, binding = 1 + ATTRIBUTE_GLOW, scalar) readonly buffer Glow { float glow[]; };\n"
      "layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape {"),

@@ -15,6 +15,7 @@
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/raster/gpu_splats.h"
+#include "engine/scene/splat_shapes.h"
 #include "trainer/exposure.h"
 #include "trainer/option_table.h"
 #include "trainer/schedule.h"
@@ -144,12 +145,14 @@ void read_header(const Json& h, Checkpoint& c, const std::string& where) {
 
 std::uint64_t floats_per_splat(const TrainerState& s) {
     std::uint64_t parameters = 0;
-    for (int a = 0; a < kAttributeCount; ++a) parameters += s.model.floats(a);
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (kernel_takes(s.model.kernel, a)) parameters += attribute_floats(a, s.model.sh_degree);
     return parameters * (s.averaged > 0 ? 4 : 3) + 2;
 }
 
 void size_arrays(Checkpoint& c, std::uint64_t splats) {
     c.state.model.resize(splats);
+    set_kernel(c.state.model, c.state.model.kernel);
     c.state.moments.resize(kAttributeCount);
     for (int a = 0; a < kAttributeCount; ++a)
         c.state.moments[a].resize(attribute_values(c.state.model, a).size() * 2);

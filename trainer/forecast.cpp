@@ -320,6 +320,7 @@ SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64
         for (size_t a = 0; a < rest; ++a)
             model.sh_rest[rest * i + a] = start.sh_rest[rest * from + a];
         model.opacity_logit[i] = kTrainedLogit;
+        if (!start.shape.empty()) model.shape[i] = start.shape[from];
     }
     return model;
 }

@@ -7,6 +7,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/splat_shapes.h"
 #include "trainer/schedule.h"
 
 namespace darb {
@@ -118,6 +119,7 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     model.footprint = options.footprint;
     model.origin = choose_origin(points.position, kFarOff);
     model.resize(points.size());
+    set_kernel(model, options.kernel);
     const Schedule schedule(options);
     // A hair above: the default is what is pruned, too, and a point that no frame has shown stays.
     const double opacity = std::min(1.001 * schedule.initial_opacity, 0.999);

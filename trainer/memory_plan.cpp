@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/frame_view.h"
@@ -33,13 +34,19 @@ FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     size.list_segments = demand.list_segments;
     size.cooperates = demand.cooperates;
     size.bucket = FrameBuffers::bucket(device, demand.frame);
+    size.shaped = kernel_has_shape(demand.frame.kernel);
     return size;
 }
 
-std::uint64_t moment_bytes(std::uint64_t splats, int sh_degree, bool largest) {
+SplatFloats floats_of(const MemoryDemand& demand) {
+    return {demand.sh_degree, demand.frame.kernel, demand.rest_sum};
+}
+
+std::uint64_t moment_bytes(std::uint64_t splats, const SplatFloats& of, bool largest) {
     std::uint64_t sum = 0, most = 0;
+    const auto strides = GpuSplats::strides(of.sh_degree, of.kernel);
     for (int a = 0; a < kAttributeCount; ++a) {
-        const AttributeRows rows = attribute_rows(a, attribute_floats(a, sh_degree), 2);
+        const AttributeRows rows = attribute_rows(a, strides[a], 2);
         const std::uint64_t bytes = Buffer::charged_bytes(rows.bytes(splats));
         sum += bytes;
         most = std::max(most, bytes);
@@ -56,7 +63,7 @@ std::uint64_t image_bytes(const Device& device, const MemoryDemand& demand) {
                                      Buffer::charged_bytes(sizeof(gpu::FrameStatus));
     return Buffer::charged_bytes(demand.image_pixels * 12) +
            Loss::device_bytes(device, demand.width, demand.height) + cameras_bytes(demand.views) +
-           2 * flight + DensityControl::fixed_bytes();
+           2 * flight + DensityControl::fixed_bytes(demand.frame.kernel);
 }
 
 std::uint64_t effect_bytes(const MemoryDemand& demand) {
@@ -73,8 +80,9 @@ std::uint64_t strategy_bytes(const MemoryDemand& demand) {
     std::uint64_t bytes = demand.small_pixels * 4;
     if (demand.small_cameras > 0) bytes += cameras_bytes(demand.small_cameras);
     const std::uint64_t pixels = std::uint64_t(demand.width) * demand.height;
-    return bytes + strategy_row(demand.strategy)
-                       .device_bytes({demand.splats, pixels, demand.list_segments});
+    return bytes +
+           strategy_row(demand.strategy)
+               .device_bytes({demand.splats, pixels, demand.list_segments, demand.frame.kernel});
 }
 
 MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
@@ -82,9 +90,10 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     FrameBytes bytes = FrameBuffers::device_bytes(device, demand.frame, size);
     bytes += Backward::device_bytes(size);
     MemoryPlan plan;
-    plan.parameters = GpuSplats::parameter_bytes(demand.splats, demand.sh_degree);
-    plan.moments = moment_bytes(demand.splats, demand.sh_degree, false) +
-                   rest_sum_bytes(demand.splats, demand.sh_degree, demand.rest_sum);
+    plan.parameters =
+        GpuSplats::parameter_bytes(demand.splats, demand.sh_degree, demand.frame.kernel);
+    plan.moments = moment_bytes(demand.splats, floats_of(demand), false) +
+                   rest_sum_bytes(demand.splats, floats_of(demand));
     plan.frame = bytes.splats;
     plan.intersections = bytes.intersections;
     plan.photos = demand.photo_pixels * 4;
@@ -99,7 +108,7 @@ std::uint64_t round_peak(const Device& device, const MemoryDemand& demand, std::
                          std::uint32_t after) {
     const MemoryPlan plan = plan_resident(device, demand);
     return plan.resident() - plan.parameters - plan.moments +
-           round_bytes(before, after, demand.sh_degree, demand.rest_sum);
+           round_bytes(before, after, floats_of(demand));
 }
 
 MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand) {
@@ -110,7 +119,7 @@ MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand) {
     }
     if (demand.averages) plan.average = plan.parameters;
     if (!device.info().unified_memory)
-        plan.staging = Buffer::staging_bytes(moment_bytes(demand.splats, demand.sh_degree, true));
+        plan.staging = Buffer::staging_bytes(moment_bytes(demand.splats, floats_of(demand), true));
     return plan;
 }
 

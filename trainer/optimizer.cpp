@@ -27,6 +27,7 @@ AdamStep Optimizer::rates(int iteration) const {
     step.rate[kOpacityLogit] = now.opacity;
     step.rate[kShDc] = now.sh_dc;
     step.rate[kShRest] = now.sh_rest;
+    step.rate[kShape] = now.shape;
     step.rest_every = schedule_.rest_every;
     return step;
 }

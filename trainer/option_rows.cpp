@@ -3,6 +3,7 @@
 
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "trainer/option_table.h"
 
 namespace darb {
@@ -175,6 +176,14 @@ const OptionRow kRows[] = {
      .usual = "0.05, times the root of that",
      .in_3dgs = 0.025,
      .resolved = [](const Opt&, const Sched& s) -> Json { return s.first.opacity; }},
+    {.flags = "--shape-lr",
+     .setting = "/shape_lr",
+     .member = &Opt::shape_lr,
+     .group = option_group::kRates,
+     .help = "of the shapes of splats, with the kernel beta",
+     .usual = "0.004, times 4000 / iterations (at most 5) in shorter runs",
+     .resolved = [](const Opt&, const Sched& s) -> Json { return s.first.shape; },
+     .stands = [](const Opt& o, const Sched&) { return kernel_has_shape(o.kernel); }},
     {.flags = "--feature-lr",
      .setting = "/sh_lr/0",
      .member = &Opt::sh_dc_lr,

@@ -48,6 +48,9 @@ struct TrainOptions {
     std::optional<float> position_lr_init, position_lr_final;
     std::optional<float> scale_lr, rotation_lr, opacity_lr;
     float sh_dc_lr = 2.5e-3f;
+    // Of a kernel with shapes; absent: 0.004 times Schedule::speedup
+    // (docs/experiments/learned_shapes.md).
+    std::optional<float> shape_lr;
     // Whether the rate of the other bands, a twentieth of it, is multiplied by 30,000 / iterations,
     // at most 10: they come late in a run. docs/experiments/harmonics.md has what that brings.
     bool speed_up_sh_rest = true;

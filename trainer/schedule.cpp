@@ -105,6 +105,7 @@ Schedule::Schedule(const TrainOptions& o)
     // The root of the speedup: with the whole, fewer splats and less time, but 0.8 dB less.
     first.opacity = o.opacity_lr.value_or(0.05f * std::sqrt(speedup));
     first.sh_dc = o.sh_dc_lr;
+    first.shape = o.shape_lr.value_or(0.004f * speedup);
     first.sh_rest = rest_rate(o, rest_every);
     // A mean settles what large steps scatter.
     position_falls_for =
@@ -124,7 +125,8 @@ Schedule::Rates Schedule::rates(int iteration) const {
     const auto late = static_cast<float>(std::pow(last_share, std::max(0.0, 2 * t - 1)));
     Rates now = first;
     now.position = position_rate(iteration);
-    for (float* rate : {&now.scale, &now.rotation, &now.opacity, &now.sh_dc, &now.sh_rest})
+    for (float* rate :
+         {&now.scale, &now.rotation, &now.opacity, &now.shape, &now.sh_dc, &now.sh_rest})
         *rate *= late;
     return now;
 }

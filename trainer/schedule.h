@@ -25,6 +25,7 @@ class Schedule {
     struct Rates {
         double position = 0;
         float scale = 0, rotation = 0, opacity = 0;
+        float shape = 0;               // of a kernel with shapes
         float sh_dc = 0, sh_rest = 0;  // of steps of the mean of rest_every iterations
     };
     Rates rates(int iteration) const;

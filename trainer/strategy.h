@@ -39,6 +39,7 @@ struct StrategyDefaults {
 struct StrategySize {
     std::uint64_t splats = 0, pixels = 0;  // pixels: of the largest picture
     std::uint32_t list_segments = 1;
+    int kernel = 0;
 };
 
 /// What a forecast of the splats at the end goes by.

@@ -62,7 +62,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       photos_(device, dataset, photos, splats_.origin()),
       order_(photos_.views(), options.seed),
       optimizer_(options, schedule_, extent_, scene_reach(dataset), photos_.count()),
-      density_(device, options.kernel),
+      density_(device, options.kernel, options.footprint),
       strategy_(strategy_row(options.strategy)
                     .make({device, options_, schedule_, loss_options(options, dataset), extent_,
                            splats_.count()})),

@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb {
 
@@ -39,7 +40,9 @@ SplatModel in_style(const SplatModel& own, SplatStyle style) {
     if (style == SplatStyle::ellipsoids) {  // what is nearly transparent would hide the rest
         for (size_t i = 0; i < model.size(); ++i)
             if (own.opacity_logit[i] < kTransparentLogit) model.opacity_logit[i] = kRemovedLogit;
-        model.kernel = KERNEL_GAUSSIAN;
+        set_kernel(model, KERNEL_GAUSSIAN);
+    } else {
+        model.shape = own.shape;
     }
     return model;
 }

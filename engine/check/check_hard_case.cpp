@@ -51,6 +51,10 @@ SplatModel poisoned(const SplatModel& healthy, size_t n, std::uint64_t seed) {
             const size_t stride = values.size() / m.size();
             for (size_t c = 0; c < stride; ++c) values[i * stride + c] = values[twin * stride + c];
         }
+        if (!m.shape.empty() && i % 6 == 0) {  // infinite ones are held at their bounds
+            m.shape[i] = kNan;
+            continue;
+        }
         const float poison = kPoison[rng.below(5)];
         switch (rng.below(5)) {
             case 0:

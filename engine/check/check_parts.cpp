@@ -7,6 +7,7 @@
 #include "engine/core/rng.h"
 #include "engine/gpu/commands.h"
 #include "engine/kernels/kernel_coefficients.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/radix_sort.h"
 #include "engine/primitives/scan.h"
 #include "engine/raster/kernel_constants.h"
@@ -31,7 +32,7 @@ struct Answer {
 };
 
 std::vector<Answer> probe(Device& device, int kernel, Footprint footprint,
-                          const std::vector<Probe>& probes) {
+                          const std::vector<Probe>& probes, float exponent) {
     const Pipeline pipeline(device, "kernel_probe", kernel_constants(kernel, footprint));
     Buffer input(device, "probes", probes.size() * sizeof(Probe));
     Buffer output(device, "answers", probes.size() * sizeof(Answer));
@@ -39,7 +40,7 @@ std::vector<Answer> probe(Device& device, int kernel, Footprint footprint,
     Commands commands(device);
     commands.begin();
     const auto count = static_cast<std::uint32_t>(probes.size());
-    commands.dispatch(pipeline, gpu::KernelProbeArgs{count}, {input, output},
+    commands.dispatch(pipeline, gpu::KernelProbeArgs{count, exponent}, {input, output},
                       (count + KERNEL_PROBE_GROUP - 1) / KERNEL_PROBE_GROUP);
     commands.submit_and_wait();
     return output.download<Answer>(probes.size());
@@ -60,7 +61,7 @@ Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
     const std::string name = fmt::format("{} {}", kernel_name(kernel), footprint_name(footprint));
     const KernelCoefficients& k = kernel_coefficients(kernel, footprint, kFullDegree);
     const std::vector<Probe> probes = ramp(kernel);
-    const std::vector<Answer> answers = probe(device, kernel, footprint, probes);
+    const std::vector<Answer> answers = probe(device, kernel, footprint, probes, 0);
     const double support = std::isfinite(kernel_support(kernel)) ? kernel_support(kernel) : 1;
     std::vector<double> value, slope, got_value, got_slope;
     for (size_t i = 0; i < probes.size(); ++i) {
@@ -83,6 +84,34 @@ Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
     const Row row = compare_row("kernels", name + " value", value, got_value, allowed);
     allowed.rel = rings ? kRingSlopeRounding : kSlopeRounding;
     allowed.abs = 1.2 * k.slope_error + allowed.rel;
+    slope_row = compare_row("kernels", name + " slope", slope, got_slope, allowed);
+    return row;
+}
+
+// Of a kernel with shapes, at one exponent; centre, edge and both sides of it are among the probes.
+Row shaped_row(Device& device, int kernel, Footprint footprint, double exponent, Row& slope_row) {
+    const std::vector<Probe> probes = ramp(kernel);
+    const auto answers = probe(device, kernel, footprint, probes, static_cast<float>(exponent));
+    std::vector<double> value, slope, got_value, got_slope;
+    for (size_t i = 0; i < probes.size(); ++i) {
+        const double q = probes[i].q, off = std::abs(q / BETA_SUPPORT - 1);
+        const ShapedValue truth = shaped_value(exponent, q);
+        value.push_back(truth.w);
+        got_value.push_back(answers[i].value);
+        if (off < 2e-6) continue;  // the slope of the exponent 1 jumps at the edge
+        slope.push_back(truth.slope * BETA_SUPPORT);
+        got_slope.push_back(answers[i].slope * BETA_SUPPORT);
+    }
+    KernelCoefficients k = kernel_coefficients(kernel, footprint, kFullDegree);
+    k.exponent = exponent;
+    reference::Tolerance allowed;
+    allowed.name = "kernel";
+    allowed.abs = 1.1 * k.value_error + float_rounding(k);
+    const std::string name =
+        fmt::format("{} {}, exponent {}", kernel_name(kernel), footprint_name(footprint), exponent);
+    const Row row = compare_row("kernels", name + " value", value, got_value, allowed);
+    allowed.rel = kSlopeRounding;
+    allowed.abs *= exponent;
     slope_row = compare_row("kernels", name + " slope", slope, got_slope, allowed);
     return row;
 }
@@ -135,6 +164,14 @@ std::vector<Row> check_kernels(Device& device, std::optional<int> kernel) {
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
             if (footprint == Footprint::exact && !has_exact_footprint(k)) continue;
             Row slope;
+            if (kernel_has_shape(k)) {
+                for (const double exponent :
+                     {EXPONENT_LEAST, 2.5, BETA_START, 20.0, EXPONENT_MOST}) {
+                    rows.push_back(shaped_row(device, k, footprint, exponent, slope));
+                    rows.push_back(slope);
+                }
+                continue;
+            }
             rows.push_back(value_row(device, k, footprint, slope));
             rows.push_back(slope);
         }

@@ -46,8 +46,9 @@ std::vector<Row> check_walk(Device& device, int kernel, Footprint footprint, int
     const auto compared = [&](const auto& image, const auto& got) {
         std::vector<Row> rows{compare_row(group, "image", truth.image, image, "image_float32")};
         for (int a = 0; a < kAttributeCount; ++a)
-            rows.push_back(compare_row(group, std::string("d_") + attribute_name(a), truth.d[a],
-                                       got.d[a], allowed, true));
+            if (!truth.d[static_cast<size_t>(a)].empty())
+                rows.push_back(compare_row(group, std::string("d_") + attribute_name(a), truth.d[a],
+                                           got.d[a], allowed, true));
         rows.push_back(compare_row(group, "mean gradient", truth.mean_gradient_ndc,
                                    got.mean_gradient_ndc, allowed, true));
         return rows;

@@ -6,6 +6,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/kernels/kernel_profile.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
 
 namespace darb::check {
@@ -44,6 +45,10 @@ struct Stage {
         const float turn[] = {0.9f, 0.1f, -0.3f, 0.2f}, stretch[] = {1, 0.8f, 1.25f};
         for (size_t a = 0; a < 4; ++a) m.rotation[4 * i + a] = turn[(a + i) % 4];
         m.opacity_logit[i] = static_cast<float>(logit);
+        if (kernel_has_shape(m.kernel)) {  // blunt, as at the start, sharp
+            m.shape.resize(i + 1);
+            m.shape[i] = static_cast<float>(i % 5) * 0.7f - 1.2f;
+        }
         for (size_t a = 0; a < 3; ++a) {
             // The centre of the camera has no scale of its own.
             const double world = scale / c.fx * std::max(std::abs(depth), 0.01);

@@ -20,15 +20,16 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
         if (has_exact_footprint(*one)) footprints.push_back({*one, Footprint::exact});
         return footprints;
     }
-    if (!every)  // the kernels of the paper, an exact footprint, and the built-in exp
+    if (!every)  // the kernels of the paper, an exact footprint, the built-in exp, shapes
         return {{KERNEL_GAUSSIAN},
                 {KERNEL_RAISED_COSINE},
                 {KERNEL_HALF_COSINE_SQUARED},
                 {KERNEL_SINC},
                 {KERNEL_INVERSE_QUADRATIC},
                 {KERNEL_RAISED_COSINE, Footprint::exact},
-                {KERNEL_GAUSSIAN, Footprint::psi, EVALUATION_BUILTIN}};
-    std::vector<Variant> all;
+                {KERNEL_GAUSSIAN, Footprint::psi, EVALUATION_BUILTIN},
+                {KERNEL_BETA}};
+    std::vector<Variant> all{{KERNEL_BETA}, {KERNEL_BETA, Footprint::exact}};
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
         for (const Footprint f : {Footprint::psi, Footprint::exact})
             for (const int e : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})

@@ -5,18 +5,18 @@
 
 #include <cmath>
 
+#include "engine/kernels/profile_integrals.h"
 #include "engine/kernels/quadrature.h"
 
 namespace darb {
 
-GaussianEquivalent gaussian_equivalent(int kernel, Footprint footprint, bool keep_opacity) {
-    const double support = kernel_support(kernel), scale = covariance_scale(kernel, footprint);
-    if (!std::isfinite(support)) return {scale, 1, 0};
+GaussianEquivalent gaussian_equivalent_of(const std::function<double(double)>& profile,
+                                          double support, double scale, bool keep_opacity) {
     // u = s^2 makes half powers of u analytic; dq is 2 R^2 s ds.
     const auto integral = [&](auto f) {
         return 2 * support * integrate_unit([&](double s) {
                    const double q = support * (1 - s * s);
-                   return s * f(q, kernel_value(kernel, footprint, q));
+                   return s * f(q, profile(q));
                });
     };
     const auto overlap = [&](double c) {
@@ -36,6 +36,13 @@ GaussianEquivalent gaussian_equivalent(int kernel, Footprint footprint, bool kee
     const double a = keep_opacity ? 1 : overlap(high) / high;
     const double rest = square - 2 * a * overlap(high) + a * a * high;
     return {high * scale, a, std::sqrt(rest / square)};
+}
+
+GaussianEquivalent gaussian_equivalent(int kernel, Footprint footprint, bool keep_opacity) {
+    const double support = kernel_support(kernel), scale = covariance_scale(kernel, footprint);
+    if (!std::isfinite(support)) return {scale, 1, 0};
+    return gaussian_equivalent_of([&](double q) { return kernel_value(kernel, footprint, q); },
+                                  support, scale, keep_opacity);
 }
 
 }  // namespace darb

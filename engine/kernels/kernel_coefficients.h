@@ -24,6 +24,7 @@ struct KernelCoefficients {
     bool squared = false;          // x = t^2 rather than t; compact only
     bool line_integral = false;    // the exact footprint; quadric only
     double support = 0;            // R^2
+    double exponent = 0;           // beta: e of (1 - q/R^2)^e
     double inverse_support = 0;    // 1/R^2 as the shaders have it: rounded up to float, so that the
                                    // edge q = R^2 gives u <= 0 with fused and unfused arithmetic
     // of the polynomial, rising powers; rings: q of the peak and of the end of each pulse
@@ -48,6 +49,7 @@ const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, i
 /// inversesqrt, and for sqrt both of them, so 7 for 1/sqrt(1+q), each 6e-8 below w = 1. Terms that
 /// cancel leave the rounding of the largest: built-in kernels have none.
 inline double float_rounding(const KernelCoefficients& k) {
+    if (k.form == KERNEL_FORM_BETA) return 2e-7 + 2e-7 * k.exponent;  // of the logarithm
     const bool divides = k.form == KERNEL_FORM_QUADRIC;
     const bool compact = k.form == KERNEL_FORM_COMPACT;
     const bool has_root = compact && k.half_power % 2 == 1;
@@ -98,6 +100,21 @@ void evaluate_gaussian(const KernelCoefficients& k, Real q, Real& w, Real& slope
     w = std::ldexp(p, static_cast<int>(n));
     slope = k.degree < 5 ? Real(-0.72134752044448170368) * std::ldexp(dp, static_cast<int>(n))
                          : Real(-0.5) * w;
+}
+
+/// u^e = 2^(e log2 u), as shaders/kernels/beta.glsl but for its logarithm.
+template <class Real>
+void evaluate_beta(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
+    const Real t = std::min(q * static_cast<Real>(k.inverse_support), Real(1)), u = 1 - t;
+    w = slope = 0;
+    if (!(u > 0)) return;
+    const Real exponent = static_cast<Real>(k.exponent);
+    const Real y = std::max(exponent * std::log1p(-t) * Real(std::numbers::log2e), Real(-126));
+    const Real n = std::nearbyint(y);
+    Real p, dp;
+    evaluate_polynomial(k, y - n, p, dp);
+    w = std::ldexp(p, static_cast<int>(n));
+    slope = -exponent * w / u * static_cast<Real>(k.inverse_support);
 }
 
 template <class Real>
@@ -169,6 +186,8 @@ void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
         evaluate_compact(k, q, w, slope);
     } else if (k.form == KERNEL_FORM_GAUSSIAN) {
         evaluate_gaussian(k, q, w, slope);
+    } else if (k.form == KERNEL_FORM_BETA) {
+        evaluate_beta(k, q, w, slope);
     } else if (k.form == KERNEL_FORM_RINGS) {
         evaluate_rings(k, q, w, slope);
     } else {

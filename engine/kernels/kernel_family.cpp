@@ -7,7 +7,7 @@ std::string_view kernel_name(int kernel) {
 }
 
 std::optional<int> kernel_with_pulses(int kernel, int pulses) {
-    const bool rings = kernel >= KERNEL_COUNT && kernel < KERNEL_ROWS;
+    const bool rings = kernel_pulses(kernel) > 1;
     const int base = rings ? kernel_profile(kernel).kernel : kernel;
     if (pulses == 1) return base;
     for (int row = KERNEL_COUNT; row < KERNEL_ROWS; ++row)

@@ -82,6 +82,8 @@ const std::array<KernelProfile, KERNEL_ROWS> kRows{{
      cosine_pulses(3)},
     {"sinc_2_pulses", 36, 1, KERNEL_FORM_RINGS, modulus_of_sinc, KERNEL_SINC, sinc_pulses(2)},
     {"sinc_3_pulses", 81, 1, KERNEL_FORM_RINGS, modulus_of_sinc, KERNEL_SINC, sinc_pulses(3)},
+    {"beta", BETA_SUPPORT, 4, KERNEL_FORM_BETA,  // of shape 0; others: shaped_kernel.h
+     [](Complex q) { return square(square((BETA_SUPPORT - q) / BETA_SUPPORT)); }},
 }};
 
 }  // namespace

@@ -18,7 +18,7 @@ double relocation_opacity(double opacity, int count);
 double relocation_scale(int kernel, Footprint footprint, double opacity, int count);
 
 /// relocation_scale for a shader: [max_count][opacities], row count - 1, column k at opacity
-/// (k + 1/2) / opacities.
+/// (k + 1/2) / opacities. Of a kernel with shapes a block of these for each of SHAPE_ROWS.
 std::vector<float> relocation_table(int kernel, Footprint footprint, int opacities, int max_count);
 
 }  // namespace darb

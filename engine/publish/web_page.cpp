@@ -17,6 +17,7 @@
 #include "engine/report/html.h"
 #include "engine/scene/merge_splats.h"
 #include "engine/scene/orbit_cameras.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb {
 
@@ -152,6 +153,11 @@ std::string make_web_page(Device& device, const SplatModel& model, const WebPage
                           WebPageFacts* facts) {
     if (model.size() == 0)
         throw Error("web page", "the scene has no splats", "Choose another scene.");
+    if (!model.shape.empty())
+        throw Error("web page",
+                    fmt::format("has no place for the shape that each splat of the kernel {} has",
+                                kernel_name(model.kernel)),
+                    "Write the nearest Gaussians: darb convert --kernel gaussian.");
     PageDocument document;
     document.title = options.title;
     document.background = options.background;

@@ -74,7 +74,7 @@ void Backward::record_project(Commands& commands, const FrameView& view, const F
                    {frame.splats.intersection_count, frame.splats.first_intersection});
     for (std::uint32_t w = 0; w < PARTIAL_WINDOWS; ++w) buffers.push_back(blend_.partials(w));
     buffers.insert(buffers.end(), {blend_.rest(), extra.sums, frame.counters.status,
-                                   splats.smoothing(), extra.rest_sum});
+                                   splats.smoothing(), extra.rest_sum, blend_.exponent()});
     const Groups g = groups_for(range.count);
     commands.dispatch(pipeline, args, buffers, g.x, g.y);
 }

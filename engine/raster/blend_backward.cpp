@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/core/error.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
 #include "engine/raster/forward.h"
 
@@ -32,9 +33,10 @@ BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
     make_buffers(device, *this, segment_buffers({}), "blend backward");
 }
 
-BufferList<BlendBackward> BlendBackward::intersection_buffers(std::uint64_t k) {
+BufferList<BlendBackward> BlendBackward::intersection_buffers(std::uint64_t k, bool shaped) {
     return {{&BlendBackward::partials_, "intersection partials", k * kPartialBytes},
-            {&BlendBackward::rest_, "intersection partials, rest", k * 4}};
+            {&BlendBackward::rest_, "intersection partials, rest", k * 4},
+            {&BlendBackward::exponent_, "intersection partials, exponent", shaped ? k * 4 : 4}};
 }
 
 BufferList<BlendBackward> BlendBackward::segment_buffers(const FrameSize& size) {
@@ -48,7 +50,7 @@ BufferList<BlendBackward> BlendBackward::bucket_buffers(std::uint64_t records) {
 
 FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
     FrameBytes bytes;
-    bytes.intersections = charged_bytes(intersection_buffers(size.intersections));
+    bytes.intersections = charged_bytes(intersection_buffers(size.intersections, size.shaped));
     bytes.images = charged_bytes(segment_buffers(size));
     if (const std::uint64_t records = size.checkpoint_records(); records > 0)
         bytes.intersections += charged_bytes(bucket_buffers(records));
@@ -86,7 +88,9 @@ void BlendBackward::reserve(std::uint32_t intersections, std::uint32_t records) 
     if (intersections <= capacity_ && capacity_ > 0) return;
     capacity_ = 0;
     intersections = std::max(intersections, 1024u);
-    make_buffers(*device_, *this, intersection_buffers(intersections), "blend backward");
+    make_buffers(*device_, *this,
+                 intersection_buffers(intersections, kernel_has_shape(options_.kernel)),
+                 "blend backward");
     capacity_ = intersections;
     const std::uint64_t most = of_a_binding(*device_);
     if (window_intersections_ > 0 || capacity_ <= most) return;
@@ -114,6 +118,7 @@ void BlendBackward::record(Commands& commands, const FrameView& view, const Fram
     if (method_ != BackwardBlend::team) {  // which writes every slot
         commands.fill(partials_, 0);
         commands.fill(rest_, 0);
+        if (kernel_has_shape(options_.kernel)) commands.fill(exponent_, 0);
     }
     const gpu::CameraData& camera = view.camera;
     const gpu::BlendArgs args{camera.width,
@@ -138,12 +143,12 @@ void BlendBackward::record_lists(Commands& commands, const Frame& frame, const B
     const FrameImages& images = frame.images;
     const std::uint32_t tiles_y = (args.height + TILE_SIZE - 1) / TILE_SIZE;
     for (args.segment = args.segments; args.segment-- > 0;)
-        commands.dispatch(
-            blend_, args,
-            {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape, s.light,
-             s.bound, d_image, images.final_transmittance, images.last_intersection, partials(0),
-             partials(1), partials(2), partials(3), partials(4), rest_, behind_},
-            args.tiles_x, tiles_y);
+        commands.dispatch(blend_, args,
+                          {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection,
+                           s.shape, s.light, s.bound, d_image, images.final_transmittance,
+                           images.last_intersection, partials(0), partials(1), partials(2),
+                           partials(3), partials(4), rest_, behind_, s.exponent, exponent_},
+                          args.tiles_x, tiles_y);
 }
 
 void BlendBackward::record_buckets(Commands& commands, const Frame& frame, const Buffer& d_image,
@@ -169,7 +174,7 @@ void BlendBackward::record_buckets(Commands& commands, const Frame& frame, const
     commands.dispatch(blend_, buckets,
                       {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape,
                        s.light, s.bound, d_image, images.last_intersection, bucket_tile_,
-                       images.checkpoints, bucket_rest_, partials_, rest_},
+                       images.checkpoints, bucket_rest_, partials_, rest_, s.exponent, exponent_},
                       g.x, g.y);
 }
 

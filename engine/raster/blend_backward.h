@@ -35,9 +35,11 @@ class BlendBackward {
     BufferRange partials(std::uint32_t window) const;
     std::uint32_t window_intersections() const { return window_intersections_; }
     const Buffer& rest() const { return rest_; }  // float [K]
+    /// float [K] of a kernel with shapes: sums of its derivative by the exponent; else a word.
+    const Buffer& exponent() const { return exponent_; }
 
   private:
-    static BufferList<BlendBackward> intersection_buffers(std::uint64_t intersections);
+    static BufferList<BlendBackward> intersection_buffers(std::uint64_t intersections, bool shaped);
     static BufferList<BlendBackward> segment_buffers(const FrameSize& size);
     static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
     void make_pipelines(bool segmented);
@@ -55,7 +57,7 @@ class BlendBackward {
     Buffer behind_;                          // pixels' state between their dispatches
     Buffer bucket_tile_, bucket_rest_;       // of buckets
     std::uint32_t capacity_ = 0, window_intersections_ = 0;
-    Buffer partials_, rest_;
+    Buffer partials_, rest_, exponent_;
 };
 
 }  // namespace darb

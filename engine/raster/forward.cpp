@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "engine/core/error.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/kernel_constants.h"
@@ -126,6 +127,11 @@ void Forward::record_intersections(Commands& commands, const GpuSplats& splats,
                     fmt::format("{} splats at {} x {} px, buffers for {} and {} px", n,
                                 camera.width, camera.height, frame.size.splats, frame.size.pixels),
                     "Call FrameBuffers::reserve for them first.");
+    if (n > 0 && kernel_has_shape(options_.kernel) && splats.stride(kShape) == 0)
+        throw Error("frame",
+                    fmt::format("the kernel {} takes a shape of each splat, these have none",
+                                kernel_name(options_.kernel)),
+                    "Call set_kernel on the splats, which gives them one.");
     const gpu::IntersectionArgs args{frame.size.intersections, camera.tiles_x,
                                      camera.tiles_x * camera.tiles_y,
                                      frame.size.list_segments * LIST_SEGMENT};
@@ -150,7 +156,7 @@ void Forward::record_projection(Commands& commands, const GpuSplats& splats, con
         splats.bind_parameters(range, buffers);
         buffers.insert(buffers.end(),
                        {out.shape, out.light, out.bound, out.cover, out.intersection_count,
-                        out.visible, status, splats.smoothing()});
+                        out.visible, status, splats.smoothing(), out.exponent});
         commands.dispatch(project_pipeline(view.sh_degree, splats.sh_degree()), args, buffers, g.x,
                           g.y);
     }
@@ -229,11 +235,11 @@ void Forward::record_blend(Commands& commands, const FrameView& view, Frame& fra
         const gpu::BlendArgs blend{camera.width,      camera.height,           camera.tiles_x,
                                    view.background.r, view.background.g,       view.background.b,
                                    segment,           frame.size.list_segments};
-        commands.dispatch(
-            pipeline, blend,
-            {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection, s.shape, s.light,
-             s.bound, out.image, out.final_transmittance, out.last_intersection, out.checkpoints},
-            camera.tiles_x, camera.tiles_y);
+        commands.dispatch(pipeline, blend,
+                          {t.tile_range, t.intersection_from_sorted, t.splat_from_intersection,
+                           s.shape, s.light, s.bound, out.image, out.final_transmittance,
+                           out.last_intersection, out.checkpoints, s.exponent},
+                          camera.tiles_x, camera.tiles_y);
     }
 }
 

@@ -21,6 +21,7 @@ struct FrameSize {
     std::uint32_t list_segments = 1;  // dispatches of the blend passes, LIST_SEGMENT of a list each
     bool cooperates = false;          // some frame had huge splats
     std::uint32_t bucket = 0;         // intersections of a checkpoint; 0: there are none
+    bool shaped = false;              // the kernel has shapes
     /// Of every tile one more than its full buckets.
     std::uint64_t checkpoint_records() const {
         return bucket > 0 ? intersections / bucket + std::uint64_t{tiles} : 0;
@@ -50,6 +51,7 @@ struct FrameCounters {
 /// What the projection leaves of each splat, [N] each, and the order of depth.
 struct ProjectedSplats {
     Buffer shape, light, bound;              // as shaders/lib/projected.glsl reads them
+    Buffer exponent;                         // of a kernel with shapes; else a word
     Buffer cover, intersection_count;        // the tiles that a splat meets
     Buffer visible, visible_offset;          // 0 or 1, and its sum over the splats before
     Buffer depth_key, splat_from_depth;      // of the visible ones, nearest first

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "engine/core/error.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_limit.h"
@@ -48,6 +49,7 @@ BufferList<ProjectedSplats> splat_buffers(const ForwardOptions& options, std::ui
     return {{&S::shape, "splat shape", n * 16},
             {&S::light, "splat light", n * light},
             {&S::bound, "splat bound", n * 16},
+            {&S::exponent, "splat exponent", kernel_has_shape(options.kernel) ? n * 4 : 4},
             {&S::cover, "tile cover", n * 16},
             {&S::intersection_count, "intersection count", n * 4},
             {&S::visible, "visible", n * 4},
@@ -112,6 +114,7 @@ Error too_many(const Device& device, std::uint32_t wanted, std::uint32_t most, b
 FrameBuffers::FrameBuffers(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
     frame_.size.bucket = bucket(device, options);
+    frame_.size.shaped = kernel_has_shape(options.kernel);
     make_buffers(device, frame_.counters, counter_buffers(), "project");
     make_buffers(device, frame_.intersections, no_huge_buffers(), "project");
     make_buffers(device, frame_.images, checkpoint_buffers(0), "blend");

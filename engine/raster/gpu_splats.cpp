@@ -7,15 +7,16 @@
 
 namespace darb {
 
-std::array<std::uint32_t, kAttributeCount> GpuSplats::strides(int sh_degree) {
+std::array<std::uint32_t, kAttributeCount> GpuSplats::strides(int sh_degree, int kernel) {
     std::array<std::uint32_t, kAttributeCount> floats{};
-    for (int a = 0; a < kAttributeCount; ++a) floats[a] = attribute_floats(a, sh_degree);
+    for (int a = 0; a < kAttributeCount; ++a)
+        floats[a] = kernel_takes(kernel, a) ? attribute_floats(a, sh_degree) : 0;
     return floats;
 }
 
-std::uint64_t GpuSplats::parameter_bytes(std::uint64_t count, int sh_degree) {
+std::uint64_t GpuSplats::parameter_bytes(std::uint64_t count, int sh_degree, int kernel) {
     std::uint64_t bytes = 0;
-    const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree);
+    const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree, kernel);
     for (int a = 0; a < kAttributeCount; ++a)
         bytes += Buffer::charged_bytes(attribute_rows(a, all[a]).bytes(count));
     return bytes;
@@ -92,7 +93,7 @@ BufferRange GpuSplats::rest_sum(const SplatRange& range) const {
 // harmonics are bound by range, but are one buffer.
 std::uint32_t GpuSplats::max_count(const Device& device, int sh_degree, bool with_moments) {
     const std::uint64_t word = (with_moments ? 2 : 1) * sizeof(float);
-    const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree);
+    const std::array<std::uint32_t, kAttributeCount> all = strides(sh_degree, KERNEL_GAUSSIAN);
     std::uint32_t widest = 0;
     for (int a = 0; a < kAttributeCount; ++a)
         widest = std::max(widest, attribute_rows(a, all[a]).floats_held());

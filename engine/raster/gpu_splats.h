@@ -72,11 +72,11 @@ class GpuSplats {
     /// rest_sum() likewise.
     BufferRange rest_sum(const SplatRange& range) const;
 
-    /// Device memory of the parameters of so many splats, optional ones among them; their moments
-    /// take twice as much.
-    static std::uint64_t parameter_bytes(std::uint64_t count, int sh_degree);
-    /// Floats per splat of the attributes, optional ones as where they are there.
-    static std::array<std::uint32_t, kAttributeCount> strides(int sh_degree);
+    /// Device memory of the parameters of so many splats of this kernel; their moments take twice
+    /// as much.
+    static std::uint64_t parameter_bytes(std::uint64_t count, int sh_degree, int kernel);
+    /// Floats per splat of the attributes, 0 of those that the kernel does not take.
+    static std::array<std::uint32_t, kAttributeCount> strides(int sh_degree, int kernel);
 
     /// The most splats that this device's bindings and its largest buffer allow.
     static std::uint32_t max_count(const Device& device, int sh_degree, bool with_moments);

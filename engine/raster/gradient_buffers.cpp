@@ -31,8 +31,9 @@ GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats)
     commands.submit_and_wait();
 }
 
-std::uint64_t GradientBuffers::device_bytes(std::uint64_t count, int sh_degree) {
-    return GpuSplats::parameter_bytes(count, sh_degree) + Buffer::charged_bytes(count * kViewBytes);
+std::uint64_t GradientBuffers::device_bytes(std::uint64_t count, int sh_degree, int kernel) {
+    return GpuSplats::parameter_bytes(count, sh_degree, kernel) +
+           Buffer::charged_bytes(count * kViewBytes);
 }
 
 void GradientBuffers::bind(const SplatRange& range, std::vector<BufferRange>& to) const {

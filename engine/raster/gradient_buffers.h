@@ -47,7 +47,7 @@ class GradientBuffers {
     std::vector<float> download(int attribute) const;
 
     /// Device memory of so many splats.
-    static std::uint64_t device_bytes(std::uint64_t count, int sh_degree);
+    static std::uint64_t device_bytes(std::uint64_t count, int sh_degree, int kernel);
 
   private:
     Device* device_ = nullptr;

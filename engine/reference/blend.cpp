@@ -31,7 +31,8 @@ bool sample_splat(const ProjectedSplat<T>& s, T x, T y, const KernelTable& kerne
     if (!(sample.q < s.reach * T(1.001) + T(1e-3))) {
         return false;
     }
-    sample.weight = static_cast<T>(kernel.value(static_cast<double>(sample.q)));
+    sample.weight = static_cast<T>(
+        kernel.value(static_cast<double>(sample.q), static_cast<double>(s.exponent)));
     const T unclamped = s.opacity * sample.weight;
     sample.clamped = unclamped > T(ALPHA_MAX);
     sample.alpha = sample.clamped ? T(ALPHA_MAX) : unclamped;
@@ -116,8 +117,10 @@ void add_sample_gradient(const ProjectedSplat<T>& s, const Sample<T>& sample, T 
     if (sample.clamped) {
         return;
     }
+    const auto q = static_cast<double>(sample.q), exponent = static_cast<double>(s.exponent);
     out.d_opacity += d_alpha * sample.weight;
-    const T slope = static_cast<T>(kernel.slope(static_cast<double>(sample.q)));
+    out.d_exponent += d_alpha * s.opacity * static_cast<T>(kernel.by_exponent(q, exponent));
+    const T slope = static_cast<T>(kernel.slope(q, exponent));
     const T d_u = d_alpha * s.opacity * slope * 2 * sample.u;
     const T d_v = d_alpha * s.opacity * slope * 2 * sample.v;
     out.d_l11 += d_u * sample.dx;

@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "engine/core/error.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb::reference {
 namespace {
@@ -66,13 +67,14 @@ KernelTable::KernelTable(int kernel, Footprint footprint, int polynomial_degree)
     : kernel_(kernel),
       footprint_(footprint),
       in_place_(
-          polynomial_degree == 0 && has_exact_footprint(kernel)
+          kernel_has_shape(kernel) || (polynomial_degree == 0 && has_exact_footprint(kernel))
               ? nullptr
               : &kernel_coefficients(kernel, footprint, std::max(polynomial_degree, kLeastDegree))),
+      shaped_(kernel_has_shape(kernel)),
       exact_(footprint == Footprint::exact),
       support_(kernel_support(kernel)),
       covariance_scale_(darb::covariance_scale(kernel, footprint)) {
-    if (!std::isfinite(support_) || in_place_ != nullptr) {
+    if (!std::isfinite(support_) || in_place_ != nullptr || shaped_) {
         return;
     }
     const auto q_of = [this](double x) {
@@ -95,7 +97,8 @@ double KernelTable::evaluate(const std::vector<double>& table, double x) const {
     return sum;
 }
 
-double KernelTable::value(double q) const {
+double KernelTable::value(double q, double exponent) const {
+    if (shaped_) return shaped_value(exponent, q).w;
     if (in_place_ != nullptr) {
         double w, slope;
         darb::evaluate(*in_place_, q, w, slope);
@@ -108,7 +111,16 @@ double KernelTable::value(double q) const {
     return t < 1 ? evaluate(value_table_, exact_ ? std::sqrt(1 - t) : t) : 0.0;
 }
 
-double KernelTable::slope(double q) const {
+double KernelTable::by_exponent(double q, double exponent) const {
+    return shaped_ ? shaped_value(exponent, q).by_exponent : 0;
+}
+
+double KernelTable::covariance_scale(double exponent) const {
+    return shaped_ ? shaped_covariance_scale(footprint_, exponent) : covariance_scale_;
+}
+
+double KernelTable::slope(double q, double exponent) const {
+    if (shaped_) return shaped_value(exponent, q).slope;
     if (in_place_ != nullptr) {
         double w, slope;
         darb::evaluate(*in_place_, q, w, slope);
@@ -125,7 +137,8 @@ double KernelTable::slope(double q) const {
     return exact_ ? evaluate(slope_table_, s) / s : evaluate(slope_table_, t);
 }
 
-double KernelTable::reach(double opacity, double cutoff) const {
+double KernelTable::reach(double opacity, double cutoff, double exponent) const {
+    if (shaped_) return shaped_reach(exponent, opacity, cutoff);
     if (!(opacity >= cutoff)) {
         return 0.0;
     }

@@ -17,12 +17,15 @@ class KernelTable {
     /// place.
     KernelTable(int kernel, Footprint footprint, int polynomial_degree = 0);
 
-    /// As kernel_value and kernel_slope, to 1e-12 absolute; q >= 0.
-    double value(double q) const;
-    double slope(double q) const;
+    /// As kernel_value and kernel_slope, to 1e-12 absolute; q >= 0. exponent: of the splat, which
+    /// kernels without shapes do not read.
+    double value(double q, double exponent = 0) const;
+    double slope(double q, double exponent = 0) const;
+    /// d value / d exponent; 0 without shapes.
+    double by_exponent(double q, double exponent) const;
     /// As kernel_reach, to 1e-13 of the support; by bisection of value.
-    double reach(double opacity, double cutoff) const;
-    double covariance_scale() const { return covariance_scale_; }
+    double reach(double opacity, double cutoff, double exponent = 0) const;
+    double covariance_scale(double exponent = 0) const;
 
   private:
     double evaluate(const std::vector<double>& table, double x) const;
@@ -30,6 +33,7 @@ class KernelTable {
     int kernel_;
     Footprint footprint_;
     const KernelCoefficients* in_place_ = nullptr;  // of the tables: a polynomial, or rings
+    bool shaped_;                                   // in closed form, an exponent for each splat
     bool exact_;                                    // tabled in s, else in q / R^2
     double support_;                                // R^2
     double covariance_scale_;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/reference/projection_terms.h"
 #include "engine/reference/reference_lens.h"
 #include "engine/reference/sh.h"
@@ -28,6 +29,15 @@ T sigmoid_of_clamped(T logit) {
 template <class T>
 T antialias_factor(const Splats<T>& splats, const CovarianceTerms<T>& terms) {
     return splats.antialias ? std::sqrt(terms.det_sharp / terms.det) : T(1);
+}
+
+/// Of a kernel with shapes; else 0, which no kernel reads.
+template <class T>
+T exponent_of(const Splats<T>& splats, size_t index) {
+    if (!kernel_has_shape(splats.kernel)) return 0;
+    const auto shape = static_cast<double>(splats.shape[index]);
+    return std::isnan(shape) ? splats.shape[index]
+                             : static_cast<T>(shape_exponent(splats.footprint, shape));
 }
 
 template <class T>
@@ -261,13 +271,15 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     }
     const CovarianceTerms<T> terms =
         covariance_terms(mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index),
-                         camera, settings.low_pass, kernel.covariance_scale());
+                         camera, settings.low_pass,
+                         kernel.covariance_scale(static_cast<double>(exponent_of(splats, index))));
+    p.exponent = exponent_of(splats, index);
     p.opacity = sigmoid_of_clamped(splats.opacity_logit[index]) * opacity_factor(splats, terms);
     const bool half = settings.storage == STORAGE_FLOAT16;
     if (half) {
         p.opacity = static_cast<T>(round_to_half(static_cast<double>(p.opacity)));
     }
-    if (!(p.opacity >= T(settings.alpha_cutoff))) {
+    if (!(p.opacity >= T(settings.alpha_cutoff)) || std::isnan(p.exponent)) {
         p.cull = Cull::opacity;
         return p;
     }
@@ -289,7 +301,8 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
     }
     p.depth = mean.z;
     set_shape(camera, settings, rotation, terms, p);
-    p.reach = T(kernel.reach(static_cast<double>(p.opacity), settings.alpha_cutoff));
+    p.reach = T(kernel.reach(static_cast<double>(p.opacity), settings.alpha_cutoff,
+                             static_cast<double>(p.exponent)));
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     p.colour = colour_of(splats, index, active_degree(splats, settings), view.direction);
     if (!std::isfinite(p.colour.x + p.colour.y + p.colour.z)) {
@@ -311,9 +324,9 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     }
     const Vec3<T> mean = mean_in_camera(&splats.position[index * 3], camera);
     const RotationTerms<T> rotation = rotation_terms(&splats.rotation[index * 4]);
-    const CovarianceTerms<T> terms =
-        covariance_terms(mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index),
-                         camera, settings.low_pass, kernel.covariance_scale());
+    const CovarianceTerms<T> terms = covariance_terms(
+        mean, rotation, &splats.log_scale[index * 3], filter_of(splats, index), camera,
+        settings.low_pass, kernel.covariance_scale(static_cast<double>(splat.exponent)));
     const Mat3<T> view_matrix = view_rotation<T>(camera);
 
     // r1 = root (k1 R) diag(scale), r2 alike.
@@ -343,6 +356,16 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     }
     for (int c = 0; c < 4; ++c) {
         out.rotation[index * 4 + c] = d_rotation[c];
+    }
+    if (kernel_has_shape(splats.kernel)) {
+        // Through the profile, and through psi = R^2 / (2 e + 5), which scales every row of M by
+        // its root.
+        const auto shape = static_cast<double>(splats.shape[index]);
+        const T by_shape = static_cast<T>(shape_exponent_slope(splats.footprint, shape));
+        const T d_length = glm::dot(d_scale, terms.scale);
+        const T length_slope =
+            splats.footprint == Footprint::psi ? -1 / (2 * splat.exponent + 5) : T(0);
+        out.shape[index] = by_shape * (gradient.d_exponent + length_slope * d_length);
     }
     const T sigmoid = sigmoid_of_clamped(splats.opacity_logit[index]);
     out.opacity_logit[index] =

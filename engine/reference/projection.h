@@ -26,6 +26,7 @@ struct ProjectedSplat {
     // q = (l11 dx + l21 dy)^2 + (l22 dy)^2 with (dx, dy) = mean_px - pixel centre; 1/px
     T l11 = 0, l21 = 0, l22 = 0;
     T opacity = 0;      // (0, 1), with the antialiasing factor where the model asks for it
+    T exponent = 0;     // of a kernel with shapes
     T reach = 0;        // q from which alpha is below the cut-off
     Vec3<T> colour{0};  // >= 0
     /// The splat's depth at a pixel is depth - depth_slope . (u, v) in the mean, (u, v) the offset
@@ -42,6 +43,7 @@ struct ProjectedGradient {
     Vec2<T> d_mean_px{0};  // 1/px
     T d_l11 = 0, d_l21 = 0, d_l22 = 0;
     T d_opacity = 0;
+    T d_exponent = 0;
     Vec3<T> d_colour{0};
 };
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "engine/core/rng.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb::reference {
 namespace {
@@ -60,6 +61,8 @@ TestScene random_scene(const SceneOptions& options) {
     fill(model.opacity_logit, [&] { return rng.uniform(options.min_logit, options.max_logit); });
     fill(model.sh_dc, [&] { return rng.uniform(-0.5, 1.5); });
     fill(model.sh_rest, [&] { return rng.uniform(-0.1, 0.1); });
+    set_kernel(model, options.kernel);
+    fill(model.shape, [&] { return rng.uniform(-2.2, 3); });  // some are held at either end
     return scene;
 }
 

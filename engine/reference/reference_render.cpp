@@ -45,6 +45,7 @@ void add(ProjectedGradient<T>& sum, const ProjectedGradient<T>& term) {
     sum.d_l21 += term.d_l21;
     sum.d_l22 += term.d_l22;
     sum.d_opacity += term.d_opacity;
+    sum.d_exponent += term.d_exponent;
     sum.d_colour += term.d_colour;
 }
 

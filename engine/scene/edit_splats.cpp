@@ -147,9 +147,10 @@ std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel
 }
 
 bool has_only_finite(const SplatModel& model) {
-    for (const std::vector<float>* values : {&model.position, &model.log_scale, &model.rotation,
-                                             &model.opacity_logit, &model.sh_dc, &model.sh_rest})
-        if (!row_is_finite(*values, 0, values->size())) return false;
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (const std::vector<float>& values = attribute_values(model, a);
+            !row_is_finite(values, 0, values.size()))
+            return false;
     return true;
 }
 

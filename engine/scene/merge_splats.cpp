@@ -18,6 +18,7 @@
 #include "engine/core/error.h"
 #include "engine/core/on_threads.h"
 #include "engine/kernels/second_moment.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_moments.h"
 #include "engine/scene/splat_shapes.h"
@@ -118,6 +119,14 @@ Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& 
     moments_.resize(first_);
     for (std::size_t i = 0; i < first_; ++i)
         if (is_drawn(model_, i)) moments_[i] = moments_of(model_, i);
+    if (!kernel_has_shape(model.kernel)) return;
+    // What is merged has the shape 0. A splat counts as the one of this shape that is as wide.
+    for (std::size_t i = 0; i < first_; ++i) {
+        const double moment =
+            shaped_second_moment(model.footprint, shape_exponent(model.footprint, model.shape[i]));
+        for (double& c : moments_[i].covariance) c *= moment / second_moment_;
+        moments_[i].mass *= moment / second_moment_;
+    }
 }
 
 void Merging::report(double share) const {
@@ -220,6 +229,7 @@ void Merging::merge(std::uint32_t a, std::uint32_t b) {
     double share = 0;
     moments_[a] = merge_moments(moments_[a], moments_[b], second_moment_, &share);
     merged_[a] = 1;
+    if (!model_.shape.empty()) model_.shape[a] = 0;
     for (const int attribute : {int{kShDc}, int{kShRest}}) {
         std::vector<float>& values = attribute_values(model_, attribute);
         const std::size_t floats = model_.floats(attribute);

@@ -15,6 +15,7 @@
 #include "engine/scene/ply_table.h"
 #include "engine/scene/splat_format.h"
 #include "engine/scene/splat_shapes.h"
+#include "shaders/shared/kernel_forms.h"
 
 namespace darb {
 
@@ -111,6 +112,16 @@ SplatModel load_ply(const SplatSource& source, SplatFile& file) {
     return model;
 }
 
+void said_of_foreign_shapes(std::size_t held, PlyFacts* facts) {
+    if (!facts) return;
+    facts->notes.push_back(
+        "is a scene of Deformable Beta Splatting: drawn with the kernel beta (exact)");
+    if (held > 0)
+        facts->notes.push_back(
+            fmt::format("{} of its exponents lie outside of {} to {} and are held there", held,
+                        EXPONENT_LEAST, EXPONENT_MOST));
+}
+
 std::vector<std::string> ply_losses(const SplatModel& model, const std::string&) {
     if (!needs_double_positions(model)) return {};
     const glm::dvec3 to_0 = 0.0 - model.origin;
@@ -147,6 +158,11 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
     model.sh_degree =
         static_cast<int>(std::lround(std::sqrt(columns.of[kShRest].size() / 3 + 1))) - 1;
     read_ply_comments(header, where, model, said.notes);
+    const bool foreign = columns.foreign_beta;  // a scene of Deformable Beta Splatting
+    if (foreign) {
+        model.kernel = KERNEL_BETA;
+        model.footprint = Footprint::exact;
+    }
     for (std::size_t a = 0; a < kAttributeCount; ++a)
         attribute_values(model, static_cast<int>(a)).resize(vertex->count * columns.of[a].size());
     std::vector<double> positions, translated;
@@ -170,6 +186,8 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
         *facts = std::move(said);
     }
     model.resize(kept);
+    if (foreign) said_of_foreign_shapes(take_foreign_shapes(model), facts);
+    set_kernel(model, model.kernel);
     set_positions(positions, model);
     return model;
 }
@@ -215,7 +233,7 @@ const SplatFormatRow& ply_format() {
         .encode = [](const SplatModel& model, const std::string&,
                      const EncodeOptions&) { return EncodedSplats{encode_ply(model)}; },
         .keeps = kKeepsKernel | kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions |
-                 kKeepsUnturned,
+                 kKeepsUnturned | kKeepsShape,
         .cuts = ply_losses};
     return row;
 }

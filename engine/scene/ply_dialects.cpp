@@ -8,9 +8,11 @@
 #include <string_view>
 
 #include "engine/core/error.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/compressed_ply.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_file.h"
+#include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {
@@ -35,7 +37,7 @@ int need(const PlyElement& vertex, const std::string& name, const std::string& w
 }
 
 bool has_colour_bytes(const PlyElement& vertex) {
-    return vertex.find("f_dc_0") < 0 &&
+    return vertex.find("f_dc_0") < 0 && vertex.find("sh0_0") < 0 &&
            std::ranges::all_of(std::array{"red", "green", "blue"}, [&](const char* name) {
                const int column = find_value(vertex, name);
                return column >= 0 &&
@@ -43,10 +45,21 @@ bool has_colour_bytes(const PlyElement& vertex) {
            });
 }
 
+bool is_foreign_beta(const PlyElement& vertex) {
+    return find_value(vertex, "beta") >= 0 && vertex.find(ply_column(kShape, 0)) < 0;
+}
+
+/// Deformable Beta Splatting has other names of harmonics.
+std::string harmonics_column(const PlyElement& vertex, int attribute, std::size_t c) {
+    const bool other = is_foreign_beta(vertex) && vertex.find("sh0_0") >= 0;
+    return other ? fmt::format("{}_{}", attribute == kShDc ? "sh0" : "shN", c)
+                 : ply_column(attribute, c);
+}
+
 void find_harmonics(const PlyElement& vertex, const std::string& where, PlyColumns& columns) {
     std::vector<int> rest;  // in the file's order, channel by channel
-    for (std::size_t i = 0; vertex.find(ply_column(kShRest, i)) >= 0; ++i)
-        rest.push_back(need(vertex, ply_column(kShRest, i), where));
+    for (std::size_t i = 0; vertex.find(harmonics_column(vertex, kShRest, i)) >= 0; ++i)
+        rest.push_back(need(vertex, harmonics_column(vertex, kShRest, i), where));
     const std::size_t count = rest.size();
     if (count == kRestOfDegree4) {  // the last band of each channel is left out
         std::vector<int> kept;
@@ -66,14 +79,17 @@ void find_harmonics(const PlyElement& vertex, const std::string& where, PlyColum
 
 /// Names; harmonics have a note of their own.
 std::vector<std::string> unread_properties(const PlyElement& vertex, const PlyColumns& columns) {
+    const bool lobes = vertex.find("sb_params_0") >= 0;
     std::vector<int> read = columns.normal;
     read.push_back(columns.filter);
     for (const auto& of : columns.of) read.insert(read.end(), of.begin(), of.end());
     std::vector<std::string> names;
     for (std::size_t i = 0; i < vertex.properties.size(); ++i)
         if (const std::string& name = vertex.properties[i].name;
-            std::ranges::count(read, static_cast<int>(i)) == 0 && !name.starts_with("f_rest_"))
+            std::ranges::count(read, static_cast<int>(i)) == 0 && !name.starts_with("f_rest_") &&
+            !(lobes && name.starts_with("sb_params_")))
             names.push_back(name);
+    if (lobes) names.emplace_back("sb_params, its lobes of colour");
     return names;
 }
 
@@ -114,12 +130,21 @@ PlyColumns find_ply_columns(const PlyElement& vertex, const std::string& where) 
         if (a == kShRest) continue;
         std::vector<int>& of = columns.of[static_cast<std::size_t>(a)];
         const SplatAttribute& row = kSplatAttributes[static_cast<std::size_t>(a)];
-        if (row.optional && find_value(vertex, ply_column(a, 0)) < 0) continue;
+        if (row.optional && find_value(vertex, ply_column(a, 0)) < 0) {
+            if (a != kShape || !is_foreign_beta(vertex)) continue;
+            of.push_back(find_value(vertex, "beta"));
+            columns.foreign_beta = true;
+            continue;
+        }
         for (std::size_t c = 0; c < row.floats; ++c) {
             const bool byte = a == kShDc && columns.dc_is_byte;
             of.push_back(a == kLogScale && c == 2 && flat
                              ? missing
-                             : need(vertex, byte ? colours[c] : ply_column(a, c), where));
+                             : need(vertex,
+                                    byte         ? colours[c]
+                                    : a == kShDc ? harmonics_column(vertex, a, c)
+                                                 : ply_column(a, c),
+                                    where));
         }
     }
     if (flat)
@@ -133,6 +158,19 @@ PlyColumns find_ply_columns(const PlyElement& vertex, const std::string& where) 
     find_harmonics(vertex, where, columns);
     columns.unread = unread_properties(vertex, columns);
     return columns;
+}
+
+std::size_t take_foreign_shapes(SplatModel& model) {
+    const auto longer = static_cast<float>(0.5 * std::log(BETA_SUPPORT));
+    for (float& scale : model.log_scale) scale -= longer;
+    std::size_t held = 0;
+    for (float& shape : model.shape) {
+        const double drawn = BETA_START * std::exp(double{shape});
+        held += drawn < EXPONENT_LEAST || drawn > EXPONENT_MOST ? 1 : 0;
+        const double inside = std::clamp<double>(drawn, EXPONENT_LEAST, EXPONENT_MOST);
+        shape = static_cast<float>(shape_of_exponent(inside - 0.5));
+    }
+    return held;
 }
 
 std::vector<std::string> ply_notes(const PlyColumns& columns, bool has_normals) {

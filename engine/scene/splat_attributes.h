@@ -21,6 +21,7 @@ enum Attribute {
     kOpacityLogit = ATTRIBUTE_OPACITY_LOGIT,
     kShDc = ATTRIBUTE_SH_DC,
     kShRest = ATTRIBUTE_SH_REST,
+    kShape = ATTRIBUTE_SHAPE,
     kAttributeCount = ATTRIBUTES
 };
 
@@ -33,15 +34,16 @@ struct SplatArrays {
     std::vector<T> opacity_logit;  // [N]
     std::vector<T> sh_dc;          // [N][3]; colour = 0.5 + SH_C0 * dc
     std::vector<T> sh_rest;        // [N][C-1][3]: coefficient-major, rgb innermost
+    std::vector<T> shape;          // [N] of a kernel with shapes, engine/kernels/shaped_kernel.h
 };
 
 /// The array of an attribute.
 template <class T>
 std::vector<T>& attribute_values(SplatArrays<T>& arrays, int attribute) {
     using Arrays = SplatArrays<T>;
-    constexpr std::vector<T> Arrays::*members[] = {&Arrays::position, &Arrays::log_scale,
-                                                   &Arrays::rotation, &Arrays::opacity_logit,
-                                                   &Arrays::sh_dc,    &Arrays::sh_rest};
+    constexpr std::vector<T> Arrays::*members[] = {
+        &Arrays::position, &Arrays::log_scale, &Arrays::rotation, &Arrays::opacity_logit,
+        &Arrays::sh_dc,    &Arrays::sh_rest,   &Arrays::shape};
     static_assert(std::size(members) == kAttributeCount);
     return arrays.*members[attribute];
 }
@@ -69,6 +71,7 @@ constexpr std::array<SplatAttribute, kAttributeCount> kSplatAttributes{{
     {"opacity_logit", "opacity", 3, 1, false, false, true, STEP_OPACITY, limit_infinite_logit},
     {"sh_dc", "f_dc", 1, 3, false, false, true, STEP_PLAIN, nullptr},
     {"sh_rest", "f_rest", 2, 3, true, false, true, STEP_REST, nullptr},
+    {"shape", "shape", 6, 1, false, true, true, STEP_PLAIN, nullptr},
 }};
 
 constexpr const char* attribute_name(int attribute) {
@@ -82,10 +85,12 @@ constexpr std::uint32_t attribute_floats(int attribute, int sh_degree) {
     return row.per_coefficient ? row.floats * (bands * bands - 1) : row.floats;
 }
 
-/// Of all attributes.
+/// Of all attributes that no model lacks.
 constexpr std::uint32_t splat_floats(int sh_degree) {
     std::uint32_t sum = 0;
-    for (int a = 0; a < kAttributeCount; ++a) sum += attribute_floats(a, sh_degree);
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (!kSplatAttributes[static_cast<std::size_t>(a)].optional)
+            sum += attribute_floats(a, sh_degree);
     return sum;
 }
 

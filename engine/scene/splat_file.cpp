@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/text.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_format.h"
 
@@ -53,6 +54,15 @@ const SplatModel& writable(SplatFormat format, const SplatModel& scene, SplatMod
     copy = scene;
     dropped = drop_unwritable(format, copy);
     return copy;
+}
+
+void check_shape_has_a_place(const SplatFormatRow& row, const SplatModel& model,
+                             const std::string& where) {
+    if ((row.keeps & kKeepsShape) || !kernel_has_shape(model.kernel)) return;
+    throw Error(where,
+                fmt::format("{} has no place for the shape that each splat of the kernel {} has",
+                            row.name, kernel_name(model.kernel)),
+                "Write .ply, or the nearest Gaussians: darb convert --kernel gaussian.");
 }
 
 std::vector<std::string> missing_places(const SplatFormatRow& row, const SplatModel& model) {
@@ -157,6 +167,7 @@ std::string endings_to_write() {
 std::vector<std::string> losses_of(SplatFormat format, const SplatModel& scene,
                                    const std::string& where) {
     const SplatFormatRow& row = row_of(format);
+    check_shape_has_a_place(row, scene, where);
     SplatModel copy;
     std::size_t dropped = 0;
     const SplatModel& model = writable(format, scene, copy, dropped);
@@ -195,6 +206,7 @@ EncodedSplats encode_scene(SplatFormat format, const SplatModel& scene, const st
     if (!row.encode)
         throw Error(where, fmt::format("{} is read and not written", row.name),
                     "Write one that ends in " + endings_to_write() + ".");
+    check_shape_has_a_place(row, scene, where);
     SplatModel copy;
     std::size_t dropped = 0;
     return row.encode(writable(format, scene, copy, dropped), where, options);

@@ -28,6 +28,7 @@ enum SplatFeature : unsigned {
     kKeepsHarmonics = 4,
     kKeepsDoublePositions = 8,  // or `cuts` says what becomes of them
     kKeepsUnturned = 16,        // splats without a rotation, which are not drawn
+    kKeepsShape = 32,           // of each splat; what does not refuses a kernel with shapes
 };
 
 struct SplatFormatRow {

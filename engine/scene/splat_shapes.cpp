@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "engine/core/error.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb {
 
@@ -18,6 +19,24 @@ void check_splat_shapes(const SplatModel& model) {
                         fmt::format("{} holds {} values, {} splats need {}", attribute_name(a),
                                     held, model.size(), wanted),
                         "Each array holds the values of all splats, as splat_attributes.h says.");
+    if (kernel_takes(model.kernel, kShape) && model.shape.size() != model.size())
+        throw Error("splat model",
+                    fmt::format("{} splats of the kernel {} have no shape", model.size(),
+                                kernel_name(model.kernel)),
+                    "Call set_kernel, which gives them one.");
+}
+
+bool kernel_takes(int kernel, int attribute) {
+    if (!kSplatAttributes[static_cast<std::size_t>(attribute)].optional) return true;
+    return attribute == kShape && kernel_has_shape(kernel);
+}
+
+void set_kernel(SplatModel& model, int kernel) {
+    model.kernel = kernel;
+    if (!kernel_takes(kernel, kShape))
+        model.shape.clear();
+    else if (model.shape.size() != model.size())
+        model.shape.assign(model.size(), 0.0f);
 }
 
 }  // namespace darb

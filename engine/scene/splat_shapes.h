@@ -5,7 +5,14 @@
 
 namespace darb {
 
-/// Throws Error where the degree or the length of an array is wrong.
+/// Throws Error where the degree or the length of an array is wrong, or splats of a kernel with
+/// shapes have none.
 void check_splat_shapes(const SplatModel& model);
+
+/// Whether splats of this kernel hold an attribute: an optional one is the kernel's own.
+bool kernel_takes(int kernel, int attribute);
+/// Sets the kernel. Splats that had no shape get 0, the start, where it takes one; they lose theirs
+/// where it takes none.
+void set_kernel(SplatModel& model, int kernel);
 
 }  // namespace darb

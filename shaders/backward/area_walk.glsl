@@ -1,6 +1,7 @@
 // A subgroup walks a part of a tile's list from its end over the pixels of an area: what blend_backward.comp and
 // blend_backward_team.comp have in common. Needs their bindings, lib/area.glsl, lib/hits.glsl,
-// backward/splat_sums.glsl, and where the sums of intersection j of the sorted list go: place_of(j), put_sums.
+// backward/splat_sums.glsl, splat_exponent, and where the sums of intersection j of the sorted list go: place_of(j),
+// put_sums, and put_exponent of that of a kernel with shapes.
 
 struct Pixels {
     float transmittance[PIXELS];
@@ -32,10 +33,11 @@ uint load_pixels(uvec2 first, out Pixels px) {
     return last;
 }
 
-Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number) {
+Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, float exponent,
+                uint number) {
     Sums s = NO_SUMS;
     for (uint k = 0u; k < PIXELS; ++k)
-        add_pixel(s, px.transmittance[k], px.behind[k], d - vec2(slot_offset(k)), shape, l22, light,
+        add_pixel(s, px.transmittance[k], px.behind[k], d - vec2(slot_offset(k)), shape, l22, light, exponent,
                   px.d_colour[k], number <= px.last[k]);
     return s;
 }
@@ -47,7 +49,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
         const uint size = min(rest, SUBGROUP_SIZE);
         rest -= size;
         vec4 shape = vec4(0.0), light = vec4(0.0);
-        float l22 = 0.0;
+        float l22 = 0.0, exponent = 0.0;
         uint number = 0u, place = 0u;
         if (gl_SubgroupInvocationID < size) {
             const uint at = hits_base() + rest + gl_SubgroupInvocationID;
@@ -56,6 +58,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
             place = place_of(hit_index[at]);
             shape = load_shape(splat, l22);
             light = load_light(splat);
+            if (SHAPED) exponent = splat_exponent[splat];
         }
         uint lane = size;
         do {
@@ -63,11 +66,13 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
             const vec4 s = subgroupBroadcast(shape, lane);
             const vec4 c = subgroupBroadcast(light, lane);
             const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
+                                         SHAPED ? subgroupBroadcast(exponent, lane) : 0.0,
                                          subgroupBroadcast(number, lane));
             float parts[PARTIALS] =
                 float[](sums.gx * c.w, sums.gxx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
                         sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
             put_sums(subgroupBroadcast(place, lane), parts, sums.gdydy * c.w);
+            if (SHAPED) put_exponent(subgroupBroadcast(place, lane), sums.exponent * c.w);
         } while (lane > 0u);
     } while (rest > 0u);
 }

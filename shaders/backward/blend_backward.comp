@@ -33,6 +33,8 @@ layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]
 layout(set = 0, binding = 8, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 14, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
 layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
+layout(set = 0, binding = 16, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
+layout(set = 0, binding = 17, scalar) buffer PartialExponent { float partial_exponent[]; };  // [K] where SHAPED
 
 #define SHAPE_BINDING 3
 #define LIGHT_BINDING 4
@@ -62,6 +64,10 @@ void put_sums(uint slot, float v[PARTIALS], float rest) {
         put_partial(slot, lane, mine.x);
     }
     if (lane == 0u) partial_rest[slot] += rest;
+}
+void put_exponent(uint slot, float value) {
+    value = subgroup_sum(value);
+    if (gl_SubgroupInvocationID == 0u) partial_exponent[slot] += value;
 }
 #include "backward/area_walk.glsl"
 

@@ -33,6 +33,8 @@ layout(set = 0, binding = 9, scalar) readonly buffer Checkpoints { float checkpo
 layout(set = 0, binding = 10, scalar) readonly buffer BucketBehind { float bucket_behind[]; };  // [records][TILE_PIXELS]
 layout(set = 0, binding = 11, scalar) writeonly buffer Partials { vec4 partials[]; };  // [K][2]
 layout(set = 0, binding = 12, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 13, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
+layout(set = 0, binding = 14, scalar) writeonly buffer PartialExponent { float partial_exponent[]; };  // [K] where SHAPED
 
 #define SHAPE_BINDING 3
 #define LIGHT_BINDING 4
@@ -87,7 +89,8 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
 
 // One intersection a thread, all pixels; `local` is the intersection's number within the bucket. A pixel is at thread t
 // in the step that is t after its own number. What leaves at the last thread enters the part before this one.
-Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, vec4 light) {
+Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, float exponent,
+          vec4 light) {
     const uint lane = gl_SubgroupInvocationID;
     Sums sums = NO_SUMS;
     float transmittance = 1.0, behind = 0.0;
@@ -103,7 +106,7 @@ Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, vec4 light) 
         }
         const uint word = pixel_word[i];
         const vec2 to_mean = mean - vec2(slot_to_pixel(word & (TILE_PIXELS - 1u)));
-        add_pixel(sums, transmittance, behind, to_mean, shape, l22, light,
+        add_pixel(sums, transmittance, behind, to_mean, shape, l22, light, exponent,
                   vec3(pixel_d_red[i], pixel_d_green[i], pixel_d_blue[i]),
                   here && local < word >> SLOT_BITS);
         if (BUCKET > SUBGROUP_SIZE && here && lane == SUBGROUP_SIZE - 1u) {
@@ -118,19 +121,21 @@ void blend_part(uint part, uvec2 tile, uint begin, uint end, uint count) {
     const uint local = part * SUBGROUP_SIZE + (SUBGROUP_SIZE - 1u - gl_SubgroupInvocationID);
     const bool has_pair = begin + local < end;
     vec4 shape = vec4(0.0), light = vec4(0.0);
-    float l22 = 0.0;
+    float l22 = 0.0, exponent = 0.0;
     uint slot = 0u;
     if (has_pair) {
         slot = intersection_from_sorted[begin + local];
         const uint splat = splat_from_intersection[slot] & INTERSECTION_SPLAT_MASK;
         shape = load_shape(splat, l22);
         light = load_light(splat);
+        if (SHAPED) exponent = splat_exponent[splat];
     }
-    const Sums s = walk(count, local, shape.xy - (vec2(tile * TILE_SIZE) + 0.5), shape, l22, light);
+    const Sums s = walk(count, local, shape.xy - (vec2(tile * TILE_SIZE) + 0.5), shape, l22, exponent, light);
     if (has_pair) {
         partials[2u * slot] = vec4(s.gx, s.gxx, s.gxdy, s.gdy) * light.w;
         partials[2u * slot + 1u] = vec4(s.opacity, s.colour);
         partial_rest[slot] = s.gdydy * light.w;
+        if (SHAPED) partial_exponent[slot] = s.exponent * light.w;
     }
 }
 

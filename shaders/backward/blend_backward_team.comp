@@ -32,6 +32,8 @@ layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]
 layout(set = 0, binding = 8, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 14, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K]
 layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
+layout(set = 0, binding = 16, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
+layout(set = 0, binding = 17, scalar) writeonly buffer PartialExponent { float partial_exponent[]; };  // [K] where SHAPED
 
 #define SHAPE_BINDING 3
 #define LIGHT_BINDING 4
@@ -47,7 +49,7 @@ const uint CHUNK = 32u;
 #include "lib/reduce.glsl"
 #include "backward/splat_sums.glsl"
 
-const uint TEAM = AREAS, SUMS = PARTIALS + 1u;
+const uint TEAM = AREAS, SUMS = PARTIALS + (SHAPED ? 2u : 1u);
 shared float chunk_sums[TEAM * CHUNK * SUMS];
 shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // of each intersection: its slot, its splat and blocks
 shared uint area_end[TEAM];  // the list's intersections before it reach a pixel of the area
@@ -67,6 +69,10 @@ void put_sums(uint place, float v[PARTIALS], float rest) {
         chunk_sums[place + lane] = mine.x;
     }
     if (lane == 0u) chunk_sums[place + PARTIALS] = rest;
+}
+void put_exponent(uint place, float value) {
+    value = subgroup_sum(value);
+    if (gl_SubgroupInvocationID == 0u) chunk_sums[place + PARTIALS + 1u] = value;
 }
 #include "backward/area_walk.glsl"
 
@@ -92,6 +98,8 @@ void store_chunk(uint end) {
         put_partial(chunk_slot[i / PARTIALS], i % PARTIALS, team_sum(i / PARTIALS, i % PARTIALS));
     for (uint i = gl_LocalInvocationIndex; i < count; i += THREADS)
         partial_rest[chunk_slot[i]] = team_sum(i, PARTIALS);
+    for (uint i = gl_LocalInvocationIndex; SHAPED && i < count; i += THREADS)
+        partial_exponent[chunk_slot[i]] = team_sum(i, PARTIALS + 1u);
 }
 
 void main() {

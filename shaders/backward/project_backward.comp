@@ -33,6 +33,7 @@ layout(set = 0, binding = 1 + ATTRIBUTE_ROTATION, scalar) buffer Rotation { vec4
 layout(set = 0, binding = 1 + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer OpacityLogit { float opacity_logit[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) buffer ShDc { vec3 sh_dc[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) buffer ShRest { vec4 sh_rest[]; };  // from first_splat on, as m_sh_rest and d_sh_rest
+layout(set = 0, binding = 1 + ATTRIBUTE_SHAPE, scalar) buffer Shape { float shape[]; };  // with SHAPED, as the next two
 
 // Moments with UPDATE_ADAM, else gradients.
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_POSITION, scalar) buffer MPosition { Moments3 m_position[]; };
@@ -47,6 +48,8 @@ layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_ROTATION, scalar) buffer DRo
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_OPACITY_LOGIT, scalar) buffer DOpacityLogit { float d_opacity_logit[]; };
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_DC, scalar) buffer DShDc { vec3 d_sh_dc[]; };
 layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SH_REST, scalar) buffer DShRest { vec4 d_sh_rest[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SHAPE, scalar) buffer MShape { vec2 m_shape[]; };
+layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SHAPE, scalar) buffer DShape { float d_shape[]; };
 
 layout(set = 0, binding = FRAME_BINDING, scalar) readonly buffer IntersectionCount { uint intersection_count[]; };
 layout(set = 0, binding = FRAME_BINDING + 1, scalar) readonly buffer FirstIntersection { uint first_intersection[]; };
@@ -56,6 +59,7 @@ layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus
 layout(set = 0, binding = FRAME_BINDING + 10, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world
 layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer RestSum { vec4 rest_sum[]; };  // as sh_rest, but with REST_EACH
 layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer CameraGradient { float camera_gradient[]; };  // [N][13] with CAMERA_GRADIENT
+layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExponent { float partial_exponent[]; };  // with SHAPED
 
 #define PARTIALS_BINDING (FRAME_BINDING + 2)
 #include "effects/constants.glsl"
@@ -73,7 +77,7 @@ layout(set = 0, binding = FRAME_BINDING + 11, scalar) buffer CameraGradient { fl
 #include "backward/project_gradient.glsl"
 
 Partial sum_partials(uint i) {
-    Partial sums = Partial(vec4(0.0), 0.0, 0.0, vec3(0.0));
+    Partial sums = Partial(vec4(0.0), 0.0, 0.0, 0.0, vec3(0.0));
     uint e = first_intersection[i];
     const uint end = e + intersection_count[i];
     for (uint stop = e; e < end;) {
@@ -84,6 +88,7 @@ Partial sum_partials(uint i) {
             sums.b += partial_rest[e];
             sums.d_opacity += light.x;
             sums.d_colour += light.yzw;
+            if (SHAPED) sums.d_exponent += partial_exponent[e];
         }
     }
     return sums;
@@ -92,7 +97,8 @@ Partial sum_partials(uint i) {
 bool finite(SplatGradient g) {
     const uint ellipsoid = max(max(magnitude(g.position), magnitude(g.log_scale)), magnitude(g.rotation));
     const uint light = max(magnitude(g.colour), magnitude(vec3(g.opacity_logit, g.mean)));
-    return below(max(ellipsoid, light), GRADIENT_LIMIT);
+    const uint shape = SHAPED ? magnitude(vec3(g.shape)) : 0u;
+    return below(max(max(ellipsoid, light), shape), GRADIENT_LIMIT);
 }
 
 // What becomes of an attribute's gradient.
@@ -167,6 +173,7 @@ void update_splat(uint i, SplatGradient g) {
     UPDATE_ATTRIBUTE(mat2x4, rotation[i], m_rotation[i], d_rotation[i], g.rotation, ATTRIBUTE_ROTATION)
     UPDATE_ATTRIBUTE(vec2, opacity_logit[i], m_opacity_logit[i], d_opacity_logit[i], g.opacity_logit,
                      ATTRIBUTE_OPACITY_LOGIT)
+    if (SHAPED) UPDATE_ATTRIBUTE(vec2, shape[i], m_shape[i], d_shape[i], g.shape, ATTRIBUTE_SHAPE)
     if (UPDATE == UPDATE_ADAM && stands_near(cameras[args.camera_index], i, args.clearance))
         opacity_logit[i] -= FADING;
     if (SH_DEGREE > 0 && (REST != REST_GATHER || intersection_count[i] > 0u)) update_rest(i, g);
@@ -179,7 +186,7 @@ SplatGradient no_gradient() {
     SplatGradient g;
     g.position = g.log_scale = g.colour = g.direction = vec3(0.0);
     g.rotation = vec4(0.0);
-    g.opacity_logit = 0.0;
+    g.opacity_logit = g.shape = 0.0;
     g.mean = vec2(0.0);
     return g;
 }

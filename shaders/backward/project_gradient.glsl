@@ -4,7 +4,7 @@
 struct SplatGradient {
     vec3 position, log_scale;  // with LINEAR_VALUES of scale and, below, opacity
     vec4 rotation;
-    float opacity_logit;
+    float opacity_logit, shape;
     vec3 colour;          // of the unclamped SH sum
     vec3 direction;       // unit, camera to splat: the SH basis is evaluated there
     vec2 mean;            // px
@@ -13,7 +13,7 @@ struct SplatGradient {
 struct Partial {
     vec4 a;               // sums over pixels of G x, G x x, G x dy, G dy; G = opacity dL/dalpha dw/dq
     float b;              // G dy dy
-    float d_opacity;
+    float d_opacity, d_exponent;
     vec3 d_colour;
 };
 
@@ -71,7 +71,9 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const vec3 scale = s;
     float kept = 1.0;  // of the opacity, by the filters
     if (SMOOTHING == 1) kept = smooth_scale(s, smoothing[i], share);
-    s *= sqrt(kernel_covariance_scale());
+    float exponent = 0.0, by_shape = 0.0;
+    if (SHAPED) exponent = shape_exponent(shape[i], by_shape);
+    s *= sqrt(kernel_covariance_scale(exponent));
     vec4 unit;
     float norm;
     normalise_rotation(rotation[i], unit, norm);
@@ -85,6 +87,9 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const float o = LINEAR_VALUES == 1 ? logit : 1.0 / (1.0 + exp(-logit)), rest = 1.0 / (1.0 + exp(logit));
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
     factor_gradient(f, sums, r1, r2, o * kept, d_r1, d_r2, d_log_scale, g.mean);
+    g.shape = 0.0;
+    if (SHAPED) g.shape = by_shape * (sums.d_exponent + beta_length_slope(exponent) *
+                                      (d_log_scale.x + d_log_scale.y + d_log_scale.z));
     if (ANTIALIAS == 1) kept *= compensation(r1, r2, f);
     if (SMOOTHING == 1)
         d_log_scale = d_log_scale * share + sums.d_opacity * o * kept * (1.0 - share);

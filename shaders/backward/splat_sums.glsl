@@ -2,21 +2,21 @@
 // after it / (1 - alpha), and 1 - alpha >= 0.01 by ALPHA_MAX; what is behind, dotted with dL/dcolour, is a convex
 // combination, so nothing cancels. Needs kernels/kernel.glsl.
 
-// Sums over pixels; G = opacity dL/dalpha dw/dq without the opacity.
+// Sums over pixels; G = opacity dL/dalpha dw/dq without the opacity, as that of the exponent, with SHAPED.
 struct Sums {
-    float gx, gxx, gxdy, gdy, gdydy, opacity;
+    float gx, gxx, gxdy, gdy, gdydy, opacity, exponent;
     vec3 colour;
 };
 
-const Sums NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
+const Sums NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
 
 // to_mean: mean - centre of the pixel. reached: the pixel had not ended before this splat. On entry transmittance
 // and behind are those behind the splat, afterwards those before it.
 void add_pixel(inout Sums s, inout float transmittance, inout float behind, vec2 to_mean, vec4 shape,
-               float l22, vec4 light, vec3 d_colour, bool reached) {
+               float l22, vec4 light, float exponent, vec3 d_colour, bool reached) {
     const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
-    float w, slope;
-    kernel_value_slope(x * x + y * y, w, slope);
+    float w, slope, by_exponent;
+    kernel_value_slope(x * x + y * y, exponent, w, slope, by_exponent);
     const float raw = light.w * w;
     const bool counts = raw >= ALPHA_CUTOFF && reached;
     const float alpha = counts ? min(raw, ALPHA_MAX) : 0.0;
@@ -30,6 +30,7 @@ void add_pixel(inout Sums s, inout float transmittance, inout float behind, vec2
     s.gdy += gdy;
     s.gdydy += gdy * to_mean.y;
     s.opacity += d_alpha * w;
+    if (SHAPED) s.exponent += d_alpha * by_exponent;
     s.colour += (alpha * before) * d_colour;
     behind += alpha * ahead;
     transmittance = before;

@@ -6,6 +6,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shared/kernel_forms.h"
 #include "shared/limits.h"
 #include "shared/optim_args.h"
 #include "shared/strategy_args.h"
@@ -14,13 +15,15 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
 
 #include "lib/linear_id.glsl"
+#include "densify/shape_rows.glsl"
 
 layout(push_constant, scalar) uniform Push { RelocationArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Sources { uvec2 sources[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Copies { uint copies[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer Table { float scale_table[]; };  // [counts][opacities]
+layout(set = 0, binding = 2, scalar) readonly buffer Table { float scale_table[]; };  // [SHAPES][counts][opacities]
 layout(set = 0, binding = 3, scalar) buffer LogScale { vec3 log_scale[]; };
 layout(set = 0, binding = 4, scalar) buffer Opacity { float opacity_logit[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Shape { float shape[]; };  // with SHAPES > 1
 
 // -log(1 - opacity), to the last bits for small opacities, too.
 float absorption(float logit) {
@@ -35,8 +38,8 @@ float logit_of(float a) {
 }
 
 // Between the columns, at (k + 1/2) / RELOCATION_OPACITIES, and 1 at opacity 0.
-float scale_factor(float opacity, uint count) {
-    const uint row = (count - 1u) * RELOCATION_OPACITIES;
+float scale_factor(float opacity, uint count, uint shape) {
+    const uint row = (shape * RELOCATION_COUNTS + count - 1u) * RELOCATION_OPACITIES;
     const float at = opacity * float(RELOCATION_OPACITIES) - 0.5;
     if (at < 0.0) return mix(1.0, scale_table[row], opacity * 2.0 * float(RELOCATION_OPACITIES));
     const uint k = min(uint(at), RELOCATION_OPACITIES - 2u);
@@ -49,7 +52,14 @@ void main() {
     const uint count = min(copies[sources[i].x] + 1u, RELOCATION_COUNTS);
     const float limit = log(ALPHA_MAX / (1.0 - ALPHA_MAX));  // more than that is never blended
     const float logit = min(opacity_logit[i], limit);
-    const float factor = scale_factor(1.0 / (1.0 + exp(-logit)), count);
+    const float opacity = 1.0 / (1.0 + exp(-logit));
+    float factor, part;
+    if (SHAPES > 1u) {
+        const uint row = shape_row(shape[i], part);
+        factor = mix(scale_factor(opacity, count, row), scale_factor(opacity, count, row + 1u), part);
+    } else {
+        factor = scale_factor(opacity, count, 0u);
+    }
     opacity_logit[i] = logit_of(absorption(logit) / float(count));
     log_scale[i] += log(factor);
 }

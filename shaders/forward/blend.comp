@@ -34,6 +34,7 @@ layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3]
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 9, scalar) writeonly buffer Checkpoints { float checkpoints[]; };  // where CHECKPOINTS
+layout(set = 0, binding = 10, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
 
 #define SHAPE_BINDING 3
 #define LIGHT_BINDING 4
@@ -73,11 +74,12 @@ void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, uint number
 }
 
 // One splat on all pixels of the thread. d: mean - centre of the thread's first pixel.
-void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, uint number, vec3 depth) {
+void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, float exponent, uint number,
+                 vec3 depth) {
     for (uint k = 0u; k < PIXELS; ++k) {
         const vec2 to_mean = d - vec2(slot_offset(k));
         const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
-        const float raw = min(light.w * kernel_value(x * x + y * y), ALPHA_MAX);
+        const float raw = min(light.w * kernel_value(x * x + y * y, exponent), ALPHA_MAX);
         const float alpha = raw >= ALPHA_CUTOFF ? raw : 0.0;
         if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) {
             const float z = alpha > 0.0 ? depth.x - depth.y * x - depth.z * y : NO_DEPTH;
@@ -97,13 +99,14 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
         const uint mine = batch + gl_SubgroupInvocationID;
         vec4 shape = vec4(0.0), light = vec4(0.0);
         vec3 depth = vec3(0.0);
-        float l22 = 0.0;
+        float l22 = 0.0, exponent = 0.0;
         uint number = 0u;
         if (mine < count) {
             const uint splat = hit_splat[hits_base() + mine];
             number = hit_index[hits_base() + mine] + 1u;
             shape = load_shape(splat, l22);
             light = load_light(splat);
+            if (SHAPED) exponent = splat_exponent[splat];
             if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) depth = load_depth(splat);
         }
         const uint end = min(SUBGROUP_SIZE, count - batch);
@@ -113,7 +116,8 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
             vec3 z = vec3(0.0);
             if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) z = subgroupBroadcast(depth, lane);
             blend_splat(px, s.xy - centre, s, subgroupBroadcast(light, lane),
-                        subgroupBroadcast(l22, lane), subgroupBroadcast(number, lane), z);
+                        subgroupBroadcast(l22, lane), SHAPED ? subgroupBroadcast(exponent, lane) : 0.0,
+                        subgroupBroadcast(number, lane), z);
         } while (++lane < end);
         alive = px.transmittance[0];
         for (uint k = 1u; k < PIXELS; ++k) alive = max(alive, px.transmittance[k]);

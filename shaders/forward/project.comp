@@ -35,6 +35,7 @@ layout(set = 0, binding = 1 + ATTRIBUTE_ROTATION, scalar) readonly buffer Rotati
 layout(set = 0, binding = 1 + ATTRIBUTE_OPACITY_LOGIT, scalar) readonly buffer Opacity { float opacity_logit[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_SH_DC, scalar) readonly buffer ShDc { vec3 sh_dc[]; };
 layout(set = 0, binding = 1 + ATTRIBUTE_SH_REST, scalar) readonly buffer ShRest { vec4 sh_rest[]; };  // from first_splat on
+layout(set = 0, binding = 1 + ATTRIBUTE_SHAPE, scalar) readonly buffer Shape { float shape[]; };  // with SHAPED
 layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape { vec4 splat_shape[]; };  // mean, l11, l21
 layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShapeHalf { uvec4 splat_shape_half[]; };
 layout(set = 0, binding = FRAME_BINDING + 1, scalar) writeonly buffer SplatLight { vec4 splat_light[]; };  // rgb, opacity
@@ -45,6 +46,7 @@ layout(set = 0, binding = FRAME_BINDING + 4, scalar) writeonly buffer Intersecti
 layout(set = 0, binding = FRAME_BINDING + 5, scalar) writeonly buffer Visible { uint visible[]; };
 layout(set = 0, binding = FRAME_BINDING + 6, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world, with SMOOTHING
+layout(set = 0, binding = FRAME_BINDING + 8, scalar) writeonly buffer SplatExponent { float splat_exponent[]; };  // with SHAPED
 
 #include "lib/rest.glsl"
 
@@ -131,14 +133,19 @@ uint project(uint i, out int reason) {
     const float logit = opacity_logit[i];
     float opacity = opacity_of(logit);
     if (STORAGE == STORAGE_FLOAT16 && !FILTERED) opacity = round_half(opacity);
-    float reach = kernel_reach(opacity);
+    float exponent = 0.0, by_shape;
+    if (SHAPED) {
+        if (is_nan(shape[i])) return 0u;
+        exponent = shape_exponent(shape[i], by_shape);
+    }
+    float reach = kernel_reach(opacity, exponent);
     if (!(reach > 0.0) || is_nan(logit)) return 0u;
 
     reason = CULL_COVARIANCE;
     const vec3 raw_scale = log_scale[i];
     vec3 s = scale_of(raw_scale), share;
     if (SMOOTHING == 1) opacity *= smooth_scale(s, smoothing[i], share);
-    s *= sqrt(kernel_covariance_scale());
+    s *= sqrt(kernel_covariance_scale(exponent));
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
     const mat3 axes = rotation_matrix(unit);
@@ -153,7 +160,7 @@ uint project(uint i, out int reason) {
         reason = CULL_OPACITY;
         if (ANTIALIAS == 1) opacity *= compensation(r1, r2, f);
         if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);
-        reach = kernel_reach(opacity);
+        reach = kernel_reach(opacity, exponent);
         if (!(reach > 0.0) || is_nan(opacity)) return 0u;
     }
 
@@ -172,6 +179,7 @@ uint project(uint i, out int reason) {
     if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) slope = depth_slope(f, r1, r2, (camera.row2 * axes) * s);
     store_splat(i, mean, f, colour, opacity);
     splat_bound[i] = vec4(f.l22, reach, p.z, slope);
+    if (SHAPED) splat_exponent[i] = exponent;
     cover[i] = pack_cover(c);
     return count;
 }

@@ -36,14 +36,18 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 #include "kernels/polynomial.glsl"
 
 #include "kernels/builtin.glsl"
+#include "kernels/beta.glsl"
 #include "kernels/compact.glsl"
 #include "kernels/gaussian.glsl"
 #include "kernels/quadric.glsl"
 
 // w and its derivative by q, for q >= 0; both 0 at and after the support's edge, w never negative. The slope is
-// the derivative of the w computed here.
-void kernel_value_slope(float q, out float w, out float slope) {
-    if (EVALUATION == EVALUATION_BUILTIN && builtin_exists()) {
+// the derivative of the w computed here. exponent: the splat's, of a kernel with shapes; by_exponent: dw by it.
+void kernel_value_slope(float q, float exponent, out float w, out float slope, out float by_exponent) {
+    by_exponent = 0.0;
+    if (SHAPED) {
+        beta_value_slope(q, exponent, w, slope, by_exponent);
+    } else if (EVALUATION == EVALUATION_BUILTIN && builtin_exists()) {
         builtin_value_slope(q, w, slope);
     } else if (KERNEL_FORM == KERNEL_FORM_COMPACT) {
         compact_value_slope(q, w, slope);
@@ -54,9 +58,9 @@ void kernel_value_slope(float q, out float w, out float slope) {
     }
 }
 
-float kernel_value(float q) {
-    float w, slope;
-    kernel_value_slope(q, w, slope);
+float kernel_value(float q, float exponent) {
+    float w, slope, by_exponent;
+    kernel_value_slope(q, exponent, w, slope, by_exponent);
     return w;
 }
 
@@ -64,11 +68,11 @@ float kernel_value(float q) {
 void last_flank(float least, out float low, out float high) {
     low = KERNEL_C0;
     high = KERNEL_C1;
-    if (KERNEL_PULSES > 1 && kernel_value(KERNEL_C2) >= least) {
+    if (KERNEL_PULSES > 1 && kernel_value(KERNEL_C2, 0.0) >= least) {
         low = KERNEL_C2;
         high = KERNEL_C3;
     }
-    if (KERNEL_PULSES > 2 && kernel_value(KERNEL_C4) >= least) {
+    if (KERNEL_PULSES > 2 && kernel_value(KERNEL_C4, 0.0) >= least) {
         low = KERNEL_C4;
         high = KERNEL_C5;
     }
@@ -77,12 +81,14 @@ void last_flank(float least, out float low, out float high) {
 // The q beyond which opacity * w < ALPHA_CUTOFF, rounded outwards, at most R^2; 0 below the cut-off. Once per
 // splat: closed forms where there are, else halvings of [0, R^2], or of a pulse's outer flank, on the falling w that
 // is computed.
-float kernel_reach(float opacity) {
+float kernel_reach(float opacity, float exponent) {
     if (!(opacity >= ALPHA_CUTOFF)) return 0.0;
     const float least = ALPHA_CUTOFF * (1.0 - KERNEL_REACH_MARGIN) / opacity;
     float q;
     if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
         q = -2.0 * log(least);
+    } else if (SHAPED) {
+        q = beta_reach(exponent, least);
     } else if (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI) {
         q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
     } else {
@@ -90,7 +96,7 @@ float kernel_reach(float opacity) {
         if (KERNEL_FORM == KERNEL_FORM_RINGS) last_flank(least, low, high);
         for (int step = 0; step < 24; ++step) {
             const float middle = 0.5 * (low + high);
-            const bool inside = kernel_value(middle) >= least;
+            const bool inside = kernel_value(middle, 0.0) >= least;
             low = inside ? middle : low;
             high = inside ? high : middle;
         }
@@ -100,8 +106,8 @@ float kernel_reach(float opacity) {
 }
 
 // What multiplies the projected 2x2 covariance before the low-pass.
-float kernel_covariance_scale() {
-    return COVARIANCE_SCALE;
+float kernel_covariance_scale(float exponent) {
+    return SHAPED ? beta_covariance_scale(exponent) : COVARIANCE_SCALE;
 }
 
 #endif

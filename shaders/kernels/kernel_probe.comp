@@ -17,8 +17,8 @@ layout(set = 0, binding = 1, scalar) writeonly buffer Output { vec4 value_slope_
 void main() {
     const uint i = gl_GlobalInvocationID.x;
     if (i >= args.count) return;
-    float w, slope;
-    kernel_value_slope(q_opacity[i].x, w, slope);
+    float w, slope, by_exponent;
+    kernel_value_slope(q_opacity[i].x, args.exponent, w, slope, by_exponent);
     value_slope_reach_scale[i] =
-        vec4(w, slope, kernel_reach(q_opacity[i].y), kernel_covariance_scale());
+        vec4(w, slope, kernel_reach(q_opacity[i].y, args.exponent), kernel_covariance_scale(args.exponent));
 }

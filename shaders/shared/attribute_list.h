@@ -9,7 +9,8 @@
 #define ATTRIBUTE_OPACITY_LOGIT 3
 #define ATTRIBUTE_SH_DC 4
 #define ATTRIBUTE_SH_REST 5
-#define ATTRIBUTES 6
+#define ATTRIBUTE_SHAPE 6
+#define ATTRIBUTES 7
 
 // The rows of an attribute of each coefficient, on the device: blocks of so many splats, in each a
 // column of as many vec4 after the other (shaders/lib/rows.glsl).

@@ -13,6 +13,20 @@
 // place of the coefficients the q of the peak and of the end of each pulse
 #define KERNEL_FORM_RINGS 3
 
+// w = (1 - q/R^2)^e = 2^(e log2(1 - q/R^2)), 2^x by P as the Gaussian, e of each splat: with the
+// footprint psi e = b, with exact b + 1/2, b = BETA_START exp(shape), held within the bounds
+#define KERNEL_FORM_BETA 4
+
+#define BETA_SUPPORT 13.0   // R^2: with BETA_START the second moment is the Gaussian's
+#define BETA_START 4.0      // b of shape 0
+#define EXPONENT_LEAST 1.0  // below it the slope at the edge grows without bound
+#define EXPONENT_MOST 64.0
+
+// Rows of density control's tables over the shape, evenly from the first to the last.
+#define SHAPE_ROWS 16
+#define SHAPE_FIRST -2.1
+#define SHAPE_LAST 2.8
+
 #define KERNEL_MAX_DEGREE 8
 
 #endif

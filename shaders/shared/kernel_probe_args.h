@@ -11,11 +11,12 @@ namespace darb::gpu {
 #endif
 
 struct KernelProbeArgs {
-    uint count;  // entries
+    uint count;      // entries
+    float exponent;  // of a kernel with shapes
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(KernelProbeArgs) == 4);
+static_assert(sizeof(KernelProbeArgs) == 8);
 }  // namespace darb::gpu
 #endif
 #endif

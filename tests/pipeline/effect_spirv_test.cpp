@@ -116,7 +116,7 @@ class EffectSpirv : public testing::TestWithParam<const char*> {
 };
 
 TEST_P(EffectSpirv, what_is_off_leaves_no_instruction_and_no_read) {
-    const int rest = 6, smoothing = backward ? 23 : 14;
+    const int rest = 6, smoothing = backward ? 25 : 15;
     EXPECT_EQ(none.atan, 0u);
     EXPECT_FALSE(reads_lens(none));
     EXPECT_FALSE(none.bindings.count(smoothing));
@@ -186,9 +186,32 @@ TEST_F(PassSpirv, frames_without_huge_splats_know_no_list_of_huge_splats_and_no_
     EXPECT_GT(parts.instructions, whole.instructions);
 }
 
+// Constant 103 is KERNEL_FORM: 0 compact, 1 Gaussian, 4 that of the kernel beta.
+TEST_F(PassSpirv, kernels_without_shapes_read_and_write_no_exponent) {
+    struct Pass {
+        const char* shader;
+        std::set<int> bindings;  // of shapes, exponents and their sums
+    };
+    for (const Pass& pass :
+         {Pass{"project", {7, 16}}, Pass{"blend", {10}}, Pass{"blend_backward", {16, 17}},
+          Pass{"blend_backward_team", {16, 17}}, Pass{"blend_backward_buckets", {14}},
+          Pass{"project_backward", {7, 14, 27}}, Pass{"densify_split", {5}}}) {
+        SCOPED_TRACE(pass.shader);
+        const bool split = std::string(pass.shader) == "densify_split";  // constant 2: SHAPES
+        const Left shaped = left_in(pass.shader, split ? "2:16" : "103:4");
+        for (const char* without : {"103:0", "103:1"}) {
+            const Left plain = left_in(pass.shader, split ? "2:1" : without);
+            for (const int binding : pass.bindings) {
+                EXPECT_FALSE(plain.bindings.count(binding)) << binding;
+                EXPECT_TRUE(shaped.bindings.count(binding)) << binding;
+            }
+        }
+    }
+}
+
 // Constant 9 of these is WINDOW_INTERSECTIONS.
 TEST_F(PassSpirv, sums_that_one_binding_holds_know_no_windows) {
-    for (const auto& [shader, first] : {std::pair{"blend_backward", 9}, {"project_backward", 15}}) {
+    for (const auto& [shader, first] : {std::pair{"blend_backward", 9}, {"project_backward", 17}}) {
         const Left whole = left_in(shader, "9:0"), windows = left_in(shader, "9:640");
         EXPECT_TRUE(whole.bindings.count(first)) << shader;
         EXPECT_FALSE(whole.bindings.count(first + 1)) << shader;

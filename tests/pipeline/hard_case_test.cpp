@@ -25,7 +25,8 @@ std::vector<Param> every_case() {
     const auto names = check::hard_cases(KERNEL_GAUSSIAN, Footprint::psi);
     for (size_t i = 0; i < names.size(); ++i) {
         all.push_back({i, names[i].name, KERNEL_GAUSSIAN, Footprint::psi});
-        all.push_back({i, names[i].name, 1 + static_cast<int>(i % (KERNEL_COUNT - 1)),
+        const int other = 1 + static_cast<int>(i % KERNEL_COUNT);
+        all.push_back({i, names[i].name, other < KERNEL_COUNT ? other : KERNEL_BETA,
                        i % 3 == 0 ? Footprint::exact : Footprint::psi});
         if (names[i].name == "discs")
             all.push_back({i, names[i].name, KERNEL_PARABOLIC, Footprint::exact});
@@ -52,7 +53,7 @@ INSTANTIATE_TEST_SUITE_P(every, HardCase, testing::ValuesIn(every_case()),
                          [](const auto& p) { return p.param.name; });
 
 TEST(PoisonedSplats, harm_no_other) {
-    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_SINC})
+    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_BETA})
         for (const check::Row& row : check::check_poison(shared_device(), kernel, "poison"))
             EXPECT_TRUE(row.pass) << row.name << row.detail;
 }

@@ -179,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(every_kernel, KernelGradient,
                          name_of);
 
 INSTANTIATE_TEST_SUITE_P(every_kernel, RingGradient,
-                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_ROWS),
+                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_BETA),
                                           testing::Values(Footprint::psi)),
                          [](const auto& i) {
                              return std::string(kernel_name(std::get<0>(i.param)));

@@ -21,6 +21,7 @@ Intersections gradients_of(const BlendScene& scene, const reference::TileLists& 
                                  d_l21,
                                  2 * s.l22 * p.g_dy_dy,
                                  p.d_opacity,
+                                 p.d_exponent,
                                  glm::dvec3(p.d_colour)});
     }
     return intersections;
@@ -40,7 +41,7 @@ struct Result {
     BlendOutput out;
 };
 
-void expect_gradients_match(const Result& r, const Tolerance& allowed) {
+void expect_gradients_match(const Result& r, const Tolerance& allowed, bool shaped) {
     const auto check = [&](const char* name, const auto& get) {
         const std::vector<double> expected = column(r.truth, get);
         EXPECT_TRUE(compare_scaled(name, expected, column(r.got, get), allowed));
@@ -51,6 +52,7 @@ void expect_gradients_match(const Result& r, const Tolerance& allowed) {
     check("d_l21", [](const auto& p) { return p.d_l21; });
     check("d_l22", [](const auto& p) { return p.d_l22; });
     check("d_opacity", [](const auto& p) { return p.d_opacity; });
+    if (shaped) check("d_exponent", [](const auto& p) { return p.d_exponent; });
     for (int c = 0; c < 3; ++c)
         check(fmt::format("d_colour.{}", c).c_str(), [c](const auto& p) { return p.d_colour[c]; });
 }
@@ -73,7 +75,7 @@ Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed
                                        {d_colour, {}}, r.truth.data() + r.lists.begin[t]);
     r.out = blend_on_device(scene, r.lists, true, planes);
     r.got = gradients_of(scene, r.lists, r.out);
-    expect_gradients_match(r, allowed);
+    expect_gradients_match(r, allowed, kernel_has_shape(scene.kernel));
     return r;
 }
 
@@ -111,6 +113,16 @@ TEST_P(BlendBackward, random_layers_match_double) {
     BlendScene scene = GetParam().scene(53, 37);
     scene.add_random(120, 4, 0.01, 0.98);
     const Result r = expect_backward_matches(scene, allowed());
+    EXPECT_GT(r.lists.intersection_count(), 200U);
+}
+
+TEST_P(EveryWay, exponents_of_splats_match_double) {
+    BlendScene scene = BlendVariant{KERNEL_BETA}.scene(53, 37);
+    scene.back = GetParam();
+    scene.add_random(120, 8, 0.01, 0.98);
+    scene.add({5.5, 7.5}, {0.3, 0, 0.3}, 0.7, {1, 0.5, 0},
+              1);  // the centre, and a kink at the edge
+    const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
     EXPECT_GT(r.lists.intersection_count(), 200U);
 }
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 
 #include "engine/core/rng.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/backward.h"
 #include "engine/reference/reference_density_control.h"
+#include "engine/scene/splat_shapes.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
 #include "trainer/density/density_control.h"
@@ -46,7 +48,8 @@ struct Population {
 
     /// Moments are 1, 2, 3, ... so that every one is known again.
     Generation run(const gpu::DensifyArgs& args, DensityResult& result,
-                   int kernel = KERNEL_GAUSSIAN, std::uint32_t max_splats = kNoLimit) const {
+                   int kernel = KERNEL_GAUSSIAN, std::uint32_t max_splats = kNoLimit,
+                   Footprint footprint = Footprint::psi) const {
         Device& device = shared_device();
         GpuSplats splats(device, model, true, true);
         for (int a = 0; a < kAttributeCount; ++a) splats.upload_moments(a, moments_before(a));
@@ -54,7 +57,7 @@ struct Population {
         if (!ones.empty()) splats.upload_rest_sum(ones);
         Buffer sums(device, "gradient sum", std::max<size_t>(model.size(), 1) * 8);
         if (!gradient_sum.empty()) sums.upload(gradient_sum);
-        DensityControl density(device, kernel);
+        DensityControl density(device, kernel, footprint);
         result = density.run(splats, sums, args, max_splats);
         Generation g{splats.download(), {}, {}};
         const size_t rest = g.model.size() * stride(kShRest);
@@ -221,9 +224,13 @@ TEST(Densify, values_that_are_not_finite_do_not_grow) {
     EXPECT_EQ(result.grown, 3U);
 }
 
-/// Offsets of children from their parent, in the parent's frame and in units of its scale.
-std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t seed) {
+/// Offsets of children from their parent, in the parent's frame and in units of its scale. shape:
+/// of all parents, where the kernel has shapes.
+std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t seed,
+                                      Footprint footprint = Footprint::psi, float shape = 0) {
     Population population(parents);
+    set_kernel(population.model, kernel);
+    for (float& value : population.model.shape) value = shape;
     const float log_scale[] = {0.5f, -1.0f, 0.1f}, rotation[] = {0.9f, 0.3f, -0.5f, 0.2f};
     for (size_t i = 0; i < parents; ++i) {
         for (size_t c = 0; c < 3; ++c) population.model.position[i * 3 + c] = 1;
@@ -235,7 +242,8 @@ std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t 
     gpu::DensifyArgs args = args_for({});
     args.seed = seed;
     DensityResult result;
-    const Generation after = population.run(args, result, kernel);
+    const Generation after = population.run(args, result, kernel, kNoLimit, footprint);
+    for (const float value : after.model.shape) EXPECT_EQ(value, shape) << "children keep it";
     EXPECT_EQ(after.model.size(), 2 * parents);
     glm::dmat3 axes;  // images of the unit vectors
     for (int c = 0; c < 3; ++c) {
@@ -250,6 +258,22 @@ std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t 
         offsets.push_back(inverse * glm::dvec3(p[0] - 1.0, p[1] - 1.0, p[2] - 1.0));
     }
     return offsets;
+}
+
+TEST(Densify, offsets_of_children_follow_the_density_of_their_own_shape) {
+    for (const Footprint footprint : {Footprint::psi, Footprint::exact})
+        for (const float shape : {-3.0f, -0.6f, 0.0f, 1.1f, 4.0f}) {  // the outer ones are held
+            SCOPED_TRACE(shape);
+            const auto offsets = child_offsets(KERNEL_BETA, 10'000, 7, footprint, shape);
+            const auto radii = shaped_radius_quantiles(
+                footprint, shape_exponent(footprint, static_cast<double>(shape)), 20);
+            for (const int k : {1, 5, 10, 14, 18}) {
+                const auto below = std::count_if(offsets.begin(), offsets.end(), [&](auto& o) {
+                    return length(o) < radii[static_cast<size_t>(k)];
+                });
+                EXPECT_NEAR(double(below) / 20'000, (k + 0.5) / 20, 0.015) << k;
+            }
+        }
 }
 
 TEST(Densify, offsets_of_children_follow_the_kernels_radial_density) {

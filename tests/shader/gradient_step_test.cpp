@@ -143,6 +143,7 @@ TEST(GradientStep, both_ways_agree_for_every_kernel) {
     };
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel) agree(kernel, Footprint::psi);
     agree(KERNEL_RAISED_COSINE, Footprint::exact);
+    agree(KERNEL_BETA, Footprint::psi);
 }
 
 TEST(GradientStep, both_ways_agree_with_each_effect) {

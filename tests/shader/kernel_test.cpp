@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "engine/gpu/commands.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/kernel_constants.h"
+#include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/kernel_probe_args.h"
 #include "tests/support/kernel_vectors.h"
 #include "tests/support/own_kernels.h"
@@ -60,7 +62,9 @@ class KernelShader : public testing::Test {
         device_ = nullptr;
     }
 
-    std::vector<Answer> run(const Variant& v, const std::vector<Probe>& probes) {
+    /// exponent: of a kernel with shapes.
+    std::vector<Answer> run(const Variant& v, const std::vector<Probe>& probes,
+                            float exponent = 0) {
         Pipeline& pipeline = pipelines_[v.name()];
         if (!pipeline)
             pipeline = Pipeline(*device_, "kernel_probe",
@@ -71,7 +75,7 @@ class KernelShader : public testing::Test {
         Commands commands(*device_);
         commands.begin();
         const auto count = static_cast<std::uint32_t>(probes.size());
-        commands.dispatch(pipeline, gpu::KernelProbeArgs{count}, {input, output},
+        commands.dispatch(pipeline, gpu::KernelProbeArgs{count, exponent}, {input, output},
                           (count + KERNEL_PROBE_GROUP - 1) / KERNEL_PROBE_GROUP);
         commands.submit_and_wait();
         return output.download<Answer>(probes.size());
@@ -88,7 +92,7 @@ class KernelShader : public testing::Test {
         for (const int own : test::own_kernels())
             for (const Footprint f : {Footprint::psi, Footprint::exact})
                 check({own, f, EVALUATION_POLYNOMIAL, kFullDegree});
-        for (int rings = KERNEL_COUNT; rings < KERNEL_ROWS; ++rings)
+        for (int rings = KERNEL_COUNT; rings < KERNEL_BETA; ++rings)
             check({rings, Footprint::psi, EVALUATION_BUILTIN, kFullDegree});
     }
 
@@ -161,6 +165,41 @@ TEST_F(KernelShader, CentreEdgeAndBeyond_areExact) {
                 << v.name();
         }
     });
+}
+
+TEST_F(KernelShader, Exponents_of_beta_areThoseOfDoubleFromCentreToEdgeAndBeyond) {
+    for (const Footprint footprint : {Footprint::psi, Footprint::exact})
+        for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
+            for (const double e : {EXPONENT_LEAST, 1.5, 4.0, 4.5, 20.0, EXPONENT_MOST}) {
+                const Variant v{KERNEL_BETA, footprint, evaluation, kFullDegree};
+                SCOPED_TRACE(fmt::format("{}, exponent {}", v.name(), e));
+                std::vector<Probe> probes = ramp(v, 500);
+                const auto edge = static_cast<float>(BETA_SUPPORT);
+                for (const float q : {edge, std::nextafter(edge, 20.0f), 1e4f, 1e30f})
+                    probes.push_back({q, 1});
+                for (Probe& p : probes) p.opacity = 0.5f;
+                const std::vector<Answer> got = run(v, probes, static_cast<float>(e));
+                EXPECT_NEAR(got[0].value, 1, evaluation == EVALUATION_BUILTIN ? 1e-4 : 0);
+                for (std::size_t i = 0; i < probes.size(); ++i) {
+                    const double q = probes[i].q;
+                    const ShapedValue truth = shaped_value(e, q);
+                    const double allowed =
+                        evaluation == EVALUATION_BUILTIN ? 1e-4 : 3e-7 + 2e-7 * e;
+                    ASSERT_NEAR(got[i].value, truth.w, allowed) << q;
+                    if (q >= BETA_SUPPORT) {
+                        ASSERT_EQ(got[i].value, 0) << q;
+                        ASSERT_EQ(got[i].slope, 0) << q;
+                    } else if (q < BETA_SUPPORT * (1 - 1e-6)) {
+                        ASSERT_NEAR(got[i].slope, truth.slope, e * allowed) << q;
+                    }
+                    if (0.5 * got[i].value >= kCutoff) {
+                        ASSERT_GE(got[i].reach, q);
+                    }
+                    ASSERT_NEAR(got[i].covariance_scale, shaped_covariance_scale(footprint, e),
+                                1e-6);
+                }
+                EXPECT_NEAR(got[0].reach, shaped_reach(e, 0.5, kCutoff), 2e-3);
+            }
 }
 
 TEST_F(KernelShader, CovarianceScale_isPsiOrOne) {

@@ -4,9 +4,12 @@
 
 #include "engine/core/rng.h"
 #include "engine/kernels/relocation_table.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
 #include "engine/reference/reference_mcmc.h"
 #include "engine/reference/reference_render.h"
+#include "engine/scene/splat_shapes.h"
+#include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/guarded_buffer.h"
@@ -32,8 +35,10 @@ SplatModel population(size_t count, std::uint64_t seed = 31) {
 
 template <class Args>
 void run_pass(const char* shader, const Args& args, std::initializer_list<BufferRange> buffers,
-              std::uint32_t count) {
-    const Pipeline pipeline(shared_device(), shader, kThreads);
+              std::uint32_t count, const SpecConstants& more = {}) {
+    SpecConstants constants = kThreads;
+    constants.insert(more.begin(), more.end());
+    const Pipeline pipeline(shared_device(), shader, constants);
     Commands commands(shared_device());
     commands.begin();
     const Groups g = groups_for(count);
@@ -120,16 +125,22 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
         copies[i] = i % 7 == 0 ? 70 : rng.below(8);  // more than the table has rows for
         sources[i] = {static_cast<std::uint32_t>(i), copies[i] > 0 ? DENSIFY_CLONE : DENSIFY_KEEP};
     }
-    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel) {
+    for (int k = 0; k <= KERNEL_COUNT; ++k) {
+        const int kernel = k < KERNEL_COUNT ? k : KERNEL_BETA;
         SCOPED_TRACE(std::string(kernel_name(kernel)));
-        const GuardedBuffer source(d, "sources", sources), copy(d, "copies", copies),
+        const bool shaped = kernel_has_shape(kernel);
+        set_kernel(model, kernel);
+        for (float& shape : model.shape) shape = static_cast<float>(rng.uniform(-2.5, 3.2));
+        const GuardedBuffer shapes(d, "shape", model.shape), source(d, "sources", sources),
+            copy(d, "copies", copies),
             table(
                 d, "table",
                 relocation_table(kernel, Footprint::psi, RELOCATION_OPACITIES, RELOCATION_COUNTS)),
             scale(d, "log_scale", model.log_scale), opacity(d, "opacity", model.opacity_logit);
         const auto count = static_cast<std::uint32_t>(n);
         run_pass("relocate", gpu::RelocationArgs{count, count, 0, 0, kDead, 0, 0},
-                 {source, copy, table, scale, opacity}, count);
+                 {source, copy, table, scale, opacity, shapes}, count,
+                 {{"SHAPES", shaped ? SHAPE_ROWS : 1}});
         const auto logit = opacity.read<float>(), log_scale = scale.read<float>();
         for (size_t i = 0; i < n; ++i) {
             if (copies[i] == 0) {
@@ -137,14 +148,21 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
                 ASSERT_EQ(log_scale[3 * i], model.log_scale[3 * i]) << i;
                 continue;
             }
-            const auto expected =
+            auto expected =
                 reference::relocated(kernel, Footprint::psi, model.opacity_logit[i], copies[i] + 1);
+            if (shaped)
+                expected.log_factor = std::log(shaped_relocation_scale(
+                    shape_exponent(Footprint::psi, static_cast<double>(model.shape[i])),
+                    std::min(sigmoid(static_cast<double>(model.opacity_logit[i])),
+                             double{ALPHA_MAX}),
+                    static_cast<int>(std::min<std::uint32_t>(copies[i] + 1, RELOCATION_COUNTS))));
             ASSERT_NEAR(logit[i], expected.opacity_logit,
                         3e-5 + 1e-5 * std::abs(expected.opacity_logit))
                 << i;
-            for (size_t c = 0; c < 3; ++c)  // between the table's columns: up to 0.3 %
+            // Between the table's columns: up to 0.3 %; between its shapes as much again.
+            for (size_t c = 0; c < 3; ++c)
                 ASSERT_NEAR(log_scale[3 * i + c] - model.log_scale[3 * i + c], expected.log_factor,
-                            4e-3)
+                            shaped ? 7e-3 : 4e-3)
                     << i << ": " << model.opacity_logit[i] << ", " << copies[i];
         }
         EXPECT_TRUE(scale.intact() && opacity.intact());
@@ -255,8 +273,10 @@ TEST(Relocation, a_round_moves_the_dead_grows_and_clears_the_moments_of_what_cha
         ASSERT_NEAR(round.model.opacity_logit[i], changed ? expected.opacity_logit : 0, 1e-4) << i;
         ASSERT_NEAR(round.model.log_scale[3 * i] - model.log_scale[3 * from],
                     changed ? expected.log_factor : 0, 4e-3);
-        for (int a = 0; a < kAttributeCount; ++a)
+        for (int a = 0; a < kAttributeCount; ++a) {
+            if (round.moments[a].empty()) continue;
             ASSERT_EQ(round.moments[a][round.moments[a].size() / 525 * i], changed ? 0 : 1) << i;
+        }
     }
 }
 

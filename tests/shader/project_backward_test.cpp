@@ -44,8 +44,9 @@ void expect_gradients_match(const SplatModel& model, const Camera& camera, int s
 }
 
 TEST(ProjectBackward, every_kernel_and_footprint_matches_double) {
-    for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
+    for (int k = 0; k <= KERNEL_COUNT; ++k)
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
+            const int kernel = k < KERNEL_COUNT ? k : KERNEL_BETA;
             SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
                          std::string(footprint_name(footprint)));
             const TestScene s = random_scene({.count = 100,

@@ -17,7 +17,7 @@ namespace darb::test {
 
 /// What blend_backward leaves for one intersection: [0..3] sums of G x, G x x, G x dy, G dy, [4]
 /// d_opacity, [5..7] d_colour, [8] sum of G dy dy.
-using IntersectionPartials = std::array<float, 9>;
+using IntersectionPartials = std::array<float, 10>;
 
 /// The intersections of every splat, one after another.
 struct Partials {
@@ -101,10 +101,11 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
     constants["REST"] = step.rest;
     add_constants(effects, constants);
     const Pipeline pipeline(device, "project_backward", constants);
-    std::vector<float> sums, rest;
+    std::vector<float> sums, rest, exponent;
     for (const IntersectionPartials& intersection : partials.intersections) {
         sums.insert(sums.end(), intersection.begin(), intersection.begin() + 8);
         rest.push_back(intersection[8]);
+        exponent.push_back(intersection[9]);
     }
     const auto& b = before;
     const GuardedBuffer cameras(device, "cameras", std::vector{camera_data(camera, model.origin)});
@@ -123,12 +124,13 @@ inline PassState run_backward_pass(const SplatModel& model, const Camera& camera
         begin(device, "first intersection", partials.begin), sum(device, "partials", sums),
         rests(device, "partial rest", rest), gradient(device, "gradient sum", b.gradient_sum),
         status(device, "status", std::vector{b.status}), smoothing(device, "smoothing", filters),
-        rest_sum(device, "rest sum", held_rows(rows[kShRest], b.rest_sum));
+        rest_sum(device, "rest sum", held_rows(rows[kShRest], b.rest_sum)),
+        exponents(device, "partial exponent", exponent);
     std::vector<BufferRange> buffers{cameras};
     for (const GuardedBuffer& buffer : p) buffers.emplace_back(buffer);
     for (const GuardedBuffer& buffer : held) buffers.emplace_back(buffer);
     for (const GuardedBuffer* buffer : {&count, &begin, &sum, &sum, &sum, &sum, &sum, &rests,
-                                        &gradient, &status, &smoothing, &rest_sum})
+                                        &gradient, &status, &smoothing, &rest_sum, &exponents})
         buffers.emplace_back(*buffer);
     Commands commands(device);
     commands.begin();
@@ -169,15 +171,16 @@ inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera
     DoubleGradients result;
     for (size_t i = 0; i < model.size(); ++i) {
         const auto s = reference::project(splats, i, camera, settings, kernel);
-        double sum[9] = {};
+        double sum[10] = {};
         for (std::uint32_t e = 0; e < partials.count[i]; ++e)
-            for (int c = 0; c < 9; ++c) sum[c] += partials.intersections[partials.begin[i] + e][c];
+            for (int c = 0; c < 10; ++c) sum[c] += partials.intersections[partials.begin[i] + e][c];
         const reference::ProjectedGradient<double> g{
             {2 * s.l11 * sum[0], 2 * (s.l21 * sum[0] + s.l22 * s.l22 * sum[3])},
             2 * (sum[1] - s.l21 * sum[2]) / s.l11,  // x = l11 dx + l21 dy
             2 * sum[2],
             2 * s.l22 * sum[8],
             sum[4],
+            sum[9],
             {sum[5], sum[6], sum[7]}};
         reference::project_backward(splats, i, camera, settings, kernel, {s, g}, out);
         result.mean_ndc.push_back(

@@ -8,6 +8,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/gpu/commands.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/kernel_constants.h"
 #include "engine/reference/blend.h"
@@ -33,7 +34,8 @@ struct BlendScene {
 
     /// Mean in px, S' = [[xx, xy], [xy, yy]] in px^2. Everything is rounded to float, so that both
     /// sides start from the same numbers.
-    void add(glm::dvec2 mean, glm::dvec3 cov, double opacity, glm::dvec3 colour) {
+    void add(glm::dvec2 mean, glm::dvec3 cov, double opacity, glm::dvec3 colour,
+             double exponent = 4) {
         const auto rounded = [](double value) { return double(static_cast<float>(value)); };
         reference::ProjectedSplat<double> s;
         const double det = cov.x * cov.z - cov.y * cov.y;
@@ -46,7 +48,8 @@ struct BlendScene {
         s.l21 = rounded(-cov.y / std::sqrt(cov.z * det));
         s.l22 = rounded(1 / std::sqrt(cov.z));
         s.opacity = rounded(opacity);
-        s.reach = table().reach(s.opacity, double(cutoff));
+        s.exponent = rounded(exponent);
+        s.reach = table().reach(s.opacity, double(cutoff), s.exponent);
         for (int c = 0; c < 3; ++c) s.colour[c] = rounded(colour[c]);
         splats.push_back(s);
     }
@@ -59,7 +62,10 @@ struct BlendScene {
                                  c * size);
             const glm::dvec2 mean(rng.uniform(-4, width + 4), rng.uniform(-4, height + 4));
             const double opacity = rng.uniform(min_opacity, max_opacity);
-            add(mean, cov, opacity, {rng.uniform(), rng.uniform(), rng.uniform()});
+            const glm::dvec3 colour(rng.uniform(), rng.uniform(), rng.uniform());
+            // From a kink at the edge to a spike.
+            const double exponent = kernel_has_shape(kernel) ? std::exp2(rng.uniform(0, 6)) : 4;
+            add(mean, cov, opacity, colour, exponent);
         }
     }
     const reference::KernelTable& table() const {
@@ -115,6 +121,8 @@ inline std::vector<BlendVariant> every_blend_variant() {
         for (const Footprint footprint : {Footprint::psi, Footprint::exact})
             for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
                 all.push_back({kernel, footprint, evaluation});
+    for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
+        all.push_back({KERNEL_BETA, Footprint::psi, evaluation});  // exact: another exponent alone
     return all;
 }
 
@@ -123,7 +131,7 @@ inline std::vector<BlendVariant> every_blend_variant() {
 struct IntersectionSums {
     float gx, gxx, gx_dy, g_dy, d_opacity;
     glm::vec3 d_colour;
-    float g_dy_dy;
+    float g_dy_dy, d_exponent;
 };
 
 /// What the passes leave. Intersections are in the order of the lists.
@@ -211,9 +219,11 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     const BlendPipelines pipelines(device, scene, store);
     const ShuffledIntersections shuffled(scene, lists, all_blocks);
     std::vector<glm::vec4> shape, light, bound;
+    std::vector<float> exponent;
     for (const auto& s : scene.splats) {
         shape.emplace_back(s.mean_px.x, s.mean_px.y, s.l11, s.l21);
         light.emplace_back(s.colour.x, s.colour.y, s.colour.z, s.opacity);
+        exponent.push_back(static_cast<float>(s.exponent));
         bound.emplace_back(s.l22, s.reach * (1 + 1e-5), s.depth, 0.0);
     }
     const size_t pixels = size_t(scene.width) * scene.height,
@@ -234,6 +244,8 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
         // A team writes every slot.
         partials(device, "partials", std::vector<float>(intersections * 8, start)),
         rest(device, "partial rest", std::vector<float>(intersections, start)),
+        exponents(device, "exponent", exponent),
+        partial_exponent(device, "partial exponent", std::vector<float>(intersections, start)),
         checkpoints(device, "checkpoints", unwritten),
         bucket_tile(device, "bucket tile", std::vector<std::uint32_t>(records, 0)),
         bucket_rest(device, "behind buckets",
@@ -254,10 +266,10 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     Commands commands(device);
     commands.begin();
     for (; args.segment < args.segments; ++args.segment)
-        commands.dispatch(
-            pipelines.blend, args,
-            {ranges, order, splats, shapes, lights, bounds, image, final_t, last, checkpoints},
-            groups_x, groups_y);
+        commands.dispatch(pipelines.blend, args,
+                          {ranges, order, splats, shapes, lights, bounds, image, final_t, last,
+                           checkpoints, exponents},
+                          groups_x, groups_y);
     commands.submit_and_wait();
     BlendOutput out{image.read<float>(), final_t.read<float>(), last.read<std::uint32_t>(), {}};
     commands.begin();
@@ -275,23 +287,31 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
             commands.dispatch(
                 pipelines.backward, args,
                 {ranges, order, splats, shapes, lights, bounds, d_images, final_t, last, partials,
-                 partials, partials, partials, partials, rest, behind},
+                 partials, partials, partials, partials, rest, behind, exponents, partial_exponent},
                 groups_x, groups_y);
     if (scene.buckets() && !d_image.empty())
-        commands.dispatch(pipelines.backward, bucket_args,
-                          {ranges, order, splats, shapes, lights, bounds, d_images, last,
-                           bucket_tile, checkpoints, bucket_rest, partials, rest},
-                          static_cast<std::uint32_t>(records));
+        commands.dispatch(
+            pipelines.backward, bucket_args,
+            {ranges, order, splats, shapes, lights, bounds, d_images, last, bucket_tile,
+             checkpoints, bucket_rest, partials, rest, exponents, partial_exponent},
+            static_cast<std::uint32_t>(records));
     commands.submit_and_wait();
     for (const GuardedBuffer* buffer :
          {&ranges, &order, &splats, &shapes, &lights, &bounds, &image, &final_t, &last, &partials,
-          &rest, &behind, &checkpoints, &bucket_tile, &bucket_rest})
+          &rest, &behind, &checkpoints, &bucket_tile, &bucket_rest, &partial_exponent})
         EXPECT_TRUE(buffer->intact());
     const auto sums = partials.read<float>(), rests = rest.read<float>();
+    const auto of_exponent = partial_exponent.read<float>();
     for (size_t j = 0; j < intersections; ++j) {
         const float* p = &sums[shuffled.order[j] * size_t{8}];
-        out.intersections.push_back(
-            {p[0], p[1], p[2], p[3], p[4], {p[5], p[6], p[7]}, rests[shuffled.order[j]]});
+        out.intersections.push_back({p[0],
+                                     p[1],
+                                     p[2],
+                                     p[3],
+                                     p[4],
+                                     {p[5], p[6], p[7]},
+                                     rests[shuffled.order[j]],
+                                     of_exponent[shuffled.order[j]]});
     }
     return out;
 }

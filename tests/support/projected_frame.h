@@ -16,6 +16,7 @@ namespace darb::test {
 struct ProjectedFrame {
     std::vector<glm::vec4> shape, light, bound;  // as blend.comp reads them
     std::vector<glm::uvec4> cover;
+    std::vector<float> exponent;
     std::vector<std::uint32_t> intersection_count, visible;
     gpu::FrameStatus status;
 };
@@ -41,30 +42,29 @@ inline ProjectedFrame project_on_device(const SplatModel& model, const Camera& c
         opacity(device, "opacity", model.opacity_logit), sh_dc(device, "sh_dc", model.sh_dc),
         sh_rest(device, "sh_rest",
                 held_rows(attribute_rows(kShRest, model.floats(kShRest)), model.sh_rest)),
-        smoothing(device, "smoothing", filters);
+        shapes(device, "shapes", model.shape), smoothing(device, "smoothing", filters);
     const GuardedBuffer shape(device, "shape", n * 16), light(device, "light", n * 16),
         bound(device, "bound", n * 16), cover(device, "cover", n * 16),
         intersection_count(device, "intersection count", n * 4), visible(device, "visible", n * 4),
-        status(device, "status", std::vector<gpu::FrameStatus>(1));
+        status(device, "status", std::vector<gpu::FrameStatus>(1)),
+        exponent(device, "exponent", n * 4);
     Commands commands(device);
     commands.begin();
     const Groups g = groups_for(n);
-    commands.dispatch(pipeline, gpu::ProjectArgs{0, n, 0, static_cast<float>(low_pass)},
-                      {cameras, position, log_scale, rotation, opacity, sh_dc, sh_rest, shape,
-                       light, bound, cover, intersection_count, visible, status, smoothing},
-                      g.x, g.y);
+    commands.dispatch(
+        pipeline, gpu::ProjectArgs{0, n, 0, static_cast<float>(low_pass)},
+        {cameras, position, log_scale, rotation, opacity, sh_dc, sh_rest, shapes, shape, light,
+         bound, cover, intersection_count, visible, status, smoothing, exponent},
+        g.x, g.y);
     commands.submit_and_wait();
     for (const GuardedBuffer* b :
          {&cameras, &position, &log_scale, &rotation, &opacity, &sh_dc, &sh_rest, &shape, &light,
-          &bound, &cover, &intersection_count, &visible, &status, &smoothing})
+          &bound, &cover, &intersection_count, &visible, &status, &smoothing, &exponent})
         EXPECT_TRUE(b->intact());
-    return {shape.read<glm::vec4>(),
-            light.read<glm::vec4>(),
-            bound.read<glm::vec4>(),
-            cover.read<glm::uvec4>(),
-            intersection_count.read<std::uint32_t>(),
-            visible.read<std::uint32_t>(),
-            status.read<gpu::FrameStatus>()[0]};
+    return {shape.read<glm::vec4>(),       light.read<glm::vec4>(),
+            bound.read<glm::vec4>(),       cover.read<glm::uvec4>(),
+            exponent.read<float>(),        intersection_count.read<std::uint32_t>(),
+            visible.read<std::uint32_t>(), status.read<gpu::FrameStatus>()[0]};
 }
 
 /// A rectangle of tiles that one bit of a cover stands for; ends exclusive.

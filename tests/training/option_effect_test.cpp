@@ -29,6 +29,7 @@ const std::map<std::string, std::string> kOtherValues{
     {"/scale_lr", "0.02"},
     {"/rotation_lr", "0.02"},
     {"/opacity_lr", "0.01"},
+    {"/shape_lr", "0.2"},
     {"/sh_lr/0", "0.01"},
     {"/sh_rest_every", "3"},
     {"/position_lr_falls", "0.5"},
@@ -82,6 +83,7 @@ TinyTraining run_for(const OptionRow& row) {
     if (strategies == "mcmc") o.strategy = Strategy::mcmc;
     if (strategies == "budget") o.strategy = Strategy::budget;
     if (!strategies.empty() && !strategies.starts_with("adc")) o.max_splats = 80;
+    if (key == "/shape_lr") o.kernel = KERNEL_BETA;
     if (key == "/random_points") t.dataset.points = {};
     return t;
 }

@@ -57,6 +57,7 @@ void print_scene_info(const json& info) {
     row("98 % within", bounds_text(info["inner_bounds"]));
     row("scale", percentiles_text(info["scale"]));
     row("opacity", percentiles_text(info["opacity"]));
+    if (info.contains("exponent")) row("exponent", percentiles_text(info["exponent"]));
     for (const json& warning : info["warnings"]) row("warning", warning.get<std::string>());
 }
 

@@ -8,6 +8,7 @@
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/scene/splat_shapes.h"
 #include "tools/darb/outputs.h"
 
 namespace darb {
@@ -25,8 +26,8 @@ int kernel_of_item(const std::string& option, const std::string& item) {
     if (is_kernel_expression(item)) return registered(kernel_from_expression(item, option));
     const auto kernel = kernel_from_name(item);
     std::string known;
-    for (const int k : known_kernels())
-        known += (known.empty() ? "" : ", ") + std::string(kernel_name(k));
+    for (const int k : known_kernels()) known += std::string(kernel_name(k)) + ", ";
+    known += kernel_name(KERNEL_BETA);
     if (!kernel)
         throw Error(option + " " + item, "no such kernel",
                     "There are " + known + ", and \"expr: (1 - q/9)^3, support 9\".");
@@ -76,7 +77,7 @@ std::optional<int> chosen_kernel(const KernelFlags& flags) {
 }
 
 SplatModel in_kernel(const KernelFlags& flags, SplatModel model) {
-    model.kernel = chosen_kernel(flags).value_or(model.kernel);
+    set_kernel(model, chosen_kernel(flags).value_or(model.kernel));
     if (!has_exact_footprint(model.kernel)) model.footprint = Footprint::psi;
     return model;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/quantile.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "shaders/shared/limits.h"
@@ -59,7 +60,7 @@ double diagonal(const json& bounds) {
 // Counts of odd splats, and the percentiles of scale and opacity.
 void add_splats(const SplatModel& model, json& info) {
     const double huge_scale = kHugeShare * diagonal(info["inner_bounds"]);
-    std::vector<double> scales, opacities;
+    std::vector<double> scales, opacities, exponents;
     size_t zero_rotations = 0, huge = 0, needles = 0, saturated = 0, invisible = 0;
     for (size_t i = 0; i < model.size(); ++i) {
         std::array<double, 3> s{};
@@ -67,6 +68,8 @@ void add_splats(const SplatModel& model, json& info) {
         std::sort(s.begin(), s.end());
         scales.push_back(s[2]);
         opacities.push_back(sigmoid(model.opacity_logit[i]));
+        if (!model.shape.empty())
+            exponents.push_back(shape_exponent(model.footprint, double{model.shape[i]}));
         zero_rotations += !has_rotation(model, i);
         huge += s[2] > huge_scale;
         needles += s[2] > kNeedleRatio * s[1];
@@ -75,6 +78,7 @@ void add_splats(const SplatModel& model, json& info) {
     }
     info["scale"] = percentiles(scales);
     info["opacity"] = percentiles(opacities);
+    if (!exponents.empty()) info["exponent"] = percentiles(exponents);
     info["zero_rotations"] = zero_rotations;
     info["huge"] = huge;
     info["needles"] = needles;

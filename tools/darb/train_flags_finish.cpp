@@ -3,6 +3,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/train_flags.h"
@@ -99,6 +100,9 @@ void finish_train_flags(TrainFlags& f) {
         throw Error(fmt::format("--kernel {} --pulses {}", kernel_name(kernel), f.pulses),
                     "goes with the footprint psi only",
                     "Leave --footprint out, or use another kernel or one pulse.");
+    if (f.train.shape_lr && !kernel_has_shape(f.train.kernel))
+        say_note(
+            "note: --shape-lr is not used: splats have shapes of their own with --kernel beta");
     note_iterations_beyond(f);
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())

@@ -30,7 +30,7 @@ void PyScene::set_drawing(int kernel, Footprint footprint, bool antialias) {
                     fmt::format("is not there for the kernel {}", kernel_name(kernel)),
                     "Use psi, or a kernel of one pulse.");
     change([&] {
-        model_.kernel = kernel;
+        set_kernel(model_, kernel);
         model_.footprint = footprint;
         model_.antialias = antialias;
         ++changes_;
@@ -140,7 +140,7 @@ PyScene scene_of_arrays(const py::dict& options) {
         model.opacity_logit.push_back(static_cast<float>(std::log(o / (1 - o))));
     }
     split_harmonics(sh, model.sh_dc, model.sh_rest);
-    model.kernel = take_kernel(options["kernel"], "kernel");
+    set_kernel(model, take_kernel(options["kernel"], "kernel"));
     model.footprint = take_footprint(options["footprint"]);
     model.antialias = take_flag(options["antialiased"], "antialiased");
     PyScene scene(std::move(model));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/kernels/shaped_kernel.h"
 #include "tools/python/kernel.h"
 #include "tools/python/rasterize.h"
 
@@ -70,6 +71,10 @@ SplatArraysGiven take_splats(const py::dict& options) {
     given.colours = given.direct_colour ? take_floats(options["colors"], "colors", {n, 3})
                                         : take_floats(options["sh"], "sh", {n, kAny, 3});
     if (!options["kernel"].is_none()) header.kernel = take_kernel(options["kernel"], "kernel");
+    if (kernel_has_shape(header.kernel))
+        throw Error(fmt::format("kernel {}", kernel_name(header.kernel)),
+                    "takes a shape of each splat, which this call has no place for",
+                    "Load or train a scene of it: darb.Scene, darb.train.");
     if (!options["footprint"].is_none()) header.footprint = take_footprint(options["footprint"]);
     if (!options["antialiased"].is_none())
         header.antialias = take_flag(options["antialiased"], "antialiased");

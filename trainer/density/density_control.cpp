@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "engine/core/check.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
+#include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
 #include "trainer/density/round_buffers.h"
 
@@ -32,28 +34,42 @@ void limit_growth(const std::vector<glm::vec2>& gradient_sum, std::uint32_t room
         grow[growing[k]] = 0;
     }
 }
+
+// [rows][kQuantiles]: a row for each of SHAPE_ROWS shapes, where the kernel has them.
+std::vector<float> radius_quantiles(int kernel, Footprint footprint) {
+    std::vector<float> quantiles;
+    for (int row = 0; row < SHAPE_ROWS && kernel_has_shape(kernel); ++row)
+        for (const double radius : shaped_radius_quantiles(
+                 footprint, shape_exponent(footprint, shape_of_row(row)), kQuantiles))
+            quantiles.push_back(static_cast<float>(radius));
+    for (int k = 0; k < kQuantiles && !kernel_has_shape(kernel); ++k)
+        quantiles.push_back(
+            static_cast<float>(kernel_radius_quantile(kernel, (k + 0.5) / kQuantiles)));
+    return quantiles;
+}
 }  // namespace
 
-DensityControl::DensityControl(Device& device, int kernel) : device_(&device), commands_(device) {
+DensityControl::DensityControl(Device& device, int kernel, Footprint footprint)
+    : device_(&device), commands_(device) {
     const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
     decide_ = Pipeline(device, "densify_decide", threads);
     sources_ = Pipeline(device, "densify_sources", threads);
     gather_ = Pipeline(device, "gather_attribute", threads);
     gather_columns_ =
         Pipeline(device, "gather_attribute", {{"THREADS", SPLAT_GROUP}, {"COLUMNS", 1}});
-    split_ =
-        Pipeline(device, "densify_split", {{"THREADS", SPLAT_GROUP}, {"QUANTILES", kQuantiles}});
+    split_ = Pipeline(device, "densify_split",
+                      {{"THREADS", SPLAT_GROUP},
+                       {"QUANTILES", kQuantiles},
+                       {"SHAPES", kernel_has_shape(kernel) ? SHAPE_ROWS : 1}});
     reset_ = Pipeline(device, "reset_opacity", threads);
     decay_ = Pipeline(device, "decay_opacity", threads);
-    std::vector<float> quantiles(kQuantiles);
-    for (int k = 0; k < kQuantiles; ++k)
-        quantiles[k] = static_cast<float>(kernel_radius_quantile(kernel, (k + 0.5) / kQuantiles));
-    quantile_ = Buffer(device, "radius quantiles", fixed_bytes());
-    quantile_.upload(quantiles);
+    quantile_ = Buffer(device, "radius quantiles", fixed_bytes(kernel));
+    quantile_.upload(radius_quantiles(kernel, footprint));
 }
 
-std::uint64_t DensityControl::fixed_bytes() {
-    return kQuantiles * sizeof(float);
+std::uint64_t DensityControl::fixed_bytes(int kernel) {
+    const std::uint64_t row = kQuantiles * sizeof(float);
+    return kernel_has_shape(kernel) ? SHAPE_ROWS * row : row;
 }
 
 DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
@@ -107,7 +123,7 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
     commands_.pass("split");
     commands_.dispatch(split_, args,
                        {sources, splats.parameters(kPosition), splats.parameters(kLogScale),
-                        splats.parameters(kRotation), quantile_},
+                        splats.parameters(kRotation), quantile_, splats.parameters(kShape)},
                        after.x, after.y);
     commands_.submit_and_wait();
     return result;

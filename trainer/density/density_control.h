@@ -19,7 +19,7 @@ struct DensityResult {
 
 class DensityControl {
   public:
-    DensityControl(Device& device, int kernel);
+    DensityControl(Device& device, int kernel, Footprint footprint = Footprint::psi);
 
     /// One round. gradient_sum: [N][2] of Backward. The queue must be idle. args.splat_count is set
     /// here. Beyond max_splats nothing grows, the largest mean gradients go first. New buffers
@@ -28,7 +28,7 @@ class DensityControl {
                       std::uint32_t max_splats);
 
     /// Device memory between rounds.
-    static std::uint64_t fixed_bytes();
+    static std::uint64_t fixed_bytes(int kernel);
 
     /// Every opacity down to at most `opacity`, its moments to zero.
     void reset_opacity(GpuSplats& splats, float opacity);

@@ -80,7 +80,7 @@ const StrategyRow& mcmc_row() {
         .settings = {"noise_lr"},
         .prunes_random_start = false,
         .target = grow_by_share,
-        .device_bytes = [](const StrategySize&) { return Relocation::device_bytes(); },
+        .device_bytes = [](const StrategySize& of) { return Relocation::device_bytes(of.kernel); },
         .make = [](const StrategySetup& setup) -> std::unique_ptr<DensityStrategy> {
             return std::make_unique<Mcmc>(setup);
         }};

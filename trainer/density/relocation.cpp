@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "engine/kernels/relocation_table.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
+#include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
 
 namespace darb {
@@ -24,16 +26,19 @@ Relocation::Relocation(Device& device, int kernel, Footprint footprint)
     weight_ = Pipeline(device, "relocation_weight", threads);
     draw_ = Pipeline(device, "relocation_draw", threads);
     sources_ = Pipeline(device, "relocation_sources", threads);
-    relocate_ = Pipeline(device, "relocate", threads);
+    relocate_ =
+        Pipeline(device, "relocate",
+                 {{"THREADS", SPLAT_GROUP}, {"SHAPES", kernel_has_shape(kernel) ? SHAPE_ROWS : 1}});
     noise_ = Pipeline(device, "position_noise", threads);
     const std::vector<float> table =
         relocation_table(kernel, footprint, RELOCATION_OPACITIES, RELOCATION_COUNTS);
-    table_ = Buffer(device, "relocation table", device_bytes());
+    table_ = Buffer(device, "relocation table", device_bytes(kernel));
     table_.upload(table);
 }
 
-std::uint64_t Relocation::device_bytes() {
-    return std::uint64_t{RELOCATION_OPACITIES} * RELOCATION_COUNTS * sizeof(float);
+std::uint64_t Relocation::device_bytes(int kernel) {
+    const std::uint64_t row = std::uint64_t{RELOCATION_OPACITIES} * RELOCATION_COUNTS;
+    return row * (kernel_has_shape(kernel) ? SHAPE_ROWS : 1) * sizeof(float);
 }
 
 DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float dead_opacity,
@@ -78,10 +83,10 @@ DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float 
     density.move(splats, sources, args.splats_after);
     commands_.begin();
     commands_.pass("relocate");
-    commands_.dispatch(
-        relocate_, args,
-        {sources, copies, table_, splats.parameters(kLogScale), splats.parameters(kOpacityLogit)},
-        after.x, after.y);
+    commands_.dispatch(relocate_, args,
+                       {sources, copies, table_, splats.parameters(kLogScale),
+                        splats.parameters(kOpacityLogit), splats.parameters(kShape)},
+                       after.x, after.y);
     commands_.submit_and_wait();
     return result;
 }

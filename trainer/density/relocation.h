@@ -9,11 +9,11 @@ namespace darb {
 
 class Relocation {
   public:
-    /// The table of scales takes about 0.1 s.
+    /// The table of scales takes about 0.1 s, a second with a kernel that has shapes.
     Relocation(Device& device, int kernel, Footprint footprint);
 
     /// Device memory between rounds. A round takes a little less than one of DensityControl.
-    static std::uint64_t device_bytes();
+    static std::uint64_t device_bytes(int kernel);
 
     /// One round: splats of an opacity up to dead_opacity move onto live ones, drawn in proportion
     /// to their opacities, and `grown` more are drawn likewise; all that share a place take the

@@ -18,18 +18,18 @@ BufferList<RoundBuffers> RoundBuffers::list(std::uint64_t splats) {
             {&R::sources, "densify sources", bytes * 4}};  // at most twice as many, two words each
 }
 
-std::uint64_t rest_sum_bytes(std::uint64_t splats, int sh_degree, bool rest_sum) {
-    const std::uint32_t floats = rest_sum ? attribute_floats(kShRest, sh_degree) : 0;
+std::uint64_t rest_sum_bytes(std::uint64_t splats, const SplatFloats& of) {
+    const std::uint32_t floats = of.rest_sum ? attribute_floats(kShRest, of.sh_degree) : 0;
     return Buffer::charged_bytes(attribute_rows(kShRest, floats).bytes(splats));
 }
 
-std::uint64_t round_bytes(std::uint32_t before, std::uint32_t after, int sh_degree, bool rest_sum) {
+std::uint64_t round_bytes(std::uint32_t before, std::uint32_t after, const SplatFloats& of) {
     std::vector<AttributeRows> replaced;  // in each buffer
+    const auto strides = GpuSplats::strides(of.sh_degree, of.kernel);
     for (int a = 0; a < kAttributeCount; ++a)
         for (const std::uint32_t of_each : {1u, 2u})
-            replaced.push_back(attribute_rows(a, attribute_floats(a, sh_degree), of_each));
-    replaced.push_back(
-        attribute_rows(kShRest, rest_sum ? attribute_floats(kShRest, sh_degree) : 0));
+            replaced.push_back(attribute_rows(a, strides[a], of_each));
+    replaced.push_back(attribute_rows(kShRest, of.rest_sum ? strides[kShRest] : 0));
     const auto bytes = [](std::uint64_t splats, const AttributeRows& each) {
         return Buffer::charged_bytes(each.bytes(splats));
     };

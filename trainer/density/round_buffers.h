@@ -15,11 +15,16 @@ struct RoundBuffers {
     static BufferList<RoundBuffers> list(std::uint64_t splats);
 };
 
+/// What the floats of a splat depend on.
+struct SplatFloats {
+    int sh_degree = 0, kernel = 0;
+    bool rest_sum = false;  // GpuSplats::rest_sum
+};
 /// Bytes of GpuSplats::rest_sum of so many splats.
-std::uint64_t rest_sum_bytes(std::uint64_t splats, int sh_degree, bool rest_sum);
+std::uint64_t rest_sum_bytes(std::uint64_t splats, const SplatFloats& of);
 
 /// The most bytes that parameters, moments and working space take at a time while a round makes
 /// `after` splats out of `before`: attributes are replaced one at a time, so that one exists twice.
-std::uint64_t round_bytes(std::uint32_t before, std::uint32_t after, int sh_degree, bool rest_sum);
+std::uint64_t round_bytes(std::uint32_t before, std::uint32_t after, const SplatFloats& of);
 
 }  // namespace darb

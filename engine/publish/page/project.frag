@@ -44,11 +44,11 @@ void main() {
     if (!magnitude_below(p, 1e30) || !(p.z > camera.near_plane)) return;
 
     float opacity = position.w;
-    float reach = kernel_reach(opacity);
+    float reach = kernel_reach(opacity, 0.0);
     if (!(reach > 0.0)) return;
 
     const vec3 s = exp(clamp(texelFetch(size, at, 0).xyz, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)) *
-        sqrt(kernel_covariance_scale());
+        sqrt(kernel_covariance_scale(0.0));
     vec3 j0, j1;
     jacobian_rows(camera, p, j0, j1);
     const mat3 axes = rotation_matrix(texelFetch(turn, at, 0));
@@ -59,7 +59,7 @@ void main() {
     if (!is_finite(f.determinant) || !(f.determinant > DETERMINANT_MIN * unit_area * unit_area)) return;
     if (FILTERED) {
         opacity *= compensation(r1, r2, f);
-        reach = kernel_reach(opacity);
+        reach = kernel_reach(opacity, 0.0);
         if (!(reach > 0.0)) return;
     }
 

@@ -11,7 +11,7 @@ out vec4 colour;
 void main() {
     vec2 to_mean = shape.xy - gl_FragCoord.xy;
     float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
-    float alpha = min(light.w * kernel_value(x * x + y * y), ALPHA_MAX);
+    float alpha = min(light.w * kernel_value(x * x + y * y, 0.0), ALPHA_MAX);
     if (!(alpha >= ALPHA_CUTOFF)) discard;
     colour = vec4(alpha * light.rgb, alpha);
 }

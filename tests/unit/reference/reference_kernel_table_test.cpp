@@ -64,7 +64,7 @@ INSTANTIATE_TEST_SUITE_P(Reference, EveryTable,
                          });
 
 INSTANTIATE_TEST_SUITE_P(ReferenceRings, EveryTable,
-                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_ROWS),
+                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_BETA),
                                           testing::Values(Footprint::psi)),
                          [](const auto& i) {
                              return std::string(kernel_name(std::get<0>(i.param)));

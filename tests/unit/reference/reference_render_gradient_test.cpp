@@ -70,6 +70,9 @@ class Differences {
         check(name + " rotation", &Splats<double>::rotation, d.rotation, allowed);
         check(name + " opacity", &Splats<double>::opacity_logit, d.opacity_logit, allowed);
         check(name + " sh_dc", &Splats<double>::sh_dc, d.sh_dc, allowed);
+        if (!splats_.shape.empty()) {
+            check(name + " shape", &Splats<double>::shape, d.shape, allowed);
+        }
         if (splats_.rest_count() > 0) {
             check(name + " sh_rest", &Splats<double>::sh_rest, d.sh_rest, allowed);
         }
@@ -154,6 +157,13 @@ INSTANTIATE_TEST_SUITE_P(Reference, EveryKernel,
                                     std::string(footprint_name(std::get<1>(i.param)));
                          });
 
+INSTANTIATE_TEST_SUITE_P(Shaped, EveryKernel,
+                         testing::Combine(testing::Values(KERNEL_BETA),
+                                          testing::Values(Footprint::psi, Footprint::exact)),
+                         [](const auto& i) {
+                             return std::string(footprint_name(std::get<1>(i.param)));
+                         });
+
 class EveryRing : public EveryKernel {};
 
 TEST_P(EveryRing, Parameters_MatchDifferences) {
@@ -166,7 +176,7 @@ TEST_P(EveryRing, Parameters_MatchDifferences) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Reference, EveryRing,
-                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_ROWS),
+                         testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_BETA),
                                           testing::Values(Footprint::psi)),
                          [](const auto& i) {
                              return std::string(kernel_name(std::get<0>(i.param)));

@@ -25,6 +25,7 @@ namespace {
 SplatModel counted(int sh_degree) {
     SplatModel model;
     model.sh_degree = sh_degree;
+    model.kernel = KERNEL_BETA;  // which takes every attribute
     float next = 0.25f;
     for (int a = 0; a < kAttributeCount; ++a) {
         attribute_values(model, a).resize(3 * attribute_floats(a, sh_degree));
