@@ -113,7 +113,13 @@ LiveSystem::LiveSystem(bool on, const DeviceOptions& options) {
     survive_display_loss(system_->lost);
 }
 
-LiveSystem::~LiveSystem() = default;
+// Where the window's thread lost the display, what this one asked of it would be waited for without
+// end: it stays as it is until the process ends.
+LiveSystem::~LiveSystem() {
+    if (!system_ || !system_->lost) return;
+    static const System* const kept = system_.release();
+    static_cast<void>(kept);
+}
 
 std::unique_ptr<LiveView> LiveSystem::open(Device& device, const Dataset& dataset,
                                            const std::atomic<bool>& stop, bool white) const {
