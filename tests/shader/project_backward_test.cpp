@@ -162,9 +162,10 @@ TEST(ProjectBackward, a_splat_with_43000_intersections_sums_all_of_them) {
     const auto got =
         run_backward_pass(s.model, s.camera, 3, UPDATE_STORE, start_state(s.model), partials).d;
     for (int a = 0; a < kAttributeCount; ++a)
-        if (!expected.d[a].empty())
+        if (!expected.d[a].empty()) {
             EXPECT_TRUE(compare_scaled(attribute_name(a), expected.d[a], got[a],
                                        tolerance("project_gradient_float32")));
+        }
 }
 
 }  // namespace
