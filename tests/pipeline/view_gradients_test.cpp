@@ -39,10 +39,13 @@ Camera turned(Camera camera, double angle) {
 
 void expect_matches(const WalkTruth& truth, const ViewGradients& view) {
     EXPECT_TRUE(compare_scaled("image", truth.image, view.image.data, tolerance("image_float32")));
-    for (int a = 0; a < kAttributeCount; ++a)
-        EXPECT_TRUE(compare_scaled(std::string("d_") + attribute_name(a),
-                                   truth.d[static_cast<size_t>(a)], attribute_values(view.d, a),
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<double>& expected = truth.d[static_cast<size_t>(a)];
+        if (expected.empty()) continue;
+        EXPECT_TRUE(compare_scaled(std::string("d_") + attribute_name(a), expected,
+                                   attribute_values(view.d, a),
                                    tolerance("gradient_scaled_float32")));
+    }
     EXPECT_TRUE(compare_scaled("mean gradient", truth.mean_gradient_ndc, view.mean_gradient_ndc,
                                tolerance("gradient_scaled_float32")));
 }
@@ -275,6 +278,7 @@ TEST(ViewGradients, of_several_views_make_one_step_as_in_double) {
     const SplatModel after = views.splats.download();
     for (int a = 0; a < kAttributeCount; ++a) {
         const auto at = static_cast<size_t>(a);
+        if (truth[at].empty()) continue;
         EXPECT_TRUE(compare_scaled(std::string("sum of d_") + attribute_name(a), truth[at],
                                    sum.download(a), tolerance("gradient_scaled_float32")));
         // Adam of the device's own sums: a first step is the sign of a gradient.

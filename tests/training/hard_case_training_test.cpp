@@ -89,8 +89,9 @@ std::vector<double> losses_in_double(const Training& t, const check::HardCase& c
     SplatModel model = c.scene.model;
     const TrainOptions& o = t.options;
     const Schedule::Rates first = Schedule(o).first;
-    const double rates[] = {first.position * extent, first.scale, first.rotation,
-                            first.opacity,           first.sh_dc, first.sh_rest};
+    const double rates[] = {
+        first.position * extent, first.scale, first.rotation, first.opacity, first.sh_dc,
+        first.sh_rest,           first.shape};
     std::array<std::vector<double>, kAttributeCount> value, m1, m2;
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& from = attribute_values(model, a);
