@@ -3,6 +3,7 @@
 // every degree of the harmonics.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdlib>
 #include <set>
 
