@@ -52,6 +52,7 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {train + "--strategy mcmc --densify_grad_threshold 1e-4", "--strategy mcmc"},
                     {train + "--opacity-decay 0.1", "goes with --strategy budget"},
                     {train + "--resolution-ramp maybe", "--resolution-ramp"},
+                    {train + "--kernel beta --html", "convert --kernel gaussian"},
                     {"eval", "scene"},
                     {"eval a.ply b --split no_such", "--split"},
                     {"render a.ply -o b --depth png", "--depth"},

@@ -27,7 +27,7 @@ struct Partials {
     /// 0 to 5 intersections each; every fifth splat has none. The size of the sums differs by 1e4
     /// between splats, as it does in scenes.
     static Partials random(size_t splats, std::uint64_t seed) {
-        Pcg32 rng(seed);
+        Pcg32 rng(seed), exponents(seed, 9);  // of kernels with shapes, apart from the others
         Partials p;
         for (size_t i = 0; i < splats; ++i) {
             p.begin.push_back(static_cast<std::uint32_t>(p.intersections.size()));
@@ -35,8 +35,10 @@ struct Partials {
             const double size = std::pow(10.0, rng.uniform(-4, 0));
             for (std::uint32_t k = 0; k < p.count.back(); ++k) {
                 p.intersections.emplace_back();
-                for (float& value : p.intersections.back())
-                    value = static_cast<float>(size * rng.uniform(-1, 1));
+                IntersectionPartials& sums = p.intersections.back();
+                for (size_t c = 0; c < 9; ++c)
+                    sums[c] = static_cast<float>(size * rng.uniform(-1, 1));
+                sums[9] = static_cast<float>(size * exponents.uniform(-1, 1));
             }
         }
         return p;

@@ -444,27 +444,26 @@ TEST(Training, more_bad_gradients_than_one_in_a_thousand_stop_the_run) {
     }
 }
 
-TEST(Training, every_kernel_and_footprint_brings_the_loss_down) {
-    for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel)
-        for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
-            if (footprint == Footprint::exact && !has_exact_footprint(kernel)) continue;
-            SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
-                         std::string(footprint_name(footprint)));
-            TinyTraining t = tiny_training();
-            t.options.kernel = kernel;
-            t.options.footprint = footprint;
-            t.options.densify_until = 0;
-            t.options.sh_degree = 0;
-            std::vector<double> losses;
-            Trainer trainer = t.trainer();
-            trainer.on_result = [&](const IterationResult& r) { losses.push_back(r.loss); };
-            run_to(trainer, 60);
-            trainer.drain();
-            double first = 0, last = 0;  // of two epochs of five views
-            for (int i = 0; i < 10; ++i) first += losses[i], last += losses[50 + i];
-            EXPECT_LT(last, 0.9 * first);
-            EXPECT_EQ(trainer.counters().bad_gradients, 0U);
-        }
+// Each in one footprint: gradients of both are compared with double elsewhere.
+TEST(Training, every_kernel_brings_the_loss_down) {
+    for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel) {
+        const bool exact = kernel % 2 == 1 && has_exact_footprint(kernel);
+        SCOPED_TRACE(std::string(kernel_name(kernel)) + (exact ? " exact" : " psi"));
+        TinyTraining t = tiny_training();
+        t.options.kernel = kernel;
+        t.options.footprint = exact ? Footprint::exact : Footprint::psi;
+        t.options.densify_until = 0;
+        t.options.sh_degree = 0;
+        std::vector<double> losses;
+        Trainer trainer = t.trainer();
+        trainer.on_result = [&](const IterationResult& r) { losses.push_back(r.loss); };
+        run_to(trainer, 60);
+        trainer.drain();
+        double first = 0, last = 0;  // of two epochs of five views
+        for (int i = 0; i < 10; ++i) first += losses[i], last += losses[50 + i];
+        EXPECT_LT(last, 0.9 * first);
+        EXPECT_EQ(trainer.counters().bad_gradients, 0U);
+    }
 }
 
 }  // namespace

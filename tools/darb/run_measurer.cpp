@@ -1,5 +1,7 @@
 #include "tools/darb/run_measurer.h"
 
+#include <functional>
+
 #include "engine/scene/splat_file.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/tune_flags.h"
@@ -38,14 +40,19 @@ void RunMeasurer::measure_models(ComparedRun& run, Device& device) const {
 
 void RunMeasurer::measure(ComparedRun& run, const std::vector<View>& held_out) {
     attempt(run, "LPIPS", [&] { lpips_.measure(run); });
-    const bool blending = flags_.blending_views > 0 && !blended_.contains(run.kernel);
-    if (scaled_.empty() && off_path_.empty() && !blending) return;
-    attempt(run, "measuring on the device", [&] {
-        DeviceOptions options = command_device(flags_.device);
-        Device device(options);
-        settle_tuning(device);
-        measure_models(run, device);
-        if (!blending) return;
+    const auto on_device = [&](const char* what, const std::function<void(Device&)>& measurement) {
+        attempt(run, what, [&] {
+            DeviceOptions options = command_device(flags_.device);
+            Device device(options);
+            settle_tuning(device);
+            measurement(device);
+        });
+    };
+    if (!scaled_.empty() || !off_path_.empty())
+        on_device("other sizes and views off the path",
+                  [&](Device& device) { measure_models(run, device); });
+    if (flags_.blending_views == 0 || blended_.contains(run.kernel)) return;
+    on_device("blending", [&](Device& device) {
         std::vector<Camera> cameras;
         for (const View& view : held_out) cameras.push_back(view.camera);
         measure_blending_of(run, device, cameras, flags_.blending_views);

@@ -85,8 +85,10 @@ std::vector<View> off_path_views(const std::filesystem::path& dataset,
                                  const DatasetOptions& options) {
     const std::filesystem::path folder = dataset / "off_path";
     if (!std::filesystem::exists(folder / "transforms_test.json")) return {};
+    DatasetOptions own = options;
+    own.images_folder = DatasetOptions{}.images_folder;  // --images is of the data set's photos
     std::vector<View> views;
-    for (View& view : load_dataset(folder, options).views)
+    for (View& view : load_dataset(folder, own).views)
         if (view.is_test) views.push_back(std::move(view));
     return views;
 }

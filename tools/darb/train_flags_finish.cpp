@@ -103,6 +103,10 @@ void finish_train_flags(TrainFlags& f) {
     if (f.train.shape_lr && !kernel_has_shape(f.train.kernel))
         say_note(
             "note: --shape-lr is not used: splats have shapes of their own with --kernel beta");
+    if (f.page && kernel_has_shape(f.train.kernel))
+        throw Error("--html", "web pages cannot draw shapes of splats yet",
+                    "Leave it out; darb convert --kernel gaussian OUT page.html writes a page of "
+                    "nearest Gaussians.");
     note_iterations_beyond(f);
     for (std::vector<int>* list : {&f.run.test_iterations, &f.run.save_iterations})
         if (list->empty())

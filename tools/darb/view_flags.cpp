@@ -6,6 +6,8 @@
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
+#include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/open_cameras.h"
@@ -49,6 +51,11 @@ std::vector<int> kernels_beside(const ViewFlags& flags) {
     if (kernels.size() > kMostBeside)
         throw Error("--beside", fmt::format("{} kernels are too many", kernels.size()),
                     fmt::format("Up to {} fit beside the scene's own.", kMostBeside));
+    for (const int kernel : kernels)
+        if (kernel_has_shape(kernel))
+            throw Error(fmt::format("--beside {}", kernel_name(kernel)),
+                        "takes a shape of each splat, and kernels side by side share their splats",
+                        "Open a scene of that kernel, or name another.");
     return kernels;
 }
 

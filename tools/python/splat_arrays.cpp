@@ -74,7 +74,7 @@ SplatArraysGiven take_splats(const py::dict& options) {
     if (kernel_has_shape(header.kernel))
         throw Error(fmt::format("kernel {}", kernel_name(header.kernel)),
                     "takes a shape of each splat, which this call has no place for",
-                    "Load or train a scene of it: darb.Scene, darb.train.");
+                    "Load or train a scene of it: darb.Scene, darb.Trainer.");
     if (!options["footprint"].is_none()) header.footprint = take_footprint(options["footprint"]);
     if (!options["antialiased"].is_none())
         header.antialias = take_flag(options["antialiased"], "antialiased");

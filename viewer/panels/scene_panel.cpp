@@ -2,8 +2,10 @@
 #include <imgui.h>
 
 #include <string>
+#include <vector>
 
 #include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "viewer/panels/panels.h"
 
 namespace darb {
@@ -14,7 +16,9 @@ void kernel_choice(Session& s) {
     DisplaySettings& d = s.display;
     const std::string now(kernel_name(d.kernel));
     if (ImGui::BeginCombo("kernel", now.c_str())) {
-        for (const int k : known_kernels()) {
+        std::vector<int> kernels = known_kernels();
+        if (kernel_has_shape(s.own.kernel)) kernels.push_back(s.own.kernel);
+        for (const int k : kernels) {
             const std::string name(kernel_name(k));
             if (ImGui::Selectable(name.c_str(), k == d.kernel)) d.kernel = k;
         }

@@ -82,8 +82,8 @@ TEST(PageDocument, numbers_are_those_of_the_tree) {
     EXPECT_NE(blend.find("#define ALPHA_MAX 0.99"), blend.npos);
 }
 
-TEST(PageDocument, script_and_shaders_are_about_70_kilobytes) {
-    EXPECT_LT(page_script_bytes(), 70'000u);
+TEST(PageDocument, script_and_shaders_are_under_75_kilobytes) {
+    EXPECT_LT(page_script_bytes(), 75'000u);
 }
 
 // ES as glslang knows it; the browser's own compiler has the last word in tools/page_check.py.
