@@ -1,0 +1,191 @@
+// What darb does with a scene that it has trained: eval, render, check --dump, info, and resuming.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "engine/core/files.h"
+#include "engine/data/image_io.h"
+#include "engine/scene/ply.h"
+#include "tests/support/run_command.h"
+#include "tests/support/test_data.h"
+
+namespace darb {
+namespace {
+
+using nlohmann::json;
+using namespace test;
+
+const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+
+// A scene of 20 iterations. 3DGS's names of the options, with underscores.
+class TrainedCommand : public testing::Test {
+  protected:
+    static void SetUpTestSuite() {
+        const Outcome o =
+            darb(fmt::format("train -s {} -m {} -r 2 --eval --iterations 20 --test_iterations 20 "
+                             "--densify_from_iter 500 --strategy adc -i images -w --quiet",
+                             kScene, output()));
+        ASSERT_EQ(o.code, 0) << o.err;
+        EXPECT_EQ(o.err, "");
+    }
+    static std::string output() { return scratch() / "run"; }
+    static std::string ply() { return output() + "/point_cloud/iteration_20/point_cloud.ply"; }
+    static size_t count_png(const fs::path& folder) {
+        return static_cast<size_t>(
+            std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
+                          [](const auto& entry) { return entry.path().extension() == ".png"; }));
+    }
+};
+
+TEST_F(TrainedCommand, eval_reports_what_training_reported) {
+    const std::string file = scratch() / "eval.json";
+    const Outcome o = darb(fmt::format("eval {} {} -r 2 -w --json {}", ply(), kScene, file));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("mean of 8"), std::string::npos) << o.out;
+    const json eval = json::parse(read_text_file(file));
+    const json trained = json::parse(read_text_file(output() + "/metrics.json"))["evaluations"][0];
+    EXPECT_NEAR(eval["mean"]["psnr_db"].get<double>(), trained["psnr_db"].get<double>(), 1e-6);
+    EXPECT_NEAR(eval["mean"]["ssim"].get<double>(), trained["ssim"].get<double>(), 1e-6);
+    ASSERT_EQ(eval["views"].size(), 8U);
+    EXPECT_EQ(eval["views"][0]["name"], "view_03.png");
+    ASSERT_EQ(eval.at("off_path").at("views").size(), 16U);
+    EXPECT_EQ(eval["off_path"]["views"][0]["name"], "images/between_0.png");
+    EXPECT_GT(eval["off_path"]["mean"]["psnr_db"].get<double>(), 5.0);
+    EXPECT_GT(eval["views"][0]["psnr_db"].get<double>(), 5.0);
+}
+
+TEST_F(TrainedCommand, eval_measures_at_other_sizes) {
+    const std::string command = fmt::format("eval {} {} -w ", ply(), kScene);
+    const std::string file = scratch() / "scales.json", whole = scratch() / "whole.json";
+    const Outcome o = darb(command + "-r 4 --scales 4,0.5,1 --json " + file);
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("1/2       25 x 19"), std::string::npos) << o.out;
+    const json rows = json::parse(read_text_file(file)).at("scales");
+    ASSERT_EQ(rows.size(), 3U);
+    // Four times a quarter is the whole photo, and half of it what -r 8 loads.
+    ASSERT_EQ(darb(command + "-r 1 --json " + whole).code, 0);
+    const json first = json::parse(read_text_file(whole));
+    EXPECT_EQ(rows[0].at("scale"), 4);
+    EXPECT_EQ(rows[0].at("width"), 200);
+    EXPECT_EQ(rows[0].at("mean"), first.at("mean"));
+    EXPECT_EQ(rows[0].at("views"), first.at("views"));
+    ASSERT_EQ(darb(command + "-r 8 --json " + whole).code, 0);
+    EXPECT_EQ(rows[1].at("mean"), json::parse(read_text_file(whole)).at("mean"));
+    expect_refused({{command + "-r 2 --scales 4", "4 times 100 px is 400 px"}});
+}
+
+TEST_F(TrainedCommand, eval_takes_the_split_asked_for) {
+    const std::string command = fmt::format("eval {} {} -r 4 --split ", output(), kScene);
+    EXPECT_NE(darb(command + "train").out.find("mean of 40"), std::string::npos);
+    const std::string single = scratch() / "single";
+    json cameras = json::parse(read_text_file(kScene + "/transforms_train.json"));
+    cameras["frames"].erase(cameras["frames"].begin() + 1, cameras["frames"].end());
+    cameras["frames"][0]["file_path"] = kScene + "/images/view_00.png";
+    write_file_atomic(single + "/transforms.json", cameras.dump());
+    expect_refused({{fmt::format("eval {} {} --split train", ply(), single), "split 'train'"}});
+}
+
+TEST_F(TrainedCommand, check_dumps_a_view) {
+    const std::string dump = scratch() / "dump";
+    const std::string command =
+        fmt::format("check --scene {} --cameras {}/cameras.json --dump {}", ply(), output(), dump);
+    EXPECT_EQ(darb(command + " --view 2").code, 0);
+    EXPECT_EQ(darb(command + "/double --view 2 --reference").code, 0);
+    for (const char* name :
+         {"image", "d_xyz", "d_f_dc", "d_f_rest", "d_opacity", "d_scale", "d_rot"}) {
+        const fs::path file = fs::path(dump) / (std::string(name) + ".npy");
+        const fs::path reference = fs::path(dump) / "double" / (std::string(name) + ".npy");
+        EXPECT_EQ(fs::file_size(reference) - 128, 2 * (fs::file_size(file) - 128)) << name;
+    }
+    expect_refused({{command + " --view 48", "--view takes 0 to 47"}});
+}
+
+TEST_F(TrainedCommand, render_takes_every_kind_of_cameras) {
+    const std::string own = scratch() / "own", transforms = scratch() / "transforms";
+    const Outcome o =
+        darb(fmt::format("render {} --cameras {}/cameras.json -o {} -w", ply(), output(), own));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("48 frames"), std::string::npos) << o.out;
+    EXPECT_EQ(count_png(own), 48U);
+    EXPECT_EQ(read_image_info(own + "/view_00.png").width, 100);
+    const Outcome t =
+        darb(fmt::format("render {} --cameras {}/transforms_test.json -r 4 "
+                         "--sh_degree 0 --near 0.5 -o {}",
+                         ply(), kScene, transforms));
+    ASSERT_EQ(t.code, 0) << t.err;
+    EXPECT_EQ(count_png(transforms), 8U);
+    if (const auto data = test::test_data_folder()) {
+        const std::string list = *data / "fixtures" / "inria_miku_output" / "cameras.json";
+        const std::string foreign = scratch() / "foreign";
+        ASSERT_EQ(
+            darb(fmt::format("render {} --cameras {} -r 64 -o {}", ply(), list, foreign)).code, 0);
+        EXPECT_EQ(count_png(foreign), 97U);
+        EXPECT_EQ(read_image_info(foreign + "/20240212_003919.png").width, 64);
+    }
+}
+
+TEST_F(TrainedCommand, frames_of_equal_names_are_kept_apart) {
+    json cameras = json::parse(read_text_file(output() + "/cameras.json"));
+    cameras.erase(cameras.begin() + 3, cameras.end());
+    cameras[0]["img_name"] = "a/b.png";
+    cameras[1]["img_name"] = "a_b.jpg";
+    cameras[2]["img_name"] = "../../a";
+    const std::string list = scratch() / "list.json", frames = scratch() / "frames";
+    write_file_atomic(list, cameras.dump());
+    ASSERT_EQ(darb(fmt::format("render {} --cameras {} -r 4 -o {}", ply(), list, frames)).code, 0);
+    for (const char* name : {"a_b.png", "a_b_2.png", ".._.._a.png"})
+        EXPECT_TRUE(fs::exists(fs::path(frames) / name)) << name;
+    EXPECT_EQ(count_png(frames), 3U);
+}
+
+TEST_F(TrainedCommand, what_a_data_set_notes_is_said) {
+    const fs::path set = scratch() / "noted" / "transforms.json";
+    json cameras = json::parse(read_text_file(kScene + "/transforms_test.json"));
+    for (json& frame : cameras["frames"])
+        frame["file_path"] = kScene + "/" + frame["file_path"].get<std::string>();
+    cameras["frames"][0]["file_path"] = "no_photo.png";
+    cameras["k1"] = 1e-3;
+    write_file_atomic(set, cameras.dump());
+    const Outcome e = darb(fmt::format("eval {} {} -r 8 --split all", ply(), set.string()));
+    EXPECT_EQ(e.code, 0) << e.err;
+    EXPECT_NE(e.err.find("note: Skipped: 1 frame whose photo"), std::string::npos) << e.err;
+    const Outcome r =
+        darb(fmt::format("render {} --cameras {} -r 8 -o {} --depth png "
+                         "--depth-unit 1e-6",
+                         ply(), set.string(), (scratch() / "noted_out").string()));
+    EXPECT_EQ(r.code, 0) << r.err;
+    EXPECT_NE(r.err.find("note: Undistorted at load: 8 photos"), std::string::npos) << r.err;
+    EXPECT_NE(r.err.find("pixels of the depth PNGs lie beyond 0.065535 world units"),
+              std::string::npos)
+        << r.err;
+}
+
+TEST_F(TrainedCommand, info_describes_the_scene) {
+    const Outcome text = darb("info " + output());
+    EXPECT_EQ(text.code, 0) << text.err;
+    EXPECT_NE(text.out.find("gaussian, footprint psi"), std::string::npos) << text.out;
+    const json info = json::parse(darb("info --json - " + ply()).out);
+    EXPECT_EQ(info["splats"], 4000);
+    EXPECT_EQ(info["bytes"], fs::file_size(ply()));
+    EXPECT_EQ(info["sh_degree"], 0) << "no degree is admitted within 20 iterations";
+    EXPECT_EQ(info["warnings"], json::array());
+    for (const char* key : {"p1", "p10", "p50", "p90", "p99"}) {
+        EXPECT_GT(info["scale"][key].get<double>(), 0) << key;
+        EXPECT_GT(info["opacity"][key].get<double>(), 0) << key;
+    }
+    for (size_t axis = 0; axis < 3; ++axis)
+        EXPECT_LT(info["bounds"]["low"][axis], info["bounds"]["high"][axis]) << axis;
+}
+
+TEST_F(TrainedCommand, finished_run_resumes_to_the_same_end) {
+    const Outcome o = darb("train --resume -o " + output());
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("at iteration 20"), std::string::npos) << o.err;
+}
+
+}  // namespace
+}  // namespace darb
