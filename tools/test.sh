@@ -49,7 +49,7 @@ numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases)\.|
 # Of processes and of scripts, seconds each: they run in the steps unit and gpu, and find nothing new in the others.
 once='^(scripts|pages|Outputs)\.'
 # Passes that other tests also record, with other numbers: not under validation.
-same_passes='^(kernel_gradient|walk|accuracy_walk|hard_case)_test$'
+same_passes='^(kernel_gradient|walk|accuracy_walk|hard_case|blend|blend_backward|project)_test$'
 run_ctest() {
     local preset=$1 log=$logs/$step
     shift
