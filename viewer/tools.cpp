@@ -147,20 +147,24 @@ void show_edit(std::size_t changed, Session& s) {
     s.ask(request::ShowEdits{});
 }
 
+namespace {
+
+void show_step(const std::string& what, const char* said, Session& s) {
+    if (what.empty()) return;
+    s.tell(said + what);
+    s.ask(request::ShowEdits{});
+}
+
+}  // namespace
+
 void undo_edit(Session& s) {
     if (!s.scene || s.edit.transforms()) return;
-    const std::string what = s.edit.undo(s.scene->model);
-    if (what.empty()) return;
-    s.tell("undone: " + what);
-    s.ask(request::ShowEdits{});
+    show_step(s.edit.undo(s.scene->model), "undone: ", s);
 }
 
 void redo_edit(Session& s) {
     if (!s.scene || s.edit.transforms()) return;
-    const std::string what = s.edit.redo(s.scene->model);
-    if (what.empty()) return;
-    s.tell("redone: " + what);
-    s.ask(request::ShowEdits{});
+    show_step(s.edit.redo(s.scene->model), "redone: ", s);
 }
 
 }  // namespace darb

@@ -89,8 +89,9 @@ std::filesystem::path project_of_photos(const std::filesystem::path& folder);
 /// alpha 0.
 ImageU8 load_photo(const View& view);
 
-/// The same views at `scale` times their size; load_photo follows. Whole photos where that comes
-/// within a pixel of theirs. Throws Error where a photo is smaller.
+/// The same views at `scale` times their size; load_photo follows. Whole photos where they are that
+/// size but for the half pixel that rounding took from the view's. Throws Error where a photo is
+/// smaller.
 std::vector<View> scaled_views(std::vector<View> views, double scale);
 
 /// Loads all, on `threads` threads (0 = all cores), in the order of views. As many at a time as

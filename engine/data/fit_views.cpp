@@ -165,6 +165,7 @@ PhotoSize size_at_resolution(int width, int height, int resolution) {
 }
 
 std::vector<View> scaled_views(std::vector<View> views, double scale) {
+    if (scale == 1) return views;
     for (View& view : views) {
         const Camera now = view.camera;
         const Camera full = now.lens.active || !view.lens.distorted()
@@ -182,7 +183,7 @@ std::vector<View> scaled_views(std::vector<View> views, double scale) {
             size.height = std::max(
                 1, static_cast<int>(std::lround(double(full.height) * size.width / full.width)));
         }
-        if (scale != 1) set_size(now, size, view.camera);
+        set_size(now, size, view.camera);
     }
     return views;
 }

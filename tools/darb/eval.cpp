@@ -60,9 +60,9 @@ int eval(EvalFlags flags) {
     print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
     const std::vector<View> views = views_of(dataset, flags);
-    const std::vector<View> away =
-        flags.split == "train" ? std::vector<View>{} : off_path_views(flags.dataset, flags.data);
-    refuse_to_overwrite_inputs({flags.json}, files_of(away));
+    const Dataset away =
+        flags.split == "train" ? Dataset{} : off_path_of(flags.dataset, flags.data);
+    refuse_to_overwrite_inputs({flags.json}, files_of(away.views));
     std::vector<std::vector<View>> sizes;  // before the first picture: a photo may be too small
     for (const double scale : flags.scales) sizes.push_back(scaled_views(views, scale));
     DeviceOptions device_options = command_device(flags.device);
@@ -84,11 +84,12 @@ int eval(EvalFlags flags) {
         json = evaluation_json(scales);
         print_evaluation(out, scales);
     }
-    if (!away.empty()) {
-        const Evaluation evaluation = evaluate_scene(device, model, away, options);
+    if (!away.views.empty()) {
+        options.alpha_is_mask = away.alpha_is_mask;
+        const Evaluation evaluation = evaluate_scene(device, model, test_views(away), options);
         json["off_path"] = evaluation_json(evaluation);
-        tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", away.size(), evaluation.psnr_db,
-             evaluation.ssim);
+        tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
+             evaluation.psnr_db, evaluation.ssim);
     }
     write_json(flags.json, json);
     tell_paths(flags.quiet, {flags.json});

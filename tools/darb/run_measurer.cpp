@@ -8,16 +8,9 @@
 
 namespace darb {
 
-std::vector<View> test_views(const Dataset& dataset) {
-    std::vector<View> views;
-    for (const View& v : dataset.views)
-        if (v.is_test) views.push_back(v);
-    return views;
-}
-
 RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
                          const Dataset& dataset, const TrainFlags& first, const Lpips* lpips)
-    : flags_(flags), lpips_(lpips), off_path_(off_path_views(path, dataset.options)) {
+    : flags_(flags), lpips_(lpips), off_path_(off_path_of(path, dataset.options)) {
     for (const double scale : flags.scales)
         scaled_.push_back(scaled_views(test_views(dataset), scale));
     options_.background = glm::vec3(first.train.white_background ? 1.0f : 0.0f);
@@ -33,8 +26,10 @@ void RunMeasurer::measure_models(ComparedRun& run, Device& device) const {
             const Evaluation e = evaluate_scene(device, model, scaled_[i], options_);
             at.scales.push_back({flags_.scales[i], e.psnr_db, e.ssim});
         }
-        if (!off_path_.empty())
-            at.off_path_db = evaluate_scene(device, model, off_path_, options_).psnr_db;
+        if (off_path_.views.empty()) continue;
+        SceneEvaluation options = options_;
+        options.alpha_is_mask = off_path_.alpha_is_mask;
+        at.off_path_db = evaluate_scene(device, model, test_views(off_path_), options).psnr_db;
     }
 }
 
@@ -48,7 +43,7 @@ void RunMeasurer::measure(ComparedRun& run, const std::vector<View>& held_out) {
             measurement(device);
         });
     };
-    if (!scaled_.empty() || !off_path_.empty())
+    if (!scaled_.empty() || !off_path_.views.empty())
         on_device("other sizes and views off the path",
                   [&](Device& device) { measure_models(run, device); });
     if (flags_.blending_views == 0 || blended_.contains(run.kernel)) return;

@@ -13,9 +13,7 @@
 
 namespace darb {
 
-/// Of one data set: the views that are held out.
-std::vector<View> test_views(const Dataset& dataset);
-
+/// Of one data set.
 class RunMeasurer {
   public:
     /// path: of the data set. Throws Error where a photo is too small for one of flags.scales.
@@ -33,8 +31,8 @@ class RunMeasurer {
     const CompareFlags& flags_;
     ViewLpips lpips_;
     std::vector<std::vector<View>> scaled_;  // [scale]
-    std::vector<View> off_path_;
     SceneEvaluation options_;
+    Dataset off_path_;
     std::set<std::string> blended_;  // kernels
 };
 

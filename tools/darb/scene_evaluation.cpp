@@ -81,15 +81,18 @@ void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales) {
              at.evaluation.ssim);
 }
 
-std::vector<View> off_path_views(const std::filesystem::path& dataset,
-                                 const DatasetOptions& options) {
+Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& options) {
     const std::filesystem::path folder = dataset / "off_path";
     if (!std::filesystem::exists(folder / "transforms_test.json")) return {};
     DatasetOptions own = options;
     own.images_folder = DatasetOptions{}.images_folder;  // --images is of the data set's photos
+    return load_dataset(folder, own);
+}
+
+std::vector<View> test_views(const Dataset& dataset) {
     std::vector<View> views;
-    for (View& view : load_dataset(folder, own).views)
-        if (view.is_test) views.push_back(std::move(view));
+    for (const View& view : dataset.views)
+        if (view.is_test) views.push_back(view);
     return views;
 }
 

@@ -33,10 +33,11 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
 /// --scales: sizes to measure at, as multiples of that of -r, each above 0.
 CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales);
 
-/// The held-out views of DATASET/off_path, a data set of its own, at the size of -r: pictures away
-/// from the path of the photos. None where that has no transforms_test.json.
-std::vector<View> off_path_views(const std::filesystem::path& dataset,
-                                 const DatasetOptions& options);
+/// DATASET/off_path, a data set that is all held out, at the size of -r: pictures away from the
+/// path of the photos. Without views where that folder has no transforms_test.json.
+Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& options);
+/// Those of its views that are held out.
+std::vector<View> test_views(const Dataset& dataset);
 
 /// An evaluation at one of the scales.
 struct AtScale {

@@ -53,13 +53,13 @@ std::vector<Column> every_column(const Comparison& comparison) {
     std::vector<Column> columns = quality_columns();
     auto at = columns.begin() + 1;
     for (const double scale : comparison.scales)
-        at = 1 +
-             columns.insert(at, {"at " + scale_text(scale), "dB", "psnr_db_at_" + scale_text(scale),
-                                 2, true, [scale](const ComparedRun&, const ComparedAt& run) {
-                                     for (const ComparedScale& s : run.scales)
-                                         if (s.scale == scale) return Value(s.psnr_db);
-                                     return Value();
-                                 }});
+        at = 1 + columns.insert(
+                     at, {"at " + scale_text(scale), "dB", fmt::format("psnr_db_at_{:.4g}", scale),
+                          2, true, [scale](const ComparedRun&, const ComparedAt& run) {
+                              for (const ComparedScale& s : run.scales)
+                                  if (s.scale == scale) return Value(s.psnr_db);
+                              return Value();
+                          }});
     columns.insert(at, {"off path", "dB", "off_path_psnr_db", 2, true,
                         [](const ComparedRun&, const ComparedAt& run) { return run.off_path_db; }});
     return columns;
