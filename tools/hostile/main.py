@@ -94,9 +94,15 @@ def signature(text):
     return re.sub(r"[\w./-]*/[\w./-]*|-?\d[\d.e+-]*|\S*\\\S*", "N", text)[:60]
 
 
+def commit():
+    """Empty where there is no git, or no repository."""
+    if not shutil.which("git"):
+        return ""
+    return subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False).stdout.strip()
+
+
 def summary(day, begin, hours):
-    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False)
-    return {"darb": day.darb, "commit": commit.stdout.strip(), "seed": day.seed, "hours_asked": hours,
+    return {"darb": day.darb, "commit": commit(), "seed": day.seed, "hours_asked": hours,
             "hours": round((time.time() - begin) / 3600, 4),
             "parts": {part: {"cases": day.cases[part], "executions": day.runs[part], "seconds": round(day.seconds[part], 1),
                              "findings": sum(1 for sign in day.findings if sign[0] == part)}
