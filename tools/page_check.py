@@ -197,6 +197,8 @@ def check_page(page, path, truths, least, name, arguments, failures, folder, che
     found = worst_of_page(page, truths, arguments.out and os.path.join(folder, name.replace(" ", "_")))
     row.update(db=found, worst_db=min(found), mean_db=sum(found) / len(found), blended=page.run("darb.state.format"))
     row["merged_db"] = merged_splats(page, truths)
+    merges = 2 if row["splats"] >= page.run("darb.fewSplats") else 0
+    check(failures, len(row["merged_db"]) == merges, f"{name}: {len(row['merged_db'])} levels of merged splats, {merges} are wanted")
     check(failures, all(db >= arguments.least_merged for db in row["merged_db"]), f"{name}: merged splats: {row['merged_db']}")
     if arguments.turn:
         page.run(f"darb.turn({arguments.turn})")

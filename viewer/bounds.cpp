@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/core/quantile.h"
+#include "shaders/shared/limits.h"
 
 namespace darb {
 
@@ -76,6 +77,10 @@ double framing_distance(const SplatModel& model, const Bounds& bounds, const glm
         distances.push_back(std::max(std::abs(p.x) / tan_x, std::abs(p.y) / tan_y) - p.z);
     }
     return distances.empty() ? 0 : std::max(nearest_rank(distances, 1 - kUnframed), 0.0);
+}
+
+float near_plane_for(const Bounds& bounds) {
+    return std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(bounds.radius * 0.1));
 }
 
 glm::dvec3 guess_up(const SplatModel& m) {

@@ -24,6 +24,11 @@ Bounds scene_bounds(const SplatModel& model);
 double framing_distance(const SplatModel& model, const Bounds& bounds, const glm::dmat3& axes,
                         double tan_x, double tan_y);
 
+/// The near plane to look at a scene from outside with, world units: that of training, which does
+/// not see what is nearer: such splats hang before the training cameras, and a nearer plane would
+/// show them. Less only where a scene is so small that it is looked at from nearer.
+float near_plane_for(const Bounds& bounds);
+
 /// A guess which way is up in a scene without cameras: -y, as 3DGS has it, but where the top looks
 /// like a foot: opacity times area within 5 % of the height, times how wide that is, is more than
 /// 1.5 times that of the bottom. What stands is wide where it stands.

@@ -166,6 +166,7 @@ std::size_t Edit::end_transform(const SplatModel& model) {
     if (count == 0 || moved.after.size() != count) return 0;  // was not moved
     DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
     push({counted("moved", count), ++last_id_, std::move(moved)});
+    ++model_version_;  // what waited for the end of the move follows
     return count;
 }
 
@@ -237,6 +238,11 @@ std::string Edit::undo(SplatModel& model) {
     return steps_[done_].what;
 }
 
+void Edit::take_back(SplatModel& model) {
+    if (undo(model).empty()) return;
+    steps_.resize(done_);
+}
+
 std::string Edit::redo(SplatModel& model) {
     if (!can_redo()) return "";
     apply_step(steps_[done_++], true, model);
@@ -269,14 +275,6 @@ SplatModel Edit::apply(const SplatModel& model) const {
     SplatModel out = model;
     keep_splats([&](std::size_t i) { return removed_[i] == 0; }, out);
     return out;
-}
-
-std::size_t count_inside(const SplatModel& model, const Region& region, const Edit& edit) {
-    const SplatMask mask = in_region(model, region);
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < mask.size(); ++i)
-        count += mask[i] != 0 && edit.removed()[i] == 0 ? 1 : 0;
-    return count;
 }
 
 }  // namespace darb

@@ -51,6 +51,8 @@ class Edit {
     bool can_redo() const { return done_ < steps_.size(); }
     /// What was undone or redone, "deleted 12 splats"; "" where there was nothing to do.
     std::string undo(SplatModel& model);
+    /// The last step was not: it cannot be done again either.
+    void take_back(SplatModel& model);
     std::string redo(SplatModel& model);
     /// Of the last step.
     const std::string& last() const;
@@ -66,6 +68,8 @@ class Edit {
     std::size_t selected_count() const { return selected_count_; }
     /// What would be saved differs from the file and from the last mark_saved(). Selections and
     /// what is hidden are not saved.
+    /// Which content this is: equal where what would be saved is equal; 0: as it was opened.
+    int content() const;
     bool unsaved() const;
     void mark_saved() { saved_ = content(); }
     /// The scene without the deleted splats, in the same order.
@@ -95,7 +99,6 @@ class Edit {
     void append(const SplatModel& added, SplatModel& model);
     void cut(const Merged& merged, SplatModel& model);
     std::vector<std::uint32_t> moved_splats() const;
-    int content() const;
 
     SplatMask removed_, hidden_, selected_;
     std::vector<Step> steps_;
@@ -105,8 +108,5 @@ class Edit {
     int last_id_ = 0, model_version_ = 0;
     int saved_ = 0;  // content when it was saved; 0: of the file
 };
-
-/// Splats of the region that are not deleted yet.
-std::size_t count_inside(const SplatModel& model, const Region& region, const Edit& edit);
 
 }  // namespace darb

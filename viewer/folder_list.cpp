@@ -1,16 +1,14 @@
 #include "viewer/folder_list.h"
 
 #include <algorithm>
-#include <array>
 
-#include "engine/core/files.h"
+#include "engine/scene/splat_file.h"
 
 namespace darb {
 
 namespace {
 
 constexpr std::size_t kMostEntries = 5'000;
-constexpr std::array kSceneEndings = {".ply", ".spz", ".splat", ".sog", ".ksplat", ".glb", ".gltf"};
 
 }  // namespace
 
@@ -22,11 +20,7 @@ std::vector<FolderEntry> list_folder(const std::filesystem::path& folder) {
         std::error_code none;
         const std::string name = at->path().filename().string();
         const bool is_folder = at->is_directory(none);
-        const bool is_scene =
-            at->is_regular_file(none) &&
-            (name == "meta.json" ||  // of SOG in a folder
-             std::any_of(kSceneEndings.begin(), kSceneEndings.end(),
-                         [&](const char* ending) { return has_extension(at->path(), ending); }));
+        const bool is_scene = at->is_regular_file(none) && names_scene(at->path());
         if (!name.starts_with('.') && (is_folder || is_scene)) entries.push_back({name, is_folder});
     }
     std::sort(entries.begin(), entries.end(), [](const FolderEntry& a, const FolderEntry& b) {

@@ -1,6 +1,7 @@
 #include "viewer/pane_pictures.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/primitives/groups.h"
 
@@ -27,11 +28,13 @@ void PanePictures::render(SplatPicture& picture, const Camera& camera,
     composed_.reset();
     pass_times_.clear();
     compiled_ = !strips_;
-    size_ = {camera.width, camera.height};
-    pictures_.resize(photos + displays.size());
-    for (Buffer& b : pictures_)
+    std::vector<Buffer> pictures = std::exchange(pictures_, {});  // none where one has no room
+    pictures.resize(photos + displays.size());
+    for (Buffer& b : pictures)
         if (b.bytes() < bytes) b = Buffer(*device_, "pane", bytes);
     if (pixels_.bytes() < bytes) pixels_ = Buffer(*device_, "panes", bytes);
+    pictures_ = std::move(pictures);
+    size_ = {camera.width, camera.height};
     if (photos > 0) draw_photo(photo, displays.front());
     picture.keep_panes(displays.size());
     for (std::size_t i = 0; i < displays.size(); ++i) {

@@ -14,6 +14,12 @@ constexpr float kNarrowest = 0.01f;  // share of the width between two lines
 
 }  // namespace
 
+std::vector<int> kernels_beside(const Panes& panes, int shown) {
+    std::vector<int> kernels = panes.kernels;
+    std::erase(kernels, shown);
+    return kernels;
+}
+
 void fit_lines(std::size_t panes, Panes& state, float left) {
     const std::size_t wanted = panes > 0 ? panes - 1 : 0;
     if (state.lines.size() == wanted) return;

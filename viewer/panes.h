@@ -19,6 +19,8 @@ struct Panes {
     std::vector<double> psnr_db;
 };
 
+/// Those of panes.kernels but the one that is shown first.
+std::vector<int> kernels_beside(const Panes& panes, int shown);
 /// Lines where their number is not one less than that of the panes: evenly spaced right of `left`,
 /// a share of the width.
 void fit_lines(std::size_t panes, Panes& state, float left = 0);

@@ -44,7 +44,9 @@ void RecentFiles::opened(const std::filesystem::path& scene) const {
     if (list_.empty()) return;
     std::optional<std::vector<std::string>> names = read_recent(list_);
     if (!names) return;
-    const std::string name = std::filesystem::absolute(scene).lexically_normal().string();
+    std::filesystem::path path = std::filesystem::absolute(scene).lexically_normal();
+    if (!path.has_filename()) path = path.parent_path();  // a folder, named with a slash
+    const std::string name = path.string();
     std::erase(*names, name);
     names->insert(names->begin(), name);
     names->resize(std::min(names->size(), kMostRecent));

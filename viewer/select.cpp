@@ -66,7 +66,7 @@ class CubeGrid {
     using Cube = std::array<std::int64_t, 3>;
     Cube cube(const glm::dvec3& p) const {
         const glm::dvec3 c = glm::floor((p - corner_) / side_);
-        constexpr double kFar = 1 << 20;  // what is farther shares cubes, which is only slower
+        constexpr double kFar = 1 << 21;  // what is farther shares cubes, which is only slower
         return {static_cast<std::int64_t>(std::fmod(c.x, kFar)),
                 static_cast<std::int64_t>(std::fmod(c.y, kFar)),
                 static_cast<std::int64_t>(std::fmod(c.z, kFar))};

@@ -72,6 +72,7 @@ bool use_gizmo(const Input& in, const Camera& camera, Session& s) {
         s.edit.begin_transform(s.scene->model);
     }
     if (in.left) {
+        if (in.dx == 0 && in.dy == 0) return true;  // a hand that rests, or a click alone
         const Similarity total =
             dragged(t.gizmo, camera, *t.handle, t.stroke.front(), {in.x, in.y});
         s.edit.drag_transform(total, s.scene->model);

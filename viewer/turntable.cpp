@@ -38,6 +38,7 @@ CameraPath turntable(const SplatModel& model, const TurntableOptions& options) {
         view.orbit(2 * glm::pi<double>() * frame / frames, 0);
         view.look_from(bounds.centre, distance);
         path.add(view, 1.0 / options.fps);
+        path.keys.back().seconds = static_cast<double>(frame) / options.fps;  // no sum of roundings
     }
     return path;
 }

@@ -138,6 +138,7 @@ class Viewer {
     void load_current_photo();
     void pace_picture(int width, int height, bool full, bool works);
     std::vector<DisplaySettings> pane_displays() const;
+    void show_degree(int degree);
     void render_shown(const Camera& camera, const WindowArea& area, std::optional<double> moving);
     void compose_panes();
     bool ready_to_move() const;
@@ -170,6 +171,7 @@ class Viewer {
     RecentFiles recent_;
     std::string told_;                      // the note that is a toast already
     int shown_model_ = 0;                   // Edit::model_version of the picture
+    int edit_at_load_ = 0;                  // Edit::content when a load was started
     glm::dvec3 known_up_{0.0};              // of the scene, as it was opened or last remembered
     std::vector<double> shares_;            // of the splats, below all
     std::unique_ptr<MotionLevels> levels_;  // of the scene; null: none asked for

@@ -68,6 +68,7 @@ bool Viewer::levels_ready() const {
 void Viewer::load_current_photo() {
     Photos& p = session_.photos;
     const bool wanted = p.compare || session_.display.mode == VIEW_ERROR;
+    if (live_ != nullptr) return;  // whoever draws reads it
     if (p.current < 0 || !wanted || p.loaded == p.current || p.failed) return;
     if (attempt([&] { load_photo_of_view(*device_, p); })) {
         ++version_;
@@ -103,7 +104,7 @@ void Viewer::pace_picture(int width, int height, bool full, bool works) {
 // One for each pane of a kernel; the first is the whole picture where there are no more.
 std::vector<DisplaySettings> Viewer::pane_displays() const {
     std::vector<DisplaySettings> displays{session_.display};
-    for (const int kernel : session_.panes.kernels)
+    for (const int kernel : kernels_beside(session_.panes, session_.display.kernel))
         displays.emplace_back(session_.display).kernel = kernel;
     return displays;
 }

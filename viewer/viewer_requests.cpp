@@ -132,7 +132,6 @@ void Viewer::show_edits() {
     if (!s.scene) return;
     lose_scene("the scene was edited");
     if (s.edit.model_version() != shown_model_) {
-        shown_model_ = s.edit.model_version();
         Scene& scene = *s.scene;
         if (s.edit.transforms()) {
             picture_.update_scene();
@@ -143,8 +142,9 @@ void Viewer::show_edits() {
                           ? motion_shares(picture_.splat_count(), picture_.most_moving())
                           : std::vector<double>();
             pacing_.motion().start(shares_);
-            session_.sh_degree = scene.model.sh_degree;
+            show_degree(scene.model.sh_degree);
         }
+        shown_model_ = s.edit.model_version();
     }
     picture_.set_marks(s.edit.unseen(), s.edit.selected());
 }

@@ -24,13 +24,10 @@ bool any_lens(const std::vector<View>& views) {
 
 // Beside the scene, in its format where that is written.
 fs::path edited_name(const fs::path& file) {
-    const std::string name = file.filename().string();
-    const std::size_t dot = name.find('.');
-    const std::string stem = name.substr(0, dot);
-    if (dot != std::string::npos && dot > 0) {
-        const fs::path same = fs::path(file).replace_filename(stem + "_edited" + name.substr(dot));
-        if (format_to_write(same)) return same;
-    }
+    const std::string stem = stem_to_write(file),
+                      ending = file.filename().string().substr(stem.size());
+    const fs::path same = fs::path(file).replace_filename(stem + "_edited" + ending);
+    if (!stem.empty() && format_to_write(same)) return same;
     return fs::path(file).replace_filename(file.stem().string() + "_edited.ply");
 }
 
@@ -51,7 +48,13 @@ void Viewer::merge(LoadedScene loaded) {
     const std::string from = loaded.scene.file.filename().string();
     if (s.edit.transforms()) choose_tool(Tool::navigate, s);
     const std::size_t count = s.edit.merge(std::move(loaded.scene.model), s.scene->model);
-    show_edits();
+    try {
+        show_edits();
+    } catch (const std::exception&) {  // the device has no room: as it was before
+        s.edit.take_back(s.scene->model);
+        show_edits();
+        throw;
+    }
     s.tell(fmt::format("merged {} splats of {}", count, from));
 }
 
@@ -69,6 +72,7 @@ void Viewer::drop(const std::filesystem::path& path) {
 void Viewer::start_load(const std::filesystem::path& path, bool dropped, bool merges) {
     attempt([&] {
         loader_.start(path, dropped, merges);
+        edit_at_load_ = session_.edit.content();
         session_.error.clear();
         if (dropped) session_.note.clear();
     });
@@ -85,8 +89,11 @@ void Viewer::finish_loading() {
 void Viewer::take_loaded() {
     attempt([&] {
         if (std::optional<LoadedScene> loaded = loader_.poll()) {
+            const Edit& edit = session_.edit;
             if (loaded->merges && session_.scene)
                 merge(std::move(*loaded));
+            else if (session_.scene && edit.unsaved() && edit.content() != edit_at_load_)
+                session_.leaving = Leaving{false, loaded->asked_for};  // edited since
             else
                 show(std::move(*loaded));
         }
@@ -121,9 +128,12 @@ void Viewer::show(LoadedScene loaded) {
     session_.tools.grow = static_cast<float>(s.bounds.radius / 50);
     session_.tools.scale[1] = static_cast<float>(s.bounds.radius / 10);
     shown_model_ = 0;
-    attempt([&] { recent_.opened(asked); });
+    try {
+        recent_.opened(asked);
+    } catch (const std::exception& e) {  // the scene is there all the same
+        session_.scene->notes.emplace_back(e.what());
+    }
     session_.selection.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
-    session_.save_file = s.file;
     session_.save_file = edited_name(s.file);
     session_.fly_speed = s.bounds.radius / 2;
     show_as_meant(s, first);
@@ -196,11 +206,7 @@ void Viewer::show_as_meant(const Scene& s, bool first) {
     d.effects.antialias = s.model.antialias;
     d.effects.lens = any_lens(session_.photos.views);
     d.huge_splat_path = HugeSplatPath::by_counters;
-    // That of training, which does not see what is nearer: such splats hang before the training
-    // cameras, and a nearer plane would show them. Less only where a scene is so small that it is
-    // looked at from nearer.
-    d.near_plane =
-        std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(s.bounds.radius * 0.1));
+    d.near_plane = near_plane_for(s.bounds);
     session_.own = d;
     session_.measured.clear();
     session_.plan = plan_rendering(
@@ -236,11 +242,18 @@ void Viewer::show_live(LivePicture& pictures, const Bounds& bounds, const LiveSc
     set_pivot(bounds);
 }
 
+// Whoever sees every degree there is goes on to.
+void Viewer::show_degree(int degree) {
+    DisplaySettings& d = session_.display;
+    if (d.sh_degree == session_.sh_degree) d.sh_degree = degree;
+    session_.sh_degree = session_.own.sh_degree = degree;
+}
+
 void Viewer::show_as_trained(const LiveScene& scene, bool first) {
     live_scene_ = scene;
     DisplaySettings& d = session_.display;
-    if (first || d.sh_degree == session_.sh_degree) d.sh_degree = scene.sh_degree;  // it grows
-    session_.sh_degree = session_.own.sh_degree = scene.sh_degree;
+    if (first) d.sh_degree = session_.sh_degree;
+    show_degree(scene.sh_degree);  // it grows
     d.effects.smoothing = session_.own.effects.smoothing = scene.antialias && scene.smoothing;
     if (!first) return;
     d.kernel = scene.kernel;
@@ -257,10 +270,11 @@ void Viewer::follow_live(int width, int height) {
         while (const std::optional<LiveMade> made = live_->take()) take_live(*made);
     });
     const WindowArea area = free_area(s, width, height);
-    const std::size_t panes = s.panes.kernels.size() + (photo_beside(s.photos, s.display) ? 2 : 1);
+    const std::vector<int> beside = kernels_beside(s.panes, s.display.kernel);
+    const std::size_t panes = beside.size() + (photo_beside(s.photos, s.display) ? 2 : 1);
     fit_lines(panes, s.panes, static_cast<float>(area.left) / static_cast<float>(width));
     LiveWish wish{{camera_in_window(s.photos, s.navigation, area), s.display, s.photos.current,
-                   false, s.panes.kernels, 0},
+                   false, beside, 0},
                   area,
                   s.photos.compare,
                   s.panes};

@@ -173,7 +173,6 @@ struct ViewerWindow::State {
     int settling = 0;
     std::atomic<bool> woken{false};
     double next_frame_at = 0;  // s of GLFW's clock
-    double looked_at = -1, longest_gap_s = 0;
     double last_click = -1;
     double last_x = 0, last_y = 0;
     int windowed[4] = {0, 0, 1280, 720};  // place and size outside of full screen
@@ -372,22 +371,16 @@ void ViewerWindow::wake() {
     glfwPostEmptyEvent();
 }
 
-double ViewerWindow::longest_gap_s() const {
-    return state_->longest_gap_s;
-}
-
 bool ViewerWindow::pump(double patience_s) {
     State& s = *state_;
     const auto due = [&] { return s.dirty || s.settling > 0 || glfwGetTime() >= s.next_frame_at; };
     const double sleep = due() ? 0 : std::min(patience_s, s.next_frame_at - glfwGetTime());
-    if (s.looked_at >= 0) s.longest_gap_s = std::max(s.longest_gap_s, glfwGetTime() - s.looked_at);
     if (sleep <= 0)
         glfwPollEvents();
     else if (std::isfinite(sleep))
         glfwWaitEventsTimeout(sleep);
     else
         glfwWaitEvents();
-    s.looked_at = glfwGetTime();
     // Dirty, as after an event: a message that a load ends with takes frames to appear.
     if (s.woken.exchange(false)) s.dirty = true;
     if (due()) s.draw();

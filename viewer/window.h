@@ -39,8 +39,6 @@ class ViewerWindow {
     bool pump(double patience_s);
     /// As `wake` of the options; from any thread.
     void wake();
-    /// The longest time between two looks at what the user did, s, of pumps that did not sleep.
-    double longest_gap_s() const;
 
   private:
     struct State;

@@ -244,6 +244,13 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
                 "Free memory, or use a smaller data set.");
 }
 
+std::vector<View> held_out_views(const std::vector<View>& views) {
+    std::vector<View> chosen;
+    for (const View& view : views)
+        if (view.is_test) chosen.push_back(view);
+    return chosen;
+}
+
 double scene_extent(const Dataset& dataset) {
     const std::vector<glm::dvec3> centres = training_centres(dataset);
     if (centres.empty()) return 1;

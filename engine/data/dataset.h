@@ -89,6 +89,9 @@ std::filesystem::path project_of_photos(const std::filesystem::path& folder);
 /// alpha 0.
 ImageU8 load_photo(const View& view);
 
+/// The views that are held out, in their order.
+std::vector<View> held_out_views(const std::vector<View>& views);
+
 /// The same views at `scale` times their size; load_photo follows. Whole photos where they are that
 /// size but for the half pixel that rounding took from the view's. Throws Error where a photo is
 /// smaller.

@@ -143,17 +143,41 @@ const std::vector<std::string>& endings_of(SplatFormat format) {
     return row_of(format).endings;
 }
 
-std::optional<SplatFormat> format_to_write(const fs::path& path) {
+namespace {
+
+struct Asked {
+    std::optional<SplatFormat> format;
+    std::size_t ending = 0;  // its length
+};
+
+Asked asked_for(const fs::path& path) {
     const std::string name = lower(path.filename().string());
-    std::optional<SplatFormat> best;
-    std::size_t longest = 0;
+    Asked best;
     for (const SplatFormat format : kSplatFormats)
         for (const std::string& ending : row_of(format).endings)
-            if (row_of(format).encode && ending.size() > longest && ends_so(name, ending)) {
-                longest = ending.size();
-                best = format;
-            }
+            if (row_of(format).encode && ending.size() > best.ending && ends_so(name, ending))
+                best = {format, ending.size()};
     return best;
+}
+
+}  // namespace
+
+std::optional<SplatFormat> format_to_write(const fs::path& path) {
+    return asked_for(path).format;
+}
+
+std::string stem_to_write(const fs::path& path) {
+    const std::string name = path.filename().string();
+    return name.substr(0, name.size() - asked_for(path).ending);
+}
+
+bool names_scene(const fs::path& path) {
+    const std::string name = lower(path.filename().string());
+    return std::ranges::any_of(kSplatFormats, [&](SplatFormat format) {
+        return std::ranges::any_of(row_of(format).endings, [&](const std::string& ending) {
+            return ends_so(name, ending);
+        });
+    });
 }
 
 std::string endings_to_write() {

@@ -60,6 +60,10 @@ bool is_point_cloud(const PlyHeader& header);
 const std::vector<std::string>& endings_of(SplatFormat format);
 /// What a name asks for when writing; nothing where it asks for nothing that is written.
 std::optional<SplatFormat> format_to_write(const std::filesystem::path& path);
+/// The name without the ending that asks for a format; the whole name where none does.
+std::string stem_to_write(const std::filesystem::path& path);
+/// Whether it is named as a scene of any format is, those that are only read among them.
+bool names_scene(const std::filesystem::path& path);
 /// All endings that are written, for sentences: ".ply, .spz or .splat".
 std::string endings_to_write();
 /// What of this scene the format has no place for, and what of it other programs may not read, a

@@ -179,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(own, DoubleDifferences,
                                           testing::Values(Footprint::psi, Footprint::exact)),
                          name_of);
 
-INSTANTIATE_TEST_SUITE_P(rings, DoubleDifferences,
+INSTANTIATE_TEST_SUITE_P(every_kernel_with_rings, DoubleDifferences,
                          testing::Combine(testing::Range(KERNEL_COUNT, KERNEL_BETA),
                                           testing::Values(Footprint::psi)),
                          [](const auto& i) {

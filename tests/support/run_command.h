@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -44,6 +45,12 @@ inline Outcome darb(const std::string& arguments) {
                     read_text_file(err)};
     EXPECT_EQ(o.err.find("vulkan validation:"), std::string::npos) << o.err;
     return o;
+}
+
+inline std::size_t count_png(const fs::path& folder) {
+    return static_cast<std::size_t>(
+        std::count_if(fs::directory_iterator(folder), fs::directory_iterator(),
+                      [](const auto& entry) { return entry.path().extension() == ".png"; }));
 }
 
 struct BadCommand {

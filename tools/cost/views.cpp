@@ -9,16 +9,13 @@
 namespace darb {
 
 CostViews dataset_views(const Dataset& dataset, size_t most) {
-    std::vector<const View*> all;
-    for (const View& view : dataset.views)
-        if (view.is_test) all.push_back(&view);
-    if (all.empty())
-        for (const View& view : dataset.views) all.push_back(&view);
+    std::vector<View> all = held_out_views(dataset.views);
+    if (all.empty()) all = dataset.views;
     CostViews views;
     views.alpha_is_mask = dataset.alpha_is_mask;
     const size_t count = std::min(most, all.size());
     for (size_t i = 0; i < count; ++i) {
-        const View& view = *all[i * all.size() / count];
+        const View& view = all[i * all.size() / count];
         views.cameras.push_back(view.camera);
         views.names.push_back(view.name);
         views.photos.push_back(load_photo(view));

@@ -42,7 +42,7 @@ class Comparer {
     ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
 
   private:
-    std::vector<View> held_out() const { return test_views(dataset_); }
+    std::vector<View> held_out() const { return held_out_views(dataset_.views); }
     void train(TrainFlags& f, const std::atomic<bool>& stop);
 
     const CompareFlags& flags_;

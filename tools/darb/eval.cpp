@@ -62,6 +62,7 @@ int eval(EvalFlags flags) {
     const std::vector<View> views = views_of(dataset, flags);
     const Dataset away =
         flags.split == "train" ? Dataset{} : off_path_of(flags.dataset, flags.data);
+    print_notes(away.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(away.views));
     std::vector<std::vector<View>> sizes;  // before the first picture: a photo may be too small
     for (const double scale : flags.scales) sizes.push_back(scaled_views(views, scale));
@@ -86,7 +87,8 @@ int eval(EvalFlags flags) {
     }
     if (!away.views.empty()) {
         options.alpha_is_mask = away.alpha_is_mask;
-        const Evaluation evaluation = evaluate_scene(device, model, test_views(away), options);
+        const Evaluation evaluation =
+            evaluate_scene(device, model, held_out_views(away.views), options);
         json["off_path"] = evaluation_json(evaluation);
         tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
              evaluation.psnr_db, evaluation.ssim);

@@ -25,12 +25,9 @@ int registered(const KernelDefinition& definition) {
 int kernel_of_item(const std::string& option, const std::string& item) {
     if (is_kernel_expression(item)) return registered(kernel_from_expression(item, option));
     const auto kernel = kernel_from_name(item);
-    std::string known;
-    for (const int k : known_kernels()) known += std::string(kernel_name(k)) + ", ";
-    known += kernel_name(KERNEL_BETA);
     if (!kernel)
         throw Error(option + " " + item, "no such kernel",
-                    "There are " + known + ", and \"expr: (1 - q/9)^3, support 9\".");
+                    "There are " + kernel_names() + ", and \"expr: (1 - q/9)^3, support 9\".");
     if (kernel_pulses(*kernel) > 1)
         throw Error(option + " " + item, "has more than one pulse",
                     fmt::format("Write {}: darb train and compare have --pulses, and darb psi "
@@ -103,9 +100,8 @@ std::vector<int> kernels_from_list(const std::string& option, const std::string&
 
 std::string kernel_names() {
     std::string names;
-    for (int k = 0; k < KERNEL_COUNT; ++k)
-        names += (k == 0 ? "" : ", ") + std::string(kernel_name(k));
-    return names;
+    for (const int k : known_kernels()) names += std::string(kernel_name(k)) + ", ";
+    return names + std::string(kernel_name(KERNEL_BETA));
 }
 
 }  // namespace darb

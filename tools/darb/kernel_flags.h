@@ -39,7 +39,7 @@ SplatModel in_kernel(const KernelFlags& flags, SplatModel model);
 std::vector<int> kernels_from_list(const std::string& option, const std::string& list,
                                    const std::vector<std::filesystem::path>& files = {});
 
-/// The names of the family, with commas.
+/// The names that --kernel takes, with commas: built in, read from files, with shapes.
 std::string kernel_names();
 
 }  // namespace darb

@@ -1,10 +1,8 @@
 #include "tools/darb/live_window.h"
 
-#include <cstdlib>
 #include <utility>
 
 #include "engine/core/error.h"
-#include "engine/core/say.h"
 
 namespace darb {
 
@@ -28,6 +26,13 @@ void LiveView::State::show_window() {
     try {
         Device device(window_device);
         ViewerWindow shown(device, viewer_options, 1280, 720);
+        struct Forget {  // before the window goes, whichever way it does
+            State& state;
+            ~Forget() {
+                const std::lock_guard lock(state.mutex);
+                state.window = nullptr;
+            }
+        } const forget{*this};
         shown.set_title("training - darb");
         Session& session = shown.viewer().session();
         if (!session.photos.views.empty()) shown.viewer().choose_camera(0);
@@ -41,12 +46,9 @@ void LiveView::State::show_window() {
             follow_run(shown);
             check_display();
         } while (!(ended && stop) && !leave && shown.pump(kNap_s));
-        const std::lock_guard lock(mutex);
-        window = nullptr;
     } catch (const std::exception& e) {
         const auto* known = dynamic_cast<const Error*>(&e);
         const std::lock_guard lock(mutex);
-        window = nullptr;
         failure = lost ? "the display is gone" : known != nullptr ? known->reason : e.what();
     }
     const std::lock_guard lock(mutex);
@@ -79,8 +81,6 @@ void LiveView::State::follow_run(ViewerWindow& shown) {
     }
     if (!finished || ended) return;
     ended = true;
-    if (std::getenv("DARB_VIEW_GAPS") != nullptr)
-        say("longest gap of the window: {:.0f} ms\n", shown.longest_gap_s() * 1000);
     const std::filesystem::path scene_file = model;
     lock.unlock();
     viewer.end_live();

@@ -64,9 +64,9 @@ int render(RenderFlags flags) {
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
+    const float near_plane = flags.near_plane.value_or(static_cast<float>(NEAR_DEFAULT));
     EffectPlan plan = plan_rendering(
-        model, views, {.depth = !flags.depth.format.empty(), .near_plane = flags.near_plane},
-        choice);
+        model, views, {.depth = !flags.depth.format.empty(), .near_plane = near_plane}, choice);
     apply_plan(plan, model);
     apply_plan(plan, views);
     for (const View& view : views)
@@ -77,7 +77,7 @@ int render(RenderFlags flags) {
     std::vector<double> frame_ms;
     for (const View& view : views) {
         const auto start = std::chrono::steady_clock::now();
-        const ImageF image = renderer.render(view.camera, background, -1, flags.near_plane);
+        const ImageF image = renderer.render(view.camera, background, -1, near_plane);
         const std::chrono::duration<double, std::milli> ms =
             std::chrono::steady_clock::now() - start;
         frame_ms.push_back(ms.count());
@@ -114,13 +114,16 @@ void add_render(CLI::App& app, Action& action) {
                         "1, 2, 4, 8: divide the cameras' size; above 8: width in px; default: as "
                         "they are, those of a data set at most 1,600 px wide");
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
-    command->add_option("--near", flags->near_plane, "nearest distance drawn, world units")
-        ->capture_default_str()
+    command
+        ->add_option("--near", flags->near_plane,
+                     "nearest distance drawn, world units [0.2; without --cameras less of a small "
+                     "scene]")
         ->check(CLI::PositiveNumber);
     add_kernel_flags(*command, flags->kernel, "draw with it in the place of the scene's own");
     add_accuracy_flags(*command, flags->accuracy);
     add_effects_flag(*command, flags->effects);
     add_lens_flag(*command, flags->data);
+    command->get_option("--lens")->needs(cameras);
     command
         ->add_option("--depth", flags->depth.format,
                      "depth beside the frames, NAME_depth: png (16 bits, 0 = nothing seen) or npy "

@@ -69,8 +69,10 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     Device device(device_options);
     settle_tuning(device, flags.tune);
     check_frame(device, size.width, size.height, "--size");
+    const float near_plane =
+        flags.near_plane ? *flags.near_plane : near_plane_for(scene_bounds(model));
     EffectPlan plan =
-        plan_rendering(model, {}, {.near_plane = flags.near_plane, .free_camera = true}, choice);
+        plan_rendering(model, {}, {.near_plane = near_plane, .free_camera = true}, choice);
     apply_plan(plan, model);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
@@ -78,7 +80,9 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     while (!film.done())
         film.step(
             [&](const Camera& camera, const DisplaySettings&) {
-                return to_8bit(renderer.render(camera, background, -1, flags.near_plane));
+                const ImageF image = renderer.render(camera, background, -1, near_plane);
+                plan.note_frame(renderer.status().huge_splats, renderer.status().longest_list);
+                return to_8bit(image);
             },
             true);
     tell(flags.quiet ? nullptr : stdout, "effects: {}\n{}\n", plan_line(plan), film.summary());

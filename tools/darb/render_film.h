@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "tools/darb/accuracy_flags.h"
@@ -24,7 +25,7 @@ struct RenderFlags {
     std::filesystem::path scene, cameras, output;
     std::string device;
     bool white_background = false, quiet = false;
-    float near_plane = static_cast<float>(NEAR_DEFAULT);
+    std::optional<float> near_plane;  // world units
     std::string effects = "auto";
     FilmFlags film;
     DepthFlags depth;

@@ -12,7 +12,7 @@ RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path&
                          const Dataset& dataset, const TrainFlags& first, const Lpips* lpips)
     : flags_(flags), lpips_(lpips), off_path_(off_path_of(path, dataset.options)) {
     for (const double scale : flags.scales)
-        scaled_.push_back(scaled_views(test_views(dataset), scale));
+        scaled_.push_back(scaled_views(held_out_views(dataset.views), scale));
     options_.background = glm::vec3(first.train.white_background ? 1.0f : 0.0f);
     options_.effects = parse_effects(first.effects);  // as it trains, so it is measured
     options_.alpha_is_mask = dataset.alpha_is_mask;
@@ -29,7 +29,8 @@ void RunMeasurer::measure_models(ComparedRun& run, Device& device) const {
         if (off_path_.views.empty()) continue;
         SceneEvaluation options = options_;
         options.alpha_is_mask = off_path_.alpha_is_mask;
-        at.off_path_db = evaluate_scene(device, model, test_views(off_path_), options).psnr_db;
+        at.off_path_db =
+            evaluate_scene(device, model, held_out_views(off_path_.views), options).psnr_db;
     }
 }
 

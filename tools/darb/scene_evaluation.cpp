@@ -27,7 +27,6 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
         check_frame(device, view.camera.width, view.camera.height, view.name);
     Renderer renderer(device, planned, options.accuracy, plan.projection(), plan.huge_splat_path());
     Evaluation evaluation;
-    evaluation.splats = static_cast<std::uint32_t>(model.size());
     for (const View& view : views) {
         const ImageU8 photo = load_photo(view);
         ImageF image = renderer.render(view.camera, options.background);
@@ -87,13 +86,6 @@ Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& 
     DatasetOptions own = options;
     own.images_folder = DatasetOptions{}.images_folder;  // --images is of the data set's photos
     return load_dataset(folder, own);
-}
-
-std::vector<View> test_views(const Dataset& dataset) {
-    std::vector<View> views;
-    for (const View& view : dataset.views)
-        if (view.is_test) views.push_back(view);
-    return views;
 }
 
 CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales) {

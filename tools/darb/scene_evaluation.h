@@ -36,9 +36,6 @@ CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales);
 /// DATASET/off_path, a data set that is all held out, at the size of -r: pictures away from the
 /// path of the photos. Without views where that folder has no transforms_test.json.
 Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& options);
-/// Those of its views that are held out.
-std::vector<View> test_views(const Dataset& dataset);
-
 /// An evaluation at one of the scales.
 struct AtScale {
     double scale = 1;

@@ -34,7 +34,7 @@ void add_schedule_flag(CLI::App& command, TrainFlags& f) {
 void add_scene_flags(CLI::App& command, TrainFlags& f) {
     add_kernel_flags(command, f.kernel,
                      kernel_names() +
-                         ", beta (each splat learns its shape), or one of your own: \"expr: (1 - "
+                         " (each splat learns its shape), or one of your own: \"expr: (1 - "
                          "q/9)^3, support 9\"",
                      option_group::kScene);
     command.get_option("--kernel")->default_str("gaussian");

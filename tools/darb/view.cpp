@@ -100,7 +100,8 @@ int view(ViewFlags flags) {
     options.start_at_camera = true;
     if (const auto kept = state_folder(); !kept.empty()) {
         options.up_list = kept / "up.json";
-        options.recent_list = kept / "recent.json";
+        const bool window = flags.screenshot.empty() && flags.frames.empty() && flags.times.empty();
+        if (window) options.recent_list = kept / "recent.json";  // of what a person opened
     }
     if (flags.cameras.empty()) options.find_cameras = cameras_beside;
     if (!flags.screenshot.empty() || !flags.frames.empty())

@@ -28,9 +28,11 @@ int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
     try {
         while (!stop && window.pump(kNap_s))
             if (lost) throw Error("window", "the display is gone");
-    } catch (const Error& e) {
-        if (!lost) throw Error(e.where, e.reason, recovered(e.hint));
-        throw Error("window", "the display is gone", recovered(""));
+    } catch (const std::exception& e) {  // memory that runs out, too
+        if (lost) throw Error("window", "the display is gone", recovered(""));
+        const auto* known = dynamic_cast<const Error*>(&e);
+        throw known != nullptr ? Error(known->where, known->reason, recovered(known->hint))
+                               : Error("window", e.what(), recovered(""));
     }
     if (stop) say("interrupted by {}\n  {}\n", stop_name(), recovered(""));
     return stop ? stop_exit_code() : 0;

@@ -87,10 +87,6 @@ PointCloud sample_points(const World& world, const std::vector<View>& views,
     return points;
 }
 
-}  // namespace
-
-namespace {
-
 /// A view of the middle of the scene; angles in radians.
 View view_from(std::string name, double azimuth, double elevation, double radius, int scale) {
     const dvec3 eye(radius * std::cos(azimuth) * std::cos(elevation),

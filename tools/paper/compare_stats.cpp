@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/quantile.h"
 #include "engine/report/html.h"
 
 namespace darb {
@@ -106,9 +107,7 @@ OverSeeds over_seeds(const ComparedDataset& dataset, const std::string& kernel, 
     }
     if (values.empty()) return {};
     std::sort(values.begin(), values.end());
-    const std::size_t n = values.size();
-    return {0.5 * (values[(n - 1) / 2] + values[n / 2]), values.front(), values.back(),
-            static_cast<int>(n)};
+    return {quantile(values, 0.5), values.front(), values.back(), static_cast<int>(values.size())};
 }
 
 Marks marks_of(const std::vector<Value>& values, const Column& column) {

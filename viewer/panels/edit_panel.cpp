@@ -208,11 +208,10 @@ void format_choice(Session& s) {
         tip("another ending for the file, and so another format");
         return;
     }
-    const std::string name = s.save_file.filename().string();
+    const std::string stem = stem_to_write(s.save_file);
     for (const char* ending : kEndings) {
         const std::filesystem::path other =
-            std::filesystem::path(s.save_file)
-                .replace_filename(name.substr(0, name.find('.')) + ending);
+            std::filesystem::path(s.save_file).replace_filename(stem + ending);
         if (format_to_write(other) && ImGui::Selectable(ending)) s.save_file = other;
     }
     ImGui::EndCombo();

@@ -10,8 +10,8 @@ namespace {
 namespace fs = std::filesystem;
 
 void go_to(const fs::path& folder, OpenDialog& dialog) {
-    dialog.folder = folder;
-    dialog.entries = list_folder(folder);
+    dialog.folder = folder.has_filename() ? folder : folder.parent_path();
+    dialog.entries = list_folder(dialog.folder);
 }
 
 void choose(const fs::path& file, Session& s) {

@@ -21,7 +21,8 @@ std::vector<std::string> pane_names(const Session& s) {
     std::vector<std::string> names;
     if (photo_beside(s.photos, s.display)) names.emplace_back("photo");
     names.emplace_back(kernel_name(s.display.kernel));
-    for (const int kernel : s.panes.kernels) names.emplace_back(kernel_name(kernel));
+    for (const int kernel : kernels_beside(s.panes, s.display.kernel))
+        names.emplace_back(kernel_name(kernel));
     return names;
 }
 
@@ -101,8 +102,8 @@ void draw_panes(Session& s) {
 
 void panes_panel(Session& s) {
     std::vector<int>& beside = s.panes.kernels;
-    std::erase(beside, s.display.kernel);
-    const std::string now = beside.empty() ? "none" : std::to_string(beside.size()) + " more";
+    const std::size_t count = kernels_beside(s.panes, s.display.kernel).size();
+    const std::string now = count == 0 ? "none" : std::to_string(count) + " more";
     if (ImGui::BeginCombo("side by side", now.c_str())) {
         for (const int k : known_kernels()) {
             if (k == s.display.kernel) continue;

@@ -235,6 +235,29 @@ TEST(Undistort, a_fisheye_too_wide_keeps_its_lens_where_that_is_asked_for) {
     EXPECT_TRUE(load(400, {.original_lens = true}).views[0].camera.lens.active);
 }
 
+TEST(ScaledViews, are_of_the_straightened_photo_or_of_the_original) {
+    View view;
+    view.name = "a.png";
+    view.lens = {"OPENCV", {400, 400, 320, 240, -0.1, 0, 0, 0}, 640, 480};
+    const Camera flat = undistorted_frame(view.lens, "test").camera;
+    ASSERT_NE(flat.width, 640);
+    const auto quarter = [](Camera full) {
+        full.fx /= 4, full.fy /= 4, full.cx /= 4, full.cy /= 4;
+        full.width = (full.width + 2) / 4, full.height = (full.height + 2) / 4;
+        return full;
+    };
+    view.camera = quarter(flat);
+    const Camera whole = scaled_views({view}, 4)[0].camera;
+    EXPECT_EQ(whole.width, flat.width);
+    EXPECT_EQ(whole.height, flat.height);
+    EXPECT_NEAR(whole.fx, flat.fx, 1 + flat.fx / flat.width);
+    EXPECT_THROW(scaled_views({view}, 4.2), Error);
+    view.camera = quarter(pinhole_camera(view.lens));
+    view.camera.lens.active = true;
+    EXPECT_EQ(scaled_views({view}, 4)[0].camera.width, 640);
+    EXPECT_TRUE(scaled_views({view}, 4)[0].camera.lens.active);
+}
+
 TEST(Undistort, pixels_beyond_the_fold_are_transparent) {
     const LensModel model = make("SIMPLE_RADIAL", {100, 320, 240, -0.3});
     const UndistortedFrame frame = undistorted_frame(model, "test");

@@ -110,9 +110,8 @@ TEST(Edit, Sphere_and_origin_are_in_world_coordinates) {
     m.origin = {1000, 0, 0};
     Edit edit(10);
     const Region sphere{Region::Shape::sphere, {1004, 0, 0}, {1.5, 0.1, 0.1}};
-    EXPECT_EQ(count_inside(m, sphere, edit), 3u);
     EXPECT_EQ(edit.remove(m, sphere, true), 3u);
-    EXPECT_EQ(count_inside(m, sphere, edit), 0u);
+    EXPECT_EQ(edit.remove(m, sphere, true), 0u);  // those are gone
 }
 
 SplatMask only(size_t n, std::initializer_list<size_t> splats) {
