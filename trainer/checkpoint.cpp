@@ -15,6 +15,7 @@
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/raster/gpu_splats.h"
+#include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_shapes.h"
 #include "trainer/exposure.h"
 #include "trainer/option_table.h"
@@ -290,16 +291,6 @@ std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU
 namespace {
 
 constexpr const char* kOtherCheckpoint = "Start from another checkpoint, or without --resume.";
-
-bool is_finite(const SplatModel& m, size_t splat) {
-    const auto all = [splat](const std::vector<float>& values, size_t each) {
-        return std::all_of(values.begin() + std::ptrdiff_t(splat * each),
-                           values.begin() + std::ptrdiff_t(splat * each + each),
-                           [](float value) { return std::isfinite(value); });
-    };
-    return all(m.position, 3) && all(m.log_scale, 3) && all(m.rotation, 4) &&
-           all(m.opacity_logit, 1);
-}
 
 // What the settings say and the state does not follow, which no run writes.
 std::string contradiction(const TrainerState& s, const TrainOptions& o, size_t photos) {

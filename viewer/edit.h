@@ -66,10 +66,10 @@ class Edit {
     std::size_t removed_count() const { return removed_count_; }
     std::size_t hidden_count() const { return hidden_count_; }
     std::size_t selected_count() const { return selected_count_; }
-    /// What would be saved differs from the file and from the last mark_saved(). Selections and
-    /// what is hidden are not saved.
     /// Which content this is: equal where what would be saved is equal; 0: as it was opened.
     int content() const;
+    /// What would be saved differs from the file and from the last mark_saved(). Selections and
+    /// what is hidden are not saved.
     bool unsaved() const;
     void mark_saved() { saved_ = content(); }
     /// The scene without the deleted splats, in the same order.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/quantile.h"
 #include "engine/data/lens_model.h"
 #include "engine/kernels/kernel_family.h"
 #include "engine/plan/effect_rules.h"
@@ -175,12 +176,6 @@ std::optional<double> brightness(const View& view, const ImageU8& photo, const d
     return sum;
 }
 
-double median_of(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
 /// Per photo, the median over its points of brightness here over the median brightness of the
 /// point; empty where too few points say so.
 std::vector<double> photo_gains(const Dataset& dataset, const std::vector<ImageU8>& photos) {
@@ -202,12 +197,12 @@ std::vector<double> photo_gains(const Dataset& dataset, const std::vector<ImageU
         }
         if (seen.size() < kGainViews) continue;
         std::vector<double> sorted = seen;
-        const double middle = median_of(sorted);
+        const double middle = nearest_rank(sorted, 0.5);
         for (std::size_t k = 0; k < seen.size(); ++k) ratios[by[k]].push_back(seen[k] / middle);
     }
     std::vector<double> gains;
     for (std::vector<double>& own : ratios)
-        if (own.size() >= kGainPoints) gains.push_back(median_of(own));
+        if (own.size() >= kGainPoints) gains.push_back(nearest_rank(own, 0.5));
     return gains;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/core/on_threads.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/plan/effect_rules.h"
 #include "engine/raster/frame_view.h"
@@ -42,7 +43,12 @@ Ball ball_of(const SplatModel& model, std::size_t i) {
     ball.reach2 = opacity > kSmallestCutoff ? (std::isfinite(support) ? support : gaussian) : 0;
     const double largest =
         std::clamp(double{std::max({s[0], s[1], s[2]})}, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT);
-    ball.deviation = std::exp(largest) * std::sqrt(covariance_scale(model.kernel, model.footprint));
+    const double psi =
+        kernel_has_shape(model.kernel)
+            ? shaped_covariance_scale(model.footprint,
+                                      shape_exponent(model.footprint, double{model.shape[i]}))
+            : covariance_scale(model.kernel, model.footprint);
+    ball.deviation = std::exp(largest) * std::sqrt(psi);
     return ball;
 }
 

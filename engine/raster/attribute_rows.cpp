@@ -55,6 +55,7 @@ BufferRange bound_rows(const Buffer& buffer, const AttributeRows& rows, const Sp
 void put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
               std::size_t count, std::byte* to) {
     const std::size_t row_bytes = rows.floats * sizeof(float);
+    if (rows.floats == 0) return;
     if (rows.columns == 0) {
         for (std::size_t i = first; i < first + count; ++i)
             std::memcpy(to + i * row_bytes, values + i * pitch, row_bytes);
@@ -65,7 +66,7 @@ void put_rows(const AttributeRows& rows, const float* values, std::size_t pitch,
     for (std::size_t i = first; i < first + rows.rows_held(count); ++i) {
         const bool there = i < first + count;
         std::byte* const at = to + column_at(rows, i, 0);
-        const float* const row = values + i * pitch;
+        const float* const row = there ? values + i * pitch : nullptr;
         if (there)
             for (std::size_t c = 0; c < whole; ++c)
                 std::memcpy(at + c * kStep, row + c * kColumnFloats, kColumnBytes);

@@ -266,6 +266,7 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
     std::string behind = ply_bytes_behind(file, header, vertex, end);
     if (const PlyElement* sh = header.find("sh")) behind = read_sh(file, header, *sh, where, model);
     if (!behind.empty()) said.notes.push_back(behind);
+    settle_shapes(model, said.notes);
     said.dropped = drop_non_finite(model);
     if (facts) *facts = std::move(said);
     return model;

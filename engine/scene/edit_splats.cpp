@@ -158,13 +158,13 @@ std::size_t drop_non_finite(SplatModel& model) {
     for (int a = 0; a < kAttributeCount; ++a)
         if (const auto limit = kSplatAttributes[static_cast<std::size_t>(a)].from_file)
             for (float& value : attribute_values(model, a)) value = limit(value);
-    return keep_splats(
-        [&](std::size_t i) {
-            for (int a = 0; a < kAttributeCount; ++a)
-                if (!row_is_finite(attribute_values(model, a), i, model.floats(a))) return false;
-            return true;
-        },
-        model);
+    return keep_splats([&](std::size_t i) { return is_finite(model, i); }, model);
+}
+
+bool is_finite(const SplatModel& model, std::size_t splat) {
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (!row_is_finite(attribute_values(model, a), splat, model.floats(a))) return false;
+    return true;
 }
 
 bool has_rotation(const SplatModel& model, std::size_t splat) {

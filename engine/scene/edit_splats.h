@@ -42,6 +42,8 @@ SplatModel pick_splats(const SplatModel& model, const std::vector<std::uint32_t>
 std::size_t keep_splats(const std::function<bool(std::size_t)>& keep, SplatModel& model);
 /// Whether no parameter is NaN or infinite.
 bool has_only_finite(const SplatModel& model);
+/// Whether none of this splat is.
+bool is_finite(const SplatModel& model, std::size_t splat);
 /// Drops splats with a NaN or infinite parameter, after the rule of infinite_values.h.
 std::size_t drop_non_finite(SplatModel& model);
 /// Whether a splat's rotation has a length; one without is never drawn.

@@ -55,6 +55,7 @@ GaussianEquivalent convert_shapes(const SplatModel& model, bool keep_opacity, Sp
 }  // namespace
 
 SplatModel as_gaussians(const SplatModel& model, bool keep_opacity, GaussianEquivalent* fit) {
+    check_splat_shapes(model);
     GaussianEquivalent nearest{1, 1, 0};
     SplatModel result = model;
     if (kernel_has_shape(model.kernel)) {

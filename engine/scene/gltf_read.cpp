@@ -14,6 +14,7 @@
 #include "engine/scene/infinite_values.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb {
 
@@ -362,6 +363,9 @@ SplatModel read_placed(GltfScene& scene, const PlacedSplats& placed,
         model.footprint = exact->footprint;
         model.antialias = exact->antialias;
         read_exact(scene, *radial_object(placed.primitive), model);
+        std::vector<std::string> notes;
+        settle_shapes(model, notes);
+        for (const std::string& note : notes) scene.note(note);
     } else {
         read_fallback(scene, attributes, model);
     }

@@ -98,13 +98,7 @@ class Merging {
 };
 
 bool is_drawn(const SplatModel& model, std::size_t i) {
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const std::size_t floats = model.floats(a);
-        const float* values = attribute_values(model, a).data() + i * floats;
-        if (!std::all_of(values, values + floats, [](float v) { return std::isfinite(v); }))
-            return false;
-    }
-    return has_rotation(model, i);
+    return is_finite(model, i) && has_rotation(model, i);
 }
 
 Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& options)

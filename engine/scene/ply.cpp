@@ -35,6 +35,13 @@ bool all_finite(const double* values, const PlyColumns& columns) {
     return true;
 }
 
+// A column that is named as shapes are, of a kernel that has none.
+void drop_shapes_of_others(int kernel, PlyColumns& columns) {
+    if (columns.foreign_beta || columns.of[kShape].empty() || kernel_takes(kernel, kShape)) return;
+    columns.of[kShape].clear();
+    columns.unread.push_back(ply_column(kShape, 0));
+}
+
 // Positions are set later, all at once.
 void store_splat(const double* values, const PlyColumns& columns, std::size_t at,
                  SplatModel& model) {
@@ -150,7 +157,7 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
     if (!vertex) throw Error(where, "has no element vertex", "A splat scene is needed.");
     if (is_compressed_ply(header))
         return parse_compressed_ply(file, header, where, facts, progress);
-    const PlyColumns columns = find_ply_columns(*vertex, where);
+    PlyColumns columns = find_ply_columns(*vertex, where);
     check_ply_size(file, header, *vertex, where);
 
     SplatModel model;
@@ -158,6 +165,7 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
     model.sh_degree =
         static_cast<int>(std::lround(std::sqrt(columns.of[kShRest].size() / 3 + 1))) - 1;
     read_ply_comments(header, where, model, said.notes);
+    drop_shapes_of_others(model.kernel, columns);
     const bool foreign = columns.foreign_beta;  // a scene of Deformable Beta Splatting
     if (foreign) {
         model.kernel = KERNEL_BETA;
@@ -187,7 +195,9 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
     }
     model.resize(kept);
     if (foreign) said_of_foreign_shapes(take_foreign_shapes(model), facts);
-    set_kernel(model, model.kernel);
+    std::vector<std::string> notes;
+    settle_shapes(model, notes);
+    if (facts) facts->notes.insert(facts->notes.end(), notes.begin(), notes.end());
     set_positions(positions, model);
     return model;
 }

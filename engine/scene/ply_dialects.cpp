@@ -36,24 +36,24 @@ int need(const PlyElement& vertex, const std::string& name, const std::string& w
     return column;
 }
 
+bool is_foreign_beta(const PlyElement& vertex) {
+    return find_value(vertex, "beta") >= 0 && vertex.find("sh0_0") >= 0 &&
+           vertex.find(ply_column(kShape, 0)) < 0;
+}
+
+/// Deformable Beta Splatting has other names of harmonics.
+std::string harmonics_column(const PlyElement& vertex, int attribute, std::size_t c) {
+    return is_foreign_beta(vertex) ? fmt::format("{}_{}", attribute == kShDc ? "sh0" : "shN", c)
+                                   : ply_column(attribute, c);
+}
+
 bool has_colour_bytes(const PlyElement& vertex) {
-    return vertex.find("f_dc_0") < 0 && vertex.find("sh0_0") < 0 &&
+    return vertex.find(harmonics_column(vertex, kShDc, 0)) < 0 &&
            std::ranges::all_of(std::array{"red", "green", "blue"}, [&](const char* name) {
                const int column = find_value(vertex, name);
                return column >= 0 &&
                       vertex.properties[static_cast<std::size_t>(column)].type == PlyType::uint8;
            });
-}
-
-bool is_foreign_beta(const PlyElement& vertex) {
-    return find_value(vertex, "beta") >= 0 && vertex.find(ply_column(kShape, 0)) < 0;
-}
-
-/// Deformable Beta Splatting has other names of harmonics.
-std::string harmonics_column(const PlyElement& vertex, int attribute, std::size_t c) {
-    const bool other = is_foreign_beta(vertex) && vertex.find("sh0_0") >= 0;
-    return other ? fmt::format("{}_{}", attribute == kShDc ? "sh0" : "shN", c)
-                 : ply_column(attribute, c);
 }
 
 void find_harmonics(const PlyElement& vertex, const std::string& where, PlyColumns& columns) {

@@ -39,4 +39,13 @@ void set_kernel(SplatModel& model, int kernel) {
         model.shape.assign(model.size(), 0.0f);
 }
 
+void settle_shapes(SplatModel& model, std::vector<std::string>& notes) {
+    if (kernel_takes(model.kernel, kShape) && model.shape.empty() && model.size() > 0)
+        notes.push_back(
+            fmt::format("the kernel {} takes a shape of each splat, and the file has "
+                        "none: all have that at which training starts",
+                        kernel_name(model.kernel)));
+    set_kernel(model, model.kernel);
+}
+
 }  // namespace darb

@@ -195,9 +195,11 @@ TEST_F(PassSpirv, kernels_without_shapes_read_and_write_no_exponent) {
     for (const Pass& pass :
          {Pass{"project", {7, 16}}, Pass{"blend", {10}}, Pass{"blend_backward", {16, 17}},
           Pass{"blend_backward_team", {16, 17}}, Pass{"blend_backward_buckets", {14}},
-          Pass{"project_backward", {7, 14, 27}}, Pass{"densify_split", {5}}}) {
+          Pass{"project_backward", {7, 14, 27}}, Pass{"densify_split", {5}},
+          Pass{"relocate", {5}}}) {
         SCOPED_TRACE(pass.shader);
-        const bool split = std::string(pass.shader) == "densify_split";  // constant 2: SHAPES
+        const std::set<std::string> counted{"densify_split", "relocate"};  // constant 2: SHAPES
+        const bool split = counted.contains(pass.shader);
         const Left shaped = left_in(pass.shader, split ? "2:16" : "103:4");
         for (const char* without : {"103:0", "103:1"}) {
             const Left plain = left_in(pass.shader, split ? "2:1" : without);

@@ -99,7 +99,8 @@ TestScene scene_for(int kernel, Footprint footprint, double spread = 1) {
 }
 
 TEST(ProjectionEffects, antialias_matches_double) {
-    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_INVERSE_QUADRATIC})
+    for (const int kernel :
+         {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_INVERSE_QUADRATIC, KERNEL_BETA})
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
             SCOPED_TRACE(kernel_name(kernel));
             TestScene s = scene_for(kernel, footprint);
@@ -109,11 +110,12 @@ TEST(ProjectionEffects, antialias_matches_double) {
 }
 
 TEST(ProjectionEffects, smoothing_filter_matches_double) {
-    for (const bool antialias : {false, true}) {
-        TestScene s = scene_for(KERNEL_RAISED_COSINE, Footprint::psi);
-        s.model.antialias = antialias;
-        EXPECT_GT(expect_walks_match(s, {.antialias = antialias, .smoothing = true}), 60u);
-    }
+    for (const int kernel : {KERNEL_RAISED_COSINE, KERNEL_BETA})
+        for (const bool antialias : {false, true}) {
+            TestScene s = scene_for(kernel, Footprint::psi);
+            s.model.antialias = antialias;
+            EXPECT_GT(expect_walks_match(s, {.antialias = antialias, .smoothing = true}), 60u);
+        }
 }
 
 TEST(ProjectionEffects, every_lens_matches_double) {
