@@ -4,7 +4,7 @@
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
-all_steps="setup style release unit gpu clang sanitize fuzz sync"
+all_steps="setup style release unit sync gpu clang sanitize fuzz"
 usage() {
     cat <<TEXT
 usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all but includes, long and python)
@@ -12,11 +12,11 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all 
   style      include arrows, length caps, clang-format (tools/check_style.sh)
   release    build with gcc, warnings are errors
   unit       tests that need no device
-  gpu        tests of shaders, pipelines, pictures and training
+  sync       the quick device tests, under Vulkan synchronization validation
+  gpu        the other device tests: training, long frames, numerics, scripts
   clang      build with clang, warnings are errors, with ASan and UBSan, and the fuzzers
   sanitize   unit tests and the quick tests of pipelines of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
-  sync       the quick device tests under Vulkan synchronization validation
   includes   build all with clang without precompiled headers: a forgotten include is an error
   long       device tests that take minutes
   python     the Python module: installs what it needs, builds it and the command, runs tests/python
@@ -40,18 +40,21 @@ logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 
 # Device tests start their own threads, one per core, so two at a time are plenty.
-# Cases whose name ends in _slow run in the gpu step alone, as do those that look at SPIR-V or at other vector widths;
+# A device test runs once here, under validation (sync) or without (gpu); those of pipelines again under sanitizers.
+# Without validation: cases whose name ends in _slow, those that look at SPIR-V or at other vector widths;
 # those in _long in the step of that name.
 long='_long(/|$)'
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others: not under sanitizers.
 numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases)\.|for_every_kernel$|Accuracy_switch_changes'
-# Of processes and of scripts, seconds each: they run in the steps unit and gpu, and find nothing new in the others.
+# Of processes and of scripts, seconds each: they find nothing new under sanitizers or validation.
 once='^(scripts|pages|Outputs)\.'
-# Passes that other tests also record, with other numbers: not under validation.
+# Passes that other tests also record, with other numbers: without validation.
 same_passes='^(kernel_gradient|walk|accuracy_walk|hard_case|blend|blend_backward|project)_test$'
+without_validation="$gpu_alone|$once|$same_passes"
 run_ctest() {
-    local preset=$1 log=$logs/$step
+    local preset=$1 log
+    log=$(mktemp "$logs/$step.XXXX")
     shift
     ctest --test-dir "$preset" --output-on-failure --no-tests=error -j2 "$@" 2>&1 | tee "$log"
     local status=${PIPESTATUS[0]} total bad left_out
@@ -87,7 +90,13 @@ do_style() { tools/check_style.sh; }
 do_release() { build release; }
 do_clang() { build asan; }
 do_unit() { run_ctest build -L '^unit$'; }
-do_gpu() { run_ctest build -LE '^unit$' -E "$long"; }
+do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E "$without_validation" --timeout 300; }
+do_gpu() {
+    local status=0
+    run_ctest build -L '^training$' -E "$long" || status=1
+    run_ctest build -L '^(shader|pipeline)$' -R "$without_validation" -E "$long" || status=1
+    return "$status"
+}
 do_includes() { build clang; }
 do_long() { run_ctest build -R "$long"; }
 do_python() { tools/setup.sh --with-python --with-torch && build python && run_ctest build-python -R '^python\.'; }
@@ -96,7 +105,6 @@ do_sanitize() {
         run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$once|$numerics" --timeout 300
 }
 do_fuzz() { tools/fuzz.sh 0.02; }
-do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E "$gpu_alone|$once|$same_passes" --timeout 300; }
 
 started=$SECONDS
 for step in $steps; do
@@ -112,7 +120,7 @@ for step in $steps; do
             status=$?
             ;;
         *)
-            "do_$step" 2>&1 | tee "$logs/$step"
+            "do_$step" 2>&1 | tee "$logs/$step.log"
             status=${PIPESTATUS[0]}
             if [[ $status == 0 ]]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
             ;;
@@ -127,8 +135,8 @@ done
 for step in ${failures[@]+"${failures[@]}"}; do
     echo "=== $step, what failed:"
     case $step in
-        unit | gpu | sanitize | sync | long | python) grep -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step" | head -120 ;;
-        *) tail -n 60 "$logs/$step" ;;
+        unit | gpu | sanitize | sync | long | python) grep -h -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step".* | head -120 ;;
+        *) tail -n 60 "$logs/$step.log" ;;
     esac
 done
 [[ ${#failures[@]} == 0 ]] || echo "failed steps: ${failures[*]}"
