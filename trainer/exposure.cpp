@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "shaders/shared/effect_args.h"
@@ -19,14 +20,18 @@ std::uint32_t groups_of(std::uint32_t pixels) {
                       static_cast<std::uint32_t>(EXPOSURE_MAX_GROUPS));
 }
 
+constexpr std::uint64_t kGradientFloats = EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS;
+constexpr std::uint64_t kGradientBytes = kGradientFloats * sizeof(float);
+static_assert(kGradientBytes % 256 == 0);  // where a binding may begin
+
 }  // namespace
 
-Exposure::Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels)
+Exposure::Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels, int batch)
     : photos_(photos),
       map_(device, "exposure", {{"THREADS", SPLAT_GROUP}}),
       backward_(device, "exposure_backward", {}, false),
       update_(device, "exposure_update", {}, false) {
-    make_buffers(device, *this, buffers(photos, pixels), "exposure");
+    make_buffers(device, *this, buffers(photos, pixels, batch), "exposure");
     std::vector<float> start;
     for (std::uint32_t p = 0; p < photos; ++p)
         start.insert(start.end(), kIdentityColours.begin(), kIdentityColours.end());
@@ -34,15 +39,16 @@ Exposure::Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels)
     restore(start);
 }
 
-BufferList<Exposure> Exposure::buffers(std::uint64_t photos, std::uint64_t pixels) {
+BufferList<Exposure> Exposure::buffers(std::uint64_t photos, std::uint64_t pixels, int batch) {
     return {{&Exposure::maps_, "exposure maps", photos * EXPOSURE_TERMS * 4},
             {&Exposure::moments_, "exposure moments", photos * EXPOSURE_TERMS * 8},
             {&Exposure::mapped_, "mapped image", pixels * 12},
-            {&Exposure::partials_, "exposure partials", EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS * 4}};
+            {&Exposure::partials_, "exposure partials",
+             kGradientBytes * static_cast<std::uint64_t>(batch)}};
 }
 
-std::uint64_t Exposure::device_bytes(std::uint32_t photos, std::uint64_t pixels) {
-    return charged_bytes(buffers(photos, pixels));
+std::uint64_t Exposure::device_bytes(std::uint32_t photos, std::uint64_t pixels, int batch) {
+    return charged_bytes(buffers(photos, pixels, batch));
 }
 
 void Exposure::record(Commands& commands, const Buffer& image, std::uint32_t photo,
@@ -54,17 +60,36 @@ void Exposure::record(Commands& commands, const Buffer& image, std::uint32_t pho
 }
 
 void Exposure::record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
-                               const Buffer& status, const ExposureStep& step) {
+                               const ExposureStep& step, int place) {
     commands.pass("exposure");
     const std::uint32_t groups = groups_of(step.pixels);
+    const BufferRange partials(partials_, kGradientBytes * static_cast<std::uint64_t>(place),
+                               kGradientBytes);
     commands.dispatch(backward_, gpu::ExposureArgs{step.pixels, step.photo, groups},
-                      {maps_, image, d_image, partials_}, groups);
+                      {maps_, image, d_image, partials}, groups);
+}
+
+void Exposure::record_step(Commands& commands, const Buffer& status, const ExposureStep& step,
+                           int place) {
+    commands.pass("exposure");
     const double correction1 = 1.0 - std::pow(0.9, step.visits),
                  correction2 = 1.0 - std::pow(0.999, step.visits);
-    const gpu::ExposureUpdateArgs args{step.photo, photos_, groups,
+    const gpu::ExposureUpdateArgs args{step.photo, photos_, groups_of(step.pixels),
                                        static_cast<float>(step.rate / correction1),
                                        static_cast<float>(1.0 / std::sqrt(correction2))};
-    commands.dispatch(update_, args, {partials_, maps_, moments_, status}, 1);
+    const BufferRange partials(partials_, kGradientBytes * static_cast<std::uint64_t>(place),
+                               kGradientBytes);
+    commands.dispatch(update_, args, {partials, maps_, moments_, status}, 1);
+}
+
+std::vector<float> Exposure::gradient(int place) const {
+    return partials_.download<float>(kGradientFloats,
+                                     kGradientBytes * static_cast<std::uint64_t>(place));
+}
+
+void Exposure::set_gradient(int place, const std::vector<float>& values) {
+    DARB_CHECK(values.size() == kGradientFloats, "{} floats", values.size());
+    partials_.upload(values, kGradientBytes * static_cast<std::uint64_t>(place));
 }
 
 std::vector<ColourMap> Exposure::maps() const {

@@ -21,20 +21,28 @@ struct ExposureStep {
 
 class Exposure {
   public:
-    /// For `photos` photos of at most `pixels` pixels, all identities.
-    Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels);
+    /// For `photos` photos of at most `pixels` pixels, all identities; steps of `batch` views.
+    Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels, int batch = 1);
 
     /// Device memory of an Exposure made with these arguments.
-    static std::uint64_t device_bytes(std::uint32_t photos, std::uint64_t pixels);
+    static std::uint64_t device_bytes(std::uint32_t photos, std::uint64_t pixels, int batch = 1);
 
     /// image [3][H W] -> mapped(), the picture as this photo shows it.
     void record(Commands& commands, const Buffer& image, std::uint32_t photo, std::uint32_t pixels);
     const Buffer& mapped() const { return mapped_; }
 
-    /// d_image, dL/d(mapped), becomes dL/d(image); then the photo's Adam step. status:
-    /// gpu::FrameStatus of the frame.
+    /// d_image, dL/d(mapped), becomes dL/d(image); the map's own gradient stays for the step of
+    /// this place in the batch.
     void record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
-                         const Buffer& status, const ExposureStep& step);
+                         const ExposureStep& step, int place = 0);
+    /// The photo's Adam step of what record_backward left. status: gpu::FrameStatus of the frame.
+    void record_step(Commands& commands, const Buffer& status, const ExposureStep& step,
+                     int place = 0);
+
+    /// What record_backward left for this place, and as another process has it. The queue must be
+    /// idle.
+    std::vector<float> gradient(int place) const;
+    void set_gradient(int place, const std::vector<float>& values);
 
     std::vector<ColourMap> maps() const;
     /// maps and moments as one array, for checkpoints: [photos][12] maps, [photos][12][2] moments.
@@ -43,7 +51,7 @@ class Exposure {
     static std::size_t state_size(std::size_t photos) { return photos * 36; }
 
   private:
-    static BufferList<Exposure> buffers(std::uint64_t photos, std::uint64_t pixels);
+    static BufferList<Exposure> buffers(std::uint64_t photos, std::uint64_t pixels, int batch);
     std::uint32_t photos_;
     Pipeline map_, backward_, update_;
     Buffer maps_, moments_, mapped_, partials_;

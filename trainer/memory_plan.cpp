@@ -10,6 +10,7 @@
 #include "trainer/density/density_control.h"
 #include "trainer/density/round_buffers.h"
 #include "trainer/exposure.h"
+#include "trainer/gradient_tree.h"
 #include "trainer/resolution_ramp.h"
 #include "trainer/schedule.h"
 #include "trainer/step.h"
@@ -72,7 +73,7 @@ std::uint64_t effect_bytes(const MemoryDemand& demand) {
         bytes = Buffer::charged_bytes(std::max<std::uint64_t>(demand.splats, 1) * 4) +
                 cameras_bytes(demand.smoothing_photos);
     if (demand.exposure_photos > 0)
-        bytes += Exposure::device_bytes(demand.exposure_photos, demand.image_pixels);
+        bytes += Exposure::device_bytes(demand.exposure_photos, demand.image_pixels, demand.batch);
     return bytes;
 }
 
@@ -95,6 +96,10 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     plan.moments = moment_bytes(demand.splats, floats_of(demand), false) +
                    rest_sum_bytes(demand.splats, floats_of(demand));
     plan.frame = bytes.splats;
+    if (demand.batch > 1)
+        plan.frame +=
+            GradientTree::device_bytes(demand.splats, demand.sh_degree, demand.frame.kernel,
+                                       demand.batch, strategy_row(demand.strategy).scores_views);
     plan.intersections = bytes.intersections;
     plan.photos = demand.photo_pixels * 4;
     plan.images = bytes.images + image_bytes(device, demand);
@@ -168,6 +173,7 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
         demand.list_segments = 2;
     }
     demand.strategy = options.strategy;
+    demand.batch = options.batch;
     const std::vector<RampStep> steps = schedule.ramp_steps(std::max(demand.width, demand.height));
     if (steps.empty()) return;
     for (const View& view : views) {

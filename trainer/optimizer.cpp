@@ -1,5 +1,6 @@
 #include "trainer/optimizer.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace darb {
@@ -32,18 +33,42 @@ AdamStep Optimizer::rates(int iteration) const {
     return step;
 }
 
+// Rates times the root of the views, betas to their power, so that moments reach back over as many
+// views as those of single ones (Zhao et al., Grendel-GS, arXiv 2406.18533). Harmonics above the
+// first band that gather make their step when as many views are over, or at each of larger batches.
+AdamStep Optimizer::of_batch(AdamStep step) const {
+    const int views = schedule_.batch;
+    if (views == 1) return step;
+    const double gathered = schedule_.rest_every;
+    step.rest_every = std::max(schedule_.rest_every / views, 1);
+    const double rest_steps = step.rest_every * views / gathered;
+    for (int a = 0; a < kAttributeCount; ++a)
+        step.rate[static_cast<std::size_t>(a)] *=
+            static_cast<float>(std::sqrt(a == kShRest ? rest_steps : views));
+    step.rest_beta1 = std::pow(step.beta1, rest_steps);
+    step.rest_beta2 = std::pow(step.beta2, rest_steps);
+    step.beta1 = std::pow(step.beta1, views);
+    step.beta2 = std::pow(step.beta2, views);
+    return step;
+}
+
 AdamStep Optimizer::with_regularisers(AdamStep step, int iteration) const {
     step.opacity_weight = opacity_weight_;
     step.scale_weight = scale_weight_ / static_cast<float>(length());
     if (schedule_.largest_scale > 0)
         step.largest_log_scale =
             static_cast<float>(std::log(schedule_.largest_scale * schedule_.length_scale * reach_));
-    step.regularise_unseen = schedule_.regularises_unseen(photos_, iteration);
+    const int begin = schedule_.step_begin(iteration);
+    int unseen = 0;
+    for (int i = begin + 1; i <= iteration; ++i)
+        unseen += schedule_.regularises_unseen(photos_, i) ? 1 : 0;
+    step.regularise_unseen = static_cast<float>(unseen) / static_cast<float>(iteration - begin);
     return step;
 }
 
 AdamStep Optimizer::step(int iteration) const {
-    return with_regularisers(adam_step(rates(iteration), iteration), iteration);
+    const int steps = (iteration - 1) / schedule_.batch + 1;
+    return with_regularisers(adam_step(of_batch(rates(iteration)), steps), iteration);
 }
 
 AdamStep Optimizer::trial_step(int iteration, float share) const {

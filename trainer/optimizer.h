@@ -15,7 +15,8 @@ class Optimizer {
     Optimizer(const TrainOptions& options, const Schedule& schedule, double extent, double reach,
               std::size_t photos);
 
-    /// The step of an iteration, from 1. Its clearance is the view's, for the caller to set.
+    /// The step of an iteration, from 1, or of the batch that it is the last of. Its clearance is
+    /// the view's, for the caller to set.
     AdamStep step(int iteration) const;
     /// The same in a trial of a few iterations: all rates times `share`, and a step of all bands of
     /// colour in each.
@@ -26,6 +27,7 @@ class Optimizer {
 
   private:
     AdamStep rates(int iteration) const;
+    AdamStep of_batch(AdamStep step) const;
     AdamStep with_regularisers(AdamStep step, int iteration) const;
 
     Schedule schedule_;

@@ -18,6 +18,9 @@ constexpr std::uint32_t kAnyNumberOfSplats = std::numeric_limits<std::uint32_t>:
 struct TrainOptions {
     int iterations = 30'000;
     std::uint64_t seed = 0;
+    // Views a step, a power of two: their gradients are added by a binary tree over the views'
+    // places in the batch, then the optimizer makes one step of their mean. Iterations count views.
+    int batch = 1;
 
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;

@@ -25,8 +25,8 @@ DegreeProbe::DegreeProbe(const TrainOptions& options, const Schedule& schedule)
       next_(schedule.degree_interval) {}
 
 bool DegreeProbe::is_due(int iteration, int degree) const {
-    return on_ && iteration == next_ && iteration < schedule_.iterations &&
-           degree < highest_degree_;
+    return on_ && schedule_.step_begin(iteration) < next_ && next_ <= iteration &&
+           iteration < schedule_.iterations && degree < highest_degree_;
 }
 
 void DegreeProbe::set_aside(const std::vector<int>& views) {

@@ -38,7 +38,7 @@ class DegreeProbe {
   public:
     DegreeProbe(const TrainOptions& options, const Schedule& schedule);
 
-    /// Whether there is one after this iteration, of splats of this degree.
+    /// Whether there is one after the step that this iteration ends, of splats of this degree.
     bool is_due(int iteration, int degree) const;
     /// Tries one more degree. state: the run's, which the fork ends away from; it gets the degree
     /// that won and the iteration of the next probe, for the caller to restore. views: the training

@@ -30,8 +30,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-bool contains(const std::vector<int>& list, int value) {
-    return std::find(list.begin(), list.end(), value) != list.end();
+// Whether the list has an iteration of (begin, end].
+bool contains(const std::vector<int>& list, int begin, int end) {
+    return std::any_of(list.begin(), list.end(), [&](int i) { return begin < i && i <= end; });
 }
 
 // Measured before there is a budget of memory, and no part of the run's peak.
@@ -95,7 +96,7 @@ class Run {
     void save_checkpoint(const std::filesystem::path& path);
     void begin();
     void train(const std::atomic<bool>* stop);
-    void after_step();
+    void after_step(int begin);
     void save_what_is_there(bool failed);
     bool is_finished() const;
     RunSummary finished();
@@ -179,7 +180,7 @@ std::string exposure_text(const std::map<std::string, ColourMap>& maps) {
 void Run::on_result(const IterationResult& result) {
     latest_ = result;
     log_.iteration(result, trainer_.counters(), seconds(), trainer_.pass_totals());
-    progress_.update(result, device_);
+    if (result.ends_step) progress_.update(result, device_);
 }
 
 void Run::evaluate(int iteration) {
@@ -336,11 +337,11 @@ void Run::train(const std::atomic<bool>* stop) {
     whole_ = true;
     while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
         whole_ = false;
-        while_doing(fmt::format("iteration {}", trainer_.iteration() + 1),
-                    [&] { trainer_.step(); });
+        const int begin = trainer_.iteration();
+        while_doing(fmt::format("iteration {}", begin + 1), [&] { trainer_.step(); });
         whole_ = true;
         while_doing(fmt::format("what follows iteration {}", trainer_.iteration()),
-                    [&] { after_step(); });
+                    [&] { after_step(begin); });
         if (run_.on_step) show_step();
     }
     whole_ = false;
@@ -349,17 +350,19 @@ void Run::train(const std::atomic<bool>* stop) {
     stopwatch(false);
 }
 
-void Run::after_step() {
+// Of the iterations (begin, now].
+void Run::after_step(int begin) {
     report_resolution();
     report_memory();
     report_probes();
     const int i = trainer_.iteration();
     const bool last = i == options_.iterations;
-    if (last || contains(run_.test_iterations, i)) evaluate(i);
-    if (last || contains(run_.save_iterations, i)) save_model(i);
-    if (contains(run_.checkpoint_iterations, i))
+    if (last || contains(run_.test_iterations, begin, i)) evaluate(i);
+    if (last || contains(run_.save_iterations, begin, i)) save_model(i);
+    if (contains(run_.checkpoint_iterations, begin, i))
         save_checkpoint(run_.output / fmt::format("chkpnt{}.darb", i));
-    if (last || (run_.checkpoint_interval > 0 && i % run_.checkpoint_interval == 0))
+    if (last || (run_.checkpoint_interval > 0 &&
+                 i / run_.checkpoint_interval != begin / run_.checkpoint_interval))
         save_checkpoint(run_.output / "checkpoint.darb");
 }
 

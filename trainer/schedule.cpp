@@ -1,8 +1,11 @@
 #include "trainer/schedule.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
 
 namespace darb {
@@ -68,6 +71,7 @@ Schedule::Resets resets_of(const TrainOptions& o, float prune_opacity,
 
 Schedule::Schedule(const TrainOptions& o)
     : iterations(o.iterations),
+      batch(o.batch),
       strategy(o.strategy),
       speedup(speedup_of(o)),
       prune_extent_(o.prune_extent),
@@ -75,6 +79,9 @@ Schedule::Schedule(const TrainOptions& o)
       exposure_lr_final_(o.exposure_lr_final),
       sh_degree_(o.sh_degree),
       ramp_(o.resolution_ramp) {
+    if (batch < 1 || (batch & (batch - 1)) != 0)
+        throw Error(fmt::format("--batch {}", batch), "is no power of two",
+                    "Give 1, 2, 4, 8 and so on: gradients are added in pairs.");
     const StrategyDefaults& defaults = strategy_row(strategy).defaults;
     initial_opacity = o.initial_opacity.value_or(defaults.initial_opacity);
     initial_scale = o.initial_scale.value_or(defaults.initial_scale);
@@ -111,6 +118,11 @@ Schedule::Schedule(const TrainOptions& o)
     position_falls_for =
         o.position_lr_falls.value_or(averages() ? defaults.position_lr_falls : 1.0);
     last_share = o.final_lr_share.value_or(averages() ? 1.0 : 0.3);
+}
+
+int Schedule::step_end(int iteration) const {
+    const int end = iteration / batch * batch + batch;
+    return iteration < iterations ? std::min(end, iterations) : end;
 }
 
 double Schedule::position_rate(int iteration) const {

@@ -4,6 +4,7 @@
 // arguments.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -61,7 +62,13 @@ class Schedule {
     /// What the sides of the photos are divided by in an iteration (from 1): 1 after the last step.
     int resolution_divisor(int iteration, int longest_side) const;
 
+    /// A step ends with iterations in (step_begin(i), i], i being its last: one, or a batch.
+    int step_begin(int iteration) const { return std::max(0, (iteration - 1) / batch * batch); }
+    /// The last iteration of the step after this one: steps begin at multiples of the batch.
+    int step_end(int iteration) const;
+
     int iterations;
+    int batch = 1;
     Strategy strategy;
     // Where they are not given, the strategy's.
     float initial_opacity = 0, initial_scale = 0, prune_opacity = 0, opacity_decay = 0;

@@ -43,8 +43,8 @@ TrainedSmoothing::TrainedSmoothing(Device& device, const ProjectionEffects& effe
       cameras_(upload_cameras(device, cameras)),
       camera_count_(static_cast<std::uint32_t>(cameras.size())) {}
 
-void TrainedSmoothing::advance(int iteration) {
-    if (iteration % kFilterInterval == 0) stale_ = true;
+void TrainedSmoothing::advance(int begin, int end) {
+    if (end / kFilterInterval != begin / kFilterInterval) stale_ = true;
 }
 
 void TrainedSmoothing::update(GpuSplats& splats) {

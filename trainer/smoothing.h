@@ -29,8 +29,8 @@ class TrainedSmoothing {
     TrainedSmoothing(Device& device, const ProjectionEffects& effects,
                      const std::vector<gpu::CameraData>& cameras);
 
-    /// After every iteration: whether it is one that the filter follows.
-    void advance(int iteration);
+    /// After every step, of the iterations (begin, end]: whether the filter follows one of them.
+    void advance(int begin, int end);
     void mark_stale() { stale_ = true; }
     bool is_stale() const { return stale_; }
     /// The queue must be idle.

@@ -21,6 +21,14 @@ ForwardOptions forward_options(const TrainOptions& options) {
     return f;
 }
 
+namespace {
+
+ExposureStep exposure_step(const StepInput& input) {
+    return {input.view.photo, input.view.size(), input.exposure_rate, input.exposure_visits};
+}
+
+}  // namespace
+
 LossOptions loss_options(const TrainOptions& options, const Dataset& dataset) {
     return {.use_alpha = options.alpha, .use_mask = options.alpha && dataset.alpha_is_mask};
 }
@@ -41,7 +49,9 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, const TrainingPhot
       lambda_dssim_(options.lambda_dssim),
       d_image_(device, "d_image", photos.largest_photo() * 12),
       flights_{Flight(device), Flight(device)} {
-    if (options.exposure) exposure_.emplace(device, photos.count(), photos.largest_photo());
+    if (options.exposure)
+        exposure_.emplace(device, photos.count(), photos.largest_photo(), options.batch);
+    if (options.batch > 1) adam_.emplace(device);
 }
 
 void TrainingStep::reserve(int width, int height) {
@@ -86,7 +96,7 @@ void TrainingStep::launch(Flight& flight, const StepInput& input) {
         flight.commands.copy(given_d_image_, d_image_, std::uint64_t{input.view.size()} * 12);
     else
         record_loss(flight.commands, input, flight.loss);
-    record_update(flight.commands, input);
+    record_back(flight.commands, input);
     flight.commands.copy(buffers_.frame().counters.status, flight.status, sizeof(gpu::FrameStatus));
     flight.commands.submit();
 }
@@ -94,8 +104,17 @@ void TrainingStep::launch(Flight& flight, const StepInput& input) {
 StepFrame TrainingStep::step_frame(Commands& commands, const StepInput& input) {
     Frame& frame = buffers_.frame();
     const Buffer& compared = exposure_ ? exposure_->mapped() : frame.images.image;
-    return {commands, input.view.frame,   frame,    backward_,      *splats_,
-            compared, *input.view.pixels, d_image_, input.iteration};
+    const bool scores = input.gradients && input.gradients->scores();
+    return {commands,
+            input.view.frame,
+            frame,
+            backward_,
+            *splats_,
+            compared,
+            *input.view.pixels,
+            d_image_,
+            input.iteration,
+            scores ? &input.gradients->scores() : nullptr};
 }
 
 void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
@@ -106,6 +125,7 @@ void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
 }
 
 void TrainingStep::record_before_loss(Commands& commands, const StepInput& input) {
+    if (input.gradients && input.gradients->scores()) commands.fill(input.gradients->scores(), 0);
     if (input.strategy && input.measures)
         input.strategy->record_before_loss(step_frame(commands, input));
 }
@@ -117,15 +137,52 @@ void TrainingStep::record_loss(Commands& commands, const StepInput& input, const
                  view.frame.background, lambda_dssim_);
 }
 
-void TrainingStep::record_update(Commands& commands, const StepInput& input) {
+void TrainingStep::record_back(Commands& commands, const StepInput& input) {
     const TrainingView& view = input.view;
     Frame& frame = buffers_.frame();
+    const Buffer& status = frame.counters.status;
     if (exposure_)
-        exposure_->record_backward(
-            commands, frame.images.image, d_image_, frame.counters.status,
-            {view.photo, view.size(), input.exposure_rate, input.exposure_visits});
+        exposure_->record_backward(commands, frame.images.image, d_image_, exposure_step(input),
+                                   input.place);
+    if (input.gradients)
+        return backward_.record_gradients(commands, view.frame, frame, *splats_, d_image_,
+                                          {*input.gradients});
+    if (exposure_) exposure_->record_step(commands, status, exposure_step(input));
     backward_.record(commands, view.frame, frame, *splats_, d_image_, input.adam);
     if (input.strategy) input.strategy->record_after_update(step_frame(commands, input));
+}
+
+std::vector<PassTime> TrainingStep::work(const std::function<void(Commands&)>& record) {
+    Commands& commands = flights_[0].commands;
+    commands.begin();
+    record(commands);
+    commands.submit_and_wait();
+    return commands.pass_times();
+}
+
+std::vector<PassTime> TrainingStep::run_update(std::span<const StepInput> views,
+                                               const GradientBuffers& sum) {
+    reserve_backward();
+    return work([&](Commands& commands) { record_update(commands, views, sum); });
+}
+
+void TrainingStep::record_update(Commands& commands, std::span<const StepInput> views,
+                                 const GradientBuffers& sum) {
+    const StepInput& last = views.back();
+    const Buffer& status = buffers_.frame().counters.status;
+    adam_->record(commands, *splats_, sum, status, last.view.frame.sh_degree, last.adam,
+                  1.0f / static_cast<float>(views.size()));
+    for (const StepInput& input : views)
+        adam_->record_fading(commands, *splats_, sum, status, input.view.frame,
+                             input.adam.clearance);
+    adam_->record_sums(commands, sum, status, backward_.gradient_sum());
+    if (exposure_)
+        for (const StepInput& input : views)
+            exposure_->record_step(commands, status, exposure_step(input), input.place);
+    if (!last.strategy) return;
+    if (sum.scores())
+        last.strategy->record_scores(commands, sum.scores(), status, splats_->count());
+    last.strategy->record_after_update(step_frame(commands, last));
 }
 
 // A frame that did not fit is drawn again before anybody sees it: the step behind it then fits.
@@ -150,7 +207,7 @@ void TrainingStep::ask_for_gradient(Flight& flight) {
 }
 
 // Where the step overflowed it changed nothing and tells nothing.
-gpu::FrameStatus TrainingStep::finish(Flight& flight, StepOutcome& outcome) {
+gpu::FrameStatus TrainingStep::read(Flight& flight, StepOutcome& outcome) {
     flight.commands.wait();
     flight.busy = false;
     gpu::LossResult loss;
@@ -163,8 +220,26 @@ gpu::FrameStatus TrainingStep::finish(Flight& flight, StepOutcome& outcome) {
     outcome.mse = double(loss.mse) / std::max(double(loss.weight), 1e-12);
     outcome.pixels = flight.input.view.size();
     outcome.passes = flight.commands.pass_times();
-    if (on_finished) on_finished(outcome);
     return outcome.status;
+}
+
+gpu::FrameStatus TrainingStep::finish(Flight& flight, StepOutcome& outcome) {
+    const gpu::FrameStatus status = read(flight, outcome);
+    if (status.overflow == 0 && on_finished) on_finished(outcome);
+    return status;
+}
+
+StepOutcome TrainingStep::run_view(const StepInput& input) {
+    drain();
+    StepOutcome outcome;
+    for (;;) {
+        launch(flights_[0], input);
+        const gpu::FrameStatus status = read(flights_[0], outcome);
+        if (status.overflow == 0) return outcome;
+        ++outcome.overflows;
+        ++outcome.redone;
+        make_room(status);
+    }
 }
 
 // The overflow flag is sticky: whatever was submitted after the step that overflowed changed

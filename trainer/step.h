@@ -8,10 +8,12 @@
 #include <functional>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "engine/core/image.h"
 #include "engine/gpu/commands.h"
+#include "engine/raster/adam_update.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
@@ -37,6 +39,9 @@ struct StepInput {
     int exposure_visits = 1;              // of this photo, this step counted
     DensityStrategy* strategy = nullptr;  // that records into the step
     bool measures = true;                 // false: not before the loss, for its rounds
+    // Of a batch: where the view's gradients go, in place of a step, and which of it the view is.
+    GradientBuffers* gradients = nullptr;
+    int place = 0;
 };
 
 /// What one finished step tells.
@@ -47,6 +52,7 @@ struct StepOutcome {
     std::uint32_t pixels = 0;  // of the photo
     std::vector<PassTime> passes;
     std::uint32_t redone = 0, overflows = 0;  // how often this step was done again, and why
+    bool ends_step = true;                    // false: other views of its batch follow
 };
 
 class TrainingStep {
@@ -55,6 +61,15 @@ class TrainingStep {
     /// two steps. photos: of the largest sizes that steps will have.
     TrainingStep(Device& device, GpuSplats& splats, const TrainingPhotos& photos,
                  const LossOptions& loss, const TrainOptions& options);
+
+    /// A view of a batch, with input.gradients: these, and those of its exposure; nothing is
+    /// updated and nobody told. Drains, and waits for it.
+    StepOutcome run_view(const StepInput& input);
+    /// The step of a batch of which these are all views, in order, from the sum of their gradients;
+    /// rates and regularisers are those of the last. Waits for it; its passes.
+    std::vector<PassTime> run_update(std::span<const StepInput> views, const GradientBuffers& sum);
+    /// Other work between the views of a batch. Waits for it; its passes.
+    std::vector<PassTime> work(const std::function<void(Commands&)>& record);
 
     /// Submits the step, then waits for the one before. The outcomes of finished steps go to
     /// on_finished, in order.
@@ -105,9 +120,12 @@ class TrainingStep {
     void record_picture(Commands& commands, const StepInput& input);
     void record_before_loss(Commands& commands, const StepInput& input);
     void record_loss(Commands& commands, const StepInput& input, const Buffer& loss);
-    void record_update(Commands& commands, const StepInput& input);
+    void record_back(Commands& commands, const StepInput& input);
+    void record_update(Commands& commands, std::span<const StepInput> views,
+                       const GradientBuffers& sum);
     StepFrame step_frame(Commands& commands, const StepInput& input);
     void ask_for_gradient(Flight& flight);
+    gpu::FrameStatus read(Flight& flight, StepOutcome& outcome);
     gpu::FrameStatus finish(Flight& flight, StepOutcome& outcome);
     void complete(Flight& flight);
     gpu::FrameStatus redo(const StepInput& input, gpu::FrameStatus status);
@@ -121,6 +139,7 @@ class TrainingStep {
     Loss loss_;
     float lambda_dssim_;
     std::optional<Exposure> exposure_;  // options.exposure
+    std::optional<AdamUpdate> adam_;    // of batches
     Buffer d_image_;
     Buffer given_d_image_;  // [3][H][W] of picture_gradient
     std::array<Flight, 2> flights_;

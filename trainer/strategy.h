@@ -112,6 +112,8 @@ struct StrategyRow {
     std::uint64_t (*forecast_until)(const Schedule& schedule, int iteration, double start,
                                     std::uint32_t end) = end_at_once;
 
+    bool scores_views = false;  // DensityStrategy::record_scores
+
     /// Between rounds.
     std::uint64_t (*device_bytes)(const StrategySize& size);
     std::unique_ptr<DensityStrategy> (*make)(const StrategySetup& setup);

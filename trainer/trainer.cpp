@@ -7,6 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
+#include "trainer/batch_step.h"
 
 namespace darb {
 
@@ -31,6 +32,14 @@ Device& with_budget(Device& device, const TrainOptions& options) {
 
 double psnr_of(double mse) {
     return -10.0 * std::log10(std::max(mse, 1e-12));
+}
+
+// The last iteration of (begin, end] for which it holds; 0: none.
+template <class Holds>
+int last_in(int begin, int end, Holds holds) {
+    for (int i = end; i > begin; --i)
+        if (holds(i)) return i;
+    return 0;
 }
 
 // While it is there, the parameters are the mean, where there is one.
@@ -74,6 +83,8 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     if (options_.antialias)
         smoothing_.emplace(device, forward_options(options).effects, photos_.training_cameras());
     if (options_.morton_order) morton_.emplace(device);
+    if (options_.batch > 1)
+        tree_.emplace(device, options_.batch, strategy_row(options.strategy).scores_views);
     set_resolution(1);
     update_smoothing();
     step_.reserve(photos_.largest_width(), photos_.largest_height());
@@ -91,11 +102,12 @@ glm::vec3 Trainer::background_for(int iteration) const {
     return colour;
 }
 
-StepInput Trainer::input_for(int iteration, int view) const {
+// last: of the step, whose rates and degree all of its views have.
+StepInput Trainer::input_for(int iteration, int view, int last) const {
     StepInput input;
     input.iteration = iteration;
-    input.view = photos_.view(view, degree_at(iteration), background_for(iteration));
-    input.adam = optimizer_.step(iteration);
+    input.view = photos_.view(view, degree_at(last), background_for(iteration));
+    input.adam = optimizer_.step(last);
     input.adam.clearance = static_cast<float>(options_.clearance * photos_.nearest_distance(view));
     input.exposure_rate = static_cast<float>(schedule_.exposure_rate(iteration));
     input.exposure_visits = (iteration - 1) / static_cast<int>(photos_.count()) + 1;
@@ -103,22 +115,39 @@ StepInput Trainer::input_for(int iteration, int view) const {
     return input;
 }
 
-// Density control opens the next iteration rather than closing its own, so that what is evaluated
-// and saved between them is what was trained, not what was just reset.
+// Density control opens the next step rather than closing its own, so that what is evaluated and
+// saved between them is what was trained, not what was just reset.
 void Trainer::step() {
-    if (opened_ != iteration_) open_iteration();
+    if (opened_ != iteration_) open_step();
     set_resolution(iteration_ + 1);
-    const StepInput input = input_for(iteration_ + 1, order_.view(iteration_ + 1));
+    const int begin = iteration_;
+    tree_ ? run_batch() : run_step();
+    if (smoothing_) smoothing_->advance(begin, iteration_);
+    update_smoothing();
+    if (last_in(begin, iteration_, [&](int i) { return schedule_.averages_after(i); })) average();
+}
+
+void Trainer::run_step() {
+    const StepInput input = input_for(iteration_ + 1, order_.view(iteration_ + 1), iteration_ + 1);
     if (step_.picture_gradient) step_.run(input);
     ++iteration_;
     if (!step_.picture_gradient) step_.run(input);
-    if (smoothing_) smoothing_->advance(iteration_);
-    update_smoothing();
-    if (schedule_.averages_after(iteration_)) average();
 }
 
-void Trainer::open_iteration() {
-    const std::optional<DensityResult> round = control_density(iteration_);
+void Trainer::run_batch() {
+    const int end = schedule_.step_end(iteration_);
+    std::vector<StepInput> views;
+    for (int i = iteration_ + 1; i <= end; ++i) {
+        views.push_back(input_for(i, order_.view(i), end));
+        views.back().place = i - iteration_ - 1;
+    }
+    const std::vector<StepOutcome> outcomes = run_batch_step(step_, *tree_, splats_, views);
+    iteration_ = end;
+    for (const StepOutcome& outcome : outcomes) finish(outcome);
+}
+
+void Trainer::open_step() {
+    const std::optional<DensityResult> round = control_density();
     update_smoothing();
     if (probe_.is_due(iteration_, splats_.sh_degree())) probe_degree();
     opened_ = iteration_;
@@ -146,18 +175,20 @@ void Trainer::finish(const StepOutcome& outcome) {
     if (!on_result) return;
     on_result({outcome.iteration, outcome.loss, psnr_of(outcome.mse), splats_.count(),
                outcome.status.visible, outcome.status.intersections, outcome.pixels,
-               static_cast<int>(splats_.stride(kShRest))});
+               static_cast<int>(splats_.stride(kShRest)), outcome.ends_step});
 }
 
-std::optional<DensityResult> Trainer::control_density(int iteration) {
-    if (iteration >= schedule_.rounds.end) return std::nullopt;
-    const bool round = schedule_.refines_after(iteration);
-    const bool reset = schedule_.resets_after(iteration);
-    if (!round && !reset) return std::nullopt;
+// What is due after any iteration of the step comes once, as after the last of them.
+std::optional<DensityResult> Trainer::control_density() {
+    const int begin = schedule_.step_begin(iteration_);
+    const int end = std::min(iteration_, schedule_.rounds.end - 1);
+    const int round = last_in(begin, end, [&](int i) { return schedule_.refines_after(i); });
+    const int reset = last_in(begin, end, [&](int i) { return schedule_.resets_after(i); });
+    if (round == 0 && reset == 0) return std::nullopt;
     drain();
     std::optional<DensityResult> result;
-    if (round) result = run_round(iteration);
-    if (reset) density_.reset_opacity(splats_, schedule_.resets.to);
+    if (round > 0) result = run_round(round);
+    if (reset > 0) density_.reset_opacity(splats_, schedule_.resets.to);
     return result;
 }
 
@@ -224,7 +255,7 @@ void Trainer::probe_degree() {
         .restore = [this](const State& start) { restore(start); },
         .step =
             [this](int iteration, int view, float share) {
-                StepInput input = input_for(iteration, view);
+                StepInput input = input_for(iteration, view, iteration);
                 const float clearance = input.adam.clearance;
                 input.adam = optimizer_.trial_step(iteration, share);
                 input.adam.clearance = clearance;

@@ -17,6 +17,7 @@
 #include "trainer/density/density_control.h"
 #include "trainer/density/density_strategy.h"
 #include "trainer/density/morton_order.h"
+#include "trainer/gradient_tree.h"
 #include "trainer/iterate_average.h"
 #include "trainer/memory_budget.h"
 #include "trainer/optimizer.h"
@@ -38,6 +39,7 @@ struct IterationResult {
     std::uint32_t splats = 0, visible = 0, intersections = 0;
     std::uint32_t pixels = 0;  // of the photo, at the size of now
     int rest_floats = 0;       // of a splat's harmonics, as buffers hold them
+    bool ends_step = true;     // false: other views of its batch follow
 };
 
 /// A picture in training, as a loss of the caller's sees it; valid during the call.
@@ -60,7 +62,8 @@ class Trainer {
     Trainer(const Trainer&) = delete;
     Trainer& operator=(const Trainer&) = delete;
 
-    /// Runs iteration `iteration() + 1` and what density control has to do before it. Results of
+    /// Runs iteration `iteration() + 1`, or as many as a batch has views, and what density control
+    /// has to do before it. Results of
     /// finished iterations go to on_result, in order, at the latest at drain().
     void step();
     void drain() { step_.drain(); }
@@ -113,11 +116,13 @@ class Trainer {
   private:
     int degree_at(int iteration) const;
     glm::vec3 background_for(int iteration) const;
-    StepInput input_for(int iteration, int view) const;
+    StepInput input_for(int iteration, int view, int last) const;
+    void run_step();
+    void run_batch();
     void finish(const StepOutcome& outcome);
-    std::optional<DensityResult> control_density(int iteration);
+    std::optional<DensityResult> control_density();
     DensityResult run_round(int iteration);
-    void open_iteration();
+    void open_step();
     gpu::DensifyArgs round_args(int iteration) const;
     void reorder();
     void set_resolution(int iteration);
@@ -145,7 +150,8 @@ class Trainer {
     DegreeProbe probe_;
     RunTotals totals_;
     int iteration_ = 0;
-    int opened_ = 0;     // the iteration after which density control and probes had their turn
+    int opened_ = 0;  // the iteration after which density control and probes had their turn
+    std::optional<GradientTree> tree_;  // options.batch > 1
     TrainingStep step_;  // last: it waits for the device before anything that it uses goes
 };
 

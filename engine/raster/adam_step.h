@@ -16,7 +16,8 @@ struct AdamStep {
     // Weights of the mean opacity and the mean scale in the loss; of the splats that the frame
     // shows, or of all.
     float opacity_weight = 0, scale_weight = 0;
-    bool regularise_unseen = false;
+    // Share of the step's views at which they act on what a view does not show, too.
+    float regularise_unseen = 0;
     float largest_log_scale = std::numeric_limits<float>::max();  // none grows beyond it
     float clearance = 0;  // world: splats nearer to the camera fade
     // Harmonics above the first band make a step in every so many iterations, of the mean gradient
@@ -26,6 +27,7 @@ struct AdamStep {
     /// Others than these are AdamUpdate's alone: the step within the backward pass has them built
     /// in.
     double beta1 = 0.9, beta2 = 0.999;
+    double rest_beta1 = 0.9, rest_beta2 = 0.999;  // of the harmonics above the first band
 };
 
 /// rates: plain learning rates; t: the number of this step, from 1.

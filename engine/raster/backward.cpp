@@ -86,7 +86,8 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
     if (options_.linear_values || options_.direct_colour)
         throw Error("backward pass", "a step of Adam is made of logits, logarithms and harmonics",
                     "Leave linear_values and direct_colour off, or take record_gradients.");
-    if (step.beta1 != 0.9 || step.beta2 != 0.999)
+    if (step.beta1 != 0.9 || step.beta2 != 0.999 || step.rest_beta1 != 0.9 ||
+        step.rest_beta2 != 0.999)
         throw Error("backward pass", fmt::format("betas {} and {}", step.beta1, step.beta2),
                     "Take AdamUpdate for others than 0.9 and 0.999.");
     commands.pass("blend backward");
@@ -102,7 +103,7 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
     args.inverse_sqrt_correction2 = step.inverse_sqrt_correction2;
     args.opacity_weight = step.opacity_weight / n;
     args.scale_weight = step.scale_weight / (3.0f * n);
-    args.regularise_unseen = step.regularise_unseen ? 1u : 0u;
+    args.regularise_unseen = step.regularise_unseen > 0 ? 1u : 0u;
     args.largest_log_scale = step.largest_log_scale;
     args.clearance = step.clearance;
     args.rest_share = 1.0f / static_cast<float>(step.rest_every);

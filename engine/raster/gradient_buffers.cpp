@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint64_t kViewBytes = 2 * sizeof(float);
 }
 
-GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats)
+GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats, bool scores)
     : device_(&device),
       count_(splats.count()),
       add_(device, "add_gradients", {{"THREADS", SPLAT_GROUP}}) {
@@ -25,15 +25,24 @@ GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats)
             Buffer(device, std::string("gradients of ") + attribute_name(a), rows(a).bytes(count_));
     }
     views_ = Buffer(device, "views of gradients", count_ * kViewBytes);
+    if (scores) scores_ = Buffer(device, "scores of views", count_ * kViewBytes);
     Commands commands(device);
     commands.begin();
     record_clear(commands);
     commands.submit_and_wait();
 }
 
-std::uint64_t GradientBuffers::device_bytes(std::uint64_t count, int sh_degree, int kernel) {
+bool GradientBuffers::is_of(const GpuSplats& splats) const {
+    if (!device_ || count_ != splats.count()) return false;
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (strides_[a] != splats.stride(a)) return false;
+    return true;
+}
+
+std::uint64_t GradientBuffers::device_bytes(std::uint64_t count, int sh_degree, int kernel,
+                                            bool scores) {
     return GpuSplats::parameter_bytes(count, sh_degree, kernel) +
-           Buffer::charged_bytes(count * kViewBytes);
+           (scores ? 2 : 1) * Buffer::charged_bytes(count * kViewBytes);
 }
 
 void GradientBuffers::bind(const SplatRange& range, std::vector<BufferRange>& to) const {
@@ -46,6 +55,7 @@ void GradientBuffers::record_clear(Commands& commands) const {
     for (const Buffer& buffer : gradients_)
         if (buffer.bytes() > 0) commands.fill(buffer, 0);
     commands.fill(views_, 0);
+    if (scores_) commands.fill(scores_, 0);
 }
 
 void GradientBuffers::record_add(Commands& commands, const GradientBuffers& other) {
@@ -69,6 +79,7 @@ void GradientBuffers::record_add(Commands& commands, const GradientBuffers& othe
     for (int a = 0; a < kAttributeCount; ++a)
         if (strides_[a] > 0) add(other.gradients_[a], gradients_[a], rows(a));
     add(other.views_, views_, {2, 0});
+    if (scores_ && other.scores_) add(other.scores_, scores_, {2, 0});
 }
 
 void GradientBuffers::upload(int attribute, const std::vector<float>& values) {

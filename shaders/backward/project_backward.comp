@@ -176,9 +176,11 @@ void update_splat(uint i, SplatGradient g) {
     if (SHAPED) UPDATE_ATTRIBUTE(vec2, shape[i], m_shape[i], d_shape[i], g.shape, ATTRIBUTE_SHAPE)
     if (UPDATE == UPDATE_ADAM && stands_near(cameras[args.camera_index], i, args.clearance))
         opacity_logit[i] -= FADING;
-    if (SH_DEGREE > 0 && (REST != REST_GATHER || intersection_count[i] > 0u)) update_rest(i, g);
-    if (UPDATE == UPDATE_STORE)  // the bands beyond the degree in use
-        for (uint c = 3u * uint(FOURS); c < COLUMNS; ++c)
+    const bool shows = intersection_count[i] > 0u;
+    const bool steps = shows || (UPDATE == UPDATE_ADAM && REST != REST_GATHER);
+    if (SH_DEGREE > 0 && steps) update_rest(i, g);
+    if (UPDATE == UPDATE_STORE)  // the bands beyond the degree in use; all of what the view does not show: no -0
+        for (uint c = shows ? 3u * uint(FOURS) : 0u; c < COLUMNS; ++c)
             d_sh_rest[column_at(i - args.first_splat, c, COLUMNS)] = vec4(0.0);
 }
 

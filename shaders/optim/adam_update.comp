@@ -94,8 +94,11 @@ void main() {
         atomicAdd(status.bad_gradients, 1u);
         return;
     }
-    if ((STEP == STEP_SCALE || STEP == STEP_OPACITY) && (shown > 0.0 || args.regularise_unseen == 1u))
-        g += regulariser(value[at]);
+    // In the loss of each view that shows the splat, and of a share of the others.
+    if (STEP == STEP_SCALE || STEP == STEP_OPACITY) {
+        const float share = max(shown * args.gradient_scale, args.regularise_unseen);
+        if (share > 0.0) g += share * regulariser(value[at]);
+    }
     const float before = value[at];
     vec2 m = moment[at];
     float after = adam_step(before, m, g, args.rate);

@@ -42,10 +42,10 @@ struct AdamUpdateArgs {
     float inverse_sqrt_correction2;      // as above
     float beta1, share1, beta2, share2;  // share = 1 - beta
     float gradient_scale;                // of what the buffers of gradients hold
-    float weight;                        // of the attribute's regulariser
-    uint regularise_unseen;
-    float largest;     // STEP_SCALE: no value grows beyond it
-    float rest_share;  // STEP_REST: as above
+    float weight;                        // of the attribute's regulariser, in each view's loss
+    float regularise_unseen;  // share of the views whose regularisers act on what they do not show
+    float largest;            // STEP_SCALE: no value grows beyond it
+    float rest_share;         // STEP_REST: as above
 };
 
 // What the views of a step show of a splat is (sum of norms, views); so much less of the latter

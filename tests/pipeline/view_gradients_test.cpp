@@ -11,6 +11,7 @@
 #include "engine/reference/adam.h"
 #include "engine/render/render_gradients.h"
 #include "tests/support/test_walk.h"
+#include "trainer/gradient_tree.h"
 
 namespace darb::test {
 namespace {
@@ -315,6 +316,43 @@ TEST(ViewGradients, add_in_a_tree_as_the_host_does) {
         const std::vector<float> sum = leaves[0].download(static_cast<int>(a));
         for (size_t i = 0; i < sum.size(); ++i)
             EXPECT_EQ(sum[i], (d[0][a][i] + d[1][a][i]) + (d[2][a][i] + d[3][a][i]));
+    }
+}
+
+// Sums of the positions' gradients in the tree of the views' places, by halves of halves.
+std::vector<float> sum_by_halves(const std::vector<std::vector<float>>& views, size_t begin,
+                                 size_t end) {
+    if (begin >= views.size()) return {};
+    if (end - begin == 1) return views[begin];
+    const size_t middle = (begin + end) / 2;
+    std::vector<float> sum = sum_by_halves(views, begin, middle);
+    const std::vector<float> later = sum_by_halves(views, middle, end);
+    for (size_t i = 0; i < later.size(); ++i) sum[i] += later[i];
+    return sum;
+}
+
+// Whole batches and what is left of one at the end of a run.
+TEST(GradientTree, adds_views_by_their_places) {
+    Views views(0);
+    GradientTree tree(views.device, 8, true);
+    tree.reserve(views.splats);
+    Pcg32 rng(17);
+    Commands commands(views.device);
+    for (const size_t count : {8U, 7U, 6U, 5U, 1U}) {
+        std::vector<std::vector<float>> d(count);
+        tree.begin();
+        for (std::vector<float>& one : d) {
+            for (size_t i = 0; i < 3 * size_t{views.splats.count()}; ++i)
+                one.push_back(static_cast<float>(rng.normal() * std::exp(4 * rng.normal())));
+            tree.leaf().upload(kPosition, one);
+            tree.leaf().scores().upload(std::vector<float>(2 * views.splats.count(), 1.0f));
+            commands.begin();
+            tree.record_view(commands);
+            if (&one == &d.back()) tree.record_end(commands);
+            commands.submit_and_wait();
+        }
+        EXPECT_EQ(tree.sum().download(kPosition), sum_by_halves(d, 0, 8)) << count;
+        EXPECT_EQ(tree.sum().scores().download<float>(1)[0], static_cast<float>(count));
     }
 }
 

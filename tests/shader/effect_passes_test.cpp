@@ -43,7 +43,8 @@ ExposureRun run_exposure(std::uint32_t pixels, const std::vector<float>& image,
     Commands commands(device);
     commands.begin();
     exposure.record(commands, picture, 1, pixels);
-    exposure.record_backward(commands, picture, d, status, {1, pixels, 0.01f, 3});
+    exposure.record_backward(commands, picture, d, {1, pixels, 0.01f, 3});
+    exposure.record_step(commands, status, {1, pixels, 0.01f, 3});
     commands.submit_and_wait();
     return {exposure.mapped().download<float>(image.size()), d.download<float>(image.size()),
             exposure.state()};

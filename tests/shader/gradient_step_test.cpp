@@ -211,8 +211,9 @@ struct ExposedStep {
         exposure.record(commands, frame.images.image, 0, pixels());
         loss.record(commands, {exposure.mapped(), photo, d_image, result}, camera.width,
                     camera.height, view.background);
-        exposure.record_backward(commands, frame.images.image, d_image, status,
-                                 {0, pixels(), 0.01f, t});
+        const ExposureStep exposed{0, pixels(), 0.01f, t};
+        exposure.record_backward(commands, frame.images.image, d_image, exposed);
+        exposure.record_step(commands, status, exposed);
         if (apart) {
             backward.record_gradients(commands, view, frame, splats, d_image, {gradients});
             update.record(commands, splats, gradients, status, 1, step);

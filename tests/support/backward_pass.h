@@ -81,7 +81,7 @@ inline gpu::ProjectBackwardArgs backward_args(std::uint32_t splats, const AdamSt
     args.inverse_sqrt_correction2 = step.inverse_sqrt_correction2;
     args.opacity_weight = step.opacity_weight;
     args.scale_weight = step.scale_weight;
-    args.regularise_unseen = step.regularise_unseen ? 1u : 0u;
+    args.regularise_unseen = step.regularise_unseen > 0 ? 1u : 0u;
     args.largest_log_scale = step.largest_log_scale;
     args.clearance = step.clearance;
     args.rest_share = 1.0f / static_cast<float>(step.rest_every);

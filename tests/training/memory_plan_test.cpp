@@ -97,6 +97,8 @@ TEST(MemoryPlan, strategies_are_met_to_the_byte) {
         add_photos(small_scene(1).views, options, demand);
         EXPECT_EQ(demand.small_pixels > 0, options.resolution_ramp);
         compare_to_the_byte(options, 4'000, "", 1);
+        options.batch = 4;
+        compare_to_the_byte(options, 4'000, "", 1);
     }
 }
 

@@ -17,6 +17,7 @@ namespace {
 /// Another value than the run's, under which 20 iterations differ.
 const std::map<std::string, std::string> kOtherValues{
     {"/iterations", "12"},
+    {"/batch", "2"},
     {"/seed", "6"},
     {"/max_splats", "40"},
     {"max_memory", "2MB"},

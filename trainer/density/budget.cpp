@@ -35,8 +35,13 @@ class Budget : public DensityStrategy {
     void record_before_loss(const StepFrame& f) override {
         const int interval = std::max(1, schedule_.rounds.interval / kScoresPerRound);
         if (f.iteration >= schedule_.rounds.end || f.iteration % interval != 0) return;
-        score_.record(f.commands, f.view, f.frame, f.backward, {f.image, f.photo, f.d_image},
-                      f.splats.count());
+        score_.record(f.commands, f.view, f.frame, f.backward,
+                      {f.image, f.photo, f.d_image, f.scores}, f.splats.count());
+    }
+
+    void record_scores(Commands& commands, const Buffer& scores, const Buffer& status,
+                       std::uint32_t splats) override {
+        score_.record_sum(commands, scores, status, splats);
     }
 
     DensityResult round(const DensityRound& r) override {
@@ -79,6 +84,7 @@ const StrategyRow& budget_row() {
         .defaults = {.opacity_decay = 0.01f, .sh_rest_every = 16},
         .settings = {"opacity_decay"},
         .target = close_the_gap,
+        .scores_views = true,
         .device_bytes =
             [](const StrategySize& size) {
                 return ErrorScore::device_bytes(size.splats, size.pixels, size.list_segments);

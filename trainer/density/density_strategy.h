@@ -31,6 +31,10 @@ class DensityStrategy {
 
     /// Recorded between a picture and its loss. Not while a probe tries something out.
     virtual void record_before_loss(const StepFrame&) {}
+    /// After a batch: what record_before_loss left in StepFrame::scores of its views, added up,
+    /// goes to the strategy's own sums. Of a strategy whose row scores views.
+    virtual void record_scores(Commands&, const Buffer& /*scores*/, const Buffer& /*status*/,
+                               std::uint32_t /*splats*/) {}
     /// Recorded after the optimizer's step. A frame that overflowed must change nothing.
     virtual void record_after_update(const StepFrame&) {}
 

@@ -22,7 +22,8 @@ ErrorScore::ErrorScore(Device& device, const LossOptions& photos)
              {{"THREADS", SPLAT_GROUP},
               {"USE_MASK", photos.use_mask ? 1 : 0},
               {"USE_ALPHA", photos.use_alpha ? 1 : 0}}),
-      share_(share_pipeline(device, 0)) {
+      share_(share_pipeline(device, 0)),
+      sum_(device, "add_views", {{"THREADS", SPLAT_GROUP}, {"SEEN", 1}}) {
     reset(0);
 }
 
@@ -39,6 +40,14 @@ std::uint64_t ErrorScore::device_bytes(std::uint64_t splats, std::uint64_t pixel
     std::uint64_t bytes = charged_bytes(share_buffers(std::max<std::uint64_t>(splats, 1)));
     if (list_segments > 1) bytes += charged_bytes(segment_buffers(pixels));
     return bytes;
+}
+
+void ErrorScore::record_sum(Commands& commands, const Buffer& shares, const Buffer& status,
+                            std::uint32_t splats) {
+    if (splats == 0) return;
+    const Groups g = groups_for(splats);
+    commands.pass("error share");
+    commands.dispatch(sum_, gpu::SplatArgs{splats}, {shares, shares_, status}, g.x, g.y);
 }
 
 void ErrorScore::reset(std::uint32_t splats) {
@@ -81,11 +90,12 @@ void ErrorScore::record(Commands& commands, const FrameView& view, const Frame& 
         window_intersections_ = sums.window_intersections();
         share_ = share_pipeline(*device_, window_intersections_);
     }
-    commands.dispatch(share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
-                      {frame.splats.intersection_count, frame.splats.first_intersection,
-                       sums.partials(0), sums.partials(1), sums.partials(2), sums.partials(3),
-                       sums.partials(4), frame.counters.status, shares_},
-                      each_splat.x, each_splat.y);
+    commands.dispatch(
+        share_, gpu::ErrorShareArgs{splats, 1.0f / static_cast<float>(pixels)},
+        {frame.splats.intersection_count, frame.splats.first_intersection, sums.partials(0),
+         sums.partials(1), sums.partials(2), sums.partials(3), sums.partials(4),
+         frame.counters.status, images.shares ? *images.shares : shares_},
+        each_splat.x, each_splat.y);
 }
 
 }  // namespace darb

@@ -28,13 +28,18 @@ class ErrorScore {
                                       std::uint32_t list_segments);
 
     struct Images {
-        const Buffer& image;    // the picture that is compared
-        const Buffer& photo;    // with this
-        const Buffer& d_image;  // [3][H][W], scratch here
+        const Buffer& image;             // the picture that is compared
+        const Buffer& photo;             // with this
+        const Buffer& d_image;           // [3][H][W], scratch here
+        const Buffer* shares = nullptr;  // to which that of the view is added; null: shares()
     };
     /// Recorded between Forward::record of a frame and its loss.
     void record(Commands& commands, const FrameView& view, const Frame& frame, Backward& backward,
                 const Images& images, std::uint32_t splats);
+
+    /// The shares of several views, added up, to shares(). status: gpu::FrameStatus of a frame.
+    void record_sum(Commands& commands, const Buffer& shares, const Buffer& status,
+                    std::uint32_t splats);
 
     /// [N][2]: sum over the photos of the splat's share of their mean error; 1 where one saw it.
     const Buffer& shares() const { return shares_; }
@@ -46,7 +51,7 @@ class ErrorScore {
     static BufferList<ErrorScore> segment_buffers(std::uint64_t pixels);
 
     Device* device_;
-    Pipeline image_, share_;
+    Pipeline image_, share_, sum_;
     std::uint32_t window_intersections_ = 0;  // of the partials that share_ reads
     Buffer shares_, transmittance_;  // the latter: a copy, where lists take several dispatches
 };

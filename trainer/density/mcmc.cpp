@@ -39,7 +39,8 @@ class Mcmc : public DensityStrategy {
 
     void record_after_update(const StepFrame& f) override {
         const double rate = options_.noise_lr * schedule_.position_rate(f.iteration) *
-                            kNoiseExtent * kNoiseExtent / extent_;
+                            kNoiseExtent * kNoiseExtent / extent_ *
+                            std::sqrt(static_cast<double>(schedule_.batch));
         const auto stream = 0x6E6F697Eull << 32 | static_cast<std::uint32_t>(f.iteration);
         Pcg32 random(options_.seed, stream);
         relocation_.record_noise(f.commands, f.splats, f.frame.counters.status,

@@ -18,6 +18,9 @@ struct StepFrame {
     const Buffer& photo;    // with this, uint [H][W]
     const Buffer& d_image;  // [3][H][W], scratch until the loss writes it
     int iteration;
+    /// Of a batch, [N][2], all zero: where the strategy adds what it sums up of this view; null:
+    /// to its own sums.
+    const Buffer* scores = nullptr;
 };
 
 }  // namespace darb

@@ -43,5 +43,48 @@ TEST(Optimizer, a_trial_has_a_share_of_all_rates_and_steps_of_all_bands) {
     EXPECT_EQ(trial.regularise_unseen, usual.regularise_unseen);
 }
 
+// So that moments reach back over as many views, and a step is as long as those of its views where
+// these do not agree.
+TEST(Optimizer, a_batch_has_rates_by_the_root_and_betas_by_the_power_of_its_views) {
+    TrainOptions options;
+    options.sh_rest_every = 16;
+    const AdamStep one = optimizer_of(options).step(2'000'000);  // where nothing is corrected
+    EXPECT_EQ(one.beta1, 0.9);
+    options.batch = 4;
+    const AdamStep four = optimizer_of(options).step(2'000'000);
+    EXPECT_FLOAT_EQ(four.rate[kPosition], 2 * one.rate[kPosition]);
+    EXPECT_FLOAT_EQ(four.rate[kOpacityLogit], 2 * one.rate[kOpacityLogit]);
+    EXPECT_DOUBLE_EQ(four.beta1, std::pow(0.9, 4));
+    EXPECT_DOUBLE_EQ(four.beta2, std::pow(0.999, 4));
+    EXPECT_EQ(four.rest_every, 4) << "16 views as before, so nothing else of it changes";
+    EXPECT_FLOAT_EQ(four.rate[kShRest], one.rate[kShRest]);
+    EXPECT_EQ(four.rest_beta1, 0.9);
+    options.batch = 32;
+    const AdamStep many = optimizer_of(options).step(2'000'000);
+    EXPECT_EQ(many.rest_every, 1);
+    EXPECT_FLOAT_EQ(many.rate[kShRest], std::sqrt(2.0f) * one.rate[kShRest]);
+    EXPECT_DOUBLE_EQ(many.rest_beta2, std::pow(0.999, 2));
+}
+
+TEST(Optimizer, the_corrections_of_a_batch_are_those_of_as_many_views) {
+    TrainOptions options;
+    options.average_from = 1;  // so that rates depend on the position in the run alone
+    const AdamStep one = optimizer_of(options).step(64);
+    options.batch = 8;
+    const AdamStep eight = optimizer_of(options).step(64);
+    EXPECT_FLOAT_EQ(eight.inverse_sqrt_correction2, one.inverse_sqrt_correction2);
+    EXPECT_FLOAT_EQ(eight.rate[kRotation], std::sqrt(8.0f) * one.rate[kRotation]);
+}
+
+TEST(Optimizer, a_batch_regularises_the_unseen_in_the_share_of_its_views) {
+    TrainOptions options;
+    options.batch = 4;
+    const Schedule schedule(options);
+    EXPECT_EQ(Optimizer(options, schedule, 2, 7, 20).step(8).regularise_unseen, 1);
+    EXPECT_EQ(Optimizer(options, schedule, 2, 7, 100).step(8).regularise_unseen, 0.5f);
+    options.batch = 1;
+    EXPECT_EQ(Optimizer(options, Schedule(options), 2, 7, 100).step(7).regularise_unseen, 0);
+}
+
 }  // namespace
 }  // namespace darb

@@ -22,7 +22,7 @@ std::string other_value(const OptionRow& row) {
         return defaults.*std::get<bool TrainOptions::*>(row.member) ? "off" : "on";
     }
     if (row.is_size) return "1.5GB";
-    return row.most == 1 ? "0.5" : row.most == 3 ? "2" : row.least >= 1 ? "7" : "0.75";
+    return row.most == 1 ? "0.5" : row.most == 3 ? "2" : row.least >= 1 ? "8" : "0.75";
 }
 
 bool is_whole(const OptionRow& row) {
@@ -49,7 +49,7 @@ TEST(OptionTable, each_flag_that_changes_a_result_changes_its_setting_alone) {
         if (std::string(row.strategies) == "budget") options.strategy = Strategy::budget;
         if (name == "--shape-lr") options.kernel = KERNEL_BETA;
         const Json before = settings_json(options);
-        set_option(row, is_whole(row) ? "7" : other_value(row), options);
+        set_option(row, is_whole(row) ? "8" : other_value(row), options);
         const Json after = settings_json(options);
         const Json::json_pointer place(row.setting);
         ASSERT_TRUE(after.contains(place)) << name;
@@ -61,7 +61,7 @@ TEST(OptionTable, settings_come_back_from_their_text) {
     for (const OptionRow& row : option_rows()) {
         if (*row.flags == '\0' || *row.setting == '\0') continue;
         TrainOptions options;
-        set_option(row, is_whole(row) ? "7" : other_value(row), options);
+        set_option(row, is_whole(row) ? "8" : other_value(row), options);
         const Json settings = settings_json(options);
         EXPECT_EQ(Json::parse(settings.dump()), settings) << option_name(row);
         // What stands in the text is what the flag takes, but where it settles to something else.

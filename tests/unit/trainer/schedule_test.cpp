@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "engine/core/error.h"
+
 namespace darb::test {
 namespace {
 
@@ -230,6 +232,23 @@ TEST(Given, counts_and_what_is_absent_is_of_the_strategy) {
     EXPECT_EQ(Schedule(o).opacity_decay, 0.01f);
     o.sh_rest_every = 3;
     EXPECT_EQ(Schedule(o).rest_every, 3);
+}
+
+TEST(Schedule, steps_of_a_batch_begin_at_its_multiples_and_end_with_the_run) {
+    TrainOptions o;
+    o.iterations = 21;
+    o.batch = 8;
+    const Schedule s(o);
+    EXPECT_EQ(s.step_end(0), 8);
+    EXPECT_EQ(s.step_end(8), 16);
+    EXPECT_EQ(s.step_end(16), 21);
+    EXPECT_EQ(s.step_begin(8), 0);
+    EXPECT_EQ(s.step_begin(21), 16);
+    EXPECT_EQ(s.step_begin(0), 0);
+    for (const int batch : {0, 3, 12}) {
+        o.batch = batch;
+        EXPECT_THROW(Schedule{o}, Error) << batch;
+    }
 }
 
 TEST(Lengths, are_a_gaussians_or_longer_where_a_kernel_covers_less) {
