@@ -15,51 +15,84 @@ constexpr size_t kLooked = 100'000;
 constexpr double kTail = 0.02;  // left out at each end
 constexpr double kReach = 2.5;  // of the median distance: background farther away is cut
 constexpr float kLogitOfTenth = -2.2f;
-constexpr double kFramed = 1.35, kUnframed = 0.002;            // radii; share of the splats in them
-constexpr double kStray = 0.005, kFoot = 0.05, kSurely = 1.5;  // of guess_up
+constexpr double kFramed = 1.35, kUnframed = 0.0005;  // radii; share of the splats in them
+constexpr double kWide = 1.5, kWidest = 0.1;  // a splat is framed to so many deviations, radii
+// Of guess_up.
+constexpr double kStray = 0.005, kFoot = 0.03, kSurely = 1.5, kLying = 2;
 
-std::vector<glm::dvec3> sample(const SplatModel& m, float least_logit) {
-    std::vector<glm::dvec3> points;
+struct Sample {
+    glm::dvec3 position;  // from the origin
+    double reach;         // largest standard deviation, world units
+};
+
+std::vector<Sample> sample(const SplatModel& m, float least_logit) {
+    std::vector<Sample> points;
     const size_t step = std::max<size_t>(1, m.size() / kLooked);
-    for (size_t i = 0; i < m.size(); i += step)
-        if (m.opacity_logit[i] >= least_logit)
-            points.emplace_back(m.position[3 * i], m.position[3 * i + 1], m.position[3 * i + 2]);
+    for (size_t i = 0; i < m.size(); i += step) {
+        if (m.opacity_logit[i] < least_logit) continue;
+        const float *p = &m.position[3 * i], *s = &m.log_scale[3 * i];
+        points.push_back({{p[0], p[1], p[2]}, std::exp(double{std::max({s[0], s[1], s[2]})})});
+    }
     return points;
 }
 
-/// A splat by its height.
-struct Layered {
-    double y, x, z, weight;
+struct Weighed {
+    glm::dvec3 at;
+    double weight;
 };
 
 /// Weight of a layer times its width.
-double footing(const std::vector<Layered>& splats, double from, double to) {
-    double weight = 0, x = 0, z = 0, square = 0;
-    for (const Layered& s : splats) {
-        if (s.y < from || s.y > to) continue;
+double footing(const std::vector<Weighed>& splats, int axis, double from, double to) {
+    double weight = 0, square = 0;
+    glm::dvec3 sum(0.0);
+    for (const Weighed& s : splats) {
+        if (s.at[axis] < from || s.at[axis] > to) continue;
+        glm::dvec3 across = s.at;
+        across[axis] = 0;
         weight += s.weight;
-        x += s.weight * s.x;
-        z += s.weight * s.z;
-        square += s.weight * (s.x * s.x + s.z * s.z);
+        sum += s.weight * across;
+        square += s.weight * glm::dot(across, across);
     }
     if (!(weight > 0)) return 0;
-    const double variance = square / weight - (x * x + z * z) / (weight * weight);
+    const double variance = square / weight - glm::dot(sum, sum) / (weight * weight);
     return weight * std::sqrt(std::max(variance, 0.0));
+}
+
+/// Of the ends of an axis.
+struct Ends {
+    double low = 0, high = 0;
+};
+
+Ends footing_of_ends(std::vector<Weighed>& splats, int axis) {
+    std::sort(splats.begin(), splats.end(),
+              [axis](const Weighed& a, const Weighed& b) { return a.at[axis] < b.at[axis]; });
+    double total = 0;
+    for (const Weighed& s : splats) total += s.weight;
+    const auto place_of = [&](double share) {
+        double sum = 0;
+        for (const Weighed& s : splats)
+            if ((sum += s.weight) >= share * total) return s.at[axis];
+        return splats.back().at[axis];
+    };
+    const double low = place_of(kStray), high = place_of(1 - kStray), slab = kFoot * (high - low);
+    return {footing(splats, axis, splats.front().at[axis], low + slab),
+            footing(splats, axis, high - slab, splats.back().at[axis])};
 }
 
 }  // namespace
 
 Bounds scene_bounds(const SplatModel& model) {
-    std::vector<glm::dvec3> points = sample(model, kLogitOfTenth);
+    std::vector<Sample> points = sample(model, kLogitOfTenth);
     if (points.empty()) points = sample(model, -1e30f);
     if (points.empty()) return {model.origin, 1};
     Bounds bounds;
     std::vector<double> values(points.size());
     for (int axis = 0; axis < 3; ++axis) {
-        for (size_t i = 0; i < points.size(); ++i) values[i] = points[i][axis];
+        for (size_t i = 0; i < points.size(); ++i) values[i] = points[i].position[axis];
         bounds.centre[axis] = (nearest_rank(values, kTail) + nearest_rank(values, 1 - kTail)) / 2;
     }
-    for (size_t i = 0; i < points.size(); ++i) values[i] = glm::distance(points[i], bounds.centre);
+    for (size_t i = 0; i < points.size(); ++i)
+        values[i] = glm::distance(points[i].position, bounds.centre);
     const double middle = nearest_rank(values, 0.5);
     bounds.radius = std::max(std::min(nearest_rank(values, 1 - kTail), kReach * middle), 1e-3);
     bounds.centre += model.origin;
@@ -68,13 +101,17 @@ Bounds scene_bounds(const SplatModel& model) {
 
 double framing_distance(const SplatModel& model, const Bounds& bounds, const glm::dmat3& axes,
                         double tan_x, double tan_y) {
-    std::vector<glm::dvec3> points = sample(model, kLogitOfTenth);
+    std::vector<Sample> points = sample(model, kLogitOfTenth);
     if (points.empty()) points = sample(model, -1e30f);
+    const double cos_x = 1 / std::hypot(1, tan_x), cos_y = 1 / std::hypot(1, tan_y);
     std::vector<double> distances;
-    for (const glm::dvec3& point : points) {
-        const glm::dvec3 p = glm::transpose(axes) * (point + model.origin - bounds.centre);
+    for (const Sample& one : points) {
+        const glm::dvec3 p = glm::transpose(axes) * (one.position + model.origin - bounds.centre);
         if (glm::length(p) > kFramed * bounds.radius) continue;
-        distances.push_back(std::max(std::abs(p.x) / tan_x, std::abs(p.y) / tan_y) - p.z);
+        const double r = std::min(kWide * one.reach, kWidest * bounds.radius);
+        distances.push_back(
+            std::max((std::abs(p.x) + r / cos_x) / tan_x, (std::abs(p.y) + r / cos_y) / tan_y) -
+            p.z);
     }
     return distances.empty() ? 0 : std::max(nearest_rank(distances, 1 - kUnframed), 0.0);
 }
@@ -84,8 +121,7 @@ float near_plane_for(const Bounds& bounds) {
 }
 
 glm::dvec3 guess_up(const SplatModel& m) {
-    std::vector<Layered> splats;
-    double total = 0;
+    std::vector<Weighed> splats;
     const size_t step = std::max<size_t>(1, m.size() / kLooked);
     for (size_t i = 0; i < m.size(); i += step) {
         const float* p = &m.position[3 * i];
@@ -93,24 +129,13 @@ glm::dvec3 guess_up(const SplatModel& m) {
         const double log_area = double{s[0]} + s[1] + s[2] - std::min({s[0], s[1], s[2]});
         const double weight = sigmoid(m.opacity_logit[i]) * std::exp(std::min(log_area, 50.0));
         if (m.opacity_logit[i] < kLogitOfTenth || !(weight > 0)) continue;
-        splats.push_back({p[1], p[0], p[2], weight});
-        total += weight;
+        splats.push_back({{p[0], p[1], p[2]}, weight});
     }
     const glm::dvec3 usual(0, -1, 0);
     if (splats.size() < 100) return usual;
-    std::sort(splats.begin(), splats.end(),
-              [](const Layered& a, const Layered& b) { return a.y < b.y; });
-    const auto height_of = [&](double share) {
-        double sum = 0;
-        for (const Layered& s : splats)
-            if ((sum += s.weight) >= share * total) return s.y;
-        return splats.back().y;
-    };
-    const double low = height_of(kStray), high = height_of(1 - kStray);
-    const double slab = kFoot * (high - low);
-    const double at_top = footing(splats, splats.front().y, low + slab);  // y is down
-    const double at_bottom = footing(splats, high - slab, splats.back().y);
-    return at_top > kSurely * at_bottom ? -usual : usual;
+    const Ends y = footing_of_ends(splats, 1), z = footing_of_ends(splats, 2);  // y is down
+    if (z.low > kLying * std::max({y.low, y.high, z.high})) return {0, 0, 1};
+    return y.low > kSurely * y.high ? -usual : usual;
 }
 
 }  // namespace darb

@@ -19,8 +19,8 @@ struct Bounds {
 Bounds scene_bounds(const SplatModel& model);
 
 /// How far from the centre of the bounds an eye must be, looking along the third of `axes` (right,
-/// down, forward), for a view that is 2 tan_x by 2 tan_y wide at distance 1 to show all but 0.2 %
-/// of the splats within 1.35 radii. 0 where there are none.
+/// down, forward), for a view that is 2 tan_x by 2 tan_y wide at distance 1 to show all but 0.05 %
+/// of the splats within 1.35 radii, each to 1.5 standard deviations. 0 where there are none.
 double framing_distance(const SplatModel& model, const Bounds& bounds, const glm::dmat3& axes,
                         double tan_x, double tan_y);
 
@@ -29,9 +29,11 @@ double framing_distance(const SplatModel& model, const Bounds& bounds, const glm
 /// show them. Less only where a scene is so small that it is looked at from nearer.
 float near_plane_for(const Bounds& bounds);
 
-/// A guess which way is up in a scene without cameras: -y, as 3DGS has it, but where the top looks
-/// like a foot: opacity times area within 5 % of the height, times how wide that is, is more than
-/// 1.5 times that of the bottom. What stands is wide where it stands.
+/// A guess which way is up in a scene without cameras: -y, as 3DGS has it, but where another end
+/// looks like a foot: opacity times area within 3 % of the height, times how wide that is. What
+/// stands is wide where it stands. y is up where its low end has 1.5 times the foot of the high
+/// one; z where its low end has twice that of the three others. -z never is: a wall behind the
+/// scene would be a foot, too.
 glm::dvec3 guess_up(const SplatModel& model);
 
 }  // namespace darb

@@ -86,6 +86,7 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     scene.model = parse_splats(bytes, inner.string(), &facts, decoding, folder, read_points);
     scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
     scene.notes = facts.notes;
+    scene.up = facts.up;
     if (facts.dropped > 0)
         scene.notes.push_back(
             fmt::format("{} splats with NaN or infinity were dropped.", facts.dropped));

@@ -23,6 +23,7 @@ struct Scene {
     std::string format;                    // as format_name says it
     bool is_points = false;                // a point cloud: no splat parameters in the file
     std::vector<std::uint32_t> important;  // what is drawn in motion, most important first
+    std::string up;                        // as --up takes it, where the file says it; else empty
     double load_s = 0;
     std::vector<std::string> notes;  // what was dropped or cannot be shown, a sentence each
 };

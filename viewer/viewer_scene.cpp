@@ -150,7 +150,9 @@ void Viewer::first_look(bool of_run) {
     Photos& p = session_.photos;
     if (!of_run && p.current < 0 && p.views.empty() && options_.up.empty()) {
         const std::optional<glm::dvec3> up = remembered_.find(s.file);
-        session_.navigation.set_up(up ? *up : guess_up(s.model));
+        session_.navigation.set_up(up             ? *up
+                                   : s.up.empty() ? guess_up(s.model)
+                                                  : up_from_name(s.up));
     }
     known_up_ = session_.navigation.up;
     if (of_run || p.current >= 0) return;

@@ -255,6 +255,7 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
     SplatModel model;
     PlyFacts said;
     read_ply_comments(header, where, model, said.notes);
+    said.up = stated_up(header);
     model.resize(vertex.count);
     const PlyRow row = [&](std::size_t i, const double* values) {
         std::array<std::uint32_t, 4> packed{};

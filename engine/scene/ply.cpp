@@ -116,6 +116,7 @@ SplatModel load_ply(const SplatSource& source, SplatFile& file) {
     SplatModel model = parse_ply(source.bytes, header, source.where, &facts, source.progress);
     file.dropped = facts.dropped;
     file.notes = facts.notes;
+    file.up = facts.up;
     return model;
 }
 
@@ -165,6 +166,7 @@ SplatModel parse_ply(std::span<const std::byte> file, const PlyHeader& header,
     model.sh_degree =
         static_cast<int>(std::lround(std::sqrt(columns.of[kShRest].size() / 3 + 1))) - 1;
     read_ply_comments(header, where, model, said.notes);
+    said.up = stated_up(header);
     drop_shapes_of_others(model.kernel, columns);
     const bool foreign = columns.foreign_beta;  // a scene of Deformable Beta Splatting
     if (foreign) {

@@ -100,11 +100,14 @@ void read_ply_comments(const PlyHeader& header, const std::string& where, SplatM
             fmt::format("names SplatFootprint exact, which {} has not", kernel_name(model.kernel)),
             "Correct the comment to psi, or remove it.");
     read_render_mode(header, model, notes);
-    if (const std::string_view axis = last_value(header, "Vertical axis"); lower(axis) == "z")
-        notes.push_back(
-            fmt::format("its comment 'Vertical axis: {}' is not followed: --up z of "
-                        "darb convert turns the scene",
-                        axis));
+    if (stated_up(header) == "z")
+        notes.emplace_back(
+            "its comment 'Vertical axis: z' says what is up: darb view follows it, --up z of darb "
+            "convert turns the scene");
+}
+
+std::string stated_up(const PlyHeader& header) {
+    return lower(last_value(header, "Vertical axis")) == "z" ? "z" : "";
 }
 
 std::string ply_comments(const SplatModel& model) {

@@ -16,6 +16,8 @@ namespace darb {
 /// notes: what comments ask for that is not done.
 void read_ply_comments(const PlyHeader& header, const std::string& where, SplatModel& model,
                        std::vector<std::string>& notes);
+/// What nerfstudio's "Vertical Axis: z" says is up: "z"; "" without such a comment.
+std::string stated_up(const PlyHeader& header);
 /// Whole header lines.
 std::string ply_comments(const SplatModel& model);
 

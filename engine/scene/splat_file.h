@@ -30,6 +30,7 @@ struct SplatFile {
     std::string details;             // encoding, generator; may be empty
     std::uint64_t bytes = 0;         // on disk, all files of a folder
     std::size_t dropped = 0;         // splats with NaN or infinity
+    std::string up;                  // as --up takes it, where the file says it; else empty
     std::vector<std::string> notes;  // what was left out or set right, a sentence each
 };
 

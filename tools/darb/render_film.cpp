@@ -21,14 +21,16 @@ namespace darb {
 
 namespace {
 
-CameraPath film_path(const FilmFlags& flags, const PixelSize& size, const SplatModel& model) {
+CameraPath film_path(const FilmFlags& flags, const PixelSize& size, const SplatModel& model,
+                     const std::string& stated_up) {
     if (!flags.path.empty()) return read_camera_path(flags.path);
     TurntableOptions options;
     options.seconds = flags.seconds;
     options.fps = flags.fps;
     options.width = size.width;
     options.height = size.height;
-    options.up = flags.up.empty() ? guess_up(model) : up_from_name(flags.up);
+    const std::string& up = flags.up.empty() ? stated_up : flags.up;
+    options.up = up.empty() ? guess_up(model) : up_from_name(up);
     return turntable(model, options);
 }
 
@@ -52,7 +54,8 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
         ->capture_default_str()
         ->excludes(cameras)
         ->excludes(path);
-    c.add_option("--up", flags.up, "x, -x, y, -y, z or -z, of the turn (default: a guess)")
+    c.add_option("--up", flags.up,
+                 "x, -x, y, -y, z or -z, of the turn (default: what the file says, else a guess)")
         ->excludes(cameras)
         ->excludes(path);
 }
@@ -63,8 +66,9 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     if (flags.data.resolution != -1)
         throw Error("-r", "divides the size of cameras, and there are none", "Use --size.");
     const PixelSize size = parse_size(flags.film.size);
-    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
-    const CameraPath path = film_path(flags.film, size, model);
+    SplatFile facts;
+    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts));
+    const CameraPath path = film_path(flags.film, size, model, facts.up);
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);

@@ -43,6 +43,7 @@ void remove(const std::string& name, Row& row) {
 struct Read {
     SplatModel model;
     std::vector<std::string> notes;
+    std::string up;
 };
 
 Read read(const Row& row, const std::vector<std::string>& comments = {}) {
@@ -59,6 +60,7 @@ Read read(const Row& row, const std::vector<std::string>& comments = {}) {
     Read result;
     result.model = parse_splats(bytes, "test", &file);
     result.notes = file.notes;
+    result.up = file.up;
     return result;
 }
 
@@ -189,6 +191,8 @@ TEST(PlyDialects, a_vertical_axis_of_z_is_quoted_with_the_option_that_turns_it) 
     const Read r = read(usual_row(), {"Vertical Axis: z"});
     expect_note(r, "'Vertical axis: z'");
     expect_note(r, "--up z");
+    EXPECT_EQ(r.up, "z");
+    EXPECT_EQ(read(usual_row(), {"Vertical axis: y"}).up, "");
 }
 
 }  // namespace
