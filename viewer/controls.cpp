@@ -54,6 +54,7 @@ SplatMask all_of(const Edit& edit, std::uint8_t value) {
 }
 
 void stop_and_close(Session& s) {
+    if (cancel_stroke(s)) return;
     s.path.playing = false;
     s.error.clear();
     s.help = false;
@@ -172,6 +173,7 @@ void Session::tell(const std::string& text) {
     constexpr auto kShown = std::chrono::seconds(4);
     note = text;
     toasts.push_back({text, std::chrono::steady_clock::now() + kShown});
+    ++told;
 }
 
 void play_path(double seconds, Session& s) {

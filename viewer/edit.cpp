@@ -60,6 +60,8 @@ void Edit::flip(const Marks& marks) {
             count += mask[i] != 0 ? 1 : -std::size_t{1};
         }
     };
+    ++version_;
+    if (!marks.removed.empty() || !marks.hidden.empty()) ++seen_version_;
     turn(marks.removed, removed_, removed_count_);
     turn(marks.hidden, hidden_, hidden_count_);
     turn(marks.selected, selected_, selected_count_);
@@ -146,34 +148,37 @@ void Edit::begin_transform(const SplatModel& model) {
     DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
     Moved moved;
     moved.splats = moved_splats();
-    moved.before = pick_splats(model, moved.splats);
+    moved.other = pick_splats(model, moved.splats);
     dragged_ = std::move(moved);
+    was_dragged_ = false;
 }
 
 void Edit::drag_transform(const Similarity& total, SplatModel& model) {
     if (!dragged_) return;
-    dragged_->after = dragged_->before;
-    transform_splats(total, dragged_->after);
-    count_from(model.origin, dragged_->after);
-    put_back(dragged_->splats, dragged_->after, model);
-    ++model_version_;
+    SplatModel after = dragged_->other;
+    transform_splats(total, after);
+    count_from(model.origin, after);
+    put_back(dragged_->splats, after, model);
+    was_dragged_ = true;
+    changed_model();
 }
 
 std::size_t Edit::end_transform(const SplatModel& model) {
     if (!dragged_) return 0;
     Moved moved = *std::exchange(dragged_, std::nullopt);
     const std::size_t count = moved.splats.size();
-    if (count == 0 || moved.after.size() != count) return 0;  // was not moved
+    if (count == 0 || !was_dragged_) return 0;
     DARB_CHECK(model.size() == removed_.size(), "{} splats, {}", model.size(), removed_.size());
     push({counted("moved", count), ++last_id_, std::move(moved)});
-    ++model_version_;  // what waited for the end of the move follows
+    changed_model();  // what waited for the end of the move follows
     return count;
 }
 
-std::size_t Edit::transform(const Similarity& similarity, SplatModel& model) {
-    begin_transform(model);
-    drag_transform(similarity, model);
-    return end_transform(model);
+void Edit::cancel_transform(SplatModel& model) {
+    if (!dragged_) return;
+    const Moved moved = *std::exchange(dragged_, std::nullopt);
+    put_back(moved.splats, moved.other, model);
+    changed_model();
 }
 
 void Edit::append(const SplatModel& added, SplatModel& model) {
@@ -184,7 +189,7 @@ void Edit::append(const SplatModel& added, SplatModel& model) {
         values.insert(values.end(), more.begin(), more.end());
     }
     for (SplatMask* mask : {&removed_, &hidden_, &selected_}) mask->resize(model.size(), 0);
-    ++model_version_;
+    changed_model();
 }
 
 void Edit::cut(const Merged& merged, SplatModel& model) {
@@ -192,7 +197,7 @@ void Edit::cut(const Merged& merged, SplatModel& model) {
     for (SplatMask* mask : {&removed_, &hidden_, &selected_}) mask->resize(left);
     model.resize(left);
     limit_sh_degree(merged.degree, model);
-    ++model_version_;
+    changed_model();
 }
 
 std::size_t Edit::merge(SplatModel added, SplatModel& model) {
@@ -218,12 +223,14 @@ std::size_t Edit::merge(SplatModel added, SplatModel& model) {
     return count;
 }
 
-void Edit::apply_step(const Step& step, bool forward, SplatModel& model) {
+void Edit::apply_step(Step& step, bool forward, SplatModel& model) {
     if (const auto* marks = std::get_if<Marks>(&step.change)) {
         flip(*marks);
-    } else if (const auto* moved = std::get_if<Moved>(&step.change)) {
-        put_back(moved->splats, forward ? moved->after : moved->before, model);
-        ++model_version_;
+    } else if (auto* moved = std::get_if<Moved>(&step.change)) {
+        SplatModel now = pick_splats(model, moved->splats);
+        put_back(moved->splats, moved->other, model);
+        moved->other = std::move(now);
+        changed_model();
     } else if (const auto* merged = std::get_if<Merged>(&step.change)) {
         if (forward)
             append(merged->added, model);

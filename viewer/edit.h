@@ -34,14 +34,13 @@ class Edit {
     /// Deletes the splats whose mean is inside the region (or outside: a crop).
     std::size_t remove(const SplatModel& model, const Region& region, bool inside);
 
-    /// Moves what is selected, or, where nothing is, all that is there; bit by bit as the model was
-    /// after an undo.
-    std::size_t transform(const Similarity& similarity, SplatModel& model);
-    /// The same while a hand moves it: `total` since begin_transform. end_transform makes it one
-    /// step.
+    /// A hand moves what is selected, or, where nothing is, all that is there: `total` since
+    /// begin_transform. end_transform makes it one step, cancel_transform none; after it and after
+    /// an undo the model is as it was, bit by bit.
     void begin_transform(const SplatModel& model);
     void drag_transform(const Similarity& total, SplatModel& model);
     std::size_t end_transform(const SplatModel& model);
+    void cancel_transform(SplatModel& model);
     bool transforms() const { return dragged_.has_value(); }
     /// Appends the splats of another scene. Throws Error where one model cannot hold both: another
     /// kernel, or attributes that only one has. Harmonics of the lesser degree get zeros.
@@ -58,6 +57,10 @@ class Edit {
     const std::string& last() const;
     /// Grows with each change of the model itself, undone ones too.
     int model_version() const { return model_version_; }
+    /// Grows with each change that is seen without the highlight of a selection.
+    int seen_version() const { return seen_version_; }
+    /// Grows with each change of anything.
+    int version() const { return version_; }
 
     const SplatMask& removed() const { return removed_; }    // [N]
     const SplatMask& selected() const { return selected_; }  // [N]
@@ -81,7 +84,7 @@ class Edit {
     };
     struct Moved {
         std::vector<std::uint32_t> splats;
-        SplatModel before, after;  // of these
+        SplatModel other;  // of these: before the step where it is done, else after it
     };
     struct Merged {
         SplatModel added;
@@ -95,17 +98,19 @@ class Edit {
     void push(Step step);
     std::size_t mark(const char* verb, Marks marks, bool content);
     void flip(const Marks& marks);
-    void apply_step(const Step& step, bool forward, SplatModel& model);
+    void apply_step(Step& step, bool forward, SplatModel& model);
     void append(const SplatModel& added, SplatModel& model);
     void cut(const Merged& merged, SplatModel& model);
     std::vector<std::uint32_t> moved_splats() const;
+    void changed_model() { ++model_version_, ++seen_version_, ++version_; }
 
     SplatMask removed_, hidden_, selected_;
     std::vector<Step> steps_;
     std::size_t done_ = 0;  // of steps_
     std::size_t removed_count_ = 0, hidden_count_ = 0, selected_count_ = 0;
-    std::optional<Moved> dragged_;
-    int last_id_ = 0, model_version_ = 0;
+    std::optional<Moved> dragged_;  // other: before
+    bool was_dragged_ = false;
+    int last_id_ = 0, model_version_ = 0, seen_version_ = 0, version_ = 0;
     int saved_ = 0;  // content when it was saved; 0: of the file
 };
 

@@ -5,11 +5,13 @@
 #include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "viewer/view_camera.h"
+
 namespace darb {
 
 namespace {
 
-constexpr double kHandlePx = 10;
+constexpr double kHandle = 0.11;  // of its size: so near a pointer takes it
 constexpr int kRingSteps = 64;
 constexpr double kEdgeOn = 0.05;  // cosine between a view ray and a ring's plane
 constexpr double kLeastFactor = 0.01, kMostFactor = 100;
@@ -18,12 +20,6 @@ glm::dvec3 axis_of(int axis) {
     glm::dvec3 v(0.0);
     v[axis] = 1;
     return v;
-}
-
-std::optional<glm::dvec2> pixel_of(const Camera& c, const glm::dvec3& world) {
-    const glm::dvec3 p = c.rotation * world + c.translation;
-    if (!(p.z > 0)) return {};
-    return glm::dvec2(c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy);
 }
 
 // World units of the gizmo's size.
@@ -55,13 +51,6 @@ std::optional<double> angle_on_ring(const Gizmo& g, const Camera& c, int axis,
     return std::atan2(hit[(axis + 2) % 3], hit[(axis + 1) % 3]);
 }
 
-double distance_to_line(const glm::dvec2& p, const glm::dvec2& a, const glm::dvec2& b) {
-    const glm::dvec2 d = b - a;
-    const double square = glm::dot(d, d);
-    const double t = square > 0 ? std::clamp(glm::dot(p - a, d) / square, 0.0, 1.0) : 0;
-    return glm::distance(p, a + t * d);
-}
-
 }  // namespace
 
 std::vector<glm::dvec3> handle_lines(const Gizmo& g, const Camera& c, int axis) {
@@ -82,13 +71,13 @@ std::vector<glm::dvec3> handle_lines(const Gizmo& g, const Camera& c, int axis) 
 
 std::optional<int> handle_at(const Gizmo& g, const Camera& c, const glm::dvec2& px) {
     std::optional<int> best;
-    double nearest = kHandlePx;
+    double nearest = kHandle * g.size_px;
     for (int axis = 0; axis < 3; ++axis) {
         const std::vector<glm::dvec3> lines = handle_lines(g, c, axis);
         for (std::size_t i = 1; i < lines.size(); ++i) {
             const auto a = pixel_of(c, lines[i - 1]), b = pixel_of(c, lines[i]);
             if (!a || !b) continue;
-            const double distance = distance_to_line(px, *a, *b);
+            const double distance = distance_to_segment(px, *a, *b);
             if (distance >= nearest) continue;
             nearest = distance;
             best = axis;

@@ -23,7 +23,7 @@ struct Gizmo {
 /// Lines of one handle in the world, axis 0 to 2; of the scale there is one handle, 0, a circle
 /// that faces the camera.
 std::vector<glm::dvec3> handle_lines(const Gizmo& gizmo, const Camera& camera, int axis);
-/// The handle within 10 px of a pixel, the nearest; none where there is none.
+/// The handle within a ninth of the size of a pixel, the nearest; none where there is none.
 std::optional<int> handle_at(const Gizmo& gizmo, const Camera& camera, const glm::dvec2& px);
 /// What a drag of the handle from one pixel to another asks for; nothing where that cannot be said
 /// (an axis that points at the eye).

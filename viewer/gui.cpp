@@ -28,7 +28,6 @@ void check_gui(VkResult result) {
     check_vulkan(result, "panels");
 }
 
-// px: on the screen.
 void make_font(float px) {
     ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
     fonts.Clear();
@@ -83,14 +82,12 @@ void Gui::start_backend() {
 
 // The backend frees the texture of the letters before when it ends, and not before that.
 void Gui::set_scale(float scale) {
-    const float density = window_ != nullptr ? pixels_per_unit(window_) : 1;
     apply_theme(scale);
-    ImGui::GetIO().FontGlobalScale = 1 / density;
     if (ImGui::GetIO().BackendRendererUserData != nullptr) {
         vkDeviceWaitIdle(device_->handle());
         ImGui_ImplVulkan_Shutdown();
     }
-    make_font(std::round(kFontPx * scale * density));
+    make_font(std::round(kFontPx * scale));
     start_backend();
     upload_fonts();
 }
@@ -100,6 +97,24 @@ float pixels_per_unit(GLFWwindow* window) {
     glfwGetFramebufferSize(window, &px, &unused);
     glfwGetWindowSize(window, &units, &unused);
     return px > 0 && units > 0 ? static_cast<float>(px) / static_cast<float>(units) : 1;
+}
+
+// The backend has size and pointer in the window's units.
+void Gui::use_pixels(int width, int height) const {
+    ImGuiIO& io = ImGui::GetIO();
+    io.DisplaySize = ImVec2(static_cast<float>(width), static_cast<float>(height));
+    io.DisplayFramebufferScale = ImVec2(1, 1);
+    const float density = window_ != nullptr ? pixels_per_unit(window_) : 1;
+    if (density == 1) return;
+#if IMGUI_VERSION_NUM < 18700
+    if (ImGui::IsMousePosValid(&io.MousePos))
+        io.MousePos = ImVec2(io.MousePos.x * density, io.MousePos.y * density);
+#else
+    double x = 0, y = 0;
+    glfwGetCursorPos(window_, &x, &y);
+    if (glfwGetWindowAttrib(window_, GLFW_HOVERED) == GLFW_TRUE)
+        io.AddMousePosEvent(static_cast<float>(x) * density, static_cast<float>(y) * density);
+#endif
 }
 
 // From 1.90 on the backend uploads them itself.
@@ -123,13 +138,11 @@ Gui::~Gui() {
 
 void Gui::begin(int width, int height) {
     ImGui_ImplVulkan_NewFrame();
-    if (window_ != nullptr) {
+    if (window_ != nullptr)
         ImGui_ImplGlfw_NewFrame();
-    } else {
-        ImGuiIO& io = ImGui::GetIO();
-        io.DisplaySize = ImVec2(static_cast<float>(width), static_cast<float>(height));
-        io.DeltaTime = 1.0f / 60;
-    }
+    else
+        ImGui::GetIO().DeltaTime = 1.0f / 60;
+    use_pixels(width, height);
     ImGui::NewFrame();
 }
 

@@ -11,7 +11,8 @@ namespace darb {
 
 class Gui {
   public:
-    /// scale: of the window's coordinates. window: null where there is none. The render pass stays.
+    /// All coordinates are px of the picture, the pointer's too. window: null where there is none.
+    /// The render pass stays.
     Gui(Device& device, VkRenderPass render_pass, float scale, GLFWwindow* window);
     ~Gui();
     Gui(const Gui&) = delete;
@@ -19,7 +20,7 @@ class Gui {
 
     /// Another scale: letters are drawn anew, sharp at the screen's pixels. Not within a frame.
     void set_scale(float scale);
-    /// Starts a frame; with a window its input and size are taken from it, else these.
+    /// Starts a frame of this size, px, with the input of the window.
     void begin(int width, int height);
     /// Ends it: what the panels said is ready for draw().
     void end();
@@ -32,14 +33,15 @@ class Gui {
   private:
     void start_backend();
     void upload_fonts();
+    void use_pixels(int width, int height) const;
     Device* device_;
     VkRenderPass render_pass_;
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
     GLFWwindow* window_;
 };
 
-/// Framebuffer px of one unit of a window's coordinates, in which panels and pointer are: 2 on some
-/// high-DPI desktops, 1 on others.
+/// Framebuffer px of one unit of a window's coordinates, in which the window system has sizes and
+/// the pointer: 2 on some high-DPI desktops, 1 on others.
 float pixels_per_unit(GLFWwindow* window);
 
 }  // namespace darb

@@ -1,10 +1,11 @@
 #include "viewer/live_picture.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "engine/core/error.h"
+#include "viewer/seconds.h"
+#include "viewer/view_camera.h"
 
 namespace darb {
 
@@ -14,23 +15,11 @@ constexpr double kDrawnShare = 0.1;    // of the time, that pictures may take fr
 constexpr double kBetween_s = 0.2;     // two pictures of splats that change
 constexpr double kUnchanged_s = 0.12;  // a wish, before the whole picture of it
 
-double seconds_from(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-Camera at_scale(const Camera& camera, double scale) {
-    const auto px = [&](int full) {
-        return std::max(1, static_cast<int>(std::lround(full * scale)));
-    };
-    return scale == 1 ? camera : resized(camera, px(camera.width), px(camera.height));
-}
-
 }  // namespace
 
 bool LiveWish::operator==(const LiveWish& o) const {
-    return key == o.key && area.left == o.area.left && compare == o.compare &&
-           panes.lines == o.panes.lines && panes.difference == o.panes.difference &&
-           panes.difference_max == o.panes.difference_max;
+    return key == o.key && area.left == o.area.left && panes.lines == o.panes.lines &&
+           panes.difference == o.panes.difference && panes.difference_max == o.panes.difference_max;
 }
 
 LiveScene live_scene(const GpuSplats& splats) {
@@ -70,13 +59,14 @@ bool LiveDrawer::draw(const GpuSplats& splats, LiveChange change, LivePicture& t
     const std::optional<LiveWish> wish = to.wished();
     if (!wish) return false;
     const bool other = !drawn_ || !(*drawn_ == *wish);
-    const bool refine = !whole_ && seconds_from(drawn_at_) >= kUnchanged_s;
+    const bool refine = !whole_ && seconds_since(drawn_at_) >= kUnchanged_s;
     const bool anew = change == LiveChange::at_once ||
                       (change == LiveChange::seldom && LiveClock::now() >= next_);
     if (!other && !refine && !anew) return false;
     const bool whole = !drawn_ || !other;
-    LiveMade made = make(splats, *wish, whole ? MotionQuality() : motion_.quality());
-    if (!whole && !picture_.compiled()) motion_.measured(motion_cost(made.ms, made.passes));
+    LiveMade made = make(splats, *wish, whole);
+    if (!whole && !compiled_ && made.error.empty())
+        motion_.measured(motion_cost(made.ms, made.passes));
     drawn_ = wish;
     whole_ = whole;
     drawn_at_ = LiveClock::now();
@@ -87,35 +77,29 @@ bool LiveDrawer::draw(const GpuSplats& splats, LiveChange change, LivePicture& t
     return true;
 }
 
-LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish,
-                          const MotionQuality& quality) {
+LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish, bool whole) {
     LiveMade made;
     made.scene = live_scene(splats);
-    made.quality = quality;
+    made.whole = whole;
+    made.quality = whole ? MotionQuality() : motion_.quality();
+    device_->wait_idle();  // for the run's own work: it is no part of the picture's time
     try {
         if (shown_ != &splats) picture_.set_live(splats, bounds_);
         shown_ = &splats;
         read_photo(wish, made);
         const auto start = LiveClock::now();
-        const Camera camera = at_scale(wish.key.camera, quality.scale);
-        const PhotoOverlay photo = overlay_of(photos_, camera, wish.area);
-        std::vector<DisplaySettings> displays{wish.key.display};
-        for (const int kernel : wish.key.kernels_beside)
-            displays.emplace_back(wish.key.display).kernel = kernel;
-        const bool photo_first = photo_beside(photos_, wish.key.display);
-        const bool panes = photo_first || displays.size() > 1;
-        const std::optional<double> moving =
-            quality.scale < 1 ? std::optional(quality.splats) : std::nullopt;
+        const Camera camera = at_scale(wish.key.camera, made.quality.scale);
+        const bool panes = panes_.render_all(
+            picture_, camera, pane_displays(wish.key.display, wish.key.kernels_beside),
+            overlay_of(photos_, camera, wish.area), photo_beside(photos_, wish.key.display),
+            whole ? std::nullopt : std::optional(made.quality.splats));
+        compiled_ = panes ? panes_.compiled() : picture_.compiled();
         if (panes) {
-            panes_.render(picture_, camera, displays, photo, photo_first, moving);
             Panes layout = wish.panes;
             fit_lines(panes_.count(), layout,
                       static_cast<float>(wish.area.left) / static_cast<float>(wish.area.width));
             panes_.compose(layout);
-            if (!moving) made.psnr_db = panes_.psnr_db();
-        } else {
-            picture_.keep_panes(1);
-            picture_.render(camera, displays.front(), photo, moving);
+            if (whole) made.psnr_db = panes_.psnr_db();
         }
         made.width = camera.width;
         made.height = camera.height;
@@ -125,7 +109,7 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish,
         made.passes = panes ? panes_.pass_times() : picture_.pass_times();
         made.visible = picture_.status().visible;
         made.intersections = picture_.status().intersections;
-        made.ms = seconds_from(start) * 1000;
+        made.ms = seconds_since(start) * 1000;
     } catch (const Error& e) {
         made.error = e.what();
     }
@@ -134,8 +118,8 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish,
 
 void LiveDrawer::read_photo(const LiveWish& wish, LiveMade& made) {
     photos_.current = wish.key.photo;
-    photos_.compare = wish.compare;
-    const bool wanted = wish.compare || wish.key.display.mode == VIEW_ERROR;
+    photos_.compare = wish.key.photo_beside;
+    const bool wanted = photos_.compare || wish.key.display.mode == VIEW_ERROR;
     if (wanted && photos_.current >= 0 && photos_.loaded != photos_.current) try {
             load_photo_of_view(*device_, photos_);
         } catch (const Error& e) {

@@ -20,10 +20,9 @@ namespace darb {
 
 /// What a window wants to see.
 struct LiveWish {
-    PictureKey key;  // the camera has the window's size
+    PictureKey key;  // the camera has the window's size; photo_beside: where it can be read
     WindowArea area;
-    bool compare = false;  // the photo of key.photo, where it can be read
-    Panes panes;
+    Panes panes;  // their lines, and whether they show the error
     bool operator==(const LiveWish& other) const;
 };
 
@@ -41,9 +40,10 @@ struct LiveMade {
     std::vector<std::uint32_t> pixels;  // B8G8R8A8 [height][width]
     int width = 0, height = 0;          // px
     LiveScene scene;
+    bool whole = false;  // not one in motion
     MotionQuality quality;
     std::vector<PassTime> passes;
-    double ms = 0;
+    double ms = 0;  // without what the run had under way
     std::uint32_t visible = 0, intersections = 0;
     int photo = -1;     // that was read; -1: none
     std::string error;  // why there is no photo, or no picture
@@ -81,7 +81,7 @@ class LiveDrawer {
 
   private:
     using LiveClock = std::chrono::steady_clock;
-    LiveMade make(const GpuSplats& splats, const LiveWish& wish, const MotionQuality& quality);
+    LiveMade make(const GpuSplats& splats, const LiveWish& wish, bool whole);
     void read_photo(const LiveWish& wish, LiveMade& made);
 
     Device* device_;
@@ -92,7 +92,7 @@ class LiveDrawer {
     MotionControl motion_;
     const GpuSplats* shown_ = nullptr;
     std::optional<LiveWish> drawn_;
-    bool whole_ = false;
+    bool whole_ = false, compiled_ = false;  // of the last picture
     LiveClock::time_point drawn_at_, next_;
 };
 

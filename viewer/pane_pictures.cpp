@@ -18,6 +18,27 @@ void add_times(const std::vector<PassTime>& more, std::vector<PassTime>& sum) {
     }
 }
 
+std::vector<DisplaySettings> pane_displays(const DisplaySettings& display,
+                                           const std::vector<int>& kernels_beside) {
+    std::vector<DisplaySettings> displays{display};
+    for (const int kernel : kernels_beside) displays.emplace_back(display).kernel = kernel;
+    return displays;
+}
+
+bool PanePictures::render_all(SplatPicture& picture, const Camera& camera,
+                              const std::vector<DisplaySettings>& displays,
+                              const PhotoOverlay& photo, bool photo_first,
+                              std::optional<double> moving) {
+    const bool several = photo_first || displays.size() > 1;
+    if (several) {
+        render(picture, camera, displays, photo, photo_first, moving);
+    } else {
+        picture.keep_panes(1);
+        picture.render(camera, displays.front(), photo, moving);
+    }
+    return several;
+}
+
 PanePictures::PanePictures(Device& device) : device_(&device), commands_(device) {}
 
 void PanePictures::render(SplatPicture& picture, const Camera& camera,

@@ -19,6 +19,10 @@ class PanePictures {
     void render(SplatPicture& picture, const Camera& camera,
                 const std::vector<DisplaySettings>& displays, const PhotoOverlay& photo,
                 bool photo_first, std::optional<double> moving);
+    /// The same where there are several pictures; else the one, into `picture`. Whether there are.
+    bool render_all(SplatPicture& picture, const Camera& camera,
+                    const std::vector<DisplaySettings>& displays, const PhotoOverlay& photo,
+                    bool photo_first, std::optional<double> moving);
     /// The strips, as they are asked for; nothing where they are so already.
     void compose(const Panes& panes);
     /// Each against the first; see Panes.
@@ -53,6 +57,9 @@ class PanePictures {
     bool compiled_ = false;
 };
 
+/// What the pictures of the kernels show: the first the display as it is.
+std::vector<DisplaySettings> pane_displays(const DisplaySettings& display,
+                                           const std::vector<int>& kernels_beside);
 /// Adds the times of passes to those of the same name.
 void add_times(const std::vector<PassTime>& more, std::vector<PassTime>& sum);
 

@@ -120,8 +120,9 @@ struct Session {
     std::optional<Leaving> leaving;         // waits for an answer
     std::string title;                      // of what is shown, for a window
     std::string error;                      // shown until dismissed
-    std::string note;                       // shown in the status line
+    std::string note;                       // shown in the status line, by tell
     std::deque<Toast> toasts;               // latest last
+    int told = 0;                           // how many there were
     std::string device_name;
     WorkProgress progress;
     std::vector<MeasuredChoice> measured;

@@ -12,7 +12,7 @@ using ThemeColour = std::array<float, 4>;
 namespace theme {
 
 inline constexpr ThemeColour kText{0.95f, 0.96f, 0.98f, 1};
-inline constexpr ThemeColour kTextOff{0.64f, 0.67f, 0.72f, 1};
+inline constexpr ThemeColour kTextOff{0.75f, 0.78f, 0.83f, 1};
 inline constexpr ThemeColour kWindow{0.086f, 0.094f, 0.110f, 1};
 inline constexpr ThemeColour kField{0.157f, 0.173f, 0.204f, 1};
 inline constexpr ThemeColour kButton{0.196f, 0.231f, 0.298f, 1};

@@ -59,6 +59,24 @@ void end_stroke(const Camera& camera, Session& s) {
     show_edit(s.edit.select(mask, t.combine), s);
 }
 
+// The middle of what is selected, else of all.
+void find_centre(Session& s) {
+    ToolState& t = s.tools;
+    if (t.centre_version == s.edit.version()) return;
+    t.centre_version = s.edit.version();
+    const SplatMask unseen = s.edit.unseen();
+    const bool some = s.edit.selected_count() > 0;
+    glm::dvec3 sum(0.0);
+    double count = 0;
+    for (std::size_t i = 0; i < unseen.size(); ++i)
+        if (some ? s.edit.selected()[i] != 0 : unseen[i] == 0) {
+            sum += position_of(s.scene->model, i);
+            ++count;
+        }
+    t.centre.reset();
+    if (count > 0) t.centre = sum / count;
+}
+
 bool use_gizmo(const Input& in, const Camera& camera, Session& s) {
     ToolState& t = s.tools;
     if (!t.drawing) {
@@ -104,23 +122,19 @@ std::optional<Gizmo> gizmo_of(const Session& s) {
                                     : GizmoMode::scale;
     g.size_px = 90.0 * s.gui_scale;
     if (t.drawing) return g;
-    const SplatMask unseen = s.edit.unseen();
-    const bool some = s.edit.selected_count() > 0;
-    glm::dvec3 sum(0.0);
-    double count = 0;
-    for (std::size_t i = 0; i < unseen.size(); ++i)
-        if (some ? s.edit.selected()[i] != 0 : unseen[i] == 0) {
-            sum += position_of(s.scene->model, i);
-            ++count;
-        }
-    if (!(count > 0)) return {};
-    g.centre = sum / count;
+    if (!t.centre) return {};
+    g.centre = *t.centre;
     return g;
 }
 
 bool use_tool(const Input& in, const ControlFrame& frame, Session& s) {
     ToolState& t = s.tools;
     if (!s.scene || t.tool == Tool::navigate) return false;
+    if (!s.panels) cancel_stroke(s);
+    const bool ignores = t.ignores && in.left;
+    t.ignores = ignores;
+    if (!s.panels || ignores) return ignores;
+    if (has_gizmo(t.tool) && !t.drawing) find_centre(s);
     if (!t.drawing && (frame.panels_want_mouse || !in.left)) return false;
     const Camera camera = camera_of(s, frame);
     if (has_gizmo(t.tool)) return use_gizmo(in, camera, s);
@@ -140,6 +154,18 @@ void choose_tool(Tool tool, Session& s) {
     s.tools.stroke.clear();
     s.tools.handle.reset();
     s.tools.tool = tool;
+}
+
+bool cancel_stroke(Session& s) {
+    ToolState& t = s.tools;
+    if (!t.drawing) return false;
+    if (s.edit.transforms() && s.scene) {
+        s.edit.cancel_transform(s.scene->model);
+        s.ask(request::ShowEdits{});
+    }
+    choose_tool(t.tool, s);
+    t.ignores = true;
+    return true;
 }
 
 void show_edit(std::size_t changed, Session& s) {

@@ -1,7 +1,9 @@
 #include "viewer/view_camera.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "engine/render/upsample.h"
 #include "engine/scene/edit_splats.h"
 
 namespace darb {
@@ -25,6 +27,20 @@ Camera fitted(const Camera& camera, int width, int height, int left) {
     c.width = width;
     c.height = height;
     return c;
+}
+
+double distance_to_segment(const glm::dvec2& p, const glm::dvec2& a, const glm::dvec2& b) {
+    const glm::dvec2 along = b - a;
+    const double square = glm::dot(along, along);
+    const double t = square > 0 ? std::clamp(glm::dot(p - a, along) / square, 0.0, 1.0) : 0;
+    return glm::distance(p, a + t * along);
+}
+
+Camera at_scale(const Camera& camera, double scale) {
+    const auto px = [&](int full) {
+        return std::max(1, static_cast<int>(std::lround(full * scale)));
+    };
+    return scale == 1 ? camera : resized(camera, px(camera.width), px(camera.height));
 }
 
 std::optional<glm::dvec3> pick(const SplatModel& m, const std::vector<std::uint8_t>& removed,

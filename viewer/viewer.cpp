@@ -115,15 +115,10 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     return std::min(look_s, pacing_.count_still_frame());
 }
 
-// What a panel or a request has noted is a toast, too. Returns seconds until the next one goes.
+// Returns seconds until the next one goes.
 double Viewer::expire_toasts() {
     Session& s = session_;
-    if (s.note != told_ && !s.note.empty() &&
-        (s.toasts.empty() || s.toasts.back().text != s.note)) {
-        s.tell(s.note);
-        pacing_.unsettle();
-    }
-    told_ = s.note;
+    if (std::exchange(told_, s.told) != s.told) pacing_.unsettle();  // it is not drawn yet
     const auto now = Clock::now();
     while (!s.toasts.empty() && s.toasts.front().until <= now) s.toasts.pop_front();
     if (s.toasts.empty()) return std::numeric_limits<double>::infinity();

@@ -121,6 +121,7 @@ class Viewer {
     void save_path();
     void save_scene();
     void show_edits();
+    void show_marks(bool highlight);
     void show_open(bool merges);
     void open_file(const std::filesystem::path& file, bool merges);
     void merge(LoadedScene loaded);
@@ -137,7 +138,7 @@ class Viewer {
     // viewer_picture.cpp: the picture of a frame.
     void load_current_photo();
     void pace_picture(int width, int height, bool full, bool works);
-    std::vector<DisplaySettings> pane_displays() const;
+    std::vector<DisplaySettings> shown_displays() const;  // a pane each
     void show_degree(int degree);
     void render_shown(const Camera& camera, const WindowArea& area, std::optional<double> moving);
     void compose_panes();
@@ -162,21 +163,21 @@ class Viewer {
     LivePicture* live_ = nullptr;
     Bounds live_bounds_;
     LiveScene live_scene_;
-    std::optional<LiveWish> wished_;
     Buffer live_pixels_;       // of the run's last picture
     glm::ivec2 live_size_{0};  // px
     PicturePacing pacing_;
     PictureWork work_;
     RememberedUp remembered_;
     RecentFiles recent_;
-    std::string told_;                      // the note that is a toast already
-    int shown_model_ = 0;                   // Edit::model_version of the picture
+    int told_ = 0;                          // Session::told of the last frame
+    int shown_model_ = 0, shown_edit_ = 0;  // Edit::model_version, seen_version of the picture
     int edit_at_load_ = 0;                  // Edit::content when a load was started
     glm::dvec3 known_up_{0.0};              // of the scene, as it was opened or last remembered
     std::vector<double> shares_;            // of the splats, below all
     std::unique_ptr<MotionLevels> levels_;  // of the scene; null: none asked for
     std::vector<std::unique_ptr<MotionLevels>> ended_;  // cancelled, their threads still run
     int version_ = 0;                                   // of the scene and its edits
+    bool highlights_ = true;                            // what is selected, in the picture
     bool continuous_ = false;                           // the last frame wanted this one at once
     Clock::time_point frame_start_, last_frame_;
 };

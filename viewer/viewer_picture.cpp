@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "engine/core/error.h"
+#include "viewer/seconds.h"
+#include "viewer/view_camera.h"
 #include "viewer/viewer.h"
 
 namespace darb {
@@ -16,15 +18,7 @@ constexpr size_t kTimesKept = 60;           // frames in motion that the panel a
 constexpr int kRehearsals = 8;              // of motion, after the one that compiles
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-        .count();
-}
-
-Camera scaled(const Camera& camera, double scale) {
-    const auto px = [&](int full) {
-        return std::max(1, static_cast<int>(std::lround(full * scale)));
-    };
-    return resized(camera, px(camera.width), px(camera.height));
+    return 1000 * seconds_since(start);
 }
 
 }  // namespace
@@ -101,16 +95,12 @@ void Viewer::pace_picture(int width, int height, bool full, bool works) {
     if (!works) start_levels();
 }
 
-// One for each pane of a kernel; the first is the whole picture where there are no more.
-std::vector<DisplaySettings> Viewer::pane_displays() const {
-    std::vector<DisplaySettings> displays{session_.display};
-    for (const int kernel : kernels_beside(session_.panes, session_.display.kernel))
-        displays.emplace_back(session_.display).kernel = kernel;
-    return displays;
+std::vector<DisplaySettings> Viewer::shown_displays() const {
+    return pane_displays(session_.display, kernels_beside(session_.panes, session_.display.kernel));
 }
 
 bool Viewer::ready_to_move() const {
-    const std::vector<DisplaySettings> displays = pane_displays();
+    const std::vector<DisplaySettings> displays = shown_displays();
     for (size_t i = 0; i < displays.size(); ++i)
         if (!picture_.ready_to_move(displays[i], static_cast<int>(i))) return false;
     return true;
@@ -118,13 +108,11 @@ bool Viewer::ready_to_move() const {
 
 void Viewer::render_shown(const Camera& camera, const WindowArea& area,
                           std::optional<double> moving) {
-    const std::vector<DisplaySettings> displays = pane_displays();
-    const PhotoOverlay photo = overlay_of(session_.photos, camera, area);
+    const std::vector<DisplaySettings> displays = shown_displays();
     const bool photo_first = photo_beside(session_.photos, session_.display);
-    shows_panes_ = photo_first || displays.size() > 1;
-    if (shows_panes_) return panes_.render(picture_, camera, displays, photo, photo_first, moving);
-    picture_.keep_panes(1);
-    picture_.render(camera, displays.front(), photo, moving);
+    shows_panes_ = photo_first || displays.size() > 1;  // also where it fails
+    panes_.render_all(picture_, camera, displays, overlay_of(session_.photos, camera, area),
+                      photo_first, moving);
 }
 
 void Viewer::compose_panes() {
@@ -149,7 +137,7 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
                                   : step == PictureStep::preview
                                       ? MotionQuality{1, picture_.most_moving()}
                                       : pacing_.motion().quality();
-    const Camera camera = scaled(key.camera, quality.scale);
+    const Camera camera = at_scale(key.camera, quality.scale);
     pacing_.drew(step, quality);
     const bool drawn = attempt([&] {
         render_shown(camera, free_area(session_, key.camera.width, key.camera.height),
@@ -173,7 +161,7 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
 // frames in motion are drawn at a quality that was found before them.
 void Viewer::rehearse_motion(const PictureKey& key) {
     const FrameTimes& t = session_.times;
-    const std::vector<DisplaySettings> displays = pane_displays();
+    const std::vector<DisplaySettings> displays = shown_displays();
     const double besides_ms = std::max(0.0, t.frame_ms - t.picture_ms);
     attempt([&] {
         for (int i = 0; i <= kRehearsals; ++i) {
@@ -185,8 +173,8 @@ void Viewer::rehearse_motion(const PictureKey& key) {
             std::vector<PassTime> passes;
             bool compiled = false;
             for (size_t p = 0; p < displays.size(); ++p) {
-                add_times(picture_.rehearse(scaled(key.camera, quality.scale), displays[p], splats,
-                                            static_cast<int>(p)),
+                add_times(picture_.rehearse(at_scale(key.camera, quality.scale), displays[p],
+                                            splats, static_cast<int>(p)),
                           passes);
                 compiled |= picture_.compiled();
             }

@@ -130,7 +130,8 @@ void Viewer::show_open(bool merges) {
 void Viewer::show_edits() {
     Session& s = session_;
     if (!s.scene) return;
-    lose_scene("the scene was edited");
+    if (std::exchange(shown_edit_, s.edit.seen_version()) != s.edit.seen_version())
+        lose_scene("the scene was edited");
     if (s.edit.model_version() != shown_model_) {
         Scene& scene = *s.scene;
         if (s.edit.transforms()) {
@@ -146,14 +147,24 @@ void Viewer::show_edits() {
         }
         shown_model_ = s.edit.model_version();
     }
-    picture_.set_marks(s.edit.unseen(), s.edit.selected());
+    show_marks(!work_.draws());
+}
+
+// The highlight of a selection is for who edits: not in pictures that are written or measured.
+void Viewer::show_marks(bool highlight) {
+    const Edit& edit = session_.edit;
+    highlights_ = highlight;
+    lose_levels();  // they have none
+    ++version_;
+    picture_.set_marks(edit.unseen(),
+                       highlight ? edit.selected() : SplatMask(edit.selected().size(), 0));
 }
 
 void Viewer::load_path() {
     PathState& p = session_.path;
     p.path = read_camera_path(p.file);
     p.mark_saved();
-    session_.note = fmt::format("{} key frames from {}", p.path.keys.size(), p.file.string());
+    session_.tell(fmt::format("{} key frames from {}", p.path.keys.size(), p.file.string()));
 }
 
 void Viewer::save_path() {
@@ -162,7 +173,7 @@ void Viewer::save_path() {
     write_camera_path(p.file, p.path);
     saved_.wrote(p.file);
     p.mark_saved();
-    session_.note = "path in " + p.file.string();
+    session_.tell("path in " + p.file.string());
 }
 
 void Viewer::save_scene() {
@@ -181,8 +192,9 @@ void Viewer::save_scene() {
     write_encoded(s.save_file, encode_scene(*format, model, s.save_file.string(), options));
     saved_.wrote(s.save_file);
     s.edit.mark_saved();
-    s.note = fmt::format("saved {} splats to {}", model.size(), s.save_file.string());
-    for (const std::string& loss : losses_of(*format, model)) s.note += "\n" + loss;
+    std::string said = fmt::format("saved {} splats to {}", model.size(), s.save_file.string());
+    for (const std::string& loss : losses_of(*format, model)) said += "\n" + loss;
+    s.tell(said);
 }
 
 // Opens at what the window shows; the cameras of the photos follow.
@@ -203,7 +215,7 @@ void Viewer::save_page(int width, int height) {
     WebPageFacts facts;
     write_file_atomic(file, make_web_page(*device_, s.edit.apply(s.scene->model), options, &facts));
     saved_.wrote(file);
-    s.note = fmt::format("web page in {}\n{}", file.string(), web_page_text(facts));
+    s.tell(fmt::format("web page in {}\n{}", file.string(), web_page_text(facts)));
 }
 
 // Not with edits that are not saved, without a question.
@@ -234,6 +246,7 @@ void Viewer::save_and_leave() {
 void Viewer::take_picture(int width, int height) {
     if (live_ == nullptr) {
         need_scene("picture");
+        if (session_.edit.selected_count() > 0) show_marks(false);  // until step_work
         const WindowArea area = free_area(session_, width, height);
         render_shown(camera_in_window(session_.photos, session_.navigation, area), area, {});
         compose_panes();
@@ -242,7 +255,7 @@ void Viewer::take_picture(int width, int height) {
     if (taken.pixels == nullptr || taken.width == 0) return;  // of a run that has drawn none
     const fs::path file = free_picture_name();
     write_png(file, read_pixels(*taken.pixels, taken.width, taken.height));
-    session_.note = "picture in " + file.string();
+    session_.tell("picture in " + file.string());
 }
 
 void Viewer::start_export() {
@@ -255,11 +268,13 @@ void Viewer::start_export() {
 void Viewer::step_export(bool wait) {
     const std::optional<std::string> summary = work_.step_export(picture_, wait);
     if (!summary) return;
-    session_.note = *summary;
+    session_.tell(*summary);
     pacing_.unsettle(PicturePacing::kSettlingFrames + 1);  // the panels say so
 }
 
 void Viewer::step_work() {
+    if (highlights_ == work_.draws() && session_.edit.selected_count() > 0)
+        show_marks(!work_.draws());
     if (work_.draws()) {  // the picture is one of its own then
         pacing_.forget();
         shows_panes_ = false;

@@ -62,7 +62,7 @@ void Viewer::merge(LoadedScene loaded) {
 void Viewer::drop(const std::filesystem::path& path) {
     Session& s = session_;
     if (s.training.live && !s.training.finished)
-        s.note = "A run is shown: files can be opened when it is over.";
+        s.tell("A run is shown: files can be opened when it is over.");
     else if (s.scene && s.edit.unsaved())
         s.leaving = Leaving{false, path};
     else
@@ -127,7 +127,7 @@ void Viewer::show(LoadedScene loaded) {
     session_.tools = {};
     session_.tools.grow = static_cast<float>(s.bounds.radius / 50);
     session_.tools.scale[1] = static_cast<float>(s.bounds.radius / 10);
-    shown_model_ = 0;
+    shown_model_ = shown_edit_ = 0;
     try {
         recent_.opened(asked);
     } catch (const std::exception& e) {  // the scene is there all the same
@@ -175,7 +175,7 @@ void Viewer::remember_up() {
 // The frames of an export, and the pictures of a measurement, are of one scene.
 void Viewer::lose_scene(const char* why) {
     const std::string note = work_.lose_scene(why);
-    if (!note.empty()) session_.note = note;
+    if (!note.empty()) session_.tell(note);
     lose_levels();
     ++version_;
 }
@@ -275,14 +275,10 @@ void Viewer::follow_live(int width, int height) {
     const std::vector<int> beside = kernels_beside(s.panes, s.display.kernel);
     const std::size_t panes = beside.size() + (photo_beside(s.photos, s.display) ? 2 : 1);
     fit_lines(panes, s.panes, static_cast<float>(area.left) / static_cast<float>(width));
-    LiveWish wish{{camera_in_window(s.photos, s.navigation, area), s.display, s.photos.current,
-                   false, beside, 0},
-                  area,
-                  s.photos.compare,
-                  s.panes};
-    if (wished_ == wish) return;
-    live_->wish(wish);
-    wished_ = std::move(wish);
+    live_->wish({{camera_in_window(s.photos, s.navigation, area), s.display, s.photos.current,
+                  s.photos.compare, beside, 0},
+                 area,
+                 s.panes});
 }
 
 void Viewer::take_live(const LiveMade& made) {
@@ -303,7 +299,7 @@ void Viewer::take_live(const LiveMade& made) {
     t.passes = made.passes;
     t.picture_ms = made.ms;
     t.quality = made.quality;
-    if (made.quality == MotionQuality()) t.full_ms = made.ms;
+    if (made.whole) t.full_ms = made.ms;
     t.visible = made.visible;
     t.intersections = made.intersections;
 }
@@ -314,7 +310,6 @@ void Viewer::end_live() {
             while (const std::optional<LiveMade> made = live_->take()) take_live(*made);
         });
     live_ = nullptr;
-    wished_.reset();
     session_.photos.loaded = -1;  // on another device
     session_.training.finished = true;
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "viewer/swapchain.h"
@@ -100,13 +101,11 @@ VkSurfaceKHR make_surface(Device& device, GLFWwindow* window) {
     return surface;
 }
 
-// Of the panels, in the window's coordinates, which some desktops scale by themselves. wanted: on
-// the screen; 0: as the desktop wants it.
+// Of the panels, in px. wanted: 0: as the desktop wants it.
 float panel_scale(GLFWwindow* window, float wanted) {
     float x = 1, y = 1;
     glfwGetWindowContentScale(window, &x, &y);
-    const float scale = wanted > 0 ? wanted : std::clamp(std::max(x, y), 1.0f, 4.0f);
-    return scale / pixels_per_unit(window);
+    return wanted > 0 ? wanted : std::clamp(std::max(x, y), 1.0f, 4.0f);
 }
 
 }  // namespace
@@ -154,7 +153,7 @@ struct ViewerWindow::State {
     void install_callbacks();
     void collect();
     void drag(double x, double y);
-    glm::dvec2 pointer() const;  // px
+    glm::dvec2 pointer() const;  // px, now: later than the events that wait
     void note_buttons();
     bool* held_key(int key);  // its flag in input, or null
     void draw();
@@ -174,8 +173,8 @@ struct ViewerWindow::State {
     std::atomic<bool> woken{false};
     double next_frame_at = 0;  // s of GLFW's clock
     double last_click = -1;
-    double last_x = 0, last_y = 0;
-    int windowed[4] = {0, 0, 1280, 720};  // place and size outside of full screen
+    std::optional<glm::dvec2> last_pointer;  // px
+    int windowed[4] = {0, 0, 1280, 720};     // place and size outside of full screen
 };
 
 void ViewerWindow::State::install_callbacks() {
@@ -193,7 +192,7 @@ void ViewerWindow::State::install_callbacks() {
         s.dirty = true;
         if (button != GLFW_MOUSE_BUTTON_LEFT || action != GLFW_PRESS) return;
         s.input.left = true;
-        s.input.trail.push_back(s.pointer());
+        s.input.trail.push_back(s.last_pointer.value_or(s.pointer()));
         const double now = glfwGetTime();
         s.input.double_click = now - s.last_click < kDoubleClick_s;
         s.last_click = s.input.double_click ? -1 : now;
@@ -255,28 +254,22 @@ void ViewerWindow::State::note_buttons() {
 // Motion with a button down adds up event by event: a quick drag may begin and end between frames.
 void ViewerWindow::State::drag(double x, double y) {
     dirty = true;
-    int window_width = 1, window_height = 1, width = 1, height = 1;
-    glfwGetWindowSize(window.handle, &window_width, &window_height);
-    glfwGetFramebufferSize(window.handle, &width, &height);
+    const glm::dvec2 at = glm::dvec2(x, y) * double{pixels_per_unit(window.handle)};
+    const glm::dvec2 by = at - std::exchange(last_pointer, at).value_or(at);
     const auto down = [&](int b) { return glfwGetMouseButton(window.handle, b) == GLFW_PRESS; };
-    if (down(GLFW_MOUSE_BUTTON_LEFT)) input.trail.push_back(pointer());
+    if (down(GLFW_MOUSE_BUTTON_LEFT)) input.trail.push_back(at);
     if (down(GLFW_MOUSE_BUTTON_LEFT) || down(GLFW_MOUSE_BUTTON_MIDDLE) ||
         down(GLFW_MOUSE_BUTTON_RIGHT)) {
         note_buttons();
-        input.dx += (x - last_x) * width / std::max(window_width, 1);
-        input.dy += (y - last_y) * height / std::max(window_height, 1);
+        input.dx += by.x;
+        input.dy += by.y;
     }
-    last_x = x;
-    last_y = y;
 }
 
 glm::dvec2 ViewerWindow::State::pointer() const {
-    int window_width = 1, window_height = 1, width = 1, height = 1;
-    glfwGetWindowSize(window.handle, &window_width, &window_height);
-    glfwGetFramebufferSize(window.handle, &width, &height);
-    double x = 0, y = 0;
-    glfwGetCursorPos(window.handle, &x, &y);
-    return {x * width / std::max(window_width, 1), y * height / std::max(window_height, 1)};
+    glm::dvec2 at(0.0);
+    glfwGetCursorPos(window.handle, &at.x, &at.y);
+    return at * double{pixels_per_unit(window.handle)};
 }
 
 // What is a state rather than an event: pointer, buttons, held keys.

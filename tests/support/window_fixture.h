@@ -120,6 +120,7 @@ class DisplayTest : public ::testing::Test {
         folder_ =
             std::filesystem::temp_directory_path() / ("darb_window_" + std::to_string(::getpid()));
         std::filesystem::create_directories(folder_);
+        ::setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);  // not the user's
         start_display();
     }
     void TearDown() override {

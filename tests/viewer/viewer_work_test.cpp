@@ -9,6 +9,7 @@
 #include "engine/scene/splat_file.h"
 #include "tests/support/viewer_fixture.h"
 #include "viewer/recovery.h"
+#include "viewer/view_camera.h"
 
 namespace darb::test {
 namespace {
@@ -49,6 +50,7 @@ class ViewerWork : public ViewerTest {
     bool is_frame(int n) {
         return fs::exists(session().path.folder / fmt::format("frame_{:05d}.png", n));
     }
+    void drag(const glm::dvec2& from, const glm::dvec2& to, bool let_go = true);
     void delete_something() {
         session().selection.region = {Region::Shape::sphere, {0, 0, 0}, glm::dvec3(0.8)};
         session().selection.shown = true;
@@ -56,6 +58,137 @@ class ViewerWork : public ViewerTest {
         ASSERT_TRUE(session().edit.unsaved());
     }
 };
+
+// A left drag from one pixel to another; let_go: and the button is released.
+void ViewerWork::drag(const glm::dvec2& from, const glm::dvec2& to, bool let_go) {
+    Input input;
+    input.left = true;
+    input.trail = {from};
+    input.x = from.x;
+    input.y = from.y;
+    frame(input);
+    input.trail = {to};
+    input.x = to.x;
+    input.y = to.y;
+    input.dx = to.x - from.x;
+    input.dy = to.y - from.y;
+    frame(input);
+    input = {};
+    input.x = to.x;
+    input.y = to.y;
+    if (let_go) frame(input);
+}
+
+TEST_F(ViewerWork, Tools_select_and_move_and_esc_takes_a_drag_back) {
+    load(file_);
+    Session& s = session();
+    s.panels = true;
+    const glm::dvec3 eye = s.navigation.eye;
+    press(Key::tool_rectangle);
+    drag({0, 0}, {kWidth, kHeight});
+    EXPECT_GT(s.edit.selected_count(), s.scene->model.size() / 2);
+    press(Key::select_others);
+    press(Key::tool_lasso);
+    drag({0, 0}, {3, 0});
+    EXPECT_EQ(s.edit.selected_count(), 0u) << "a line has no inside";
+    press(Key::tool_brush);
+    s.tools.brush_px = 200;
+    drag({40, 30}, {50, 30});
+    const std::size_t brushed = s.edit.selected_count();
+    EXPECT_GT(brushed, 0u);
+    press(Key::tool_move);
+    frame();
+    const std::optional<Gizmo> gizmo = gizmo_of(s);
+    ASSERT_TRUE(gizmo);
+    const Camera camera = camera_in_window(s.photos, s.navigation, free_area(s, kWidth, kHeight));
+    const std::vector<glm::dvec3> arrow = handle_lines(*gizmo, camera, 1);
+    const glm::dvec2 at = *pixel_of(camera, arrow[1]);
+    const std::vector<float> before = s.scene->model.position;
+    drag(at, at + glm::dvec2(3, 20), false);
+    EXPECT_NE(s.scene->model.position, before);
+    Input held;
+    held.left = true;
+    held.pressed = {Key::escape};
+    frame(held);
+    EXPECT_EQ(s.scene->model.position, before);
+    EXPECT_EQ(s.tools.tool, Tool::move);
+    drag(at, at + glm::dvec2(3, 20), false);
+    EXPECT_EQ(s.scene->model.position, before) << "the button was not let go in between";
+    frame();
+    drag(at, at + glm::dvec2(3, 20));
+    EXPECT_TRUE(s.edit.unsaved());
+    EXPECT_EQ(s.edit.selected_count(), brushed);
+    press(Key::undo);
+    EXPECT_EQ(s.scene->model.position, before);
+    press(Key::tool_brush);
+    s.panels = false;
+    drag({0, 0}, {1, 1});
+    EXPECT_EQ(s.edit.selected_count(), brushed) << "what is not shown does nothing";
+    EXPECT_NE(s.navigation.eye, eye) << "it orbits";
+    press(Key::escape);
+    EXPECT_EQ(s.tools.tool, Tool::navigate);
+}
+
+TEST_F(ViewerWork, A_scene_is_merged_and_goes_again) {
+    load(file_);
+    Session& s = session();
+    const std::size_t count = s.scene->model.size();
+    s.ask(request::Open{file_, true});
+    frame();
+    finish_load();
+    frame();
+    EXPECT_EQ(s.scene->model.size(), 2 * count);
+    EXPECT_EQ(viewer_->picture().splat_count(), 2 * count);
+    EXPECT_NE(s.note.find("merged 60 splats of scene.ply"), std::string::npos) << s.note;
+    press(Key::undo);
+    EXPECT_EQ(s.scene->model.size(), count);
+    EXPECT_EQ(viewer_->picture().splat_count(), count);
+    SplatModel other = scene_.model;
+    other.kernel = KERNEL_RAISED_COSINE;
+    write_ply(folder_ / "other.ply", other);
+    s.ask(request::Open{folder_ / "other.ply", true});
+    frame();
+    finish_load();
+    EXPECT_NE(s.error.find("raised_cosine"), std::string::npos) << s.error;
+    EXPECT_EQ(s.scene->model.size(), count);
+}
+
+TEST_F(ViewerWork, What_is_selected_is_highlighted_in_the_window_alone) {
+    load(file_);
+    const ImageU8 plain = shot();
+    press(Key::select_all);
+    const ImageU8 orange = shot();
+    EXPECT_GT(largest_difference(orange, plain), 50);
+    make_path(2);
+    frame();
+    session().ask(request::ExportPath{});
+    frame();
+    press(Key::select_none);
+    press(Key::undo);
+    EXPECT_GE(session().progress.exporting, 0) << "a selection ends no export";
+    while (session().progress.exporting >= 0) frame();
+    EXPECT_LE(largest_difference(read_image(session().path.folder / "frame_00001.png"), plain), 1);
+    frame();
+    EXPECT_EQ(largest_difference(shot(), orange), 0);
+    const fs::path before = fs::current_path();
+    fs::current_path(folder_);
+    press(Key::picture);
+    fs::current_path(before);
+    EXPECT_EQ(largest_difference(read_image(folder_ / "darb_001.png"), plain), 0);
+    EXPECT_EQ(largest_difference(shot(), orange), 0);
+}
+
+TEST_F(ViewerWork, What_is_said_twice_is_shown_twice) {
+    load(file_);
+    session().path.path.add(session().navigation);
+    session().path.file = folder_ / "path.json";
+    const int before = session().told;
+    for (const int times : {1, 2}) {
+        session().ask(request::SavePath{});
+        frame();
+        EXPECT_EQ(session().told - before, times);
+    }
+}
 
 TEST_F(ViewerWork, Without_a_scene_it_says_so) {
     make_path(2);

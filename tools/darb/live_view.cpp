@@ -10,6 +10,7 @@
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
 #include "viewer/display_loss.h"
+#include "viewer/seconds.h"
 
 namespace darb {
 
@@ -18,10 +19,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kPausedNap = std::chrono::milliseconds(20);
-
-double seconds_after(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 }  // namespace
 
@@ -77,7 +74,7 @@ double LiveView::wait_while_paused(const LiveStep& step) {
         const bool steps = s.training.steps_to_go > 0;
         if (s.closed || s.stop || !s.training.paused || steps) {
             if (steps) --s.training.steps_to_go;
-            return waited ? seconds_after(start) : 0;
+            return waited ? seconds_since(start) : 0;
         }
         lock.unlock();
         const bool drew = s.drawer.draw(step.splats, LiveChange::none, s.picture);

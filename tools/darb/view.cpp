@@ -49,7 +49,7 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
     settle_tuning(device, flags.tune);
     Viewer viewer(device, options);
     apply_flags(viewer, flags, size);
-    viewer.session().note = note;
+    if (!note.empty()) viewer.session().tell(note);
     if (!flags.scene.empty()) viewer.open(flags.scene);
     viewer.finish_loading();
     viewer.draw_whole(size.width, size.height);

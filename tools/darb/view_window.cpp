@@ -51,7 +51,7 @@ int view_in_window(const ViewFlags& flags, const ViewerOptions& options, const P
     settle_tuning(device, flags.tune);
     ViewerWindow window(device, options, size.width, size.height);
     apply_flags(window.viewer(), flags, size);
-    window.viewer().session().note = note;
+    if (!note.empty()) window.viewer().session().tell(note);
     if (!flags.scene.empty()) {
         window.viewer().open(flags.scene);
         window.set_title(flags.scene.filename().string() + " - darb");

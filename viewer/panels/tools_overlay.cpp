@@ -6,6 +6,7 @@
 
 #include "viewer/panels/panels.h"
 #include "viewer/theme.h"
+#include "viewer/view_camera.h"
 
 namespace darb {
 
@@ -41,9 +42,9 @@ void draw_stroke(const Session& s, const Camera& camera) {
             list.AddLine(point(t.stroke[i]), point(t.stroke[(i + 1) % t.stroke.size()]), kStroke,
                          1.5f);
     } else if (t.tool == Tool::sphere && t.sphere) {
-        const glm::dvec3 p = camera.rotation * *t.sphere + camera.translation;
-        const ImVec2 centre =
-            point({camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy});
+        const std::optional<glm::dvec2> at = pixel_of(camera, *t.sphere);
+        if (!at) return;
+        const ImVec2 centre = point(*at);
         const auto radius = static_cast<float>(glm::distance(t.stroke.front(), t.stroke.back()));
         list.AddCircleFilled(centre, radius, kStrokeFill, 64);
         list.AddCircle(centre, radius, kStroke, 64, 1.5f);
@@ -61,10 +62,9 @@ void draw_gizmo(const Session& s, const Camera& camera) {
     for (int axis = 0; axis < 3; ++axis) {
         std::vector<ImVec2> line;
         for (const glm::dvec3& world : handle_lines(*gizmo, camera, axis)) {
-            const glm::dvec3 p = camera.rotation * world + camera.translation;
-            if (!(p.z > 0)) return;
-            line.push_back(
-                point({camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy}));
+            const std::optional<glm::dvec2> at = pixel_of(camera, world);
+            if (!at) return;
+            line.push_back(point(*at));
         }
         if (line.size() < 2) continue;
         const ImU32 colour = held == axis ? kHeldColour : kAxisColours[axis];

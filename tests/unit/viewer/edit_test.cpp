@@ -141,6 +141,12 @@ TEST(Edit, Selections_combine_and_leave_what_is_not_seen) {
     EXPECT_EQ(edit.redo(m), "selected 2 splats");
 }
 
+std::size_t transform(const Similarity& similarity, Edit& edit, SplatModel& m) {
+    edit.begin_transform(m);
+    edit.drag_transform(similarity, m);
+    return edit.end_transform(m);
+}
+
 TEST(Edit, A_move_is_of_the_selection_and_its_undo_exact) {
     SplatModel m = row(5, 3);
     for (size_t i = 0; i < 5; ++i) m.rotation[4 * i] = 1 + static_cast<float>(i);
@@ -149,7 +155,7 @@ TEST(Edit, A_move_is_of_the_selection_and_its_undo_exact) {
     Edit edit(5);
     edit.select(only(5, {1, 3}), Combine::replace);
     const Similarity quarter{2, glm::dmat3(0, 1, 0, -1, 0, 0, 0, 0, 1), {0, 0, 7}};
-    EXPECT_EQ(edit.transform(quarter, m), 2u);
+    EXPECT_EQ(transform(quarter, edit, m), 2u);
     EXPECT_TRUE(edit.unsaved());
     EXPECT_NEAR(position_of(m, 1).y, 22, 1e-5);  // (11, 0, 0), turned and twice as far
     EXPECT_NEAR(position_of(m, 1).z, 7, 1e-5);
@@ -168,6 +174,9 @@ TEST(Edit, A_move_is_of_the_selection_and_its_undo_exact) {
     edit.redo(m);
     for (int a = 0; a < kAttributeCount; ++a)
         EXPECT_EQ(attribute_values(m, a), attribute_values(after, a)) << a;
+    edit.undo(m);
+    EXPECT_EQ(m.sh_rest, before.sh_rest) << "a second time";
+    EXPECT_EQ(m.position, before.position);
 }
 
 TEST(Edit, Drags_are_from_the_start_and_one_step) {
@@ -183,6 +192,12 @@ TEST(Edit, Drags_are_from_the_start_and_one_step) {
     EXPECT_FALSE(edit.can_undo());
     edit.begin_transform(m);
     EXPECT_EQ(edit.end_transform(m), 0u) << "was not moved";
+    edit.begin_transform(m);
+    edit.drag_transform({2, glm::dmat3(1.0), {5, 0, 0}}, m);
+    edit.cancel_transform(m);
+    EXPECT_EQ(m.position[6], 2);
+    EXPECT_EQ(m.log_scale[6], 2);
+    EXPECT_FALSE(edit.transforms() || edit.can_undo());
 }
 
 TEST(Edit, A_merge_appends_in_the_world_and_goes_again) {

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "viewer/gizmo.h"
+#include "viewer/view_camera.h"
 
 namespace darb {
 namespace {
@@ -66,6 +67,33 @@ TEST(Select, Brush_is_a_line_with_a_radius) {
     EXPECT_EQ(count(under_brush(m, camera(), {{100, 110}, {500, 110}}, 20)), 5);
     EXPECT_EQ(count(under_brush(m, camera(), {{100, 110}, {500, 110}}, 5)), 0);
     EXPECT_EQ(count(under_brush(m, camera(), {{300, 300}}, 105)), 5) << "a dot";
+}
+
+TEST(Select, A_long_brush_is_as_its_segments_are) {
+    SplatModel m = grid();
+    m.resize(4000);
+    for (size_t i = 0; i < m.size(); ++i) {
+        m.position[3 * i] = static_cast<float>(i % 80) / 16 - 2.5f;
+        m.position[3 * i + 1] = static_cast<float>(i / 80) / 10 - 2.5f;
+        m.position[3 * i + 2] = 5;
+    }
+    std::vector<glm::dvec2> stroke;
+    for (int i = 0; i < 60; ++i) stroke.emplace_back(300 + 4 * i * std::cos(i), 300 + 3 * i);
+    for (const double radius : {3.0, 17.0, 90.0}) {
+        const SplatMask mask = under_brush(m, camera(), stroke, radius);
+        for (size_t i = 0; i < m.size(); ++i) {
+            const glm::dvec2 at(300 + 100.0 * double{m.position[3 * i]},
+                                300 + 100.0 * double{m.position[3 * i + 1]});
+            double least = glm::distance(at, stroke[0]);
+            for (size_t k = 1; k < stroke.size(); ++k)
+                least = std::min(least, distance_to_segment(at, stroke[k - 1], stroke[k]));
+            if (std::abs(least - radius) > 1e-9) {
+                ASSERT_EQ(mask[i], least < radius) << i << ' ' << radius;
+            }
+        }
+        EXPECT_GT(count(mask), 10) << radius;
+    }
+    EXPECT_EQ(count(under_brush(m, camera(), {}, 50)), 0);
 }
 
 TEST(Select, Values_have_both_ends) {

@@ -12,11 +12,11 @@ TEST(Theme, Contrast_is_that_of_wcag) {
 }
 
 TEST(Theme, Text_is_read_on_every_ground) {
-    for (const ThemeColour& ground : theme::kGrounds)
+    for (const ThemeColour& ground : theme::kGrounds) {
         EXPECT_GE(contrast(theme::kText, ground), 7) << ground[0] << ' ' << ground[1];
-    EXPECT_GE(contrast(theme::kText, theme::kGrab), 4.5);
-    for (const ThemeColour& ground : {theme::kWindow, theme::kField, theme::kButton})
         EXPECT_GE(contrast(theme::kTextOff, ground), 4.5) << ground[0] << ' ' << ground[1];
+    }
+    EXPECT_GE(contrast(theme::kText, theme::kGrab), 4.5);
 }
 
 }  // namespace
