@@ -72,7 +72,7 @@ bool Viewer::refined() const {
 }
 
 bool Viewer::at_rest() const {
-    return !loading() && pacing_.is_whole() && ready_to_move();
+    return !loading() && !warm_up_ && pacing_.is_whole() && ready_to_move();
 }
 
 double Viewer::frame(const Input& input, int width, int height, bool full) {
@@ -83,6 +83,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     last_frame_ = frame_start_;
     take_loaded();
     take_levels();
+    if (warm_up_ && warm_up_->done()) end_warm_up();
     for (const auto& path : input.dropped) drop(path);
     canvas_.resize(width, height);
     gui_.begin(width, height);  // now it knows whether the pointer is on a panel
@@ -103,7 +104,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     pacing_.skip();
     if (live_ != nullptr)
         follow_live(width, height);
-    else if (!picture_.empty())
+    else if (!picture_.empty() && !warm_up_)
         pace_picture(width, height, full, works);
 
     const double look_s = std::min(

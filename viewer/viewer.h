@@ -20,6 +20,7 @@
 #include "viewer/scene_loader.h"
 #include "viewer/session.h"
 #include "viewer/splat_picture.h"
+#include "viewer/warm_up.h"
 
 namespace darb {
 
@@ -37,6 +38,8 @@ struct ViewerOptions {
     std::function<std::vector<View>(const std::filesystem::path&)> find_cameras;
     /// Scenes with cameras open at the first, with its photo where there is one.
     bool start_at_camera = false;
+    /// Of a device like the viewer's, to compile on while the last picture of a run is shown.
+    std::optional<DeviceOptions> second_device;
     std::filesystem::path up_list;      // of RememberedUp
     std::filesystem::path recent_list;  // of RecentFiles
     /// Called from other threads when there is something to show.
@@ -103,6 +106,8 @@ class Viewer {
     void show_as_meant(const Scene& scene, bool first);
     void follow_plan();
     void set_pivot(const Bounds& bounds);
+    void start_warm_up();
+    void end_warm_up();
     void first_look(bool of_run);
     void remember_up();
     void lose_scene(const char* why);
@@ -176,6 +181,7 @@ class Viewer {
     std::vector<double> shares_;            // of the splats, below all
     std::unique_ptr<MotionLevels> levels_;  // of the scene; null: none asked for
     std::vector<std::unique_ptr<MotionLevels>> ended_;  // cancelled, their threads still run
+    std::unique_ptr<WarmUp> warm_up_;                   // the run's last picture is shown
     int version_ = 0;                                   // of the scene and its edits
     bool highlights_ = true;                            // what is selected, in the picture
     bool continuous_ = false;                           // the last frame wanted this one at once

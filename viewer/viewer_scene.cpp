@@ -106,7 +106,7 @@ void Viewer::take_loaded() {
 void Viewer::show(LoadedScene loaded) {
     auto scene = std::make_unique<Scene>(std::move(loaded.scene));
     picture_.set_scene(scene->model, scene->bounds, std::move(scene->important));
-    live_size_ = {0, 0};
+    warm_up_.reset();
     lose_scene("another scene was opened");
     shares_ = picture_.most_moving() < 1
                   ? motion_shares(picture_.splat_count(), picture_.most_moving())
@@ -142,6 +142,24 @@ void Viewer::show(LoadedScene loaded) {
     if (first) session_.navigation.level();
     first_look(of_run);
     set_pivot(s.bounds);
+    if (of_run && options_.second_device && live_size_.x > 0)
+        start_warm_up();
+    else
+        live_size_ = {0, 0};
+}
+
+// Until it is over the run's last picture stays, and the window lives.
+void Viewer::start_warm_up() {
+    constexpr int kSize = 256;  // px
+    warm_up_ =
+        std::make_unique<WarmUp>(*options_.second_device, session_.scene->model, shown_displays(),
+                                 session_.navigation.camera(kSize, kSize), options_.wake);
+}
+
+void Viewer::end_warm_up() {
+    warm_up_.reset();
+    live_size_ = {0, 0};
+    pacing_.forget();
 }
 
 // Through a camera of the data set where there are some; else from outside, upright.

@@ -2,7 +2,9 @@
 // them when the size, the scene or its edits change; edits that are not saved.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
+#include <thread>
 
 #include "engine/core/error.h"
 #include "engine/data/camera_list.h"
@@ -298,6 +300,31 @@ TEST_F(ViewerWork, A_run_is_followed_by_its_pictures_and_the_last_one_stays) {
     frame();
     EXPECT_EQ(session().navigation.eye, eye);
     EXPECT_GT(largest_difference(shot(), turned), 20);
+}
+
+// What the scene's pictures need is compiled on another device before.
+TEST_F(ViewerWork, At_the_end_of_a_run_its_last_picture_stays_while_another_device_compiles) {
+    const GpuSplats splats(shared_device(), scene_.model, false);
+    std::atomic<int> woken = 0;
+    options_.second_device = DeviceOptions();
+    options_.wake = [&] { ++woken; };
+    make_viewer(options_);
+    LivePicture pictures({});
+    LiveDrawer drawer(shared_device(), options_.views, {{0, 0, 0}, 2});
+    viewer_->show_live(pictures, {{0, 0, 0}, 2}, live_scene(splats));
+    frame();
+    drawer.draw(splats, LiveChange::at_once, pictures);
+    const ImageU8 last = shot();
+    viewer_->end_live();
+    session().navigation.orbit(0.5, 0.1);
+    load(file_);
+    const int before = woken;
+    EXPECT_EQ(largest_difference(shot(), last), 0);
+    EXPECT_FALSE(viewer_->at_rest());
+    while (woken == before) std::this_thread::yield();
+    while (largest_difference(shot(), last) == 0) {
+    }
+    EXPECT_GT(largest_difference(shot(), last), 20);
 }
 
 TEST_F(ViewerWork, A_run_shows_photo_and_kernels_beside_its_picture) {

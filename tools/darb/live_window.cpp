@@ -25,6 +25,7 @@ void LiveView::State::check_display() const {
 void LiveView::State::show_window() {
     try {
         Device device(window_device);
+        viewer_options.second_device = window_device;
         ViewerWindow shown(device, viewer_options, 1280, 720);
         struct Forget {  // before the window goes, whichever way it does
             State& state;

@@ -28,6 +28,8 @@ void recent_scenes(Session& s) {
         ImGui::PushID(static_cast<int>(i));
         if (ImGui::Selectable(file.filename().string().c_str())) choose(file, s);
         tip(file.string().c_str());
+        ImGui::SameLine();
+        ImGui::TextDisabled("%s", file.parent_path().string().c_str());
         ImGui::PopID();
     }
     ImGui::Separator();
