@@ -28,7 +28,7 @@ common=(-G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=g++ -DCMAKE_UNI
 build=build-portable
 configure() {
     local forgotten=(-U'*_LIBRARY' -U'*_LIBRARY_RELEASE' -U'*_LIBRARY_DEBUG')
-    cmake -S . -B "$build" "${common[@]}" "${forgotten[@]}" "$@" >/dev/null
+    cmake -S . -B "$build" -DDARB_MPI=OFF "${common[@]}" "${forgotten[@]}" "$@" >/dev/null
 }
 
 make_deb() {

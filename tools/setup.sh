@@ -12,6 +12,7 @@ usage: tools/setup.sh [options]
   --with-torch          PyTorch too, for the tests of LPIPS and of darb.torch: 0.6 GB on disk
   --with-packaging      what tools/package.sh and tools/package_test.sh run
   --with-colmap         COLMAP too: training from photos without cameras runs it
+  --with-mpi            Open MPI: training on several machines, docs/scale.md
   --with-mesa-backport  Debian 12: Mesa 25 from bookworm-backports; on the CPU it blends 1.5-1.7
                         times as fast as Mesa 22.3
 TEXT
@@ -70,6 +71,8 @@ packaging libxcursor-dev     tools/package.sh: GLFW 3.4
 packaging libxi-dev          tools/package.sh: GLFW 3.4
 packaging debootstrap        tools/package_test.sh: bare systems
 colmap   colmap               cameras from photos; optional
+mpi      libopenmpi-dev       several machines; optional
+mpi      openmpi-bin          mpirun; optional
 '
 
 dry_run=0 backport=0 groups="build run tests"
@@ -81,6 +84,7 @@ for option in "$@"; do
         --with-torch) groups+=" torch" ;;
         --with-packaging) groups+=" packaging" ;;
         --with-colmap) groups+=" colmap" ;;
+        --with-mpi) groups+=" mpi" ;;
         --with-mesa-backport) backport=1 ;;
         -h | --help) usage; exit 0 ;;
         *) echo "setup.sh: unknown option $option" >&2; usage >&2; exit 2 ;;

@@ -165,8 +165,6 @@ void size_arrays(Checkpoint& c, std::uint64_t splats) {
 
 }  // namespace
 
-namespace {
-
 std::vector<std::byte> checkpoint_bytes(const Checkpoint& checkpoint) {
     std::vector<std::byte> payload;
     for_each_array(checkpoint.state, [&](const std::vector<float>& values) {
@@ -187,8 +185,6 @@ std::vector<std::byte> checkpoint_bytes(const Checkpoint& checkpoint) {
     std::memcpy(file.data() + kCrcAt, &crc, 4);
     return file;
 }
-
-}  // namespace
 
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
     while_doing(path.string(), [&] { write_file_atomic(path, checkpoint_bytes(checkpoint)); });

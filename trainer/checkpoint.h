@@ -21,6 +21,8 @@ struct Checkpoint {
     std::string tuning = "backward=subgroup";  // result_tuning(): the only ones of older files
 };
 
+/// What a file holds.
+std::vector<std::byte> checkpoint_bytes(const Checkpoint& checkpoint);
 /// Throws Error naming the file where it cannot be written; an older file is then intact.
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
 

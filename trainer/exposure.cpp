@@ -87,6 +87,10 @@ std::vector<float> Exposure::gradient(int place) const {
                                      kGradientBytes * static_cast<std::uint64_t>(place));
 }
 
+std::size_t Exposure::gradient_floats() {
+    return kGradientFloats;
+}
+
 void Exposure::set_gradient(int place, const std::vector<float>& values) {
     DARB_CHECK(values.size() == kGradientFloats, "{} floats", values.size());
     partials_.upload(values, kGradientBytes * static_cast<std::uint64_t>(place));

@@ -42,6 +42,7 @@ class Exposure {
     /// What record_backward left for this place, and as another process has it. The queue must be
     /// idle.
     std::vector<float> gradient(int place) const;
+    static std::size_t gradient_floats();
     void set_gradient(int place, const std::vector<float>& values);
 
     std::vector<ColourMap> maps() const;

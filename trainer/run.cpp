@@ -18,6 +18,7 @@
 #include "engine/scene/ply.h"
 #include "trainer/checkpoint.h"
 #include "trainer/evaluation.h"
+#include "trainer/follow_run.h"
 #include "trainer/initial_model.h"
 #include "trainer/progress.h"
 #include "trainer/run_folder.h"
@@ -42,23 +43,6 @@ DeviceRates rates_of(Device& device) {
     return rates;
 }
 
-// Read before the trainer is made: what of the device's tuning changes bits is as the run
-// began with.
-std::optional<Checkpoint> checkpoint_of(Device& device, const std::filesystem::path& path) {
-    if (path.empty()) return std::nullopt;
-    Checkpoint checkpoint = read_checkpoint(path);
-    const TuningNames names = parse_tuning(device.info(), checkpoint.tuning, path.string());
-    device.set_tuning(with_names(device.tuning(), names));
-    return checkpoint;
-}
-
-// Where RunOptions does not bring the photos as they are to be trained and compared.
-std::vector<ImageU8> own_photos(const Dataset& dataset, const TrainOptions& options,
-                                const RunOptions& run) {
-    if (!run.photos.empty() && options.alpha) return {};
-    return photos_of_run(dataset, options, run.photos);
-}
-
 // One run: the loop and what it writes. The stopwatch counts training alone.
 class Run {
   public:
@@ -72,11 +56,12 @@ class Run {
           fingerprint_(dataset_fingerprint(dataset, photos_)),
           rates_(rates_of(device)),
           tuning_(result_tuning(device)),
-          checkpoint_(checkpoint_of(device, run.resume_from)),
+          checkpoint_(checkpoint_of(device, run)),
           trainer_(while_doing("the splats of the start",
                                [&] {
                                    return Trainer(device, dataset, photos_,
-                                                  initial_model(dataset, options), options);
+                                                  initial_model(dataset, options), options,
+                                                  run.ranks);
                                })),
           log_(run.output),
           progress_(1, options.iterations, run.quiet) {}
@@ -253,6 +238,7 @@ RunSummary Run::finished() {
 }
 
 void Run::begin() {
+    check_ranks(device_, options_, run_.ranks, fingerprint_);
     remove_leftovers(run_.output);
     if (!run_.resume_from.empty()) {
         resume();  // before anything of an earlier run is moved: it may be refused
@@ -335,7 +321,11 @@ void Run::train(const std::atomic<bool>* stop) {
         save_checkpoint(latest);
     }
     whole_ = true;
-    while (trainer_.iteration() < options_.iterations && !(stop && stop->load())) {
+    const Ranks* const ranks = run_.ranks.all;
+    const std::uint64_t sent = ranks ? ranks->sent_bytes() : 0;
+    const double waited = ranks ? ranks->seconds() : 0;
+    while (trainer_.iteration() < options_.iterations &&
+           !is_to_stop(trainer_, run_.ranks, stop && stop->load())) {
         whole_ = false;
         const int begin = trainer_.iteration();
         while_doing(fmt::format("iteration {}", begin + 1), [&] { trainer_.step(); });
@@ -343,7 +333,10 @@ void Run::train(const std::atomic<bool>* stop) {
         while_doing(fmt::format("what follows iteration {}", trainer_.iteration()),
                     [&] { after_step(begin); });
         if (run_.on_step) show_step();
+        ++summary_.trained_steps;
     }
+    if (ranks) summary_.sent_bytes = ranks->sent_bytes() - sent;
+    if (ranks) summary_.exchange_seconds = ranks->seconds() - waited;
     whole_ = false;
     trainer_.drain();
     whole_ = true;
@@ -420,20 +413,12 @@ void Run::report_troubles() {
 
 }  // namespace
 
-std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& options,
-                                   std::vector<ImageU8> loaded) {
-    std::vector<ImageU8> photos = loaded.empty() ? load_photos(dataset.views) : std::move(loaded);
-    if (options.alpha) return photos;
-    for (ImageU8& photo : photos)
-        if (photo.channels == 4)
-            for (std::size_t a = 3; a < photo.data.size(); a += 4) photo.data[a] = 255;
-    return photos;
-}
-
 RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
                         const RunOptions& run, const std::atomic<bool>* stop) {
     for (const View& view : dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
+    if (run.ranks.several() && !run.ranks.all->is_first())
+        return follow_training(device, dataset, options, run);
     check_run_folder(run.output, dataset);
     if (run.resume_from.empty()) check_start_memory(device, dataset, options);
     return Run(device, dataset, options, run).execute(stop);

@@ -17,6 +17,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "trainer/options.h"
+#include "trainer/rank_group.h"
 #include "trainer/run_report.h"
 #include "trainer/time_left.h"
 #include "trainer/trainer.h"
@@ -48,6 +49,7 @@ struct RunOptions {
     std::string command;               // of command.json, for --resume; may be empty
     std::string effects;               // the plan in a line, for the log
     std::string effects_json;          // the same as JSON, for metrics.json; may be empty
+    RankGroup ranks;                   // that train together; the first one writes and talks
     std::vector<ImageU8> photos;       // already loaded, in the order of the views; else empty
 };
 
@@ -64,6 +66,11 @@ struct RunSummary {
     int iteration = 0;
     bool interrupted = false;
     double seconds = 0;
+    // Of this process's steps, with several ranks: what it sent, and how long that took and it
+    // waited.
+    int trained_steps = 0;
+    std::uint64_t sent_bytes = 0;
+    double exchange_seconds = 0;
     std::filesystem::path model;  // the last PLY written
     std::vector<ReportPicture>
         pictures;  // held-out views beside their photos, of the last evaluation

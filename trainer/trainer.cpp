@@ -8,11 +8,13 @@
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "trainer/batch_step.h"
+#include "trainer/checkpoint.h"
 
 namespace darb {
 
 namespace {
 
+constexpr int kStepsApart = 64;    // that mixed devices take between two looks at the first
 constexpr float kGridExtents = 4;  // of half the grid's side: a cell is 1/128 of the scene's extent
 
 SplatModel start_model(SplatModel start, const TrainOptions& options) {
@@ -60,8 +62,9 @@ class ShownMean {
 }  // namespace
 
 Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-                 const SplatModel& start, const TrainOptions& options)
+                 const SplatModel& start, const TrainOptions& options, RankGroup ranks)
     : device_(&with_budget(device, options)),
+      ranks_(ranks.all ? ranks : RankGroup{&alone_}),
       options_(options),
       schedule_(options),
       background_(options.white_background ? 1.0f : 0.0f),
@@ -78,6 +81,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       average_(device),
       probe_(options, schedule_),
       step_(device, splats_, photos_, loss_options(options, dataset), options) {
+    check_batch(*ranks_.all, options.batch);
     step_.on_finished = [this](const StepOutcome& outcome) { finish(outcome); };
     step_.on_reserved = [this] { memory_.record(held()); };
     if (options_.antialias)
@@ -119,6 +123,7 @@ StepInput Trainer::input_for(int iteration, int view, int last) const {
 // saved between them is what was trained, not what was just reset.
 void Trainer::step() {
     if (opened_ != iteration_) open_step();
+    if (ranks_.mixed && iteration_ / schedule_.batch % kStepsApart == 0) follow_first();
     set_resolution(iteration_ + 1);
     const int begin = iteration_;
     tree_ ? run_batch() : run_step();
@@ -141,7 +146,8 @@ void Trainer::run_batch() {
         views.push_back(input_for(i, order_.view(i), end));
         views.back().place = i - iteration_ - 1;
     }
-    const std::vector<StepOutcome> outcomes = run_batch_step(step_, *tree_, splats_, views);
+    const std::vector<StepOutcome> outcomes =
+        run_batch_step(step_, *tree_, splats_, views, *ranks_.all, options_.batch);
     iteration_ = end;
     for (const StepOutcome& outcome : outcomes) finish(outcome);
 }
@@ -151,6 +157,7 @@ void Trainer::open_step() {
     update_smoothing();
     if (probe_.is_due(iteration_, splats_.sh_degree())) probe_degree();
     opened_ = iteration_;
+    if (round && ranks_.mixed) follow_first();
     if (round && on_round) on_round(iteration_, *round);
 }
 
@@ -205,8 +212,18 @@ gpu::DensifyArgs Trainer::round_args(int iteration) const {
     return args;
 }
 
+// Of devices that round differently: the splats of the first are everybody's again.
+void Trainer::follow_first() {
+    const int opened = opened_;
+    const Bytes bytes =
+        ranks_.all->is_first() ? checkpoint_bytes({state(), "", "", 0, ""}) : Bytes{};
+    const Bytes first = from_first(*ranks_.all, bytes);
+    if (!ranks_.all->is_first()) restore(parse_checkpoint(first, "the first rank").state);
+    opened_ = opened;
+}
+
 DensityResult Trainer::run_round(int iteration) {
-    const std::uint32_t limit = memory_.growth_limit(held(), totals_.counters);
+    const std::uint32_t limit = least(*ranks_.all, memory_.growth_limit(held(), totals_.counters));
     const DensityResult result = strategy_->round(
         {splats_, density_, step_.gradient_sum(), round_args(iteration), iteration, limit});
     memory_.end_round(result.after);

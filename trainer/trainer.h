@@ -23,6 +23,7 @@
 #include "trainer/optimizer.h"
 #include "trainer/photos.h"
 #include "trainer/probe.h"
+#include "trainer/rank_group.h"
 #include "trainer/smoothing.h"
 #include "trainer/step.h"
 #include "trainer/totals.h"
@@ -56,9 +57,11 @@ class Trainer {
     using State = TrainerState;
     using Probe = ProbeResult;
 
-    /// photos: as load_photos gives them, in the order of dataset.views.
+    /// photos: as load_photos gives them, in the order of dataset.views. ranks: that train
+    /// together, each with such a trainer; null: this one alone. Throws Error where the batch has
+    /// no equal parts for them.
     Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-            const SplatModel& start, const TrainOptions& options);
+            const SplatModel& start, const TrainOptions& options, RankGroup ranks = {});
     Trainer(const Trainer&) = delete;
     Trainer& operator=(const Trainer&) = delete;
 
@@ -77,6 +80,7 @@ class Trainer {
 
     /// Iterations finished or under way.
     int iteration() const { return iteration_; }
+    int views_a_step() const { return options_.batch; }
     std::uint32_t splat_count() const { return splats_.count(); }
     /// On the device, for work on the same queue between steps; the object stays, its buffers are
     /// replaced by density control.
@@ -123,6 +127,7 @@ class Trainer {
     std::optional<DensityResult> control_density();
     DensityResult run_round(int iteration);
     void open_step();
+    void follow_first();
     gpu::DensifyArgs round_args(int iteration) const;
     void reorder();
     void set_resolution(int iteration);
@@ -132,6 +137,8 @@ class Trainer {
     HeldMemory held() const;
 
     Device* device_;
+    OneRank alone_;
+    RankGroup ranks_;
     TrainOptions options_;
     Schedule schedule_;
     glm::vec3 background_;

@@ -11,6 +11,7 @@
 #include "engine/reference/adam.h"
 #include "engine/render/render_gradients.h"
 #include "tests/support/test_walk.h"
+#include "trainer/batch_step.h"
 #include "trainer/gradient_tree.h"
 
 namespace darb::test {
@@ -354,6 +355,30 @@ TEST(GradientTree, adds_views_by_their_places) {
         EXPECT_EQ(tree.sum().download(kPosition), sum_by_halves(d, 0, 8)) << count;
         EXPECT_EQ(tree.sum().scores().download<float>(1)[0], static_cast<float>(count));
     }
+}
+
+// To another rank and back: what no view shows is 0 there, and bytes of other splats are refused.
+TEST(PackedGradients, come_back_as_they_were) {
+    Views views(1);
+    GradientBuffers one(views.device, views.splats), back(views.device, views.splats);
+    views.record(0, one, false);
+    std::vector<glm::vec2> shown(views.splats.count(), glm::vec2(0));
+    one.views().download(std::as_writable_bytes(std::span(shown)));
+    for (size_t i = 0; i < shown.size(); i += 3) shown[i] = glm::vec2(0);  // not on their way
+    one.views().upload(shown);
+    const Bytes bytes = packed_gradients(one, 3);
+    EXPECT_LT(bytes.size(), shown.size() * 200);
+    unpack_gradients(bytes, 3, back);
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const std::vector<float> before = one.download(a), after = back.download(a);
+        const size_t each = one.stride(a);
+        for (size_t i = 0; i < after.size(); ++i)
+            ASSERT_EQ(after[i], shown[i / each].y == 0 ? 0.0f : before[i]) << attribute_name(a);
+    }
+    EXPECT_EQ(back.views().download<glm::vec2>(shown.size()), shown);
+    for (const size_t size : {size_t{0}, size_t{1}, bytes.size() - 1})
+        EXPECT_THROW(unpack_gradients(std::span(bytes).first(size), 3, back), Error) << size;
+    EXPECT_THROW(unpack_gradients(bytes, 0, back), Error) << "of another degree";
 }
 
 }  // namespace

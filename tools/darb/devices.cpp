@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/gpu/device.h"
+#include "engine/ranks/ranks.h"
 #include "tools/bench/pass_statistics.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/json_output.h"
@@ -70,6 +71,9 @@ void print_devices(std::FILE* out, const std::string& select) {
                             "virtual before cpu, then the largest memory"
                           : "the only one";
     tell(out, "\nchosen: {} {} ({})\n", devices[chosen].index, devices[chosen].name, why);
+    const std::string mpi = mpi_name();
+    tell(out, "several machines: {}\n",
+         mpi.empty() ? "no, built without MPI" : mpi + ", by mpirun");
 }
 
 void add_devices(CLI::App& app, Action& action) {

@@ -17,6 +17,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/help.h"
 #include "tools/darb/numbers.h"
@@ -24,6 +25,11 @@
 #include "tools/darb/stop_signals.h"
 
 namespace {
+
+std::string with_mpi() {
+    const std::string name = darb::mpi_name();
+    return name.empty() ? "\nwithout MPI: on one machine alone" : "\nwith " + name;
+}
 
 // 3DGS spells options with underscores; here they are the same as dashes.
 std::vector<std::string> with_dashes(int argc, char** argv) {
@@ -74,7 +80,7 @@ int run(int argc, char** argv) {
     CLI::App app(
         "Train, render and measure 3D splat scenes with a choice of kernel, on any Vulkan device.",
         "darb");
-    app.set_version_flag("--version", std::string("darb ") + DARB_VERSION);
+    app.set_version_flag("--version", std::string("darb ") + DARB_VERSION + with_mpi());
     app.require_subcommand(1);
     app.formatter(darb::make_help_formatter());
     app.set_help_flag("-h,--help", "this, without the options of few users");

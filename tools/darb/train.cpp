@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -11,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
@@ -22,6 +22,7 @@
 #include "tools/darb/train_plan.h"
 #include "tools/darb/train_recall.h"
 #include "tools/darb/train_run.h"
+#include "tools/darb/train_summary.h"
 #include "tools/darb/tune_flags.h"
 #include "trainer/run_folder.h"
 #include "trainer/start_memory.h"
@@ -29,49 +30,6 @@
 namespace darb {
 
 namespace {
-
-// The dearest first; what takes less than a hundredth of an iteration is not printed.
-std::string passes_text(std::vector<ReportPass> passes) {
-    std::string text;
-    std::sort(passes.begin(), passes.end(),
-              [](const ReportPass& a, const ReportPass& b) { return a.ms > b.ms; });
-    double all_ms = 0;
-    for (const ReportPass& pass : passes) all_ms += pass.ms;
-    if (all_ms > 0) text = fmt::format("{:.2f} ms an iteration on the device:\n", all_ms);
-    for (const ReportPass& pass : passes)
-        if (pass.ms > 0.01 * all_ms)
-            text += fmt::format(
-                "  {:<18} {:8.3f} ms{}\n", pass.name, pass.ms,
-                pass.roofline ? fmt::format("  {:4.1f} % of the roofline", 100 * *pass.roofline)
-                              : "");
-    return text;
-}
-
-// Of a quiet run the paths, and what goes on with one that was interrupted.
-std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
-    const bool quiet = flags.run.quiet;
-    std::string text;
-    if (!quiet)
-        text = fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
-    if (!quiet && !summary.evaluations.empty()) {
-        const Evaluation& e = summary.evaluations.back();
-        text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
-                            e.splats);
-    }
-    if (!quiet && flags.verbose) text += passes_text(summary.passes);
-    const auto written = [&](const char* what, const std::filesystem::path& path) {
-        if (path.empty()) return;
-        text += (quiet ? "" : fmt::format("{:<9}", what)) + path.string() + "\n";
-    };
-    written("scene", summary.model);
-    if (!summary.pictures.empty()) written("picture", summary.pictures.front().file);
-    written("report", summary.report);
-    if (summary.interrupted)
-        text += fmt::format("interrupted{}{}; go on with: darb train --resume -o '{}'\n",
-                            stop_exit_code() == 0 ? "" : " by ", stop_name(),
-                            flags.run.output.string());
-    return printable(text, true);
-}
 
 // The scene as a web page, with the photos' cameras as its bookmarks; of a run that was finished
 // before, where there is none yet.
@@ -87,12 +45,26 @@ void leave_page(Device& device, const Dataset& dataset, const TrainFlags& flags,
                                              dataset.views, file));
 }
 
-int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
+// Whatever takes a folder or a window for itself.
+void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
+    if (ranks.count() == 1) return;
+    if (flags.view)
+        throw Error("--view", fmt::format("has no place in a run of {} ranks", ranks.count()),
+                    "Leave it out; darb view opens what the run saves.");
+    if (needs_cameras(flags))
+        throw Error(flags.dataset, "has no cameras yet, and several ranks do not look for them",
+                    "Run darb train on it once on one rank: -o OUT leaves OUT/colmap/dense, a data "
+                    "set with cameras.");
+}
+
+int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
     if (recalled) recall_arguments(arguments, flags, tune);
     finish_train_flags(flags);
     if (flags.dataset.empty())
         throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
+    check_for_ranks(ranks, flags);
+    flags.run.ranks = {&ranks, flags.allow_mixed};
 
     DeviceOptions device_options = command_device(flags.device);
     const LiveSystem live(flags.view, device_options);
@@ -100,10 +72,16 @@ int train(TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) 
     settle_tuning(device, tune);
     std::optional<RunLock> lock;
     Dataset dataset = load_training_data(flags, lock);
-    check_run_folder(flags.run.output, dataset);
-    if (!lock) lock.emplace(flags.run.output);
+    if (ranks.is_first()) {
+        check_run_folder(flags.run.output, dataset);
+        if (!lock) lock.emplace(flags.run.output);
+    }
     plan_effects(dataset, flags);
     plan_strategy(dataset, flags);
+    if (!ranks.is_first()) {
+        run_training(device, dataset, flags.train, flags.run);
+        return 0;
+    }
     if (!recalled) flags.run.command = command_text(std::move(arguments), flags);
     if (flags.run.resume_from.empty())  // before the forecast, which makes them
         check_start_memory(device, dataset, flags.train);
@@ -130,7 +108,9 @@ void add_train(CLI::App& app, Action& action, const std::vector<std::string>& ar
     add_train_flags(*command, *flags);
     add_tune_flags(*command, *tune);
     command->callback([flags, tune, arguments, &action] {
-        action = [flags, tune, arguments] { return train(*flags, *tune, arguments); };
+        action = [flags, tune, arguments] {
+            return with_ranks([&](Ranks& ranks) { return train(ranks, *flags, *tune, arguments); });
+        };
     });
 }
 

@@ -91,6 +91,11 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
 
 }  // namespace
 
+bool needs_cameras(const TrainFlags& flags) {
+    return (is_video_name(flags.dataset) && !fs::is_directory(flags.dataset)) ||
+           !photos_without_cameras(flags.dataset, flags.data.images_folder).empty();
+}
+
 Dataset load_training_data(TrainFlags& flags, std::optional<RunLock>& lock) {
     const bool video = is_video_name(flags.dataset) && !fs::is_directory(flags.dataset);
     const fs::path photos = video ? photos_of_video(flags.dataset, flags, lock)

@@ -9,6 +9,9 @@
 
 namespace darb {
 
+/// Whether the data set is a video, or photos without cameras, which is to be made one first.
+bool needs_cameras(const TrainFlags& flags);
+
 /// Loads flags.dataset, every view of it to train on unless flags.data.hold_out. A folder of PNG
 /// and JPEG files (itself, or its --images folder) without sparse, sparse/0 or transforms*.json
 /// goes through the installed COLMAP into OUT/colmap first; what is there from an earlier run over

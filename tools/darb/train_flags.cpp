@@ -65,6 +65,11 @@ void add_run_flags(CLI::App& command, TrainFlags& f) {
         ->group(option_group::kRun);
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training")
         ->group(option_group::kRun);
+    command
+        .add_flag("--allow-mixed", f.allow_mixed,
+                  "ranks of mpirun may have other devices and drivers; the result then depends on "
+                  "which")
+        ->group(help_group::kDevice);
     add_quiet_flag(command, f.run.quiet)->group(option_group::kRun);
     command.add_flag("--verbose", f.verbose, "print the time of each pass at the end")
         ->group(help_group::kDevice);

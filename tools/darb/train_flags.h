@@ -20,9 +20,10 @@ struct TrainFlags {
     std::string effects = "auto", schedule_effects;
     bool antialiasing = false;  // as 3DGS spells +antialias
     bool resume = false;
-    bool verbose = false;  // the table of passes at the end
-    bool view = false;     // follow in a window
-    bool page = false;     // OUT/scene.html at the end
+    bool verbose = false;      // the table of passes at the end
+    bool allow_mixed = false;  // devices of several ranks
+    bool view = false;         // follow in a window
+    bool page = false;         // OUT/scene.html at the end
     bool sequential = false;
     int frames = 0;              // of a video; 0: by its length
     bool deterministic = false;  // every run is; the flag only lets scripts say so

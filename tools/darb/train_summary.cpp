@@ -1,0 +1,70 @@
+#include "tools/darb/train_summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/core/text.h"
+#include "engine/ranks/ranks.h"
+#include "tools/darb/stop_signals.h"
+
+namespace darb {
+
+namespace {
+
+// The dearest first; what takes less than a hundredth of an iteration is not printed.
+std::string passes_text(std::vector<ReportPass> passes) {
+    std::string text;
+    std::sort(passes.begin(), passes.end(),
+              [](const ReportPass& a, const ReportPass& b) { return a.ms > b.ms; });
+    double all_ms = 0;
+    for (const ReportPass& pass : passes) all_ms += pass.ms;
+    if (all_ms > 0) text = fmt::format("{:.2f} ms an iteration on the device:\n", all_ms);
+    for (const ReportPass& pass : passes)
+        if (pass.ms > 0.01 * all_ms)
+            text += fmt::format(
+                "  {:<18} {:8.3f} ms{}\n", pass.name, pass.ms,
+                pass.roofline ? fmt::format("  {:4.1f} % of the roofline", 100 * *pass.roofline)
+                              : "");
+    return text;
+}
+
+// What several ranks cost: of this part of a run that was resumed.
+std::string ranks_text(const RankGroup& ranks, const RunSummary& summary) {
+    if (!ranks.several() || summary.trained_steps == 0) return "";
+    const double steps = summary.trained_steps;
+    return fmt::format(
+        "{} ranks: {:.3f} MB a step from each, {:.1f} ms a step of sending and waiting\n",
+        ranks.all->count(), static_cast<double>(summary.sent_bytes) / steps / 1e6,
+        summary.exchange_seconds / steps * 1e3);
+}
+
+}  // namespace
+
+std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
+    const bool quiet = flags.run.quiet;
+    std::string text;
+    if (!quiet)
+        text = fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
+    if (!quiet && !summary.evaluations.empty()) {
+        const Evaluation& e = summary.evaluations.back();
+        text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
+                            e.splats);
+    }
+    if (!quiet) text += ranks_text(flags.run.ranks, summary);
+    if (!quiet && flags.verbose) text += passes_text(summary.passes);
+    const auto written = [&](const char* what, const std::filesystem::path& path) {
+        if (path.empty()) return;
+        text += (quiet ? "" : fmt::format("{:<9}", what)) + path.string() + "\n";
+    };
+    written("scene", summary.model);
+    if (!summary.pictures.empty()) written("picture", summary.pictures.front().file);
+    written("report", summary.report);
+    if (summary.interrupted)
+        text += fmt::format("interrupted{}{}; go on with: darb train --resume -o '{}'\n",
+                            stop_exit_code() == 0 ? "" : " by ", stop_name(),
+                            flags.run.output.string());
+    return printable(text, true);
+}
+
+}  // namespace darb

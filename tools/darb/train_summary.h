@@ -1,0 +1,14 @@
+// What `darb train` says at the end of a run.
+#pragma once
+
+#include <string>
+
+#include "tools/darb/train_flags.h"
+#include "trainer/run.h"
+
+namespace darb {
+
+/// Of a quiet run the paths, and what goes on with one that was interrupted.
+std::string summary_text(const RunSummary& summary, const TrainFlags& flags);
+
+}  // namespace darb

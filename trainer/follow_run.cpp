@@ -1,0 +1,96 @@
+#include "trainer/follow_run.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include "engine/core/doing.h"
+#include "engine/core/files.h"
+#include "engine/plan/tuning_names.h"
+#include "trainer/initial_model.h"
+
+namespace darb {
+
+namespace {
+constexpr int kStepsApart = 64;  // from one look whether ranks are equal to the next
+
+// Of a version there are many builds.
+std::string program() {
+    const std::vector<std::byte> file = read_file("/proc/self/exe");
+    const uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(file.data()), file.size());
+    return fmt::format("{} ({:08x})", DARB_VERSION, crc);
+}
+}  // namespace
+
+std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run) {
+    const std::filesystem::path& path = run.resume_from;
+    const bool reads = !run.ranks.several() || run.ranks.all->is_first();
+    Bytes file;
+    if (reads && !path.empty()) file = read_file(path);
+    if (run.ranks.several()) file = from_first(*run.ranks.all, file);
+    if (file.empty() && (path.empty() || !reads)) return std::nullopt;
+    Checkpoint checkpoint =
+        while_doing(path.string(), [&] { return parse_checkpoint(file, path.string()); });
+    const TuningNames names = parse_tuning(device.info(), checkpoint.tuning, path.string());
+    device.set_tuning(with_names(device.tuning(), names));
+    return checkpoint;
+}
+
+void check_ranks(const Device& device, const TrainOptions& options, const RankGroup& ranks,
+                 const std::string& fingerprint) {
+    if (!ranks.several()) return;
+    const DeviceInfo& info = device.info();
+    RankFacts facts{
+        {"program", program()}, {"data set", fingerprint}, {"settings", settings_text(options)}};
+    if (!ranks.mixed) {
+        facts.emplace_back("device", info.name);
+        facts.emplace_back("driver", info.driver);
+        facts.emplace_back("tuning", names_text(tuning_names(device.tuning())));
+    }
+    check_same(*ranks.all, facts);
+}
+
+bool is_to_stop(Trainer& trainer, const RankGroup& ranks, bool stop) {
+    if (!ranks.several()) return stop;
+    const int steps = trainer.iteration() / trainer.views_a_step();
+    if (!ranks.mixed && steps % kStepsApart == 0)
+        check_equal_splats(*ranks.all, trainer.splats(), trainer.iteration());
+    return any_stops(*ranks.all, stop);
+}
+
+std::vector<ImageU8> own_photos(const Dataset& dataset, const TrainOptions& options,
+                                const RunOptions& run) {
+    if (!run.photos.empty() && options.alpha) return {};
+    return photos_of_run(dataset, options, run.photos);
+}
+
+std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& options,
+                                   std::vector<ImageU8> loaded) {
+    std::vector<ImageU8> photos = loaded.empty() ? load_photos(dataset.views) : std::move(loaded);
+    if (options.alpha) return photos;
+    for (ImageU8& photo : photos)
+        if (photo.channels == 4)
+            for (std::size_t a = 3; a < photo.data.size(); a += 4) photo.data[a] = 255;
+    return photos;
+}
+
+RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                           const RunOptions& run) {
+    const std::vector<ImageU8> loaded = own_photos(dataset, options, run);
+    const std::vector<ImageU8>& photos = loaded.empty() ? run.photos : loaded;
+    const std::string fingerprint = dataset_fingerprint(dataset, photos);
+    const std::optional<Checkpoint> checkpoint = checkpoint_of(device, run);
+    Trainer trainer(device, dataset, photos, initial_model(dataset, options), options, run.ranks);
+    check_ranks(device, options, run.ranks, fingerprint);
+    if (checkpoint) {
+        check_resumable(*checkpoint, run.resume_from, options, dataset, fingerprint);
+        trainer.restore(checkpoint->state);
+    }
+    while (trainer.iteration() < options.iterations && !is_to_stop(trainer, run.ranks, false))
+        while_doing(fmt::format("iteration {}", trainer.iteration() + 1), [&] { trainer.step(); });
+    RunSummary summary;
+    summary.iteration = trainer.iteration();
+    summary.interrupted = trainer.iteration() < options.iterations;
+    return summary;
+}
+
+}  // namespace darb

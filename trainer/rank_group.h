@@ -1,0 +1,40 @@
+// RankGroup: the ranks of a training run, and what they agree on: that they train the same, when to
+// stop, that their splats are equal.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/ranks/ranks.h"
+#include "engine/raster/gpu_splats.h"
+
+namespace darb {
+
+struct RankGroup {
+    Ranks* all = nullptr;
+    /// Their devices may round differently: the first one's splats are taken over after each round
+    /// of density control, and in between, in place of the promise of equal bits.
+    bool mixed = false;
+
+    bool several() const { return all && all->count() > 1; }
+};
+
+/// Throws Error where the batch has no aligned parts of equal size for so many ranks.
+void check_batch(const Ranks& ranks, int batch);
+
+/// What a rank's run is, by what it is called.
+using RankFacts = std::vector<std::pair<std::string, std::string>>;
+/// Throws Error that names each rank which has other facts than the first, and them. All ranks call
+/// it with facts of the same names.
+void check_same(Ranks& ranks, const RankFacts& facts);
+
+/// Whether any rank is to stop. All ranks call it.
+bool any_stops(Ranks& ranks, bool stop);
+
+/// Throws Error that names the ranks whose splats differ from the first one's in any bit. The queue
+/// must be idle; all ranks call it.
+void check_equal_splats(Ranks& ranks, const GpuSplats& splats, int iteration);
+
+}  // namespace darb
