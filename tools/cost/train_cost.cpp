@@ -241,6 +241,42 @@ class GradientErrors {
     std::vector<Photo> photos_;
 };
 
+// [row][seed]. The first run is this process's own where it is the first rank, and the only one
+// whose splats are kept.
+std::vector<std::vector<TrainedRun>> train_by_turns(
+    Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
+    const TrainOptions& options, const TrainCostPlan& plan, const std::vector<TrainCostRow>& rows,
+    const std::function<void(const std::string&)>& progress) {
+    OneRank alone;
+    Ranks& ranks = plan.ranks ? *plan.ranks : static_cast<Ranks&>(alone);
+    std::vector<double> own;  // of each run its ms and its curve
+    SplatModel model;
+    for (int seed = 0; seed < plan.seeds; ++seed)
+        for (size_t r = 0; r < rows.size(); ++r) {
+            const size_t item = static_cast<size_t>(seed) * rows.size() + r;
+            if (!has_turn(ranks, item)) continue;
+            progress(fmt::format("seed {} of {}, {} of {}: {}", seed + 1, plan.seeds, r + 1,
+                                 rows.size(), rows[r].name));
+            TrainedRun run =
+                train_once(device, dataset, photos, with(options, rows[r], seed), plan.evaluations);
+            own.push_back(run.ms);
+            for (const auto& [seconds, psnr_db] : run.curve)
+                own.insert(own.end(), {seconds, psnr_db});
+            if (item == 0) model = std::move(run.model);
+        }
+    const size_t each = 1 + 2 * static_cast<size_t>(plan.evaluations);
+    const std::vector<double> all = by_turns(ranks, own, each);
+    std::vector<std::vector<TrainedRun>> runs(rows.size());
+    for (size_t at = 0; at < all.size(); at += each) {
+        TrainedRun run;
+        run.ms = all[at];
+        for (size_t e = 1; e < each; e += 2) run.curve.emplace_back(all[at + e], all[at + e + 1]);
+        runs[at / each % rows.size()].push_back(std::move(run));
+    }
+    runs[0][0].model = std::move(model);
+    return runs;
+}
+
 }  // namespace
 
 TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
@@ -251,14 +287,9 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
     views_of(dataset, true);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     result.rows = training_rows(options);
-    std::vector<std::vector<TrainedRun>> runs(result.rows.size());
-    for (int seed = 0; seed < plan.seeds; ++seed)
-        for (size_t r = 0; r < result.rows.size(); ++r) {
-            progress(fmt::format("seed {} of {}, {} of {}: {}", seed + 1, plan.seeds, r + 1,
-                                 result.rows.size(), result.rows[r].name));
-            runs[r].push_back(train_once(device, dataset, photos,
-                                         with(options, result.rows[r], seed), plan.evaluations));
-        }
+    const std::vector<std::vector<TrainedRun>> runs =
+        train_by_turns(device, dataset, photos, options, plan, result.rows, progress);
+    if (plan.ranks && !plan.ranks->is_first()) return result;
     std::vector<double> ends;
     for (const TrainedRun& run : runs[0]) ends.push_back(run.curve.back().second);
     for (const double below : kBelow) result.targets.push_back(spread_of(ends).median - below);

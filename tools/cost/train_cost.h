@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
+#include "engine/ranks/ranks.h"
 #include "tools/cost/accuracy_cost.h"
 #include "trainer/options.h"
 
@@ -17,7 +18,8 @@ namespace darb {
 
 struct TrainCostPlan {
     int seeds = 3;
-    int evaluations = 10;  // of held-out views, evenly over a run
+    int evaluations = 10;    // of held-out views, evenly over a run
+    Ranks* ranks = nullptr;  // that do the runs by turns; null: this process does all
 };
 
 struct TrainCostRow {

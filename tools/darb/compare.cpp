@@ -13,6 +13,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/gpu/device.h"
+#include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
@@ -55,23 +56,6 @@ void check_flags(CompareFlags& flags) {
             together({files_of(dataset_path(dataset)), flags.lpips, flags.kernel_files}));
 }
 
-std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
-    note = "LPIPS was left out: no weights were given (--lpips FILE).";
-    for (const auto& file : flags.lpips)
-        if (!std::filesystem::exists(file)) {
-            constexpr const char* left_out = "LPIPS was left out: {} does not exist.";
-            note = fmt::format(left_out, file.filename().string());
-            say("warning: {}\n", fmt::format(left_out, file.string()));
-            return std::nullopt;
-        }
-    if (flags.lpips.empty()) return std::nullopt;
-    std::optional<Lpips> lpips(std::in_place, flags.lpips, LpipsOptions{flags.lpips_as_3dgs, 0});
-    note = fmt::format("LPIPS: {}, colours from {} to 1{}.", lpips->net_name(),
-                       flags.lpips_as_3dgs ? "0" : "-1",
-                       flags.lpips_as_3dgs ? " as in the evaluation of 3DGS" : "");
-    return lpips;
-}
-
 // What runs say names their data set, the output and files of their options, and no folder around
 // these.
 void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags) {
@@ -91,7 +75,7 @@ nlohmann::json shared_json(Comparison comparison, const std::filesystem::path& f
     return comparison_json(comparison);
 }
 
-int compare(CompareFlags flags) {
+int compare(Ranks& ranks, CompareFlags flags) {
     check_flags(flags);
     const std::vector<int> kernels = kernels_of(flags);
     Comparison comparison;
@@ -108,19 +92,22 @@ int compare(CompareFlags flags) {
         const Device device(options);
         comparison.device = device.info().name + ", " + device.info().driver;
     }
-    const RunLock lock(flags.output);
+    std::optional<RunLock> lock;
+    if (ranks.is_first()) lock.emplace(flags.output);
     const std::atomic<bool>& stop = stop_on_signals();
     int exit_code = 0;
     for (const std::string& dataset : flags.datasets) {
         if (stop) break;
         comparison.datasets.push_back(
-            compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, stop));
+            compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, ranks, stop));
+        if (!ranks.is_first()) continue;
         leave_folders_out(comparison.datasets.back(), flags);
         for (const ComparedRun& run : comparison.datasets.back().runs)
             if (exit_code != 1 && run.exit_code != 0) exit_code = run.exit_code;
         if (flags.json != "-") write_json(flags.json, shared_json(comparison, flags.json));
         write_file_atomic(flags.html, comparison_html(comparison));
     }
+    if (!ranks.is_first()) return 0;
     if (flags.json == "-") write_json(flags.json, shared_json(comparison, flags.json));
     const std::string shown = fmt::format(
         "{}{}\n{}",
@@ -143,7 +130,11 @@ void add_compare(CLI::App& app, Action& action) {
     CLI::App* command = app.add_subcommand(
         "compare", "Kernels side by side on data sets: trains, measures, reports; resumes");
     add_compare_flags(*command, *flags);
-    command->callback([flags, &action] { action = [flags] { return compare(*flags); }; });
+    command->callback([flags, &action] {
+        action = [flags] {
+            return with_ranks([&](Ranks& ranks) { return compare(ranks, *flags); });
+        };
+    });
 }
 
 }  // namespace darb

@@ -4,9 +4,11 @@
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "engine/ranks/ranks.h"
 #include "tools/darb/train_flags.h"
 #include "tools/paper/compare_runs.h"
 #include "tools/paper/lpips.h"
@@ -53,10 +55,14 @@ std::vector<std::filesystem::path> paths_in_options(const CompareFlags& flags);
 /// What the runs have in common, as sentences; paths in them as seen from the output.
 std::string settings_of(const CompareFlags& flags);
 
+/// Of --lpips; note: which, or why none.
+std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note);
+
 /// Trains what is not there yet and reads and measures everything, one data set; ends early, with
-/// what there is, when *stop is set. lpips may be null.
+/// what there is, when *stop is set. lpips may be null. Several ranks train a share of the runs
+/// each, into the same folders; the first reads them all.
 ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,
-                           const std::vector<int>& kernels, const Lpips* lpips,
+                           const std::vector<int>& kernels, const Lpips* lpips, Ranks& ranks,
                            const std::atomic<bool>& stop);
 
 }  // namespace darb

@@ -1,6 +1,7 @@
 // What the runs of a comparison have in common, as its files say it: no folder of the machine.
 #include <fmt/format.h>
 
+#include "engine/core/say.h"
 #include "tools/darb/compare_flags.h"
 #include "trainer/portable_path.h"
 
@@ -34,6 +35,23 @@ std::string settings_of(const CompareFlags& flags) {
             : "Equal densification threshold, so each kernel has its own number of splats.";
     return fmt::format("{} Options of training:{}.", growth,
                        words.empty() ? " the defaults" : words);
+}
+
+std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {
+    note = "LPIPS was left out: no weights were given (--lpips FILE).";
+    for (const auto& file : flags.lpips)
+        if (!std::filesystem::exists(file)) {
+            constexpr const char* left_out = "LPIPS was left out: {} does not exist.";
+            note = fmt::format(left_out, file.filename().string());
+            say("warning: {}\n", fmt::format(left_out, file.string()));
+            return std::nullopt;
+        }
+    if (flags.lpips.empty()) return std::nullopt;
+    std::optional<Lpips> lpips(std::in_place, flags.lpips, LpipsOptions{flags.lpips_as_3dgs, 0});
+    note = fmt::format("LPIPS: {}, colours from {} to 1{}.", lpips->net_name(),
+                       flags.lpips_as_3dgs ? "0" : "-1",
+                       flags.lpips_as_3dgs ? " as in the evaluation of 3DGS" : "");
+    return lpips;
 }
 
 }  // namespace darb

@@ -39,6 +39,9 @@ class Comparer {
     }
 
     const std::vector<View>& views() const { return dataset_.views; }
+    /// Of these runs each rank's, by turns: what fails is tried again, and told, by run().
+    void train_share(const std::vector<int>& kernels, const Ranks& ranks,
+                     const std::atomic<bool>& stop);
     ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
 
   private:
@@ -74,6 +77,21 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     run_training(device, dataset_, f.train, f.run, &stop);
 }
 
+void Comparer::train_share(const std::vector<int>& kernels, const Ranks& ranks,
+                           const std::atomic<bool>& stop) {
+    std::size_t item = 0;
+    for (int seed = 0; seed < flags_.seeds; ++seed)
+        for (const int kernel : kernels) {
+            if (stop || !has_turn(ranks, item++)) continue;
+            TrainFlags f = train_flags_of(flags_, name_, kernel, static_cast<std::uint64_t>(seed));
+            try {
+                train(f, stop);
+            } catch (const std::exception& e) {
+                say("failed: {}\n", e.what());
+            }
+        }
+}
+
 ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
     TrainFlags f = train_flags_of(flags_, name_, kernel, seed);
     ComparedRun run;
@@ -101,7 +119,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
 }  // namespace
 
 ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,
-                           const std::vector<int>& kernels, const Lpips* lpips,
+                           const std::vector<int>& kernels, const Lpips* lpips, Ranks& ranks,
                            const std::atomic<bool>& stop) {
     ComparedDataset result{dataset_name(dataset), dataset, {}};
     std::optional<Comparer> comparer;
@@ -114,8 +132,10 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
         failed.exit_code = 2;
         say("failed: {}\n", e.what());
         result.runs.push_back(std::move(failed));
-        return result;
     }
+    if (comparer && ranks.count() > 1) comparer->train_share(kernels, ranks, stop);
+    ranks.gather({});  // all runs are there
+    if (!comparer || !ranks.is_first()) return result;
     refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
     for (int seed = 0; seed < flags.seeds; ++seed)
         for (const int kernel : kernels) {

@@ -51,7 +51,8 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
 }
 
 int cost(const CostFlags& flags) {
-    if (!flags.train.empty()) return train_cost(flags);
+    if (!flags.train.empty())
+        return with_ranks([&](Ranks& ranks) { return train_cost(ranks, flags); });
     if (flags.scene.empty())
         throw Error("darb cost", "no scene", "Name a PLY file, or a data set with --train.");
     refuse_to_overwrite_inputs({flags.json, flags.html},

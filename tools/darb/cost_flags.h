@@ -5,6 +5,7 @@
 #include <string>
 
 #include "engine/data/dataset.h"
+#include "engine/ranks/ranks.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/tune_flags.h"
 
@@ -22,6 +23,6 @@ struct CostFlags {
 };
 
 /// darb cost --train DATASET
-int train_cost(const CostFlags& flags);
+int train_cost(Ranks& ranks, const CostFlags& flags);
 
 }  // namespace darb

@@ -15,7 +15,7 @@
 
 namespace darb {
 
-int train_cost(const CostFlags& flags) {
+int train_cost(Ranks& ranks, const CostFlags& flags) {
     if (!flags.scene.empty())
         throw Error("darb cost " + flags.scene + " --train " + flags.train,
                     "--train takes no scene: it trains its own", "Leave the scene out.");
@@ -33,6 +33,7 @@ int train_cost(const CostFlags& flags) {
                     "sets the accuracy, which each row of the measurement sets itself",
                     "Leave it out; the rows fast and exact are among them.");
     TrainCostPlan plan;
+    plan.ranks = &ranks;
     plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
     if (flags.seeds > 0) plan.seeds = flags.seeds;
     Dataset dataset = load_dataset(run.dataset, run.data);
@@ -46,6 +47,7 @@ int train_cost(const CostFlags& flags) {
     plan_strategy(dataset, run);
     say_note("effects: " + run.run.effects);
     TrainCostResult result = measure_train_cost(device, dataset, run.train, plan, say_note);
+    if (!ranks.is_first()) return 0;
     result.dataset = name_in_json(flags.json, flags.train);
     write_json(flags.json, train_cost_json(result));
     result.dataset = name_in_json(flags.html, flags.train);

@@ -45,10 +45,11 @@ std::vector<View> views_of(const Dataset& dataset, const EvalFlags& flags) {
     return views;
 }
 
-int eval(EvalFlags flags) {
+int eval(Ranks& ranks, EvalFlags flags) {
     refuse_to_overwrite_inputs({flags.json},
                                together({files_of(flags.scene), files_of(flags.dataset)}));
     SceneEvaluation options;
+    options.ranks = &ranks;
     options.accuracy = chosen_accuracy(flags.accuracy);
     flags.data.hold_out = true;  // sources without a split of their own: every 8th view
     options.effects = choose_effects(flags.effects, EffectUse::measuring, flags.data);
@@ -93,6 +94,7 @@ int eval(EvalFlags flags) {
         tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
              evaluation.psnr_db, evaluation.ssim);
     }
+    if (!ranks.is_first()) return 0;
     write_json(flags.json, json);
     tell_paths(flags.quiet, {flags.json});
     return 0;
@@ -129,7 +131,9 @@ void add_eval(CLI::App& app, Action& action) {
                       "fit each picture's colours to its photo by an affine map before measuring");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);
-    command->callback([flags, &action] { action = [flags] { return eval(*flags); }; });
+    command->callback([flags, &action] {
+        action = [flags] { return with_ranks([&](Ranks& ranks) { return eval(ranks, *flags); }); };
+    });
 }
 
 }  // namespace darb

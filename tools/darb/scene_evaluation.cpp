@@ -17,6 +17,12 @@
 
 namespace darb {
 
+namespace {
+struct ViewNumbers {  // of a view, on its way from another rank
+    double psnr_db, ssim;
+};
+}  // namespace
+
 Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<View> views,
                           const SceneEvaluation& options) {
     SplatModel planned = model;
@@ -26,16 +32,24 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
     for (const View& view : views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
     Renderer renderer(device, planned, options.accuracy, plan.projection(), plan.huge_splat_path());
-    Evaluation evaluation;
-    for (const View& view : views) {
+    OneRank alone;
+    Ranks& ranks = options.ranks ? *options.ranks : static_cast<Ranks&>(alone);
+    std::vector<ViewNumbers> own;
+    for (size_t v = 0; v < views.size(); ++v) {
+        if (!has_turn(ranks, v)) continue;
+        const View& view = views[v];
         const ImageU8 photo = load_photo(view);
         ImageF image = renderer.render(view.camera, options.background);
         if (options.fit_exposure)
             image = apply_exposure(
                 fit_exposure(image, photo, options.background, options.alpha_is_mask), image);
-        evaluation.views.push_back(
-            compare_view(view.name, image, photo, options.background, options.alpha_is_mask));
+        const ViewMetrics metrics =
+            compare_view(view.name, image, photo, options.background, options.alpha_is_mask);
+        own.push_back({metrics.psnr_db, metrics.ssim});
     }
+    Evaluation evaluation;
+    for (const ViewNumbers& m : by_turns(ranks, own))
+        evaluation.views.push_back({views[evaluation.views.size()].name, m.psnr_db, m.ssim});
     take_means(evaluation);
     return evaluation;
 }

@@ -12,6 +12,7 @@
 #include "engine/gpu/device.h"
 #include "engine/plan/accuracy.h"
 #include "engine/plan/effect_plan.h"
+#include "engine/ranks/ranks.h"
 #include "engine/scene/splat_model.h"
 #include "trainer/run.h"
 
@@ -23,6 +24,7 @@ struct SceneEvaluation {
     glm::vec3 background{0.0f};
     bool fit_exposure = false;   // of each picture to its photo, before measuring
     bool alpha_is_mask = false;  // of the data set
+    Ranks* ranks = nullptr;      // that measure the views by turns; null: this process does all
 };
 
 /// What a model's pictures of these views have, and their means; views: at the size to measure at.
