@@ -303,7 +303,7 @@ TEST_F(ViewerWork, A_run_is_followed_by_its_pictures_and_the_last_one_stays) {
 }
 
 // What the scene's pictures need is compiled on another device before.
-TEST_F(ViewerWork, At_the_end_of_a_run_its_last_picture_stays_while_another_device_compiles) {
+TEST_F(ViewerWork, At_the_end_of_a_run_its_last_picture_stays_while_another_compiles_slow) {
     const GpuSplats splats(shared_device(), scene_.model, false);
     std::atomic<int> woken = 0;
     options_.second_device = DeviceOptions();
