@@ -39,7 +39,7 @@ const OptionRow kRows[] = {
     {.flags = "--batch",
      .setting = "/batch",
      .member = &Opt::batch,
-     .group = option_group::kRun,
+     .group = option_group::kRates,
      .help = "views a step, a power of two; iterations count views, so a larger batch makes fewer "
              "steps, at rates higher by its root",
      .least = 1,
