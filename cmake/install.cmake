@@ -12,7 +12,7 @@ set(package ${CMAKE_INSTALL_LIBDIR}/cmake/darb)
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/darb)  # of its own: the includes begin with engine/, trainer/ and shaders/
 target_include_directories(darb_options INTERFACE $<INSTALL_INTERFACE:${headers}>)
 install(TARGETS darb RUNTIME COMPONENT darb)
-install(TARGETS darb_library darb_options darb_shaders darb_core darb_ranks darb_kernels darb_scene darb_reference darb_data
+install(TARGETS darb_library darb_options darb_shaders darb_core darb_ranks darb_kernels darb_scene darb_reference darb_data darb_stereo
   darb_gpu darb_primitives darb_raster darb_plan darb_render darb_report darb_publish darb_check darb_trainer EXPORT darb ARCHIVE COMPONENT dev)
 install(EXPORT darb NAMESPACE darb:: FILE darb-targets.cmake DESTINATION ${package} COMPONENT dev)
 install(DIRECTORY engine trainer DESTINATION ${headers} COMPONENT dev FILES_MATCHING PATTERN "*.h")

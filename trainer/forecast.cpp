@@ -290,7 +290,7 @@ std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options
         if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
     return predict_splats(initial_count(dataset, usual), pixels, usual,
                           options.max_splats.value_or(kAnyNumberOfSplats),
-                          dataset.points.size() == 0);
+                          starts_random(dataset, options));
 }
 
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
@@ -343,9 +343,9 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
                                          GpuSplats::max_count(scratch, options.sh_degree, true));
     f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit,
-                              dataset.points.size() == 0);
+                              starts_random(dataset, options));
     f.demand.densifies = has_rounds(schedule);
-    f.falls = dataset.points.size() == 0 && has_rounds(schedule) &&
+    f.falls = starts_random(dataset, options) && has_rounds(schedule) &&
               strategy_row(options.strategy).prunes_random_start;
     f.demand.averages = schedule.averages();
     fit_size(scratch, options, f.splats, 0, f);

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "engine/core/rng.h"
+#include "engine/data/region.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_shapes.h"
 #include "trainer/schedule.h"
@@ -18,45 +19,30 @@ namespace {
 // it.
 constexpr double kFarOff = 4;
 
-struct Region {
-    glm::dvec3 centre;
-    glm::dvec3 half;
-};
+// Of splats on surfaces (docs/experiments/dense_start.md): the standard deviation along the surface
+// as a share of the distance to the next point, that across it as a share of that along.
+constexpr double kSurfaceWidth = 0.6, kSurfaceThickness = 0.3, kSurfaceOpacity = 0.5;
 
-// Least squares point of the optical axes: sum (I - d d^T) x = sum (I - d d^T) c.
-Region region_in_view(const Dataset& dataset) {
-    std::vector<View> views;
-    for (const View& v : dataset.views)
-        if (!v.is_test) views.push_back(v);
-    glm::dmat3 normal(0.0);
-    glm::dvec3 right(0.0), low(1e300), high(-1e300);
-    for (const View& v : views) {
-        const glm::dvec3 c = v.camera.centre();
-        const glm::dvec3 axis = glm::transpose(v.camera.rotation)[2];
-        const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(axis, axis);
-        normal += across;
-        right += across * c;
-        low = glm::min(low, c);
-        high = glm::max(high, c);
-    }
-    const double scale = static_cast<double>(views.size());
-    if (std::abs(glm::determinant(normal)) > 1e-3 * scale * scale * scale) {
-        const glm::dvec3 focus = glm::inverse(normal) * right;
-        double half = 0.0;
-        for (const View& v : views) {
-            const double view_half =
-                0.5 * std::min(v.camera.width / v.camera.fx, v.camera.height / v.camera.fy);
-            half += glm::length(v.camera.centre() - focus) * view_half;
-        }
-        return {focus, glm::dvec3(half / scale)};
-    }
-    return {0.5 * (low + high), glm::max(0.5 * (high - low), glm::dvec3(scene_extent(dataset)))};
+}  // namespace
+
+namespace {
+
+// Without points: random ones.
+const PointCloud& given_points(const Dataset& dataset, const TrainOptions& options) {
+    static const PointCloud kNone;
+    if (options.start == StartPoints::random) return kNone;
+    return dataset.start.size() > 0 ? dataset.start : dataset.points;
 }
 
 }  // namespace
 
+bool starts_random(const Dataset& dataset, const TrainOptions& options) {
+    return given_points(dataset, options).size() == 0;
+}
+
 std::uint64_t start_points(const Dataset& dataset, const TrainOptions& options) {
-    if (dataset.points.size() > 0) return dataset.points.size();
+    const std::size_t given = given_points(dataset, options).size();
+    if (given > 0) return given;
     std::uint64_t pixels = 0;
     for (const View& v : dataset.views)
         if (!v.is_test) pixels += std::uint64_t(v.camera.width) * v.camera.height;
@@ -91,9 +77,29 @@ PointCloud drawn_from(const PointCloud& cloud, std::uint32_t count, std::uint64_
         for (int a = 0; a < 3; ++a) {
             part.position.push_back(cloud.position[3 * order[i] + a]);
             part.colour.push_back(cloud.colour[3 * order[i] + a]);
+            if (!cloud.normal.empty()) part.normal.push_back(cloud.normal[3 * order[i] + a]);
         }
+        // As many cover the same surface.
+        if (!cloud.spacing.empty())
+            part.spacing.push_back(
+                cloud.spacing[order[i]] *
+                std::sqrt(static_cast<float>(cloud.size()) / static_cast<float>(count)));
     }
     return part;
+}
+
+// A splat of the surface: flat along the normal, as wide as the points are apart.
+void lay_flat(const PointCloud& points, size_t i, double length_scale, SplatModel& model) {
+    const glm::dvec3 n(points.normal[3 * i], points.normal[3 * i + 1], points.normal[3 * i + 2]);
+    const double width = std::log(kSurfaceWidth * points.spacing[i] * length_scale);
+    const double scale[3] = {width, width, width + std::log(kSurfaceThickness)};
+    // The shortest turn from z to the normal, which may point either way.
+    const glm::dvec3 up = n.z < 0 ? -n : n;
+    const double norm = std::sqrt(2 * (1 + up.z));
+    const double rotation[4] = {1 + up.z, -up.y, up.x, 0};
+    for (int a = 0; a < 3; ++a) model.log_scale[3 * i + a] = static_cast<float>(scale[a]);
+    for (int a = 0; a < 4; ++a) model.rotation[4 * i + a] = static_cast<float>(rotation[a] / norm);
+    model.opacity_logit[i] = static_cast<float>(std::log(kSurfaceOpacity / (1 - kSurfaceOpacity)));
 }
 
 }  // namespace
@@ -105,9 +111,9 @@ std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options)
 
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
     PointCloud drawn;
-    const bool random = dataset.points.size() == 0;
+    const bool random = starts_random(dataset, options);
     if (random) drawn = random_points(dataset, options);
-    const PointCloud& given = random ? drawn : dataset.points;
+    const PointCloud& given = random ? drawn : given_points(dataset, options);
     const std::uint32_t most = options.max_splats.value_or(kAnyNumberOfSplats);
     const bool too_many = given.size() > most;
     if (too_many) drawn = drawn_from(given, most, options.seed);
@@ -135,6 +141,8 @@ SplatModel initial_model(const Dataset& dataset, const TrainOptions& options) {
                 static_cast<float>(0.5 * std::log(distance2[i]) + std::log(initial_scale));
             model.sh_dc[at] = static_cast<float>((points.colour[at] / 255.0 - 0.5) / SH_C0);
         }
+        if (!points.spacing.empty() && points.spacing[i] > 0)
+            lay_flat(points, i, schedule.length_scale, model);
     }
     return model;
 }

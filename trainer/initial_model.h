@@ -14,7 +14,12 @@ namespace darb {
 /// the cube around the point that the optical axes come closest to, as wide as the photos show
 /// there, or in the box of the cameras where the axes are parallel. The model's origin is set where
 /// coordinates are large. Of more points than options.max_splats a drawn part.
+///
+/// Points with a spacing lie on surfaces: their splats are flat along the normal and as wide as the
+/// points are apart.
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options);
+/// Whether it starts from random points: there are none, or options.start says so.
+bool starts_random(const Dataset& dataset, const TrainOptions& options);
 /// Its number of splats.
 /// The points that they come from: the data set's, or as many as are drawn where it has none.
 std::uint64_t start_points(const Dataset& dataset, const TrainOptions& options);

@@ -15,6 +15,10 @@ namespace darb {
 
 constexpr std::uint32_t kAnyNumberOfSplats = std::numeric_limits<std::uint32_t>::max();
 
+// What training starts from. automatic: the points of the data set, random ones where it has none.
+// dense: points that stereo finds on the surfaces (engine/stereo), beside those of the data set.
+enum class StartPoints { automatic, points, dense, random };
+
 struct TrainOptions {
     int iterations = 30'000;
     std::uint64_t seed = 0;
@@ -121,6 +125,7 @@ struct TrainOptions {
     bool lengths_by_area = true;
 
     // Start.
+    StartPoints start = StartPoints::automatic;
     std::optional<float> initial_opacity;
     std::optional<float> initial_scale;          // times the distance to the neighbours
     std::optional<std::uint32_t> random_points;  // without a point cloud; absent: from the pixels

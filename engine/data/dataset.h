@@ -42,6 +42,9 @@ struct PointCloud {
     // the source does not say.
     std::vector<std::size_t> seen_begin;  // [P + 1]
     std::vector<std::uint32_t> seen_by;
+    // Of points on surfaces, as engine/stereo finds them; else empty.
+    std::vector<float> normal;   // [P][3] world, length 1, towards the cameras
+    std::vector<float> spacing;  // [P] world units, to the next points on the surface
     std::size_t size() const { return colour.size() / 3; }
 };
 
@@ -62,6 +65,7 @@ struct Dataset {
     std::string source;              // "COLMAP binary", "COLMAP text", "transforms.json", ...
     std::vector<View> views;         // by name, ascending
     PointCloud points;               // may be empty
+    PointCloud start;                // what training starts from in place of points; may be empty
     bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
     bool alpha_is_mask = false;      // some of it comes from masks or gaps: pixels to leave out
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each

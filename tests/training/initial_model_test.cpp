@@ -115,5 +115,42 @@ TEST(InitialModel, no_points_become_random_ones) {
     expect_finite(model);
 }
 
+TEST(InitialModel, a_point_of_a_surface_becomes_a_flat_splat_across_its_normal) {
+    Dataset d = looking_at(20, false);
+    const float normals[3][3] = {{0, 0, -1}, {0.6f, 0, 0.8f}, {-0.6f, -0.64f, -0.48f}};
+    for (const auto& n : normals) {
+        d.start.position.insert(d.start.position.end(), {1, 2, 3});
+        d.start.colour.insert(d.start.colour.end(), {10, 20, 30});
+        d.start.normal.insert(d.start.normal.end(), n, n + 3);
+        d.start.spacing.push_back(0.5f);
+    }
+    const SplatModel model = initial_model(d, {});
+    ASSERT_EQ(model.size(), 3U);
+    expect_finite(model);
+    for (int i = 0; i < 3; ++i) {
+        const float* scale = &model.log_scale[3 * i];
+        EXPECT_EQ(scale[0], scale[1]);
+        EXPECT_LT(scale[2], scale[0] - 1);
+        EXPECT_NEAR(std::exp(scale[0]), 0.3, 0.2);
+        const float* q = &model.rotation[4 * i];  // where it turns z to: the third column
+        const double third[3] = {2.0 * (q[1] * q[3] + q[0] * q[2]),
+                                 2.0 * (q[2] * q[3] - q[0] * q[1]),
+                                 1 - 2.0 * (q[1] * q[1] + q[2] * q[2])};
+        double along = 0;
+        for (int a = 0; a < 3; ++a) along += third[a] * normals[i][a];
+        EXPECT_NEAR(std::abs(along), 1, 1e-6) << i;
+    }
+}
+
+TEST(InitialModel, a_random_start_leaves_the_points_aside) {
+    TrainOptions options;
+    options.start = StartPoints::random;
+    options.random_points = 50;
+    const Dataset d = looking_at(20, false);
+    EXPECT_TRUE(starts_random(d, options));
+    EXPECT_FALSE(starts_random(d, {}));
+    EXPECT_EQ(initial_model(d, options).size(), 50U);
+}
+
 }  // namespace
 }  // namespace darb::test
