@@ -28,6 +28,12 @@ bool not_of_the_first(const Opt& o, const Sched&) {
     return o.strategy != Strategy{};
 }
 
+const char* start_name(StartPoints start) {
+    return start == StartPoints::points  ? "points"
+           : start == StartPoints::dense ? "dense"
+                                         : "random";
+}
+
 const OptionRow kRows[] = {
     {.flags = "--iterations",
      .setting = "/iterations",
@@ -373,6 +379,10 @@ const OptionRow kRows[] = {
      .resolved = [](const Opt&, const Sched& s) -> Json { return s.length_scale; },
      .stands = [](const Opt&, const Sched& s) { return s.length_scale != 1; }},
 
+    {.setting = "/start",
+     .group = option_group::kStart,
+     .resolved = [](const Opt& o, const Sched&) -> Json { return start_name(o.start); },
+     .stands = [](const Opt& o, const Sched&) { return o.start != StartPoints::automatic; }},
     {.flags = "--random-points",
      .setting = "/random_points",
      .member = &Opt::random_points,

@@ -245,6 +245,7 @@ void Run::begin() {
     } else {
         set_aside(run_.output);
         log_.begin();
+        if (run_.write_start) run_.write_start(run_.output / "start");
     }
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));

@@ -2,6 +2,7 @@
 // expect:
 //   point_cloud/iteration_N/point_cloud.ply  cameras.json  cfg_args
 //   run.jsonl (a line an event)  metrics.json  report.html  held_out/ITERATION/*.png
+//   start/ (points.ply and pictures of a dense start)
 //   checkpoint.darb
 // What an earlier run left there is kept in earlier.1, earlier.2, ...
 #pragma once
@@ -50,7 +51,10 @@ struct RunOptions {
     std::string effects;               // the plan in a line, for the log
     std::string effects_json;          // the same as JSON, for metrics.json; may be empty
     RankGroup ranks;                   // that train together; the first one writes and talks
-    std::vector<ImageU8> photos;       // already loaded, in the order of the views; else empty
+    /// Writes into OUT/start what splats start from, once an earlier run is out of the way; may be
+    /// empty.
+    std::function<void(const std::filesystem::path& folder)> write_start;
+    std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
 };
 
 struct Evaluation {

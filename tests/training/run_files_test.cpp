@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/data/point_cloud_ply.h"
 #include "tests/support/run_command.h"
 #include "trainer/checkpoint.h"
 
@@ -168,6 +169,21 @@ TEST_F(RunFiles, a_start_without_room_is_refused_with_the_number_that_fits) {
     expect_input_error(o, {"--random-points 4000000000", "of device memory", " fits."});
     EXPECT_FALSE(fs::exists(run() / "checkpoint.darb"));
     EXPECT_EQ(darb(train + "2000").code, 0);
+    fs::remove_all(run());
+    expect_input_error(darb(train + "2000 --start points"), {"no points for --start points"});
+    EXPECT_FALSE(fs::exists(run() / "checkpoint.darb"));
+}
+
+TEST_F(RunFiles, a_dense_start_leaves_its_points_and_pictures_and_a_resumed_run_goes_on) {
+    leave_unfinished("--start dense");
+    std::size_t dropped = 0;
+    EXPECT_GT(read_point_cloud_ply(run() / "start" / "points.ply", dropped).size(), 100u);
+    EXPECT_EQ(dropped, 0u);
+    EXPECT_FALSE(fs::is_empty(run() / "start"));
+    fs::remove_all(run() / "start");
+    const Outcome o = resume();
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_FALSE(fs::exists(run() / "start")) << "found once more";
 }
 
 }  // namespace

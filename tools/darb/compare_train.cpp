@@ -74,6 +74,8 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     DeviceOptions options = command_device(flags_.device);
     Device device(options);  // of its own, so that the peak of memory is this run's
     settle_tuning(device);
+    dataset_.start = {};
+    plan_start(device, dataset_, f);
     run_training(device, dataset_, f.train, f.run, &stop);
 }
 

@@ -44,8 +44,10 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
     Device device(device_options);
     settle_tuning(device, flags.tune);
     plan_effects(dataset, run);
+    plan_start(device, dataset, run);
     plan_strategy(dataset, run);
     say_note("effects: " + run.run.effects);
+    if (!run.start_note.empty()) say_note(run.start_note);
     TrainCostResult result = measure_train_cost(device, dataset, run.train, plan, say_note);
     if (!ranks.is_first()) return 0;
     result.dataset = name_in_json(flags.json, flags.train);

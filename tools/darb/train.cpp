@@ -77,6 +77,7 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::strin
         if (!lock) lock.emplace(flags.run.output);
     }
     plan_effects(dataset, flags);
+    plan_start(device, dataset, flags);
     plan_strategy(dataset, flags);
     if (!ranks.is_first()) {
         run_training(device, dataset, flags.train, flags.run);

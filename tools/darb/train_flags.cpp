@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <map>
+
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/help.h"
 #include "tools/darb/kernel_flags.h"
@@ -11,6 +13,11 @@
 namespace darb {
 
 namespace {
+
+const std::map<std::string, StartPoints> kStarts = {{"auto", StartPoints::automatic},
+                                                    {"points", StartPoints::points},
+                                                    {"dense", StartPoints::dense},
+                                                    {"random", StartPoints::random}};
 
 // Before every option that it changes: values are taken over in this order.
 void add_schedule_flag(CLI::App& command, TrainFlags& f) {
@@ -45,6 +52,13 @@ void add_scene_flags(CLI::App& command, TrainFlags& f) {
     command.add_option("--strategy", f.strategy, "how the splats grow: " + strategies)
         ->capture_default_str()
         ->group(option_group::kScene);
+    command
+        .add_option("--start", f.train.start,
+                    "what splats start from; dense: surfaces that stereo between the photos finds")
+        ->transform(CLI::CheckedTransformer(kStarts, CLI::ignore_case).description(""))
+        ->type_name("TEXT:{auto,points,dense,random}")
+        ->default_str("auto")
+        ->group(option_group::kStart);
     add_effects_flag(command, f.effects);
     command.get_option("--effects")->group(option_group::kScene);
     command.add_flag("--antialiasing", f.antialiasing, "as --effects +antialias")

@@ -34,6 +34,7 @@ struct TrainFlags {
     std::string preset;             // of trainer/presets.h; empty: none was named
     bool length_given = false;      // --iterations
     bool width_given = false;       // -r
+    std::string start_note;         // what plan_start found, for people; may be empty
     std::string strategy_note;      // what plan_strategy decided, for people
     GivenOfStrategies of_strategies;
     int pulses = 1;

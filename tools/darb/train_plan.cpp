@@ -124,6 +124,7 @@ void print_plan(Device& device, const Dataset& dataset, TrainFlags& flags) {
     print_notes(dataset.notes);
     say("device: {} ({})\n", device.info().name, device.info().driver);
     say("effects: {}\n", flags.run.effects);
+    if (!flags.start_note.empty()) say("{}\n", flags.start_note);
     if (!flags.strategy_note.empty()) say("{}\n", flags.strategy_note);
     print_growth(flags.train);
     // A resumed run knows better: its progress shows the time left.

@@ -4,7 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "engine/core/error.h"
 #include "tools/darb/effect_flags.h"
+#include "trainer/dense_start.h"
 #include "trainer/forecast.h"
 #include "trainer/strategy.h"
 
@@ -31,6 +33,28 @@ void plan_effects(Dataset& dataset, TrainFlags& flags) {
     flags.run.effects = plan_line(plan);
     flags.run.effects_json =
         plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+void plan_start(Device& device, Dataset& dataset, TrainFlags& flags) {
+    const StartPoints wanted = flags.train.start;
+    if (wanted == StartPoints::points && dataset.points.size() == 0)
+        throw Error(dataset.root.string(), "has no points for --start points",
+                    "Use --start dense or --start random.");
+    if (wanted != StartPoints::dense || !flags.run.resume_from.empty()) return;
+    if (flags.run.photos.empty()) flags.run.photos = load_photos(dataset.views);
+    DenseStart start = dense_start(device, dataset, flags.run.photos, flags.train.seed);
+    if (start.on_surfaces == 0)
+        throw Error(dataset.root.string(), "no surface is seen alike in several photos",
+                    "Use --start points or --start random.");
+    flags.start_note = fmt::format(
+        "start: dense, {} points on surfaces and {} of the data set, in {:.1f} s; "
+        "photos agree on {:.0f} % of their pixels",
+        start.on_surfaces, start.cloud.size() - start.on_surfaces, start.seconds,
+        100 * start.agreeing);
+    dataset.start = start.cloud;
+    flags.run.write_start = [start = std::move(start)](const std::filesystem::path& folder) {
+        write_dense_start(start, folder);
+    };
 }
 
 void plan_strategy(const Dataset& dataset, TrainFlags& flags) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
 #include "tools/darb/train_flags.h"
 
 namespace darb {
@@ -10,6 +11,11 @@ namespace darb {
 /// Loads the photos into flags.run.photos where the plan has to look at them and they are not there
 /// yet.
 void plan_effects(Dataset& dataset, TrainFlags& flags);
+
+/// Finds the points that --start asks for and leaves them in dataset.start, in flags.start_note
+/// what that brought, and what writes its pictures in flags.run; after plan_effects. Throws Error
+/// where it asks for points and there are none.
+void plan_start(Device& device, Dataset& dataset, TrainFlags& flags);
 
 /// Sets the count that mcmc and budget grow to where none was given; after plan_effects.
 void plan_strategy(const Dataset& dataset, TrainFlags& flags);

@@ -98,6 +98,7 @@ void PyTrainer::make_trainer() {
     for (const View& view : dataset_.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
     plan_effects(dataset_, flags_);
+    plan_start(device, dataset_, flags_);
     plan_strategy(dataset_, flags_);
     check_signals();
     photos_ = photos_of_run(dataset_, flags_.train, std::move(flags_.run.photos));
