@@ -48,6 +48,12 @@ void leave_page(Device& device, const Dataset& dataset, const TrainFlags& flags,
 // Whatever takes a folder or a window for itself.
 void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
     if (ranks.count() == 1) return;
+    if (flags.train.start == StartPoints::dense && flags.run.resume_from.empty())
+        throw Error("--start dense",
+                    fmt::format("has no place in a run of {} ranks: their devices may find other "
+                                "points",
+                                ranks.count()),
+                    "Begin it on one rank; several go on with --resume, or use --start points.");
     if (flags.view)
         throw Error("--view", fmt::format("has no place in a run of {} ranks", ranks.count()),
                     "Leave it out; darb view opens what the run saves.");
