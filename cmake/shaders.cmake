@@ -11,8 +11,9 @@ function(darb_compile_shaders target folder)
   foreach(source ${sources})
     get_filename_component(stem ${source} NAME_WE)
     set(header ${out}/${stem}.spv.h)
+    # SPIR-V 1.6 would let drivers vary the subgroup size of a pipeline that requires none.
     add_custom_command(OUTPUT ${header}
-      COMMAND ${GLSLANG_VALIDATOR} -V --quiet --target-env vulkan1.3 -I${PROJECT_SOURCE_DIR}/shaders
+      COMMAND ${GLSLANG_VALIDATOR} -V --quiet --target-env vulkan1.3 --target-env spirv1.5 -I${PROJECT_SOURCE_DIR}/shaders
         -I${PROJECT_SOURCE_DIR} --vn spv_${stem} --depfile ${header}.d -o ${header} ${source}
       DEPENDS ${source} DEPFILE ${header}.d COMMENT "GLSL ${stem}" VERBATIM)
     list(APPEND headers ${header})

@@ -62,9 +62,14 @@ void check_limits(const Device::State& state, const std::string& name, std::uint
 
 }  // namespace
 
+Buffer::Buffer() = default;
+
 Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kind,
                std::string_view pass)
-    : device_(&device), name_(std::move(name)), bytes_(bytes == 0 ? 16 : bytes) {
+    : device_(&device),
+      name_(std::move(name)),
+      memory_(std::make_unique<MemoryPiece>()),
+      bytes_(bytes == 0 ? 16 : bytes) {
     Device::State& state = device.state();
     const std::string what =
         (pass.empty() ? "" : fmt::format("pass {}, ", pass)) + describe(name_, bytes_);
@@ -75,11 +80,10 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
         buffer_ = create_handle(state, whole_words, what);
         VkMemoryRequirements needs{};
         vkGetBufferMemoryRequirements(state.device, buffer_, &needs);
-        const DeviceMemory memory = allocate_memory(state, needs, kind, what);
-        memory_ = memory.handle;
-        check_vulkan(vkBindBufferMemory(state.device, buffer_, memory_, 0), what);
-        if (kind == Memory::host || (memory.flags & (kMappable | kCached)) == (kMappable | kCached))
-            check_vulkan(vkMapMemory(state.device, memory_, 0, VK_WHOLE_SIZE, 0, &direct_), what);
+        *memory_ = state.device_memory->take(needs, kind, what);
+        check_vulkan(vkBindBufferMemory(state.device, buffer_, memory_->handle, memory_->offset),
+                     what);
+        if (kind == Memory::host || (memory_->flags & kCached) != 0) direct_ = memory_->mapped;
         if (kind == Memory::host) mapped_ = direct_;
     } catch (...) {
         release();
@@ -99,10 +103,10 @@ void Buffer::release() noexcept {
     if (device_ == nullptr) return;
     Device::State& state = device_->state();
     vkDestroyBuffer(state.device, buffer_, nullptr);
-    vkFreeMemory(state.device, memory_, nullptr);
+    state.device_memory->give_back(*memory_);
+    memory_.reset();
     state.allocated -= allocated_;
     buffer_ = VK_NULL_HANDLE;
-    memory_ = VK_NULL_HANDLE;
     mapped_ = direct_ = nullptr;
     bytes_ = allocated_ = 0;
     device_ = nullptr;
@@ -122,7 +126,7 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
     device_ = std::exchange(other.device_, nullptr);
     name_ = std::move(other.name_);
     buffer_ = std::exchange(other.buffer_, VK_NULL_HANDLE);
-    memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
+    memory_ = std::move(other.memory_);
     mapped_ = std::exchange(other.mapped_, nullptr);
     direct_ = std::exchange(other.direct_, nullptr);
     bytes_ = std::exchange(other.bytes_, 0);

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,9 +21,11 @@ enum class Memory {
     host,    // host-visible, coherent, cached where there is such: results that the CPU reads
 };
 
+struct MemoryPiece;  // private to engine/gpu
+
 class Buffer {
   public:
-    Buffer() = default;
+    Buffer();
     /// Throws Error naming the buffer, its size and the pass that it is for, where one is given,
     /// when memory or the device's limits do not allow it. A size of 0 is made 16 bytes, so that
     /// every binding is valid. Content is undefined.
@@ -72,7 +75,7 @@ class Buffer {
     Device* device_ = nullptr;
     std::string name_;
     VkBuffer buffer_ = VK_NULL_HANDLE;
-    VkDeviceMemory memory_ = VK_NULL_HANDLE;
+    std::unique_ptr<MemoryPiece> memory_;
     void* mapped_ = nullptr;  // Memory::host
     void* direct_ = nullptr;  // either kind where the host may copy without staging
     std::uint64_t bytes_ = 0;

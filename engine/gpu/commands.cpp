@@ -446,9 +446,8 @@ std::vector<PassTime> Commands::pass_times() const {
     if (!s.timed) return times;
     const std::vector<std::uint64_t> ticks = s.timestamps.read();
     const std::uint32_t bits = s.device.state().timestamp_bits;
-    const std::uint64_t mask = bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
     for (std::size_t i = 0; i < s.passes.size(); ++i) {
-        const double elapsed = static_cast<double>((ticks[i + 1] - ticks[i]) & mask);
+        const auto elapsed = static_cast<double>(tick_difference(ticks[i], ticks[i + 1], bits));
         times.push_back({s.passes[i].name, elapsed * s.device.info().timestamp_period_ns * 1e-6});
     }
     return times;

@@ -8,6 +8,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
 
 namespace darb {
@@ -72,11 +73,11 @@ struct Features {
     }
 };
 
-ListedDevice choose(const Instance& instance, const std::string& select) {
-    std::vector<ListedDevice> all = list_devices(instance);
+// Position in the list.
+std::size_t choose(const std::vector<ListedDevice>& all, const std::string& select) {
     std::vector<DeviceInfo> infos;
     for (const ListedDevice& device : all) infos.push_back(device.info);
-    return all[choose_device(infos, select)];
+    return choose_device(infos, select);
 }
 
 bool offers_extension(VkPhysicalDevice physical, const std::string& name) {
@@ -95,9 +96,12 @@ Device::State::State(const DeviceOptions& options, bool validation)
     : instance(validation, options.instance_extensions) {
     faults = options.faults;
     compile_only = options.compile_only;
-    const ListedDevice chosen = choose(instance, options.select);
-    physical = chosen.handle;
-    info = chosen.info;
+    const std::vector<ListedDevice> all = list_devices(instance);
+    const std::size_t chosen = choose(all, options.select);
+    physical = all[chosen].handle;
+    info = all[chosen].info;
+    for (std::size_t i = 0; i < all.size(); ++i)
+        if (i != chosen && all[i].info.usable) others.push_back(all[i].info.name);
     if (faults.binding_bytes != 0) info.max_storage_buffer_bytes = faults.binding_bytes;
     if (faults.allocation_bytes != 0) info.max_allocation_bytes = faults.allocation_bytes;
     info.max_storage_buffer_bytes =
@@ -124,7 +128,8 @@ void Device::State::create_device(const DeviceOptions& options) {
     vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
     std::vector<VkQueueFamilyProperties> families(count);
     vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
-    timestamp_bits = families[queue_family].timestampValidBits;
+    timestamp_bits = faults.timestamp_bits.value_or(families[queue_family].timestampValidBits);
+    if (timestamp_bits == 0) info.timestamp_period_ns = 0;
     queue_graphics = (families[queue_family].queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
 
     Features offered(info.float_atomics), wanted(info.float_atomics);
@@ -163,6 +168,7 @@ void Device::State::create_device(const DeviceOptions& options) {
     device_info.ppEnabledExtensionNames = extensions.data();
     check_vulkan(vkCreateDevice(physical, &device_info, nullptr, &device), info.name);
     vkGetDeviceQueue(device, queue_family, 0, &queue);
+    device_memory = std::make_unique<DeviceMemory>(*this);
     if (statistics) load_statistics();
 }
 
@@ -210,6 +216,7 @@ Device::State::~State() {
 
 void Device::State::release() noexcept {
     if (device == VK_NULL_HANDLE) return;
+    device_memory.reset();
     vkDestroyCommandPool(device, copy_pool, nullptr);
     vkDestroyPipelineCache(device, cache, nullptr);
     vkDestroyDevice(device, nullptr);
@@ -281,6 +288,9 @@ Device::~Device() {
 
 const DeviceInfo& Device::info() const {
     return state_->info;
+}
+std::string Device::description() const {
+    return describe_choice(info(), state_->others);
 }
 bool Device::is_lavapipe() const {
     return state_->lavapipe;

@@ -25,6 +25,7 @@ struct DeviceInfo {
     std::uint32_t driver_version = 0;  // as the driver counts
     std::string cache_uuid;            // pipelineCacheUUID in hex: another one, other machine code
     std::string type;                  // discrete, integrated, virtual, cpu, other
+    bool conformant = true;            // the driver claims to pass Vulkan's conformance tests
     std::uint32_t api_version = 0;
     std::uint64_t heap_bytes = 0;                // largest device-local heap
     std::uint64_t max_storage_buffer_bytes = 0;  // maxStorageBufferRange
@@ -42,8 +43,10 @@ struct DeviceInfo {
     std::string reason;  // why it was rejected, or why it ranks where it does
 };
 
-/// Why the blend passes cannot run in the subgroups of a device, or "". They want 4 to 64 lanes,
-/// and to name their number where there are several.
+/// Leaves the sizes that pipelines can have: where shaders cannot require one, all have the
+/// device's own (MoltenVK on Apple's GPUs: 32, of 4 to 32).
+void keep_subgroup_sizes(DeviceInfo& info);
+/// Why the blend passes, which want 4 to 64 lanes, cannot run in the subgroups of a device, or "".
 std::string subgroup_trouble(const DeviceInfo& info);
 
 /// Every physical device, best first; never throws for want of a device (then: empty).
@@ -52,6 +55,9 @@ std::vector<DeviceInfo> list_devices();
 /// Position in devices of what --device SELECT means: "" = best usable, all digits = index, else
 /// part of a name (the best usable match). Throws Error: none, none usable, no match, not usable.
 std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::string& select);
+
+/// A device and its driver in a line for people; others: names of the usable ones besides.
+std::string describe_choice(const DeviceInfo& chosen, const std::vector<std::string>& others);
 
 struct DeviceOptions {
     std::string select;       // "" = best usable; a number = index; else part of a name
@@ -78,6 +84,7 @@ class Device {
     Device& operator=(const Device&) = delete;
 
     const DeviceInfo& info() const;
+    std::string description() const;  // as describe_choice
     bool is_lavapipe() const;
     VkInstance instance() const;
     VkPhysicalDevice physical() const;

@@ -42,9 +42,15 @@ VkImageView create_view(const Device::State& state, VkImage image, VkFormat form
 
 }  // namespace
 
+DeviceImage::DeviceImage() = default;
+
 DeviceImage::DeviceImage(Device& device, const std::string& name, int width, int height,
                          VkFormat format, VkImageUsageFlags usage)
-    : device_(&device), format_(format), width_(width), height_(height) {
+    : device_(&device),
+      memory_(std::make_unique<MemoryPiece>()),
+      format_(format),
+      width_(width),
+      height_(height) {
     const Device::State& state = device.state();
     const std::string what = fmt::format("image \"{}\" ({} x {})", name, width, height);
     const VkExtent3D extent{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height),
@@ -53,8 +59,8 @@ DeviceImage::DeviceImage(Device& device, const std::string& name, int width, int
         image_ = create_image(state, extent, format, usage, what);
         VkMemoryRequirements needs{};
         vkGetImageMemoryRequirements(state.device, image_, &needs);
-        memory_ = allocate_memory(state, needs, Memory::device, what).handle;
-        check_vulkan(vkBindImageMemory(state.device, image_, memory_, 0), what);
+        *memory_ = state.device_memory->take_own(needs, Memory::device, what);
+        check_vulkan(vkBindImageMemory(state.device, image_, memory_->handle, 0), what);
         if ((usage & VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT) != 0)
             view_ = create_view(state, image_, format, what);
     } catch (...) {
@@ -86,7 +92,7 @@ DeviceImage& DeviceImage::operator=(DeviceImage&& other) noexcept {
     release();
     device_ = std::exchange(other.device_, nullptr);
     image_ = std::exchange(other.image_, VK_NULL_HANDLE);
-    memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
+    memory_ = std::move(other.memory_);
     view_ = std::exchange(other.view_, VK_NULL_HANDLE);
     format_ = other.format_;
     width_ = std::exchange(other.width_, 0);
@@ -100,11 +106,11 @@ void DeviceImage::release() noexcept {
         const VkDevice handle = device_->handle();
         vkDestroyImageView(handle, view_, nullptr);
         vkDestroyImage(handle, image_, nullptr);
-        vkFreeMemory(handle, memory_, nullptr);
+        if (memory_) device_->state().device_memory->give_back(*memory_);
     }
     device_ = nullptr;
     image_ = VK_NULL_HANDLE;
-    memory_ = VK_NULL_HANDLE;
+    memory_.reset();
     view_ = VK_NULL_HANDLE;
     width_ = height_ = 0;
 }

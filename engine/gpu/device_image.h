@@ -4,15 +4,18 @@
 
 #include <vulkan/vulkan.h>
 
+#include <memory>
 #include <string>
 
 #include "engine/gpu/device.h"
 
 namespace darb {
 
+struct MemoryPiece;  // private to engine/gpu
+
 class DeviceImage {
   public:
-    DeviceImage() = default;
+    DeviceImage();
     /// Texels of 4 bytes. usage: besides copies from and to it. Its memory does not count as
     /// Device::allocated_bytes: images are a window's, and the budget is a run's. Throws Error
     /// naming the image and its size.
@@ -38,7 +41,7 @@ class DeviceImage {
     void release() noexcept;
     Device* device_ = nullptr;  // null where it is not owned
     VkImage image_ = VK_NULL_HANDLE;
-    VkDeviceMemory memory_ = VK_NULL_HANDLE;
+    std::unique_ptr<MemoryPiece> memory_;
     VkImageView view_ = VK_NULL_HANDLE;
     VkFormat format_ = VK_FORMAT_UNDEFINED;
     int width_ = 0, height_ = 0;

@@ -140,6 +140,7 @@ DeviceInfo describe(VkPhysicalDevice device) {
     info.driver_version = core.driverVersion;
     info.cache_uuid = hex(core.pipelineCacheUUID);
     info.type = type_name(core.deviceType);
+    info.conformant = driver.conformanceVersion.major != 0;
     info.api_version = core.apiVersion;
     info.max_storage_buffer_bytes = limits.maxStorageBufferRange;
     info.max_allocation_bytes =
@@ -153,6 +154,7 @@ DeviceInfo describe(VkPhysicalDevice device) {
     info.max_subgroup_size = sizes.maxSubgroupSize;
     info.requires_subgroup_size =
         (sizes.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT) != 0;
+    keep_subgroup_sizes(info);
     describe_memory(device, info);
     info.float_atomics = float_atomics(device);
     const int family = compute_queue_family(device);
@@ -167,6 +169,7 @@ DeviceInfo describe(VkPhysicalDevice device) {
     const std::string missing = missing_part(device, info);
     info.usable = missing.empty();
     info.reason = info.usable ? info.type + " device" : "rejected: " + missing;
+    if (info.usable && !info.conformant) info.reason += ", whose driver is not conformant";
     if (const std::string few = buffers_trouble(info, kTraining); info.usable && !few.empty())
         info.reason += ", which cannot train: " + few;
     return info;
@@ -187,13 +190,15 @@ std::string hex(std::span<const std::uint8_t> bytes) {
     return text;
 }
 
+void keep_subgroup_sizes(DeviceInfo& info) {
+    if (info.requires_subgroup_size) return;
+    info.min_subgroup_size = info.max_subgroup_size = info.subgroup_size;
+}
+
 std::string subgroup_trouble(const DeviceInfo& info) {
     if (info.max_subgroup_size < kMinSubgroup || info.min_subgroup_size > kMaxSubgroup)
         return fmt::format("subgroups of {} to {} lanes, needs {} to {}", info.min_subgroup_size,
                            info.max_subgroup_size, kMinSubgroup, kMaxSubgroup);
-    if (info.min_subgroup_size != info.max_subgroup_size && !info.requires_subgroup_size)
-        return fmt::format("subgroups of {} to {} lanes, and compute shaders cannot require a size",
-                           info.min_subgroup_size, info.max_subgroup_size);
     return {};
 }
 
@@ -243,6 +248,16 @@ std::vector<DeviceInfo> list_devices() try {
     return infos;
 } catch (const Error&) {
     return {};
+}
+
+std::string describe_choice(const DeviceInfo& chosen, const std::vector<std::string>& others) {
+    std::string text = fmt::format("{} ({})", chosen.name, chosen.driver);
+    if (!others.empty()) text += fmt::format("; --device also takes {}", fmt::join(others, ", "));
+    if (!chosen.conformant)
+        text +=
+            "; the driver does not claim to be conformant: darb check tells whether it computes "
+            "as it should";
+    return text;
 }
 
 std::size_t choose_device(const std::vector<DeviceInfo>& devices, const std::string& select) {

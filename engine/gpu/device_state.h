@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <mutex>
 #include <span>
 #include <string>
@@ -16,6 +17,8 @@
 #include "engine/gpu/instance.h"
 
 namespace darb {
+
+class DeviceMemory;
 
 /// One physical device, as listed.
 struct ListedDevice {
@@ -52,6 +55,7 @@ struct Device::State {
     Instance instance;
     Faults faults;
     DeviceInfo info;
+    std::vector<std::string> others;  // names of the other usable devices
     Tuning tuning;
     bool lavapipe = false;
     VkPhysicalDevice physical = VK_NULL_HANDLE;
@@ -67,6 +71,8 @@ struct Device::State {
     std::filesystem::path cache_folder, cache_file;
     std::size_t loaded_cache_bytes = 0;
     VkPipelineCache cache = VK_NULL_HANDLE;
+
+    std::unique_ptr<DeviceMemory> device_memory;  // while there is a device
 
     bool compile_only = false;
     struct {  // of VK_KHR_pipeline_executable_properties, null without it

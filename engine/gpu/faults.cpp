@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -10,27 +11,42 @@ namespace darb {
 
 namespace {
 
+constexpr std::uint64_t kMaxBits = 64;
+
+// The number behind "NAME:"; nothing where the text is of another fault or no number.
+std::optional<std::uint64_t> number_of(std::string_view text, std::string_view name) {
+    if (!text.starts_with(name)) return std::nullopt;
+    const std::string_view number = text.substr(name.size());
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
+    const bool whole = error == std::errc() && end == number.data() + number.size();
+    return whole ? std::optional(value) : std::nullopt;
+}
+
 void parse_one(std::string_view text, Faults& faults) {
-    constexpr std::string_view kOom = "oom:", kLost = "lost:", kBinding = "binding:",
-                               kAllocation = "allocation:", kMemory = "memory:";
+    constexpr std::string_view kOom = "oom:";
     if (text.starts_with(kOom) && text.size() > kOom.size()) {
         faults.out_of_memory.emplace_back(text.substr(kOom.size()));
         return;
     }
-    for (const auto& [name, value] :
-         {std::pair{kLost, &faults.lost_at_submit}, std::pair{kBinding, &faults.binding_bytes},
-          std::pair{kAllocation, &faults.allocation_bytes},
-          std::pair{kMemory, &faults.memory_bytes}}) {
-        if (!text.starts_with(name)) continue;
-        const std::string_view number = text.substr(name.size());
-        const auto [end, error] =
-            std::from_chars(number.data(), number.data() + number.size(), *value);
-        const bool whole = end == number.data() + number.size();
-        if (error == std::errc() && whole && *value > 0) return;
+    const std::pair<std::string_view, std::uint64_t*> counts[] = {
+        {"lost:", &faults.lost_at_submit},
+        {"binding:", &faults.binding_bytes},
+        {"allocation:", &faults.allocation_bytes},
+        {"allocations:", &faults.allocations},
+        {"memory:", &faults.memory_bytes}};
+    for (const auto& [name, value] : counts)
+        if (const auto number = number_of(text, name); number.value_or(0) > 0) {
+            *value = *number;
+            return;
+        }
+    if (const auto bits = number_of(text, "timestamps:"); bits.value_or(kMaxBits + 1) <= kMaxBits) {
+        faults.timestamp_bits = static_cast<std::uint32_t>(*bits);
+        return;
     }
     throw Error("DARB_FAULT", "\"" + std::string(text) + "\" is no fault",
-                "Write oom:BUFFER, lost:N, binding:N, allocation:N or memory:N, separated by "
-                "commas, or unset it.");
+                "Write oom:BUFFER, lost:N, binding:N, allocation:N, allocations:N, memory:N or "
+                "timestamps:BITS, separated by commas, or unset it.");
 }
 
 }  // namespace

@@ -3,11 +3,14 @@
 //   lost:N     the N-th submit of the device (from 1) and all later ones report a lost device
 //   binding:N  the device says that a storage buffer binding holds at most N bytes
 //   allocation:N  the device says that a buffer has at most N bytes
+//   allocations:N  the driver allows N allocations of memory at once
+//   timestamps:N  of a timestamp only the lowest N bits are right; 0: there are none
 //   memory:N   buffers beyond N bytes in all fail as if the device were out of memory
 // None in normal use. A text that is none of these is an Error.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,9 +23,15 @@ struct Faults {
     std::uint64_t binding_bytes = 0;         // 0 = what the device says
     std::uint64_t allocation_bytes = 0;      // 0 = what the device says
     std::uint64_t memory_bytes = 0;          // 0 = no limit
+    std::uint64_t allocations = 0;           // 0 = what the driver allows
+    std::optional<std::uint32_t> timestamp_bits;
 
     /// in_all: bytes of all buffers, this one included.
     bool fails_allocation(std::string_view buffer, std::uint64_t in_all) const;
+    /// count: of all allocations, the new one included.
+    bool fails_allocations(std::uint64_t count) const {
+        return allocations != 0 && count > allocations;
+    }
     bool fails_submit(std::uint64_t submit) const {
         return lost_at_submit != 0 && submit >= lost_at_submit;
     }

@@ -60,8 +60,8 @@ struct Specialization {
 };
 
 // The subgroup size to require of a shader with subgroup operations, 0 where the device has only
-// one. SPIR-V 1.6 lets drivers vary the size between pipelines, so one is always required where
-// there is a choice; other shaders leave it to the driver. Full subgroups need a
+// one: in SPIR-V 1.5 a pipeline that requires none has the device's own size. One is always
+// required where there is a choice; other shaders leave it to the driver. Full subgroups need a
 // workgroup that is a multiple of it: a smaller size is taken, or full is cleared.
 std::uint32_t fitting_subgroup_size(const DeviceInfo& info, std::uint32_t threads,
                                     std::uint32_t asked, bool& full) {

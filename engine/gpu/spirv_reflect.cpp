@@ -28,15 +28,16 @@ enum Op : std::uint32_t {
     kOpSpecConstantTrue = 48,
     kOpSpecConstantFalse = 49,
     kOpSpecConstant = 50,
+    kOpSpecConstantComposite = 51,
     kOpVariable = 59,
     kOpDecorate = 71,
     kOpMemberDecorate = 72,
-    kOpExecutionModeId = 331,
 };
 enum Decoration : std::uint32_t {
     kSpecId = 1,
     kArrayStride = 6,
     kMatrixStride = 7,
+    kBuiltIn = 11,
     kNonWritable = 24,
     kNonReadable = 25,
     kBinding = 33,
@@ -49,7 +50,7 @@ enum Storage : std::uint32_t {
     kPushConstant = 9,
     kBuffer = 12
 };
-constexpr std::uint32_t kSpirvMagic = 0x07230203, kLocalSize = 17, kLocalSizeId = 38;
+constexpr std::uint32_t kSpirvMagic = 0x07230203, kLocalSize = 17, kWorkgroupSize = 25;
 constexpr std::uint32_t kGroupNonUniform = 61;
 constexpr size_t kHeaderWords = 5;
 
@@ -159,10 +160,13 @@ void read_instruction(std::uint32_t op, Operands operands, Module& module, Shade
             if (operands[1] == kLocalSize)
                 std::copy_n(operands.begin() + 2, 3, out.local_size.begin());
             break;
-        case kOpExecutionModeId:  // ids, resolved once the constants are known
-            if (operands[1] == kLocalSizeId)
+        case kOpSpecConstantComposite: {  // ids, resolved once the constants are known
+            const auto& decorations = module.of(operands[1]);
+            const auto builtin = decorations.find(kBuiltIn);
+            if (builtin != decorations.end() && builtin->second == kWorkgroupSize)
                 std::copy_n(operands.begin() + 2, 3, out.local_size_spec_id.begin());
             break;
+        }
         case kOpTypeBool:
         case kOpTypeInt:
         case kOpTypeFloat:

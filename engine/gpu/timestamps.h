@@ -9,6 +9,11 @@
 
 namespace darb {
 
+/// Ticks between two values of a counter of which the lowest `bits` (1 to 64) are valid.
+constexpr std::uint64_t tick_difference(std::uint64_t from, std::uint64_t to, std::uint32_t bits) {
+    return (to - from) & (bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1);
+}
+
 class Timestamps {
   public:
     explicit Timestamps(VkDevice device) : device_(device) {}

@@ -17,8 +17,9 @@ void check_vulkan(VkResult result, const std::string& what) {
                         "another device (darb devices).");
         case VK_ERROR_TOO_MANY_OBJECTS:
             throw Error(what, "more buffers than the driver allows at once",
-                        "Each buffer is one allocation, and each photo of a training run a buffer: "
-                        "use fewer photos, or choose another device (darb devices).");
+                        "Buffers of more than 8 MiB are an allocation each, and each photo of a "
+                        "training run is a buffer: train at a lower resolution (-r), use fewer "
+                        "photos, or choose another device (darb devices).");
         case VK_ERROR_DEVICE_LOST:
             throw Error(what, "the device was lost",
                         "The driver stopped the device: a time-out, a driver fault or a device "

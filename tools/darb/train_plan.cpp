@@ -122,7 +122,7 @@ void print_plan(Device& device, const Dataset& dataset, TrainFlags& flags) {
     say("{}: {}, {} photos to train on, {} held out, {} points\n", dataset.root.string(),
         dataset.source, dataset.views.size() - held_out, held_out, dataset.points.size());
     print_notes(dataset.notes);
-    say("device: {} ({})\n", device.info().name, device.info().driver);
+    say("device: {}\n", device.description());
     say("effects: {}\n", flags.run.effects);
     if (!flags.start_note.empty()) say("{}\n", flags.start_note);
     if (!flags.strategy_note.empty()) say("{}\n", flags.strategy_note);
