@@ -201,7 +201,8 @@ ROWS = (("project, degree 3", r"^project \[.*SH_DEGREE=3"), ("emit", r"^emit \["
         ("blend backward, team", r"^blend_backward_team "),
         ("blend backward, one subgroup", r"^blend_backward \["), ("blend backward, buckets", r"^blend_backward_buckets "),
         ("project backward + Adam, degree 3", r"^project_backward \[.*SH_DEGREE=3.*UPDATE=0 REST=0"),
-        ("loss", r"^loss \["))
+        ("loss by strips", r"^loss \["), ("loss by tiles, maps", r"^loss_maps "),
+        ("loss by tiles, gradient", r"^loss_gradient "))
 
 
 def tables(root, darb):

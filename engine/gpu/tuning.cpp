@@ -11,7 +11,7 @@ Tuning usual_tuning(const DeviceInfo& info) {
     const bool lavapipe = info.driver.starts_with("llvmpipe");
     return {lavapipe, lavapipe ? SortScatter::columns : SortScatter::ballot,
             blocks * std::clamp(info.subgroup_size, 4u, 64u),
-            lavapipe ? BackwardBlend::subgroup : BackwardBlend::team};
+            lavapipe ? BackwardBlend::subgroup : BackwardBlend::team, LossWay::strips};
 }
 
 }  // namespace darb

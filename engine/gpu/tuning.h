@@ -23,12 +23,18 @@ inline constexpr const char* kBackwardBlends[] = {"subgroup", "team", "buckets"}
 enum class SortScatter { ballot, columns };
 inline constexpr const char* kSortScatters[] = {"ballot", "columns"};
 
+/// How the loss walks a picture: loss/loss.comp, or loss/loss_maps.comp and loss_gradient.comp; in
+/// the order of their names.
+enum class LossWay { strips, tiles };
+inline constexpr const char* kLossWays[] = {"strips", "tiles"};
+
 /// Each a specialization constant or a shader.
 struct Tuning {
     bool scan_by_thread = false;  // Scan::Strategy::team_is_thread
     SortScatter scatter = SortScatter::ballot;
     std::uint32_t blend_threads = 0;  // of the forward blend's workgroup, which has a tile
     BackwardBlend backward = BackwardBlend::subgroup;
+    LossWay loss = LossWay::strips;
     bool operator==(const Tuning&) const = default;
 };
 

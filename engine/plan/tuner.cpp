@@ -19,7 +19,7 @@ namespace darb {
 namespace {
 
 constexpr double kGain = 0.97;  // less is not worth another way
-constexpr int kFormat = 2;
+constexpr int kFormat = 3;
 
 // A frame of a CPU must not take long, one of a GPU must not be too short to tell ways apart.
 struct Size {
@@ -144,13 +144,17 @@ TuningFrame::TuningFrame(Device& device)
       forward_(device, tuning_options()),
       backward_(device, tuning_options()),
       view_{camera_data(tuning_camera(size_for(device.info())), splats_.origin())},
+      loss_(device, size_for(device.info()).width, size_for(device.info()).height,
+            {.use_alpha = false}),
       cameras_(upload_cameras(device, {view_.camera})),
+      photo_(device, "photo", std::uint64_t{view_.camera.width} * view_.camera.height * 4),
       d_image_(device, "d_image", std::uint64_t{view_.camera.width} * view_.camera.height * 12),
+      loss_result_(device, "loss result", sizeof(gpu::LossResult)),
       commands_(device),
       has_timestamps_(device.info().timestamp_period_ns > 0) {
     const std::uint32_t width = view_.camera.width, height = view_.camera.height;
     view_.cameras = &cameras_;
-    d_image_.upload(std::vector<float>(std::size_t{width} * height * 3, 0.5f));
+    photo_.upload(std::vector<std::uint32_t>(std::size_t{width} * height, 0x80808080u));
     buffers_.reserve(splats_.count(), splats_.count() * 8, static_cast<int>(width),
                      static_cast<int>(height));
 }
@@ -162,6 +166,9 @@ std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
         backward_.reserve(buffers_.size().intersections);
         commands_.begin();
         forward_.record(commands_, splats_, view_, buffers_.frame());
+        loss_.record(commands_, {buffers_.frame().images.image, photo_, d_image_, loss_result_},
+                     static_cast<int>(view_.camera.width), static_cast<int>(view_.camera.height),
+                     glm::vec3(0));
         commands_.pass("blend backward");
         backward_.record(commands_, view_, buffers_.frame(), d_image_);
         start = Clock::now();

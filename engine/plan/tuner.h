@@ -14,6 +14,7 @@
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
+#include "engine/raster/loss.h"
 
 namespace darb {
 
@@ -27,7 +28,7 @@ struct TuningRecord {
     std::vector<TuningTime> times;  // of all
 };
 
-/// One frame of the tuner's scene, forward and backward blend, with the device's tuning at
+/// One frame of the tuner's scene, forward, loss and backward blend, with the device's tuning at
 /// construction. The same splats at every call; more of them where the device is no CPU.
 class TuningFrame {
   public:
@@ -43,7 +44,8 @@ class TuningFrame {
     Forward forward_;
     BlendBackward backward_;
     FrameView view_;
-    Buffer cameras_, d_image_;
+    Loss loss_;
+    Buffer cameras_, photo_, d_image_, loss_result_;
     Commands commands_;
     bool has_timestamps_;
 };

@@ -95,7 +95,8 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
             {"backward",
              usual_first(kBackwardBlends, usual_tuning(info).backward),
              {"blend", "blend backward"},
-             true}};
+             true},
+            {"loss", usual_first(kLossWays, usual_tuning(info).loss), {"loss"}}};
 }
 
 TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const std::string& where) {
@@ -115,7 +116,7 @@ TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const st
 
 std::string names_text(const TuningNames& names) {
     std::string text;
-    for (const char* name : {"scan", "scatter", "blend", "backward"})
+    for (const char* name : {"scan", "scatter", "blend", "backward", "loss"})
         if (const auto found = names.find(name); found != names.end())
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, found->second);
     return text;
@@ -125,7 +126,8 @@ TuningNames tuning_names(const Tuning& tuning) {
     return {{"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
             {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
             {"blend", shape_name(tuning.blend_threads)},
-            {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]}};
+            {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
+            {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]}};
 }
 
 Tuning with_names(Tuning tuning, const TuningNames& names) {
@@ -135,6 +137,7 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
         if (name == "blend")
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_threads);
         if (name == "backward") tuning.backward = named<BackwardBlend>(kBackwardBlends, choice);
+        if (name == "loss") tuning.loss = named<LossWay>(kLossWays, choice);
     }
     return tuning;
 }

@@ -22,7 +22,7 @@ struct TuningGroup {
     bool changes_bits = false;         // results differ by the order of sums of floats
 };
 
-/// scan, scatter, blend and backward, with what the device allows.
+/// scan, scatter, blend, backward and loss, with what the device allows.
 std::vector<TuningGroup> tuning_groups(const DeviceInfo& info);
 
 /// Whether the fastest choices are known without measuring: lavapipe, where measuring would take

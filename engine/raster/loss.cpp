@@ -23,6 +23,18 @@ int ceil_divide(int a, int b) {
     return (a + b - 1) / b;
 }
 
+std::uint32_t tiles_of(std::uint32_t pixels) {
+    return (pixels + LOSS_TILE - 1) / LOSS_TILE;
+}
+
+gpu::LossArgs tiles(int width, int height) {
+    gpu::LossArgs args{};
+    args.width = static_cast<std::uint32_t>(width);
+    args.height = static_cast<std::uint32_t>(height);
+    args.works = 3 * tiles_of(args.width) * tiles_of(args.height);
+    return args;
+}
+
 int cluster_lanes(const Device& device) {
     const std::uint32_t size = device.info().subgroup_size;  // which the pipeline has
     if (size < 4) {
@@ -53,14 +65,26 @@ int columns_of(const Device& device, int lanes, int max_width, const LossOptions
 }  // namespace
 
 Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& options)
-    : max_width_(max_width),
-      max_height_(max_height),
-      lanes_(cluster_lanes(device)),
-      columns_(columns_of(device, lanes_, max_width, options)),
-      rows_(options.rows) {
+    : max_width_(max_width), max_height_(max_height), way_(device.tuning().loss) {
     if (max_width <= 0 || max_height <= 0)
         throw Error("loss", fmt::format("images of {} x {} px", max_width, max_height),
                     "Use at least 1 px each way.");
+    const SpecConstants constants = {{"USE_MASK", options.use_mask ? 1 : 0},
+                                     {"USE_ALPHA", options.use_alpha ? 1 : 0}};
+    if (way_ == LossWay::tiles) {
+        maps_ = Pipeline(device, "loss_maps", constants);
+        slope_ = Pipeline(device, "loss_gradient", constants);
+    } else {
+        make_strips(device, options, constants);
+    }
+    sum_ = Pipeline(device, "loss_sum", {}, false);
+    make_buffers(device, *this, buffers(device, max_width, max_height, options), "loss");
+}
+
+void Loss::make_strips(Device& device, const LossOptions& options, SpecConstants constants) {
+    lanes_ = cluster_lanes(device);
+    columns_ = columns_of(device, lanes_, max_width_, options);
+    rows_ = options.rows;
     const DeviceInfo& info = device.info();
     if (device.is_lavapipe()) {
         threads_ = static_cast<int>(info.subgroup_size);
@@ -72,25 +96,27 @@ Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& opt
     if (lanes_ * columns_ <= 2 * LOSS_HALO)
         throw Error("loss", fmt::format("{} columns a thread, {} threads", columns_, lanes_),
                     "Use more columns, or 0 for what suits the device.");
-    const SpecConstants constants = {{"THREADS", threads_},
-                                     {"LANES", lanes_},
-                                     {"COLUMNS", columns_},
-                                     {"USE_MASK", options.use_mask ? 1 : 0},
-                                     {"USE_ALPHA", options.use_alpha ? 1 : 0}};
+    constants["THREADS"] = threads_;
+    constants["LANES"] = lanes_;
+    constants["COLUMNS"] = columns_;
     loss_ = Pipeline(device, "loss", constants);
-    sum_ = Pipeline(device, "loss_sum", {}, false);
-    make_buffers(device, *this, buffers(device, max_width, max_height, options), "loss");
 }
 
-// The most strips that any size up to the largest can be cut into.
+// The most works that any size up to the largest can be cut into.
 BufferList<Loss> Loss::buffers(const Device& device, int max_width, int max_height,
                                const LossOptions& options) {
+    const auto partial = [](std::uint64_t works) { return works * sizeof(glm::vec4); };
+    if (device.tuning().loss == LossWay::tiles) {
+        return {{&Loss::partial_, "loss.partial", partial(tiles(max_width, max_height).works)},
+                {&Loss::map_values_, "loss.maps",
+                 std::uint64_t(max_width) * max_height * 9 * sizeof(float)}};
+    }
     const int lanes = cluster_lanes(device);
     const int columns = columns_of(device, lanes, max_width, options);
     const int strips = ceil_divide(max_width, lanes * columns - 2 * LOSS_HALO);
     const int rows = options.rows > 0 ? options.rows : kMinRows;
     const std::uint64_t works = std::uint64_t{3} * strips * ceil_divide(max_height, rows);
-    return {{&Loss::partial_, "loss.partial", works * sizeof(glm::vec4)}};
+    return {{&Loss::partial_, "loss.partial", partial(works)}};
 }
 
 std::uint64_t Loss::device_bytes(const Device& device, int max_width, int max_height,
@@ -98,19 +124,19 @@ std::uint64_t Loss::device_bytes(const Device& device, int max_width, int max_he
     return charged_bytes(buffers(device, max_width, max_height, options));
 }
 
-gpu::LossArgs Loss::arguments(int width, int height) const {
+gpu::LossArgs Loss::strips(int width, int height) const {
     gpu::LossArgs args{};
     args.width = width;
     args.height = height;
-    const int strips = ceil_divide(width, lanes_ * columns_ - 2 * LOSS_HALO);
+    const int across = ceil_divide(width, lanes_ * columns_ - 2 * LOSS_HALO);
     int rows = rows_ > 0 ? rows_ : height;
     while (rows_ == 0 && rows > kMinRows &&
-           3 * strips * ceil_divide(height, rows) < wanted_works_) {
+           3 * across * ceil_divide(height, rows) < wanted_works_) {
         rows = std::max(kMinRows, ceil_divide(rows, 2));
     }
     args.rows = rows;
-    args.strips = strips;
-    args.works = 3 * strips * ceil_divide(height, rows);
+    args.strips = across;
+    args.works = 3 * across * ceil_divide(height, rows);
     return args;
 }
 
@@ -122,17 +148,34 @@ void Loss::record(Commands& commands, const LossBuffers& buffers, int width, int
                                 max_width_, max_height_),
                     "Make a Loss for the largest image.");
     const float scale = 1.0f / (3.0f * static_cast<float>(width) * static_cast<float>(height));
-    gpu::LossArgs args = arguments(width, height);
+    gpu::LossArgs args = way_ == LossWay::tiles ? tiles(width, height) : strips(width, height);
     args.l1_scale = (1.0f - lambda) * scale;
     args.ssim_scale = -lambda * scale;
     args.background_r = background.r;
     args.background_g = background.g;
     args.background_b = background.b;
     commands.pass("loss");
-    commands.dispatch(loss_, args, {buffers.image, buffers.ground_truth, buffers.d_image, partial_},
-                      ceil_divide(static_cast<int>(args.works), threads_ / lanes_));
+    if (way_ == LossWay::tiles)
+        record_tiles(commands, buffers, args);
+    else
+        record_strips(commands, buffers, args);
     const gpu::LossSumArgs sum_args{args.works, buffers.result_index, scale};
     commands.dispatch(sum_, sum_args, {partial_, buffers.results}, 1);
+}
+
+void Loss::record_strips(Commands& commands, const LossBuffers& buffers,
+                         const gpu::LossArgs& args) {
+    commands.dispatch(loss_, args, {buffers.image, buffers.ground_truth, buffers.d_image, partial_},
+                      ceil_divide(static_cast<int>(args.works), threads_ / lanes_));
+}
+
+void Loss::record_tiles(Commands& commands, const LossBuffers& buffers, const gpu::LossArgs& args) {
+    const std::uint32_t down = tiles_of(args.height), across = args.works / down;
+    commands.dispatch(maps_, args, {buffers.image, buffers.ground_truth, map_values_, partial_},
+                      across, down);
+    commands.dispatch(slope_, args,
+                      {buffers.image, buffers.ground_truth, map_values_, buffers.d_image}, across,
+                      down);
 }
 
 }  // namespace darb

@@ -1,5 +1,6 @@
 // Loss: (1 - lambda) L1 + lambda (1 - SSIM) of a rendered image against a photo, and its gradient,
-// in one pass over the image (shaders/loss/loss.comp) and one over a few hundred partial sums.
+// in one pass over the image (shaders/loss/loss.comp), or in two by tiles, as the device's tuning
+// says, and one over the partial sums.
 // Source: 3DGS equation 7; window 11, sigma 1.5, zero padding, C1 1e-4, C2 9e-4, means over 3 H W.
 #pragma once
 
@@ -22,8 +23,8 @@ struct LossOptions {
     // around the image does), the gradient is 0 and L1 and squared error are left out of the sums;
     // means still divide by 3 H W.
     bool use_mask = false;
-    // Columns a thread and rows a strip; 0: what suits the device. The gradient does not depend on
-    // them, the sums do in their last bit.
+    // Of strips: columns a thread and rows a strip; 0: what suits the device. The gradient does not
+    // depend on them, the sums do in their last bit.
     int columns = 0, rows = 0;
 };
 
@@ -38,16 +39,16 @@ struct LossBuffers {
 
 class Loss {
   public:
-    /// For images up to max_width x max_height px. Throws Error where the device's subgroups have
-    /// fewer than 4 lanes.
+    /// For images up to max_width x max_height px. Throws Error where it goes by strips and the
+    /// device's subgroups have fewer than 4 lanes.
     Loss(Device& device, int max_width, int max_height, const LossOptions& options = {});
 
     /// Device memory of a Loss made with these arguments.
     static std::uint64_t device_bytes(const Device& device, int max_width, int max_height,
                                       const LossOptions& options = {});
 
-    /// Two dispatches under the pass "loss". Where x = y the gradient of L1 is 0. Bit-equal from
-    /// run to run on one device.
+    /// Two or three dispatches under the pass "loss". Where x = y the gradient of L1 is 0.
+    /// Bit-equal from run to run on one device.
     void record(Commands& commands, const LossBuffers& buffers, int width, int height,
                 const glm::vec3& background, float lambda = 0.2f);
 
@@ -59,14 +60,21 @@ class Loss {
   private:
     static BufferList<Loss> buffers(const Device& device, int max_width, int max_height,
                                     const LossOptions& options);
-    gpu::LossArgs arguments(int width, int height) const;
+    void make_strips(Device& device, const LossOptions& options, SpecConstants constants);
+    gpu::LossArgs strips(int width, int height) const;
+    void record_strips(Commands& commands, const LossBuffers& buffers, const gpu::LossArgs& args);
+    void record_tiles(Commands& commands, const LossBuffers& buffers, const gpu::LossArgs& args);
 
     int max_width_, max_height_;
-    int lanes_, columns_, threads_;
-    int wanted_works_;  // strips that keep the device busy
-    int rows_;          // of a strip, 0: by wanted_works_
-    Pipeline loss_, sum_;
+    LossWay way_;
+    int lanes_ = 0, columns_ = 0, threads_ = 0;
+    int wanted_works_ = 0;   // strips that keep the device busy
+    int rows_ = 0;           // of a strip, 0: by wanted_works_
+    Pipeline loss_;          // of strips
+    Pipeline maps_, slope_;  // of tiles
+    Pipeline sum_;
     Buffer partial_;
+    Buffer map_values_;  // [3][H][W][3] of tiles
 };
 
 }  // namespace darb

@@ -5,7 +5,7 @@
 // Work: LANES neighbouring lanes own a strip of LANES * COLUMNS columns of one channel and walk down its rows;
 // each lane keeps COLUMNS columns of the last 11 rows in registers and gets the 5 columns beside its own from
 // its neighbours. LOSS_HALO columns and rows on each side are computed twice: no intermediate image, no
-// shared memory, no barrier. Reads image, photo; writes d_image and a partial sum for each strip.
+// shared memory, no barrier; loss_maps.comp is the other way. Reads image, photo; writes d_image and a partial sum for each strip.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -27,7 +27,9 @@ layout(set = 0, binding = 1, scalar) readonly buffer PhotoIn { uint photo[]; }; 
 layout(set = 0, binding = 2, scalar) writeonly buffer GradientOut { float d_image[]; };  // [3][H][W]
 layout(set = 0, binding = 3, scalar) writeonly buffer PartialOut { vec4 partial[]; };    // [works]
 
+#include "loss/pixel.glsl"
 #include "loss/window.glsl"
+#include "loss/strip.glsl"
 
 struct Strip {
     int channel;
@@ -47,29 +49,9 @@ Strip strip_of(uint work, int lane) {
     return s;
 }
 
-bool in_image(int x, int y) {
-    return x >= 0 && x < int(args.width) && y >= 0 && y < int(args.height);
-}
-
 // Columns that this strip alone owns.
 bool owns(Strip s, int k) {
     return s.slot + k >= LOSS_HALO && s.slot + k < LANES * COLUMNS - LOSS_HALO;
-}
-
-// (a, b) of one pixel, 0 outside the image.
-vec2 sum_and_difference(Strip s, int k, int row, float background) {
-    const bool inside = in_image(s.left + k, row);
-    const uint at = inside ? uint(row) * args.width + uint(s.left + k) : 0u;
-    const float x = image[uint(s.channel) * args.width * args.height + at];
-    const uint rgba = photo[at];
-    float y = float(bitfieldExtract(rgba, s.channel * 8, 8)) * (1.0 / 255.0);
-    bool counts = inside;
-    if (USE_ALPHA == 1 && USE_MASK == 0) {
-        y = mix(background, y, float(rgba >> 24) * (1.0 / 255.0));
-    } else if (USE_ALPHA == 1) {
-        counts = inside && rgba >= 0x80000000u;
-    }
-    return counts ? vec2(x + y, x - y) : vec2(0.0);
 }
 
 // SSIM of one row and its derivatives, 0 outside the image; returns the sum over owned columns.
@@ -95,8 +77,6 @@ void main() {
                       gl_SubgroupInvocationID / uint(LANES);
     if (work >= args.works) return;
     const Strip s = strip_of(work, int(gl_SubgroupInvocationID) & (LANES - 1));
-    const vec3 colour = vec3(args.background_r, args.background_g, args.background_b);
-    const float background = colour[s.channel];
 
     float a[11][COLUMNS], b[11][COLUMNS], past[3][10][COLUMNS];
     [[unroll]] for (int k = 0; k < COLUMNS; ++k) {
@@ -112,7 +92,7 @@ void main() {
                 a[j][k] = a[j + 1][k];
                 b[j][k] = b[j + 1][k];
             }
-            const vec2 ab = sum_and_difference(s, k, row, background);
+            const vec2 ab = sum_and_difference(s.channel, s.left + k, row);
             a[10][k] = ab.x;
             b[10][k] = ab.y;
             blur_down(a, k, mean_a[k], mean_aa[k]);
@@ -133,10 +113,8 @@ void main() {
                             b[0][k] * step_down(past[2], k, d_bb[k]);
             if (owns(s, k) && out_row >= s.first && s.left + k < int(args.width)) {
                 const uint at = uint(out_row) * args.width + uint(s.left + k);
-                const bool counts = USE_ALPHA == 0 || USE_MASK == 0 || photo[at] >= 0x80000000u;
-                const float x = 0.5 * (a[0][k] + b[0][k]);
-                const float error = b[0][k] + clamp(x, 0.0, 1.0) - x;
-                sums += counts ? vec4(abs(b[0][k]), 0.0, error * error, 1.0) : vec4(0.0);
+                const bool counts = is_compared(at);
+                sums += counts ? pixel_sums(vec2(a[0][k], b[0][k])) : vec4(0.0);
                 d_image[uint(s.channel) * args.width * args.height + at] =
                     counts ? args.l1_scale * sign(b[0][k]) + args.ssim_scale * g : 0.0;
             }

@@ -5,6 +5,8 @@
 #include "types.h"
 
 #define LOSS_HALO 10  // px on each side that a strip reads: 5 of the window, forward and backward
+#define LOSS_TILE 16  // px, the side of a tile
+#define LOSS_SIDE 26  // px, of what a tile reads: 5 more on each side
 #define LOSS_SUM_THREADS 64  // of the one workgroup that adds the partial sums
 
 #ifdef __cplusplus
@@ -14,7 +16,7 @@ namespace darb::gpu {
 struct LossArgs {
     uint width;        // px
     uint height;       // px
-    uint rows;         // px, of one strip
+    uint rows;         // px, of one strip; of neither rows nor strips where it goes by tiles
     uint strips;       // side by side, each LANES * COLUMNS - 2 * LOSS_HALO px wide
     uint works;        // strips * ceil(height / rows) * 3 channels
     float l1_scale;    // (1 - lambda) / (3 H W): dL/d|x - y|

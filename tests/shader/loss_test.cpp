@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/rng.h"
+#include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
 
 namespace darb {
@@ -207,6 +208,11 @@ Output run(Loss& loss, const Case& c, const Data& data, int repeats = 1) {
     return out;
 }
 
+/// With tiles in place of strips while it lives.
+struct ByTiles {
+    test::ScopedVariants variants{device(), "loss=tiles"};
+};
+
 Output run(const Case& c, const Data& data) {
     Loss loss(device(), c.width, c.height, {.use_mask = c.use_mask});
     return run(loss, c, data);
@@ -243,6 +249,25 @@ TEST(Loss_sizes, match_brute_force) {
     for (const auto& [width, height] :
          {std::pair{1, 1}, {1, 37}, {37, 1}, {16, 16}, {44, 17}, {45, 33}, {200, 149}, {7, 300}})
         expect_matches({width, height});
+}
+
+TEST(Loss_byTiles, matches_brute_force_and_has_the_gradient_of_strips) {
+    const ByTiles tiles;
+    for (const auto& [width, height] : {std::pair{1, 1}, {37, 1}, {16, 17}, {45, 33}})
+        expect_matches({width, height});
+    for (const Case& c : {Case{.width = 61, .height = 43, .opaque = true},
+                          Case{.width = 33, .height = 29, .lambda = 1.0f},
+                          Case{.width = 70, .height = 50, .use_mask = true}}) {
+        expect_matches(c);
+        const Data data = make_data(c);
+        const Output by_tiles = run(c, data);
+        const test::ScopedVariants strips(device(), "loss=strips");
+        const Output by_strips = run(c, data);
+        EXPECT_EQ(by_tiles.gradient, by_strips.gradient);
+        EXPECT_NEAR(by_tiles.result.ssim, by_strips.result.ssim, 1e-6);
+        EXPECT_NEAR(by_tiles.result.mse, by_strips.result.mse, 1e-7);
+        EXPECT_EQ(by_tiles.result.weight, by_strips.result.weight);
+    }
 }
 
 TEST(Loss_opaquePhoto_ignoresBackground, matches_brute_force) {
