@@ -174,7 +174,7 @@ TEST_F(RunFiles, a_start_without_room_is_refused_with_the_number_that_fits) {
     EXPECT_FALSE(fs::exists(run() / "checkpoint.darb"));
 }
 
-TEST_F(RunFiles, a_dense_start_leaves_its_points_and_pictures_and_a_resumed_run_goes_on) {
+TEST_F(RunFiles, a_dense_start_leaves_its_points_and_pictures_and_a_resumed_run_goes_on_long) {
     leave_unfinished("--start dense");
     std::size_t dropped = 0;
     EXPECT_GT(read_point_cloud_ply(run() / "start" / "points.ply", dropped).size(), 100u);
