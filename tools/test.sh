@@ -46,7 +46,7 @@ trap 'rm -rf "$logs"' EXIT
 long='_long(/|$)'
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others: not under sanitizers.
-numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases)\.|for_every_kernel$|Accuracy_switch_changes'
+numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)\.|for_every_kernel$|Accuracy_switch_changes'
 # Of processes and of scripts, seconds each: they find nothing new under sanitizers or validation.
 once='^(scripts|pages|Outputs)\.'
 # Passes that other tests also record, with other numbers: without validation.
