@@ -149,6 +149,7 @@ class Viewer {
     void compose_panes();
     bool ready_to_move() const;
     BufferPicture shown() const;
+    BufferPicture drawn() const;  // of the scene, while the run's last picture is still shown too
     void draw_picture(const PictureKey& key, PictureStep step);
     void rehearse_motion(const PictureKey& key);
     void start_levels();

@@ -125,6 +125,10 @@ void Viewer::compose_panes() {
 BufferPicture Viewer::shown() const {
     if ((picture_.empty() || warm_up_) && live_size_.x > 0)
         return {&live_pixels_, live_size_.x, live_size_.y};
+    return drawn();
+}
+
+BufferPicture Viewer::drawn() const {
     if (picture_.empty()) return {};
     if (shows_panes_) return {&panes_.pixels(), panes_.width(), panes_.height()};
     return {&picture_.pixels(), picture_.width(), picture_.height()};

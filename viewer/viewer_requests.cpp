@@ -251,7 +251,7 @@ void Viewer::take_picture(int width, int height) {
         render_shown(camera_in_window(session_.photos, session_.navigation, area), area, {});
         compose_panes();
     }
-    const BufferPicture taken = shown();
+    const BufferPicture taken = live_ == nullptr ? drawn() : shown();
     if (taken.pixels == nullptr || taken.width == 0) return;  // of a run that has drawn none
     const fs::path file = free_picture_name();
     write_png(file, read_pixels(*taken.pixels, taken.width, taken.height));

@@ -23,6 +23,12 @@ int ceil_divide(int a, int b) {
     return (a + b - 1) / b;
 }
 
+// Tiles where one binding holds their maps.
+LossWay way_of(const Device& device, int width, int height) {
+    const std::uint64_t bytes = std::uint64_t(width) * height * 9 * sizeof(float);
+    return bytes <= device.info().max_storage_buffer_bytes ? device.tuning().loss : LossWay::strips;
+}
+
 std::uint32_t tiles_of(std::uint32_t pixels) {
     return (pixels + LOSS_TILE - 1) / LOSS_TILE;
 }
@@ -65,7 +71,7 @@ int columns_of(const Device& device, int lanes, int max_width, const LossOptions
 }  // namespace
 
 Loss::Loss(Device& device, int max_width, int max_height, const LossOptions& options)
-    : max_width_(max_width), max_height_(max_height), way_(device.tuning().loss) {
+    : max_width_(max_width), max_height_(max_height), way_(way_of(device, max_width, max_height)) {
     if (max_width <= 0 || max_height <= 0)
         throw Error("loss", fmt::format("images of {} x {} px", max_width, max_height),
                     "Use at least 1 px each way.");
@@ -106,7 +112,7 @@ void Loss::make_strips(Device& device, const LossOptions& options, SpecConstants
 BufferList<Loss> Loss::buffers(const Device& device, int max_width, int max_height,
                                const LossOptions& options) {
     const auto partial = [](std::uint64_t works) { return works * sizeof(glm::vec4); };
-    if (device.tuning().loss == LossWay::tiles) {
+    if (way_of(device, max_width, max_height) == LossWay::tiles) {
         return {{&Loss::partial_, "loss.partial", partial(tiles(max_width, max_height).works)},
                 {&Loss::map_values_, "loss.maps",
                  std::uint64_t(max_width) * max_height * 9 * sizeof(float)}};
