@@ -35,12 +35,21 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run) {
     return checkpoint;
 }
 
+SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
+                       const std::optional<Checkpoint>& checkpoint) {
+    SplatModel model = initial_model(dataset, options);
+    if (checkpoint) model.origin = checkpoint->state.model.origin;
+    return model;
+}
+
 void check_ranks(const Device& device, const TrainOptions& options, const RankGroup& ranks,
                  const std::string& fingerprint) {
     if (!ranks.several()) return;
     const DeviceInfo& info = device.info();
-    RankFacts facts{
-        {"program", program()}, {"data set", fingerprint}, {"settings", settings_text(options)}};
+    RankFacts facts{{"option --allow-mixed", ranks.mixed ? "on" : "off"},
+                    {"program", program()},
+                    {"data set", fingerprint},
+                    {"settings", settings_text(options)}};
     if (!ranks.mixed) {
         facts.emplace_back("device", info.name);
         facts.emplace_back("driver", info.driver);
@@ -74,18 +83,20 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
 }
 
 RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const RunOptions& run) {
+                           const RunOptions& run, const std::atomic<bool>* stop) {
     const std::vector<ImageU8> loaded = own_photos(dataset, options, run);
     const std::vector<ImageU8>& photos = loaded.empty() ? run.photos : loaded;
     const std::string fingerprint = dataset_fingerprint(dataset, photos);
     const std::optional<Checkpoint> checkpoint = checkpoint_of(device, run);
-    Trainer trainer(device, dataset, photos, initial_model(dataset, options), options, run.ranks);
+    Trainer trainer(device, dataset, photos, first_model(dataset, options, checkpoint), options,
+                    run.ranks);
     check_ranks(device, options, run.ranks, fingerprint);
     if (checkpoint) {
         check_resumable(*checkpoint, run.resume_from, options, dataset, fingerprint);
         trainer.restore(checkpoint->state);
     }
-    while (trainer.iteration() < options.iterations && !is_to_stop(trainer, run.ranks, false))
+    while (trainer.iteration() < options.iterations &&
+           !is_to_stop(trainer, run.ranks, stop && stop->load()))
         while_doing(fmt::format("iteration {}", trainer.iteration() + 1), [&] { trainer.step(); });
     RunSummary summary;
     summary.iteration = trainer.iteration();

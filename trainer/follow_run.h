@@ -2,6 +2,7 @@
 // that is not the first: it trains, and leaves files and words to that one.
 #pragma once
 
+#include <atomic>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,11 @@ namespace darb {
 /// began with.
 std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run);
 
+/// What a Trainer is made with: the start, with the origin of the checkpoint that it will restore,
+/// as photos are seen from there.
+SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
+                       const std::optional<Checkpoint>& checkpoint);
+
 /// Throws Error where ranks train other things, or on devices that may round differently.
 void check_ranks(const Device& device, const TrainOptions& options, const RankGroup& ranks,
                  const std::string& fingerprint);
@@ -29,6 +35,6 @@ std::vector<ImageU8> own_photos(const Dataset& dataset, const TrainOptions& opti
 
 /// run_training() of another rank than the first.
 RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const RunOptions& run);
+                           const RunOptions& run, const std::atomic<bool>* stop);
 
 }  // namespace darb

@@ -70,17 +70,15 @@ std::vector<ImageU8> grey_photos(const std::vector<View>& views) {
     return photos;
 }
 
-// Steps until there were `most` or the time is over, at least one. Returns ms a step.
+// Iterations until there were `most` or the time is over, at least a step's. Returns ms of one.
 double timed_steps(Trainer& trainer, int most) {
     trainer.drain();
     const Clock::time_point start = Clock::now();
-    int steps = 0;
-    while (steps == 0 || (steps < most && seconds_since(start) < kSeconds)) {
-        trainer.step();
-        ++steps;
-    }
+    const int begin = trainer.iteration();
+    const auto done = [&] { return trainer.iteration() - begin; };
+    while (done() == 0 || (done() < most && seconds_since(start) < kSeconds)) trainer.step();
     trainer.drain();
-    return seconds_since(start) * 1e3 / steps;
+    return seconds_since(start) * 1e3 / done();
 }
 
 // With all bands of colour and no density control, from the first iteration on.
@@ -285,12 +283,14 @@ int predict_degree(const TrainOptions& options, int iterations) {
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
     TrainOptions usual = options;
     usual.strategy = Strategy{};
+    if (usual.start == StartPoints::dense)  // the same before its points are there
+        usual.start = StartPoints::automatic;
     std::uint64_t pixels = 0;
     for (const View& view : dataset.views)
         if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
     return predict_splats(initial_count(dataset, usual), pixels, usual,
                           options.max_splats.value_or(kAnyNumberOfSplats),
-                          starts_random(dataset, options));
+                          starts_random(dataset, usual));
 }
 
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {

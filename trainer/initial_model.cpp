@@ -31,7 +31,8 @@ namespace {
 const PointCloud& given_points(const Dataset& dataset, const TrainOptions& options) {
     static const PointCloud kNone;
     if (options.start == StartPoints::random) return kNone;
-    return dataset.start.size() > 0 ? dataset.start : dataset.points;
+    const bool dense = options.start == StartPoints::dense && dataset.start.size() > 0;
+    return dense ? dataset.start : dataset.points;
 }
 
 }  // namespace

@@ -48,6 +48,8 @@ class TrainingPhotos {
 
     /// The cameras of the training photos at their whole size, on the host.
     std::vector<gpu::CameraData> training_cameras() const;
+    /// Of the splats that the cameras see.
+    const glm::dvec3& origin() const { return origin_; }
     /// The mean of their centres.
     glm::vec3 mean_centre() const;
 

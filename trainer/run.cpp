@@ -60,8 +60,8 @@ class Run {
           trainer_(while_doing("the splats of the start",
                                [&] {
                                    return Trainer(device, dataset, photos_,
-                                                  initial_model(dataset, options), options,
-                                                  run.ranks);
+                                                  first_model(dataset, options, checkpoint_),
+                                                  options, run.ranks);
                                })),
           log_(run.output),
           progress_(1, options.iterations, run.quiet) {}
@@ -245,7 +245,7 @@ void Run::begin() {
     } else {
         set_aside(run_.output);
         log_.begin();
-        if (run_.write_start) run_.write_start(run_.output / "start");
+        if (run_.write_start) run_.write_start(run_.output / "dense_start");
     }
     write_camera_list(run_.output / "cameras.json", dataset_.views);
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
@@ -325,8 +325,14 @@ void Run::train(const std::atomic<bool>* stop) {
     const Ranks* const ranks = run_.ranks.all;
     const std::uint64_t sent = ranks ? ranks->sent_bytes() : 0;
     const double waited = ranks ? ranks->seconds() : 0;
-    while (trainer_.iteration() < options_.iterations &&
-           !is_to_stop(trainer_, run_.ranks, stop && stop->load())) {
+    const auto is_over = [&] {
+        if (trainer_.iteration() >= options_.iterations) return true;
+        whole_ = false;  // a rank that differs: whose splats are right, nobody knows
+        const bool stops = is_to_stop(trainer_, run_.ranks, stop && stop->load());
+        whole_ = true;
+        return stops;
+    };
+    while (!is_over()) {
         whole_ = false;
         const int begin = trainer_.iteration();
         while_doing(fmt::format("iteration {}", begin + 1), [&] { trainer_.step(); });
@@ -419,7 +425,7 @@ RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptio
     for (const View& view : dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
     if (run.ranks.several() && !run.ranks.all->is_first())
-        return follow_training(device, dataset, options, run);
+        return follow_training(device, dataset, options, run, stop);
     check_run_folder(run.output, dataset);
     if (run.resume_from.empty()) check_start_memory(device, dataset, options);
     return Run(device, dataset, options, run).execute(stop);

@@ -2,7 +2,7 @@
 // expect:
 //   point_cloud/iteration_N/point_cloud.ply  cameras.json  cfg_args
 //   run.jsonl (a line an event)  metrics.json  report.html  held_out/ITERATION/*.png
-//   start/ (points.ply and pictures of a dense start)
+//   dense_start/ (points.ply and pictures of a dense start)
 //   checkpoint.darb
 // What an earlier run left there is kept in earlier.1, earlier.2, ...
 #pragma once

@@ -60,7 +60,7 @@ std::uint64_t free_host_bytes() {
 
 void check_start_memory(const Device& device, const Dataset& dataset, const TrainOptions& options,
                         std::uint64_t host_bytes) {
-    const bool random = dataset.points.size() == 0;
+    const bool random = starts_random(dataset, options);
     const std::uint64_t points = random ? start_points(dataset, options) : 0;  // others are there
     const std::uint64_t splats = initial_count(dataset, options);
     const MemoryDemand demand = demand_at_start(dataset, options, splats);

@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "trainer/batch_step.h"
@@ -155,9 +156,10 @@ void Trainer::run_batch() {
 void Trainer::open_step() {
     const std::optional<DensityResult> round = control_density();
     update_smoothing();
-    if (probe_.is_due(iteration_, splats_.sh_degree())) probe_degree();
+    const bool probes = probe_.is_due(iteration_, splats_.sh_degree());
+    if (probes) probe_degree();
     opened_ = iteration_;
-    if (round && ranks_.mixed) follow_first();
+    if ((round || probes) && ranks_.mixed) follow_first();
     if (round && on_round) on_round(iteration_, *round);
 }
 
@@ -284,7 +286,8 @@ void Trainer::probe_degree() {
                 drain();
                 return psnr_of(step_.photo_mse(photos_.view(view, sh_degree(), background_)));
             }};
-    const bool has_room = memory_.has_room_for_degree(held(), splats_.sh_degree() + 1);
+    bool has_room = memory_.has_room_for_degree(held(), splats_.sh_degree() + 1);
+    if (ranks_.several()) has_room = least(*ranks_.all, has_room ? 1 : 0) == 1;
     probe_.run(tried, photos_.views(), has_room, fork);
     step_.on_finished = std::move(on_finished);
     restore(tried);
@@ -364,6 +367,7 @@ Trainer::State Trainer::state() {
 
 void Trainer::restore(const State& s) {
     check_state(s);
+    DARB_CHECK(s.model.origin == photos_.origin(), "splats of another origin than the cameras'");
     drain();
     if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
     splats_ = GpuSplats();  // first, so that there are never two

@@ -280,7 +280,13 @@ std::string mpi_name() {
 // MPI_Init takes a fifth of a second, so only where a launcher of MPI is.
 std::unique_ptr<Ranks> start_ranks() {
     if (launched_ranks() == 1) return std::make_unique<OneRank>();
-    return std::make_unique<MpiRanks>();
+    auto ranks = std::make_unique<MpiRanks>();
+    if (ranks->count() == 1)
+        throw Error("darb",
+                    fmt::format("{} processes were started by another MPI than its own, {}",
+                                launched_ranks(), mpi_name()),
+                    "Start it by the mpirun of that one.");
+    return ranks;
 }
 
 }  // namespace darb

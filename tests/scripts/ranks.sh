@@ -7,7 +7,7 @@ build=${1:?the build folder} what=${2:-quick}
 root=$(cd "$(dirname "$0")/../.." && pwd)
 darb=$build/darb
 command -v mpirun >/dev/null || { echo "skipped: no mpirun (tools/setup.sh --with-mpi)"; exit 77; }
-"$darb" --version | grep -q '^with' || { echo "skipped: $darb is built without MPI"; exit 77; }
+"$darb" --version | grep -q '^with ' || { echo "skipped: $darb is built without MPI"; exit 77; }
 # shellcheck source=check.sh
 source "$(dirname "$0")/check.sh"
 

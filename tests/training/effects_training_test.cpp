@@ -2,8 +2,10 @@
 // on bit by bit with all of them.
 #include "engine/plan/effect_plan.h"
 #include "tests/support/compare_arrays.h"
+#include "tests/support/resumed_run.h"
 #include "tests/support/test_device_options.h"
 #include "tests/support/tiny_training.h"
+#include "trainer/follow_run.h"
 
 namespace darb::test {
 namespace {
@@ -207,6 +209,31 @@ TEST(EffectsRendering, auto_equals_all_in_the_picture) {
         EXPECT_EQ(pictures[0].data, pictures[1].data) << "identities, bit by bit";
         EXPECT_EQ(pictures[0].data, pictures[2].data) << "identities, bit by bit";
     }
+}
+
+// What stereo found is not there when a run goes on, and far off its middle may lie elsewhere.
+TEST(DenseStart, far_off_goes_on_from_a_checkpoint_with_the_same_bits) {
+    TinyTraining t = tiny_training();
+    const glm::dvec3 far(1e5, 0, 0);
+    for (View& view : t.dataset.views) view.camera.translation -= view.camera.rotation * far;
+    for (std::size_t i = 0; i < t.dataset.points.position.size(); i += 3)
+        t.dataset.points.position[i] += far.x;
+    t.options.start = StartPoints::dense;
+    t.dataset.start = t.dataset.points;
+    for (std::size_t i = 0; i < t.dataset.start.position.size(); i += 3)
+        t.dataset.start.position[i] += 1;
+    Trainer whole = t.trainer();
+    run_to(whole, 20);
+    Checkpoint checkpoint;
+    checkpoint.state = whole.state();
+    run_to(whole, 30);
+    t.dataset.start = {};
+    ASSERT_NE(t.start().origin, checkpoint.state.model.origin) << "else this shows nothing";
+    Trainer resumed(shared_device(), t.dataset, t.photos,
+                    first_model(t.dataset, t.options, checkpoint), t.options);
+    resumed.restore(checkpoint.state);
+    run_to(resumed, 30);
+    EXPECT_TRUE(same_state(whole, resumed));
 }
 
 }  // namespace

@@ -177,13 +177,13 @@ TEST_F(RunFiles, a_start_without_room_is_refused_with_the_number_that_fits) {
 TEST_F(RunFiles, a_dense_start_leaves_its_points_and_pictures_and_a_resumed_run_goes_on_long) {
     leave_unfinished("--start dense");
     std::size_t dropped = 0;
-    EXPECT_GT(read_point_cloud_ply(run() / "start" / "points.ply", dropped).size(), 100u);
+    EXPECT_GT(read_point_cloud_ply(run() / "dense_start" / "points.ply", dropped).size(), 100u);
     EXPECT_EQ(dropped, 0u);
-    EXPECT_FALSE(fs::is_empty(run() / "start"));
-    fs::remove_all(run() / "start");
+    EXPECT_FALSE(fs::is_empty(run() / "dense_start"));
+    fs::remove_all(run() / "dense_start");
     const Outcome o = resume();
     EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_FALSE(fs::exists(run() / "start")) << "found once more";
+    EXPECT_FALSE(fs::exists(run() / "dense_start")) << "found once more";
 }
 
 }  // namespace

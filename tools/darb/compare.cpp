@@ -20,8 +20,10 @@
 #include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/stop_signals.h"
+#include "tools/darb/train_data.h"
 #include "tools/darb/train_run.h"
 #include "trainer/portable_path.h"
+#include "trainer/rank_group.h"
 #include "trainer/run_folder.h"
 
 namespace darb {
@@ -81,7 +83,9 @@ int compare(Ranks& ranks, CompareFlags flags) {
     Comparison comparison;
     const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
     for (const std::string& dataset : flags.datasets)  // bad options end it before it begins
-        train_flags_of(flags, dataset, kernels.front(), 0);
+        if (needs_cameras(train_flags_of(flags, dataset, kernels.front(), 0)) && ranks.count() > 1)
+            throw Error(dataset, "has no cameras yet, and several ranks do not look for them",
+                        "Run darb compare on one rank first.");
     for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
     comparison.iterations = flags.iterations;
     comparison.scales = flags.scales;
@@ -97,7 +101,7 @@ int compare(Ranks& ranks, CompareFlags flags) {
     const std::atomic<bool>& stop = stop_on_signals();
     int exit_code = 0;
     for (const std::string& dataset : flags.datasets) {
-        if (stop) break;
+        if (any_stops(ranks, stop)) break;
         comparison.datasets.push_back(
             compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, ranks, stop));
         if (!ranks.is_first()) continue;

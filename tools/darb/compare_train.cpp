@@ -59,6 +59,7 @@ class Comparer {
 void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     if (plan_sees_photos_)
         f.run.photos = photos_;  // else the plan of `darb train` has not seen them
+    dataset_.start = {};         // of the run before
     plan_effects(dataset_, f);
     plan_strategy(dataset_, f);
     f.run.photos = photos_;
@@ -74,7 +75,6 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     DeviceOptions options = command_device(flags_.device);
     Device device(options);  // of its own, so that the peak of memory is this run's
     settle_tuning(device);
-    dataset_.start = {};
     plan_start(device, dataset_, f);
     run_training(device, dataset_, f.train, f.run, &stop);
 }

@@ -10,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/plan/tuning_names.h"
 #include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
@@ -63,6 +64,18 @@ void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
                     "set with cameras.");
 }
 
+// Each rank measures its own device, and of equal ones each might choose another way. All ranks
+// ask, whatever their options are: those are compared later.
+void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own) {
+    if (ranks.count() == 1) return;
+    const std::string own = names_text(tuning_names(device.tuning()));
+    const Bytes first = from_first(ranks, std::as_bytes(std::span(own)));
+    if (keeps_own) return;
+    const std::string_view names(reinterpret_cast<const char*>(first.data()), first.size());
+    device.set_tuning(
+        with_names(device.tuning(), parse_tuning(device.info(), names, "tuning of rank 0")));
+}
+
 int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
     if (recalled) recall_arguments(arguments, flags, tune);
@@ -76,6 +89,7 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::strin
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
     settle_tuning(device, tune);
+    take_tuning_of_first(ranks, device, flags.allow_mixed || !tune.choice.empty());
     std::optional<RunLock> lock;
     Dataset dataset = load_training_data(flags, lock);
     if (ranks.is_first()) {
@@ -85,15 +99,15 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::strin
     plan_effects(dataset, flags);
     plan_start(device, dataset, flags);
     plan_strategy(dataset, flags);
+    std::atomic<bool>& stop = stop_on_signals();
     if (!ranks.is_first()) {
-        run_training(device, dataset, flags.train, flags.run);
+        run_training(device, dataset, flags.train, flags.run, &stop);
         return 0;
     }
     if (!recalled) flags.run.command = command_text(std::move(arguments), flags);
     if (flags.run.resume_from.empty())  // before the forecast, which makes them
         check_start_memory(device, dataset, flags.train);
     print_plan(device, dataset, flags);
-    std::atomic<bool>& stop = stop_on_signals();
     const std::unique_ptr<LiveView> view =
         live.open(device, dataset, stop, flags.train.white_background);
     if (view) flags.run.on_step = [&](const LiveStep& step) { return view->show(step); };

@@ -42,7 +42,11 @@ void plan_start(Device& device, Dataset& dataset, TrainFlags& flags) {
                     "Use --start dense or --start random.");
     if (wanted != StartPoints::dense || !flags.run.resume_from.empty()) return;
     if (flags.run.photos.empty()) flags.run.photos = load_photos(dataset.views);
-    DenseStart start = dense_start(device, dataset, flags.run.photos, flags.train.seed);
+    const bool opaque = !flags.train.alpha && dataset.has_alpha;
+    DenseStart start = dense_start(
+        device, dataset,
+        opaque ? photos_of_run(dataset, flags.train, flags.run.photos) : flags.run.photos,
+        flags.train.seed);
     if (start.on_surfaces == 0)
         throw Error(dataset.root.string(), "no surface is seen alike in several photos",
                     "Use --start points or --start random.");
@@ -52,8 +56,10 @@ void plan_start(Device& device, Dataset& dataset, TrainFlags& flags) {
         start.on_surfaces, start.cloud.size() - start.on_surfaces, start.seconds,
         100 * start.agreeing);
     dataset.start = start.cloud;
-    flags.run.write_start = [start = std::move(start)](const std::filesystem::path& folder) {
+    flags.run.write_start = [start =
+                                 std::move(start)](const std::filesystem::path& folder) mutable {
         write_dense_start(start, folder);
+        start = {};  // it holds every photo
     };
 }
 

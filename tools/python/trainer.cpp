@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "engine/plan/tuning_names.h"
@@ -12,7 +13,7 @@
 #include "tools/python/train_options.h"
 #include "trainer/checkpoint.h"
 #include "trainer/evaluation.h"
-#include "trainer/initial_model.h"
+#include "trainer/follow_run.h"
 #include "trainer/start_memory.h"
 
 namespace darb::python {
@@ -114,7 +115,7 @@ void PyTrainer::make_trainer() {
         check_start_memory(device, dataset_, flags_.train);
     }
     trainer_ = std::make_unique<Trainer>(device, dataset_, photos_,
-                                         initial_model(dataset_, flags_.train), flags_.train);
+                                         first_model(dataset_, flags_.train, start), flags_.train);
     trainer_->on_result = [this](const IterationResult& result) { latest_ = result; };
     trainer_->on_round = [this](int iteration, const DensityResult& result) {
         tell_round(iteration, result);
@@ -164,7 +165,8 @@ py::dict PyTrainer::step(const py::object& n, const py::object& loss) {
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
         };
         try {
-            for (long long i = 0; i < count && iteration() < iterations(); ++i) {
+            const auto last = std::min<long long>(iteration() + count, iterations());
+            while (iteration() < last) {
                 check_signals();
                 trainer_->step();
             }
