@@ -124,7 +124,9 @@ TEST(InitialModel, a_point_of_a_surface_becomes_a_flat_splat_across_its_normal) 
         d.start.normal.insert(d.start.normal.end(), n, n + 3);
         d.start.spacing.push_back(0.5f);
     }
-    const SplatModel model = initial_model(d, {});
+    TrainOptions options;
+    options.start = StartPoints::dense;
+    const SplatModel model = initial_model(d, options);
     ASSERT_EQ(model.size(), 3U);
     expect_finite(model);
     for (int i = 0; i < 3; ++i) {

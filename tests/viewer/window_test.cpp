@@ -137,6 +137,7 @@ TEST_F(WindowTest, What_was_not_saved_is_kept_when_the_display_ends_or_a_signal_
         ASSERT_TRUE(shows(wanted)) << log("view.log");
         xdo({"mousemove", "300", "200", "key", "k"});
         settled();
+        std::this_thread::sleep_for(std::chrono::seconds(1));  // the key shows nothing to wait for
         ASSERT_TRUE(program_->running()) << log("view.log");
         if (display_ends)
             display_->terminate();
