@@ -20,9 +20,10 @@ namespace darb {
 SplatModel initial_model(const Dataset& dataset, const TrainOptions& options);
 /// Whether it starts from random points: there are none, or options.start says so.
 bool starts_random(const Dataset& dataset, const TrainOptions& options);
-/// Its number of splats.
-/// The points that they come from: the data set's, or as many as are drawn where it has none.
+/// The points that its splats come from: the data set's, those of a dense start, or as many as are
+/// drawn.
 std::uint64_t start_points(const Dataset& dataset, const TrainOptions& options);
+/// Its number of splats.
 std::uint32_t initial_count(const Dataset& dataset, const TrainOptions& options);
 
 }  // namespace darb

@@ -66,8 +66,8 @@ class Trainer {
     Trainer& operator=(const Trainer&) = delete;
 
     /// Runs iteration `iteration() + 1`, or as many as a batch has views, and what density control
-    /// has to do before it. Results of
-    /// finished iterations go to on_result, in order, at the latest at drain().
+    /// has to do before it. Results of finished iterations go to on_result, in order, at the latest
+    /// at drain().
     void step();
     void drain() { step_.drain(); }
     std::function<void(const IterationResult&)> on_result;

@@ -83,9 +83,7 @@ int compare(Ranks& ranks, CompareFlags flags) {
     Comparison comparison;
     const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
     for (const std::string& dataset : flags.datasets)  // bad options end it before it begins
-        if (needs_cameras(train_flags_of(flags, dataset, kernels.front(), 0)) && ranks.count() > 1)
-            throw Error(dataset, "has no cameras yet, and several ranks do not look for them",
-                        "Run darb compare on one rank first.");
+        refuse_without_cameras(train_flags_of(flags, dataset, kernels.front(), 0), ranks.count());
     for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
     comparison.iterations = flags.iterations;
     comparison.scales = flags.scales;

@@ -58,10 +58,7 @@ void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
     if (flags.view)
         throw Error("--view", fmt::format("has no place in a run of {} ranks", ranks.count()),
                     "Leave it out; darb view opens what the run saves.");
-    if (needs_cameras(flags))
-        throw Error(flags.dataset, "has no cameras yet, and several ranks do not look for them",
-                    "Run darb train on it once on one rank: -o OUT leaves OUT/colmap/dense, a data "
-                    "set with cameras.");
+    refuse_without_cameras(flags, ranks.count());
 }
 
 // Each rank measures its own device, and of equal ones each might choose another way. All ranks

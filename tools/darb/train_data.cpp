@@ -89,11 +89,18 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
     return dataset;
 }
 
-}  // namespace
-
 bool needs_cameras(const TrainFlags& flags) {
     return (is_video_name(flags.dataset) && !fs::is_directory(flags.dataset)) ||
            !photos_without_cameras(flags.dataset, flags.data.images_folder).empty();
+}
+
+}  // namespace
+
+void refuse_without_cameras(const TrainFlags& flags, int ranks) {
+    if (ranks == 1 || !needs_cameras(flags)) return;
+    throw Error(flags.dataset, "has no cameras yet, and several ranks do not look for them",
+                "Run darb train on it once on one rank: -o OUT leaves OUT/colmap/dense, a data set "
+                "with cameras.");
 }
 
 Dataset load_training_data(TrainFlags& flags, std::optional<RunLock>& lock) {

@@ -9,8 +9,9 @@
 
 namespace darb {
 
-/// Whether the data set is a video, or photos without cameras, which is to be made one first.
-bool needs_cameras(const TrainFlags& flags);
+/// Throws Error where there are several ranks and the data set is a video, or photos without
+/// cameras, which one rank is to make first.
+void refuse_without_cameras(const TrainFlags& flags, int ranks);
 
 /// Loads flags.dataset, every view of it to train on unless flags.data.hold_out. A folder of PNG
 /// and JPEG files (itself, or its --images folder) without sparse, sparse/0 or transforms*.json
