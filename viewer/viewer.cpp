@@ -84,6 +84,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     take_loaded();
     take_levels();
     if (warm_up_ && warm_up_->done()) end_warm_up();
+    if (at_rest()) warm_pipelines_.clear();  // the pictures have them
     for (const auto& path : input.dropped) drop(path);
     canvas_.resize(width, height);
     gui_.begin(width, height);  // now it knows whether the pointer is on a panel

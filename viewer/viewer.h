@@ -183,6 +183,7 @@ class Viewer {
     std::unique_ptr<MotionLevels> levels_;  // of the scene; null: none asked for
     std::vector<std::unique_ptr<MotionLevels>> ended_;  // cancelled, their threads still run
     std::unique_ptr<WarmUp> warm_up_;                   // the run's last picture is shown
+    std::vector<Pipeline> warm_pipelines_;              // that it made, until pictures have them
     int version_ = 0;                                   // of the scene and its edits
     bool highlights_ = true;                            // what is selected, in the picture
     bool continuous_ = false;                           // the last frame wanted this one at once

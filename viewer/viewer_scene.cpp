@@ -151,12 +151,13 @@ void Viewer::show(LoadedScene loaded) {
 // Until it is over the run's last picture stays, and the window lives.
 void Viewer::start_warm_up() {
     constexpr int kSize = 256;  // px
-    warm_up_ =
-        std::make_unique<WarmUp>(*options_.second_device, session_.scene->model, shown_displays(),
-                                 session_.navigation.camera(kSize, kSize), options_.wake);
+    warm_up_ = std::make_unique<WarmUp>(*device_, *options_.second_device, session_.scene->model,
+                                        shown_displays(), session_.navigation.camera(kSize, kSize),
+                                        options_.wake);
 }
 
 void Viewer::end_warm_up() {
+    warm_pipelines_ = warm_up_->take_pipelines();
     warm_up_.reset();
     live_size_ = {0, 0};
     pacing_.forget();

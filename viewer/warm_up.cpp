@@ -22,29 +22,35 @@ SplatModel few_of(const SplatModel& model) {
 
 }  // namespace
 
-WarmUp::WarmUp(DeviceOptions options, const SplatModel& model,
+WarmUp::WarmUp(Device& window, DeviceOptions options, const SplatModel& model,
                std::vector<DisplaySettings> displays, const Camera& camera,
                std::function<void()> wake)
-    : thread_([this, options = std::move(options), few = few_of(model),
-               displays = std::move(displays), camera, wake = std::move(wake)] {
-          run(options, few, displays, camera);
+    : thread_([this, &window, options = std::move(options), few = few_of(model),
+               displays = std::move(displays), camera,
+               wake = std::move(wake)](const std::stop_token& stop) {
+          run(stop, window, options, few, displays, camera);
           done_ = true;
           if (wake) wake();
       }) {}
 
-void WarmUp::run(const DeviceOptions& options, const SplatModel& few,
-                 const std::vector<DisplaySettings>& displays, const Camera& camera) const {
+void WarmUp::run(const std::stop_token& stop, Device& window, const DeviceOptions& options,
+                 const SplatModel& few, const std::vector<DisplaySettings>& displays,
+                 const Camera& camera) {
     try {
         Device device(options);
+        device.set_tuning(window.tuning());
         SplatPicture picture(device);
         std::vector<std::uint32_t> important(few.size() / 2);
         std::iota(important.begin(), important.end(), 0u);
         picture.set_scene(few, scene_bounds(few), std::move(important));
         for (std::size_t i = 0; i < displays.size(); ++i)
             for (const bool moves : {false, true})
-                picture.render(camera, displays[i], {},
-                               moves ? std::optional(picture.most_moving()) : std::nullopt,
-                               static_cast<int>(i));
+                if (!stop.stop_requested())
+                    picture.render(camera, displays[i], {},
+                                   moves ? std::optional(picture.most_moving()) : std::nullopt,
+                                   static_cast<int>(i));
+        for (const PipelineKey& key : live_pipelines(device))
+            if (!stop.stop_requested()) made_.emplace_back(window, key);
     } catch (const std::exception&) {  // the window says what is wrong, where it is
     }
 }

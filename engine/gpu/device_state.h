@@ -15,6 +15,7 @@
 #include "engine/gpu/device.h"
 #include "engine/gpu/faults.h"
 #include "engine/gpu/instance.h"
+#include "engine/gpu/pipeline.h"
 
 namespace darb {
 
@@ -72,6 +73,7 @@ struct Device::State {
     std::size_t loaded_cache_bytes = 0;
     VkPipelineCache cache = VK_NULL_HANDLE;
 
+    PipelineTable pipelines;
     std::unique_ptr<DeviceMemory> device_memory;  // while there is a device
 
     bool compile_only = false;

@@ -149,34 +149,35 @@ VkPipeline create_pipeline(const Device::State& state, VkPipelineLayout layout,
     return pipeline;
 }
 
-void check_device_limits(const Device::State& state, const Pipeline& pipeline,
+// What a shader needs of a device.
+void check_device_limits(const Device::State& state, std::size_t buffers,
+                         std::uint32_t push_constant_bytes, std::uint32_t threads_x,
                          const std::string& what) {
     const DeviceInfo& info = state.info;
-    if (pipeline.bindings().size() > info.max_storage_buffers)
+    const char* remedy = "Choose another device (darb devices).";
+    if (buffers > info.max_storage_buffers)
         throw Error(what,
-                    fmt::format("needs {} storage buffers, {} allows {}",
-                                pipeline.bindings().size(), info.name, info.max_storage_buffers),
-                    "Choose another device (darb devices).");
-    if (pipeline.push_constant_bytes() > state.limits.maxPushConstantsSize)
+                    fmt::format("needs {} storage buffers, {} allows {}", buffers, info.name,
+                                info.max_storage_buffers),
+                    remedy);
+    if (push_constant_bytes > state.limits.maxPushConstantsSize)
         throw Error(what,
                     fmt::format("needs {} bytes of push constants, {} allows {}",
-                                pipeline.push_constant_bytes(), info.name,
-                                state.limits.maxPushConstantsSize),
-                    "Choose another device (darb devices).");
-    if (pipeline.threads_x() > info.max_workgroup_threads)
+                                push_constant_bytes, info.name, state.limits.maxPushConstantsSize),
+                    remedy);
+    if (threads_x > info.max_workgroup_threads)
         throw Error(what,
-                    fmt::format("needs workgroups of {} threads, {} allows {}",
-                                pipeline.threads_x(), info.name, info.max_workgroup_threads),
-                    "Choose another device (darb devices).");
+                    fmt::format("needs workgroups of {} threads, {} allows {}", threads_x,
+                                info.name, info.max_workgroup_threads),
+                    remedy);
 }
 
 }  // namespace
 
-Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants& constants,
-                   bool require_full_subgroups, std::uint32_t subgroup_size)
-    : device_(&device), name_(shader) {
-    Device::State& state = device.state();
-    const std::string what = "shader " + name_;
+Pipeline::Made::Made(Device& of, const PipelineKey& key) : shader(key.shader) {
+    Device::State& state = of.state();
+    device = state.device;
+    const std::string what = "shader " + shader;
     const std::span<const std::uint32_t> words = find_shader(shader);
     const ShaderInterface interface = reflect_spirv(words, shader);
     for (std::size_t i = 0; i < interface.bindings.size(); ++i) {
@@ -184,73 +185,92 @@ Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants&
         DARB_CHECK(b.set == 0 && b.binding == i && b.storage_buffer,
                    "{}: \"{}\" stands at set {} binding {}, expected storage buffer {}", what,
                    b.name, b.set, b.binding, i);
-        bindings_.push_back({b.reads, b.writes});
+        bindings.push_back({b.reads, b.writes});
     }
-    for (const auto& constant : interface.constants) constant_names_.push_back(constant.name);
-    push_constant_bytes_ = interface.push_constant_bytes;
-    const Specialization specialization(interface, constants, shader);
-    threads_x_ = specialization.threads_x;
-    check_device_limits(state, *this, what);
+    for (const auto& constant : interface.constants) constant_names.push_back(constant.name);
+    push_constant_bytes = interface.push_constant_bytes;
+    const Specialization specialization(interface, key.constants, shader);
+    threads_x = specialization.threads_x;
+    check_device_limits(state, bindings.size(), push_constant_bytes, threads_x, what);
 
-    bool full = require_full_subgroups && interface.uses_subgroups;
+    bool full = key.require_full_subgroups && interface.uses_subgroups;
     const std::uint32_t size =
         interface.uses_subgroups
-            ? fitting_subgroup_size(state.info, threads_x_, subgroup_size, full)
+            ? fitting_subgroup_size(state.info, threads_x, key.subgroup_size, full)
             : 0;
     const VkSpecializationInfo specialization_info = specialization.info();
     try {
-        set_layout_ = create_set_layout(state.device, bindings_.size(), what);
-        layout_ = create_layout(state.device, set_layout_, push_constant_bytes_, what);
+        set_layout = create_set_layout(device, bindings.size(), what);
+        layout = create_layout(device, set_layout, push_constant_bytes, what);
         const auto begun = std::chrono::steady_clock::now();
-        pipeline_ = create_pipeline(state, layout_, words, specialization_info, full, size, what);
+        pipeline = create_pipeline(state, layout, words, specialization_info, full, size, what);
         const std::chrono::duration<double, std::milli> took =
             std::chrono::steady_clock::now() - begun;
         if (state.compile_only)
-            state.note_compiled(
-                pipeline_,
-                {name_, given_constants(interface, constants), threads_x_, size, took.count(), {}});
+            state.note_compiled(pipeline, {shader,
+                                           given_constants(interface, key.constants),
+                                           threads_x,
+                                           size,
+                                           took.count(),
+                                           {}});
     } catch (...) {
         release();
         throw;
     }
-    state.set_name(VK_OBJECT_TYPE_PIPELINE, reinterpret_cast<std::uint64_t>(pipeline_), name_);
+    state.set_name(VK_OBJECT_TYPE_PIPELINE, reinterpret_cast<std::uint64_t>(pipeline), shader);
 }
 
-void Pipeline::release() noexcept {
-    if (device_ == nullptr) return;
-    vkDestroyPipeline(device_->handle(), pipeline_, nullptr);
-    vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
-    vkDestroyDescriptorSetLayout(device_->handle(), set_layout_, nullptr);
-    pipeline_ = VK_NULL_HANDLE;
-    device_ = nullptr;
+void Pipeline::Made::release() noexcept {
+    vkDestroyPipeline(device, pipeline, nullptr);
+    vkDestroyPipelineLayout(device, layout, nullptr);
+    vkDestroyDescriptorSetLayout(device, set_layout, nullptr);
 }
 
-Pipeline::~Pipeline() {
+Pipeline::Made::~Made() {
     release();
 }
 
-Pipeline::Pipeline(Pipeline&& other) noexcept {
-    *this = std::move(other);
-}
+Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants& constants,
+                   bool require_full_subgroups, std::uint32_t subgroup_size)
+    : Pipeline(device, {std::string(shader), constants, require_full_subgroups, subgroup_size}) {}
 
-Pipeline& Pipeline::operator=(Pipeline&& other) noexcept {
-    if (this == &other) return *this;
-    release();
-    device_ = std::exchange(other.device_, nullptr);
-    name_ = std::move(other.name_);
-    pipeline_ = std::exchange(other.pipeline_, VK_NULL_HANDLE);
-    layout_ = std::exchange(other.layout_, VK_NULL_HANDLE);
-    set_layout_ = std::exchange(other.set_layout_, VK_NULL_HANDLE);
-    push_constant_bytes_ = other.push_constant_bytes_;
-    threads_x_ = other.threads_x_;
-    bindings_ = std::move(other.bindings_);
-    constant_names_ = std::move(other.constant_names_);
-    return *this;
+Pipeline::Pipeline(Device& device, const PipelineKey& key) {
+    PipelineTable& table = device.state().pipelines;
+    // A device that only compiles has a row of its table for each.
+    if (!device.state().compile_only) made_ = table.find(key);
+    if (made_) return;
+    made_ = std::make_shared<const Made>(device, key);
+    table.add(key, made_);
 }
 
 bool Pipeline::declares(std::string_view constant) const {
-    return std::find(constant_names_.begin(), constant_names_.end(), constant) !=
-           constant_names_.end();
+    const std::vector<std::string>& names = made_->constant_names;
+    return std::find(names.begin(), names.end(), constant) != names.end();
+}
+
+std::vector<PipelineKey> live_pipelines(const Device& device) {
+    return device.state().pipelines.keys();
+}
+
+std::vector<PipelineKey> PipelineTable::keys() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<PipelineKey> keys;
+    for (const auto& [key, made] : made_)
+        if (!made.expired()) keys.push_back(key);
+    return keys;
+}
+
+std::shared_ptr<const Pipeline::Made> PipelineTable::find(const PipelineKey& key) {
+    const std::lock_guard lock(mutex_);
+    const auto found = made_.find(key);
+    return found == made_.end() ? nullptr : found->second.lock();
+}
+
+// Where two threads made the same one, the later is the one that others find.
+void PipelineTable::add(const PipelineKey& key, const std::shared_ptr<const Pipeline::Made>& made) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(made_, [](const auto& entry) { return entry.second.expired(); });
+    made_[key] = made;
 }
 
 }  // namespace darb

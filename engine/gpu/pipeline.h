@@ -3,8 +3,11 @@
 
 #include <vulkan/vulkan.h>
 
+#include <compare>
 #include <cstdint>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -19,6 +22,17 @@ namespace darb {
 using SpecValue = std::variant<std::int32_t, float>;
 using SpecConstants = std::map<std::string, SpecValue, std::less<>>;
 
+/// All that a pipeline is made of: equal keys are one pipeline of a device.
+struct PipelineKey {
+    std::string shader;
+    SpecConstants constants;
+    bool require_full_subgroups = true;
+    std::uint32_t subgroup_size = 0;
+    auto operator<=>(const PipelineKey&) const = default;
+};
+
+/// A handle: copies share the pipeline, and so do all of a device with the same key. It lives as
+/// long as one of them. They may be made on any thread.
 class Pipeline {
   public:
     Pipeline() = default;
@@ -29,39 +43,64 @@ class Pipeline {
     /// one between its minimum and maximum.
     Pipeline(Device& device, std::string_view shader, const SpecConstants& constants = {},
              bool require_full_subgroups = true, std::uint32_t subgroup_size = 0);
-    ~Pipeline();
-    Pipeline(Pipeline&&) noexcept;
-    Pipeline& operator=(Pipeline&&) noexcept;
+    Pipeline(Device& device, const PipelineKey& key);
 
-    const std::string& name() const { return name_; }
-    VkPipeline handle() const { return pipeline_; }
-    VkPipelineLayout layout() const { return layout_; }
-    VkDescriptorSetLayout set_layout() const { return set_layout_; }
-    std::uint32_t push_constant_bytes() const { return push_constant_bytes_; }
-    explicit operator bool() const { return pipeline_ != VK_NULL_HANDLE; }
+    explicit operator bool() const { return made_ != nullptr; }
+    const std::string& name() const { return made_->shader; }
+    VkPipeline handle() const { return made_->pipeline; }
+    VkPipelineLayout layout() const { return made_->layout; }
+    VkDescriptorSetLayout set_layout() const { return made_->set_layout; }
+    std::uint32_t push_constant_bytes() const { return made_->push_constant_bytes; }
 
     /// What the SPIR-V says of set 0: bindings must be 0..count-1, all storage buffers.
     struct Binding {
         bool reads = true;
         bool writes = true;
     };
-    const std::vector<Binding>& bindings() const { return bindings_; }
+    const std::vector<Binding>& bindings() const { return made_->bindings; }
     /// Whether the shader has a specialization constant of this name.
     bool declares(std::string_view constant) const;
-    std::uint32_t threads_x() const { return threads_x_; }  // workgroup size, after specialization
+    std::uint32_t threads_x() const { return made_->threads_x; }  // after specialization
 
   private:
-    Device* device_ = nullptr;
-    std::string name_;
-    VkPipeline pipeline_ = VK_NULL_HANDLE;
-    VkPipelineLayout layout_ = VK_NULL_HANDLE;
-    VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
-    std::uint32_t push_constant_bytes_ = 0;
-    std::uint32_t threads_x_ = 0;
-    std::vector<Binding> bindings_;
-    std::vector<std::string> constant_names_;
+    struct Made {
+        Made(Device& device, const PipelineKey& key);
+        ~Made();
+        Made(const Made&) = delete;
+        Made& operator=(const Made&) = delete;
 
-    void release() noexcept;
+        VkDevice device = VK_NULL_HANDLE;
+        std::string shader;
+        VkPipeline pipeline = VK_NULL_HANDLE;
+        VkPipelineLayout layout = VK_NULL_HANDLE;
+        VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+        std::uint32_t push_constant_bytes = 0;
+        std::uint32_t threads_x = 0;
+        std::vector<Binding> bindings;
+        std::vector<std::string> constant_names;
+
+      private:
+        void release() noexcept;
+    };
+    friend class PipelineTable;
+    std::shared_ptr<const Made> made_;
+};
+
+/// Of a device's pipelines those that live. On any thread.
+std::vector<PipelineKey> live_pipelines(const Device& device);
+
+/// Finds a device's pipelines by their keys. Private to engine/gpu.
+class PipelineTable {
+  public:
+    std::vector<PipelineKey> keys() const;
+
+  private:
+    friend class Pipeline;
+    std::shared_ptr<const Pipeline::Made> find(const PipelineKey& key);
+    void add(const PipelineKey& key, const std::shared_ptr<const Pipeline::Made>& made);
+
+    mutable std::mutex mutex_;
+    std::map<PipelineKey, std::weak_ptr<const Pipeline::Made>> made_;
 };
 
 }  // namespace darb

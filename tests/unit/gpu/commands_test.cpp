@@ -111,6 +111,22 @@ TEST(Pipeline, spec_constants_are_set_by_name) {
     EXPECT_FALSE(pipeline.declares("NOT_THERE"));
 }
 
+TEST(Pipeline, equal_ones_of_a_device_are_one_while_it_lives) {
+    Device device{test::device_options()};
+    const Pipeline first(device, "scan_top", {{"THREADS", 64}});
+    {
+        const Pipeline same(device, "scan_top", {{"THREADS", 64}}), other(device, "scan_top");
+        EXPECT_EQ(same.handle(), first.handle());
+        EXPECT_NE(other.handle(), first.handle());
+        EXPECT_EQ(live_pipelines(device).size(), 2U);
+    }
+    ASSERT_EQ(live_pipelines(device).size(), 1U);
+    Device second{test::device_options()};
+    const Pipeline anew(second, live_pipelines(device).front());
+    EXPECT_EQ(anew.threads_x(), 64U);
+    EXPECT_EQ(live_pipelines(second), live_pipelines(device));
+}
+
 TEST(PipelineDeathTest, unknown_shader_aborts_with_its_name) {
     GTEST_FLAG_SET(death_test_style, "threadsafe");
     Device device{test::device_options()};
