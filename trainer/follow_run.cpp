@@ -1,7 +1,6 @@
 #include "trainer/follow_run.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include "engine/core/doing.h"
 #include "engine/core/files.h"
@@ -12,13 +11,6 @@ namespace darb {
 
 namespace {
 constexpr int kStepsApart = 64;  // from one look whether ranks are equal to the next
-
-// Of a version there are many builds.
-std::string program() {
-    const std::vector<std::byte> file = read_file("/proc/self/exe");
-    const uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(file.data()), file.size());
-    return fmt::format("{} ({:08x})", DARB_VERSION, crc);
-}
 }  // namespace
 
 std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run) {
@@ -45,16 +37,10 @@ SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
 void check_ranks(const Device& device, const TrainOptions& options, const RankGroup& ranks,
                  const std::string& fingerprint) {
     if (!ranks.several()) return;
-    const DeviceInfo& info = device.info();
-    RankFacts facts{{"option --allow-mixed", ranks.mixed ? "on" : "off"},
-                    {"program", program()},
-                    {"data set", fingerprint},
-                    {"settings", settings_text(options)}};
-    if (!ranks.mixed) {
-        facts.emplace_back("device", info.name);
-        facts.emplace_back("driver", info.driver);
-        facts.emplace_back("tuning", names_text(tuning_names(device.tuning())));
-    }
+    RankFacts facts = ranks.mixed ? rank_facts() : rank_facts(device);
+    facts.insert(facts.begin(), {"option --allow-mixed", ranks.mixed ? "on" : "off"});
+    facts.emplace_back("data set", fingerprint);
+    facts.emplace_back("settings", settings_text(options));
     check_same(*ranks.all, facts);
 }
 

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/plan/tuning_names.h"
 
 namespace darb {
 
@@ -30,6 +32,24 @@ std::uint32_t checksum(const GpuSplats& splats) {
 }
 
 }  // namespace
+
+RankFacts rank_facts() {  // of a version there are many builds
+    return {
+        {"program", fmt::format("{} ({})", DARB_VERSION, fact_of(read_file("/proc/self/exe")))}};
+}
+
+RankFacts rank_facts(const Device& device) {
+    RankFacts facts = rank_facts();
+    facts.emplace_back("device", device.info().name);
+    facts.emplace_back("driver", device.info().driver);
+    facts.emplace_back("tuning", names_text(tuning_names(device.tuning())));
+    return facts;
+}
+
+std::string fact_of(std::span<const std::byte> bytes) {
+    const auto* data = reinterpret_cast<const Bytef*>(bytes.data());
+    return fmt::format("{:08x}", crc32_z(crc32(0, nullptr, 0), data, bytes.size()));
+}
 
 void check_batch(const Ranks& ranks, int batch) {
     if (batch % ranks.count() == 0) return;

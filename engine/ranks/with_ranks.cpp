@@ -1,6 +1,9 @@
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
+#include <new>
 #include <string>
+#include <system_error>
 
 #include "engine/core/error.h"
 #include "engine/ranks/ranks.h"
@@ -22,6 +25,12 @@ int with_ranks(const std::function<int(Ranks&)>& work) {
         return done;
     } catch (const Error& e) {
         what = e.what();
+    } catch (const std::filesystem::filesystem_error& e) {
+        what = e.path1().string() + ": " + e.code().message();
+    } catch (const std::system_error& e) {
+        what = e.code().message();
+    } catch (const std::bad_alloc&) {
+        what = "no memory is left";
     } catch (const std::exception& e) {
         what = std::string("internal: ") + e.what();
         code = kInternal;

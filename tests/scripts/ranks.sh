@@ -31,6 +31,10 @@ run=(-r 50 --densify-from-iter 6 --densification-interval 6 --densify-until-iter
 train 1 "$folder/one" "${run[@]}" --iterations 30 --checkpoint-iterations 20
 train 2 "$folder/two" "${run[@]}" --iterations 30
 same 'two ranks leave what one leaves' "$folder/one" "$folder/two" 30
+for ranks in 1 2; do
+    mpirun -n "$ranks" "$darb" eval "$folder/one" "$data" -r 50 -q --json "$folder/eval.$ranks" >"$folder/eval.log" 2>&1
+done
+check 'two ranks measure what one measures' "^$(sha256sum <"$folder/eval.1")\$" "$(sha256sum <"$folder/eval.2")"
 [[ $what == long ]] || exit "$failed"
 
 train 4 "$folder/four" "${run[@]}" --iterations 30 --start-checkpoint "$folder/one/chkpnt20.darb"
@@ -72,6 +76,22 @@ check 'devices that round differently are told' 'rank 1 has the tuning .*buckets
 mpirun -n 1 "$darb" "${mixed[@]}" --allow-mixed --densify-from-iter 10 : \
     -n 1 "$darb" "${mixed[@]}" --allow-mixed --densify-from-iter 10 --tune backward=buckets >"$folder/mixed.log" 2>&1
 check '--allow-mixed trains with them' 'point_cloud.ply' "$(cat "$folder/mixed.log")"
+
+text=$(mpirun -n 1 "$darb" eval "$folder/one" "$data" -r 50 : -n 1 "$darb" eval "$folder/gaussian_mcmc.1" "$data" -r 50 2>&1)
+check 'another scene is told' 'rank 1 has the scene' "$text"
+text=$(mpirun -n 1 "$darb" eval "$folder/one" "$data" -r 50 : -n 1 "$darb" eval "$folder/one" "$data" -r 50 --split all 2>&1)
+check 'other views are told' 'rank 1 has the views' "$text"
+compare=(compare "$data" -r 50 --iterations 20 --seeds 1 -q)
+text=$(mpirun -n 1 "$darb" "${compare[@]}" -o "$folder/compare" --kernels gaussian : \
+    -n 1 "$darb" "${compare[@]}" -o "$folder/compare" --kernels sinc 2>&1)
+check 'other runs of a comparison are told' 'rank 1 has the runs 1 seeds of sinc' "$text"
+mpirun -n 2 "$darb" train "$data" -o "$folder/ended" -r 50 --iterations 100000 --densify-until-iter 0 --batch 4 \
+    --checkpoint-interval 1000000 -q >"$folder/ended.log" 2>&1 &
+pid=$!
+sleep 8
+kill -TERM "$pid"
+wait "$pid"
+check 'a run that is ended saves' '.' "$(ls "$folder/ended/checkpoint.darb" 2>&1 | grep -v 'No such')"
 
 # fault NAME SIGNAL RANK PATTERN: a rank gets the signal in the middle; every process ends, and the run goes on.
 fault() {

@@ -10,8 +10,10 @@
 #include "engine/check/walk_truth.h"
 #include "engine/core/error.h"
 #include "engine/reference/reference_loss.h"
+#include "trainer/checkpoint.h"
 #include "trainer/evaluation.h"
 #include "trainer/initial_model.h"
+#include "trainer/rank_group.h"
 #include "trainer/schedule.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"
@@ -286,6 +288,13 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
     views_of(dataset, false);  // an Error before any photo is read
     views_of(dataset, true);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
+    if (plan.ranks && plan.ranks->count() > 1) {
+        RankFacts facts = rank_facts(device);
+        facts.emplace_back("data set", dataset_fingerprint(dataset, photos));
+        facts.emplace_back("settings", settings_text(options));
+        facts.emplace_back("seeds", std::to_string(plan.seeds));
+        check_same(*plan.ranks, facts);
+    }
     result.rows = training_rows(options);
     const std::vector<std::vector<TrainedRun>> runs =
         train_by_turns(device, dataset, photos, options, plan, result.rows, progress);

@@ -55,6 +55,11 @@ std::vector<std::filesystem::path> paths_in_options(const CompareFlags& flags);
 /// What the runs have in common, as sentences; paths in them as seen from the output.
 std::string settings_of(const CompareFlags& flags);
 
+/// Throws Error where ranks have other photos or options. fingerprint: of the data set, empty where
+/// it cannot be read. All ranks call it.
+void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string& dataset,
+                     const std::vector<int>& kernels, const std::string& fingerprint);
+
 /// Of --lpips; note: which, or why none.
 std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note);
 

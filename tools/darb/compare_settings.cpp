@@ -3,7 +3,9 @@
 
 #include "engine/core/say.h"
 #include "tools/darb/compare_flags.h"
+#include "trainer/checkpoint.h"
 #include "trainer/portable_path.h"
+#include "trainer/rank_group.h"
 
 namespace darb {
 
@@ -35,6 +37,19 @@ std::string settings_of(const CompareFlags& flags) {
             : "Equal densification threshold, so each kernel has its own number of splats.";
     return fmt::format("{} Options of training:{}.", growth,
                        words.empty() ? " the defaults" : words);
+}
+
+void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string& dataset,
+                     const std::vector<int>& kernels, const std::string& fingerprint) {
+    if (ranks.count() == 1) return;
+    std::string runs = fmt::format("{} seeds of", flags.seeds);
+    for (const int kernel : kernels) runs += fmt::format(" {}", kernel_name(kernel));
+    RankFacts facts = rank_facts();
+    facts.emplace_back("data set", fingerprint.empty() ? "unread" : fingerprint);
+    facts.emplace_back("runs", runs);
+    facts.emplace_back("settings",
+                       settings_text(train_flags_of(flags, dataset, kernels.front(), 0).train));
+    check_same(ranks, facts);
 }
 
 std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note) {

@@ -39,6 +39,7 @@ class Comparer {
     }
 
     const std::vector<View>& views() const { return dataset_.views; }
+    std::string fingerprint() const { return dataset_fingerprint(dataset_, photos_); }
     /// Of these runs each rank's, by turns: what fails is tried again, and told, by run().
     void train_share(const std::vector<int>& kernels, const Ranks& ranks,
                      const std::atomic<bool>& stop);
@@ -57,9 +58,8 @@ class Comparer {
 };
 
 void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
-    if (plan_sees_photos_)
-        f.run.photos = photos_;  // else the plan of `darb train` has not seen them
-    dataset_.start = {};         // of the run before
+    if (plan_sees_photos_) f.run.photos = photos_;  // as the plan of `darb train` sees them
+    dataset_.start = {};                            // of the run before
     plan_effects(dataset_, f);
     plan_strategy(dataset_, f);
     f.run.photos = photos_;
@@ -72,8 +72,8 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     if (state == RunState::partial) f.run.resume_from = f.run.output / "checkpoint.darb";
     say_note(title);
     const RunLock lock(f.run.output);
-    DeviceOptions options = command_device(flags_.device);
-    Device device(options);  // of its own, so that the peak of memory is this run's
+    Device device(
+        command_device(flags_.device));  // of its own, so that the peak of memory is this run's
     settle_tuning(device);
     plan_start(device, dataset_, f);
     run_training(device, dataset_, f.train, f.run, &stop);
@@ -81,10 +81,9 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
 
 void Comparer::train_share(const std::vector<int>& kernels, const Ranks& ranks,
                            const std::atomic<bool>& stop) {
-    std::size_t item = 0;
-    for (int seed = 0; seed < flags_.seeds; ++seed)
+    for (int seed = 0, item = 0; seed < flags_.seeds; ++seed)
         for (const int kernel : kernels) {
-            if (stop || !has_turn(ranks, item++)) continue;
+            if (stop || !has_turn(ranks, std::size_t(item++))) continue;
             TrainFlags f = train_flags_of(flags_, name_, kernel, static_cast<std::uint64_t>(seed));
             try {
                 train(f, stop);
@@ -135,6 +134,7 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
         say("failed: {}\n", e.what());
         result.runs.push_back(std::move(failed));
     }
+    check_same_runs(ranks, flags, dataset, kernels, comparer ? comparer->fingerprint() : "");
     if (comparer && ranks.count() > 1) comparer->train_share(kernels, ranks, stop);
     ranks.gather({});  // all runs are there
     if (!comparer || !ranks.is_first()) return result;

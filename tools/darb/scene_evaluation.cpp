@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <utility>
 
 #include "engine/core/say.h"
@@ -14,6 +15,7 @@
 #include "tools/paper/compare_stats.h"
 #include "trainer/evaluation.h"
 #include "trainer/exposure_fit.h"
+#include "trainer/rank_group.h"
 
 namespace darb {
 
@@ -21,6 +23,23 @@ namespace {
 struct ViewNumbers {  // of a view, on its way from another rank
     double psnr_db, ssim;
 };
+
+// What decides which views are measured, and the pictures.
+void check_agreement(Ranks& ranks, const Device& device, const SplatModel& model,
+                     const std::vector<View>& views) {
+    if (ranks.count() == 1) return;
+    RankFacts facts = rank_facts(device);
+    std::string names, scene(kernel_name(model.kernel));
+    for (const View& view : views)
+        names += fmt::format("{} {}x{}\n", view.name, view.camera.width, view.camera.height);
+    for (int a = 0; a < kAttributeCount; ++a)
+        scene += fact_of(std::as_bytes(std::span(attribute_values(model, a))));
+    facts.emplace_back(
+        "views", fmt::format("{} ({})", views.size(), fact_of(std::as_bytes(std::span(names)))));
+    facts.emplace_back("scene", fmt::format("{} splats ({})", model.size(),
+                                            fact_of(std::as_bytes(std::span(scene)))));
+    check_same(ranks, facts);
+}
 }  // namespace
 
 Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<View> views,
@@ -34,6 +53,7 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
     Renderer renderer(device, planned, options.accuracy, plan.projection(), plan.huge_splat_path());
     OneRank alone;
     Ranks& ranks = options.ranks ? *options.ranks : static_cast<Ranks&>(alone);
+    check_agreement(ranks, device, planned, views);
     std::vector<ViewNumbers> own;
     for (size_t v = 0; v < views.size(); ++v) {
         if (!has_turn(ranks, v)) continue;
