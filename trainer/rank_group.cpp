@@ -31,6 +31,17 @@ std::uint32_t checksum(const GpuSplats& splats) {
     return static_cast<std::uint32_t>(crc);
 }
 
+// Of an object in JSON what the other has not; other texts as they are.
+std::string what_differs(const std::string& text, const std::string& other) {
+    const auto own = nlohmann::json::parse(text, nullptr, false);
+    const auto its = nlohmann::json::parse(other, nullptr, false);
+    if (!own.is_object() || !its.is_object()) return text;
+    nlohmann::json left = nlohmann::json::object();
+    for (const auto& [name, value] : own.items())
+        if (!its.contains(name) || its[name] != value) left[name] = value;
+    return left.dump();
+}
+
 }  // namespace
 
 RankFacts rank_facts() {  // of a version there are many builds
@@ -70,7 +81,8 @@ void check_same(Ranks& ranks, const RankFacts& facts) {
             if (its[f] != first[f])
                 differences += fmt::format("{}rank {} has the {} {}, rank 0 {}",
                                            differences.empty() ? "" : "; ", r, its[f].first,
-                                           its[f].second, first[f].second);
+                                           what_differs(its[f].second, first[f].second),
+                                           what_differs(first[f].second, its[f].second));
     }
     if (!differences.empty())
         throw Error("the ranks", differences,

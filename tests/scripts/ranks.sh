@@ -84,7 +84,7 @@ check 'other views are told' 'rank 1 has the views' "$text"
 compare=(compare "$data" -r 50 --iterations 20 --seeds 1 -q)
 text=$(mpirun -n 1 "$darb" "${compare[@]}" -o "$folder/compare" --kernels gaussian : \
     -n 1 "$darb" "${compare[@]}" -o "$folder/compare" --kernels sinc 2>&1)
-check 'other runs of a comparison are told' 'rank 1 has the runs 1 seeds of sinc' "$text"
+check 'other runs of a comparison are told' 'rank 1 has the runs with seeds 1, kernels sinc' "$text"
 mpirun -n 2 "$darb" train "$data" -o "$folder/ended" -r 50 --iterations 100000 --densify-until-iter 0 --batch 4 \
     --checkpoint-interval 1000000 -q >"$folder/ended.log" 2>&1 &
 pid=$!

@@ -42,7 +42,7 @@ std::string settings_of(const CompareFlags& flags) {
 void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string& dataset,
                      const std::vector<int>& kernels, const std::string& fingerprint) {
     if (ranks.count() == 1) return;
-    std::string runs = fmt::format("{} seeds of", flags.seeds);
+    std::string runs = fmt::format("with seeds {}, kernels", flags.seeds);
     for (const int kernel : kernels) runs += fmt::format(" {}", kernel_name(kernel));
     RankFacts facts = rank_facts();
     facts.emplace_back("data set", fingerprint.empty() ? "unread" : fingerprint);
