@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "engine/core/check.h"
 #include "engine/core/rng.h"
@@ -98,6 +99,13 @@ class Adam1d {
 
 std::span<const Signal1d> signals_1d() {
     return kSignals;
+}
+
+std::vector<int> kernels_1d() {
+    std::vector<int> kernels(KERNEL_COUNT);
+    std::iota(kernels.begin(), kernels.end(), 0);
+    kernels.push_back(kGeneralisedExponential);
+    return kernels;
 }
 
 std::string_view kernel_1d_name(int kernel) {

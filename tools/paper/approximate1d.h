@@ -21,12 +21,13 @@ struct Signal1d {
 /// are not symmetric: sawtooth, steps.
 std::span<const Signal1d> signals_1d();
 
-/// Kernels: KERNEL_* of the family with the profiles of the psi footprint, in the float32
-/// arithmetic of the shaders (fitted polynomials, exp2 by range reduction); and after them GES's
+/// Kernels: any with an id but those of several pulses, with the profile of the psi footprint, in
+/// the float32 arithmetic of the shaders (fitted polynomials, exp2 by range reduction); and GES's
 /// generalised exponential exp(-(q/2)^(b/2)), whose shape b is learned too and starts at the
 /// Gaussian's 2.
-constexpr int kGeneralisedExponential = KERNEL_COUNT;
-constexpr int kKernels1d = KERNEL_COUNT + 1;
+constexpr int kGeneralisedExponential = -1;
+/// The family, and the generalised exponential after it.
+std::vector<int> kernels_1d();
 std::string_view kernel_1d_name(int kernel);
 
 struct Fit1dOptions {

@@ -208,12 +208,33 @@ std::vector<float> sample_points_1d(int samples) {
     return x;
 }
 
+namespace {
+
+// Beta in the form of the others: u^4 alone.
+KernelCoefficients coefficients_1d(int kernel) {
+    KernelCoefficients k = kernel_coefficients(
+        kernel == kGeneralisedExponential ? KERNEL_GAUSSIAN : kernel, Footprint::psi, kFullDegree);
+    if (k.form != KERNEL_FORM_BETA) return k;
+    k.form = KERNEL_FORM_COMPACT;
+    k.half_power = static_cast<int>(std::lround(2 * k.exponent));
+    k.degree = 0;
+    k.c = {1};
+    return k;
+}
+
+}  // namespace
+
+bool Terms1d::draws(int kernel) {
+    const KernelCoefficients k = coefficients_1d(kernel);
+    if (k.form != KERNEL_FORM_COMPACT)
+        return k.form == KERNEL_FORM_GAUSSIAN || k.form == KERNEL_FORM_QUADRIC;
+    return k.half_power % 2 == 0 && k.half_power <= 8;
+}
+
 Terms1d::Terms1d(int kernel, std::span<const float> target, std::size_t primitives)
     : kernel_(kernel),
-      coefficients_(
-          &kernel_coefficients(kernel == kGeneralisedExponential ? KERNEL_GAUSSIAN : kernel,
-                               Footprint::psi, kFullDegree)),
-      radius_(std::min(kGaussRadius, std::sqrt(coefficients_->support))),
+      coefficients_(coefficients_1d(kernel)),
+      radius_(std::min(kGaussRadius, std::sqrt(coefficients_.support))),
       target_(target),
       x_(sample_points_1d(static_cast<int>(target.size()))),
       residual_(target.size()),
@@ -236,11 +257,11 @@ Terms1d::Reach Terms1d::reach_of(const Primitive1d& p) const {
 void Terms1d::add_term(const Primitive1d& p, std::size_t i, const Reach& reach) {
     const std::size_t row = i * x_.size();
     const Rows rows{&w_[row], &slope_z_[row], residual_.data()};
-    const Coefficients k = floats_of(*coefficients_);
+    const Coefficients k = floats_of(coefficients_);
     if (kernel_ == kGeneralisedExponential)
         add_generalised(k, x_.data(), p, reach.first, reach.last, rows, &by_shape_[row]);
     else
-        term_of (*coefficients_)(k, x_.data(), p, reach.first, reach.last, rows);
+        term_of(coefficients_)(k, x_.data(), p, reach.first, reach.last, rows);
 }
 
 double Terms1d::loss(std::span<const Primitive1d> primitives, std::vector<double>& gradient) {

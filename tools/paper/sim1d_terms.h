@@ -17,6 +17,10 @@ class Terms1d {
   public:
     Terms1d(int kernel, std::span<const float> target, std::size_t primitives);
 
+    /// Whether the kernel has a profile here: one of several pulses has none, nor one that falls
+    /// to its edge as no whole power up to the fourth.
+    static bool draws(int kernel);
+
     /// Mean squared error; gradient [N][4] by position, log width, weight, log shape.
     double loss(std::span<const Primitive1d> primitives, std::vector<double>& gradient);
 
@@ -31,8 +35,8 @@ class Terms1d {
     void add_term(const Primitive1d& p, std::size_t i, const Reach& reach);
 
     int kernel_;
-    const KernelCoefficients* coefficients_;  // for the generalised exponential the Gaussian's
-    double radius_;                           // of the support, in widths
+    KernelCoefficients coefficients_;  // for the generalised exponential the Gaussian's
+    double radius_;                    // of the support, in widths
     std::span<const float> target_;
     std::vector<float> x_, residual_;
     std::vector<float> w_, slope_z_, by_shape_;  // [N][samples]: w, dw/dq z, dw/dlog shape

@@ -6,9 +6,13 @@
 #include <limits>
 #include <mutex>
 
+#include <fmt/format.h>
+
 #include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/core/quantile.h"
 #include "engine/reference/parallel.h"
+#include "tools/paper/sim1d_terms.h"
 
 namespace darb {
 
@@ -71,6 +75,12 @@ Study1dResult study_1d(const Study1dOptions& options,
     DARB_CHECK(options.seeds >= 1 && !options.signals.empty() && !options.kernels.empty() &&
                    !options.primitives.empty(),
                "{} seeds", options.seeds);
+    for (const int k : options.kernels)
+        if (!Terms1d::draws(k))
+            throw Error(fmt::format("kernel {}", kernel_1d_name(k)),
+                        "has several pulses, or falls to its edge as no whole power up to the "
+                        "fourth, which this study does not draw",
+                        "Leave it out.");
     const auto start = std::chrono::steady_clock::now();
     Study1dResult result{options, {}, {}, 0};
     std::vector<std::vector<float>> targets;

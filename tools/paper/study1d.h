@@ -13,7 +13,7 @@ namespace darb {
 
 struct Study1dOptions {
     std::vector<int> signals;  // indices of signals_1d()
-    std::vector<int> kernels;  // KERNEL_* or kGeneralisedExponential
+    std::vector<int> kernels;  // ids, or kGeneralisedExponential
     std::vector<int> primitives{1, 5, 10};
     int seeds = 20;
     double target_share = 0.01;  // of the signal's mean square: the loss that is timed

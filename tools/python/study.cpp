@@ -63,14 +63,9 @@ py::object psi(const py::object& kernels, const py::object& samples, const py::o
 }
 
 int take_kernel_1d(const py::object& value) {
-    if (py::isinstance<py::str>(value) &&
-        take_text(value, "kernels") == kernel_1d_name(kGeneralisedExponential))
-        return kGeneralisedExponential;
-    const int kernel = take_kernel(value, "kernels");
-    if (kernel >= KERNEL_COUNT)
-        throw Error("kernels", "names a kernel that this study does not know",
-                    "Use one of darb.kernel_names().");
-    return kernel;
+    const bool generalised = py::isinstance<py::str>(value) &&
+                             take_text(value, "kernels") == kernel_1d_name(kGeneralisedExponential);
+    return generalised ? kGeneralisedExponential : take_kernel(value, "kernels");
 }
 
 std::vector<int> take_signals(const py::object& value) {
@@ -99,7 +94,7 @@ py::object sim1d(const py::dict& given) {
     const std::vector<int> signals = take_signals(given["signals"]);
     std::vector<int> kernels;
     if (given["kernels"].is_none())
-        for (int k = 0; k < kKernels1d; ++k) kernels.push_back(k);
+        kernels = kernels_1d();
     else
         for (const py::object& one : several(given["kernels"]))
             kernels.push_back(take_kernel_1d(one));

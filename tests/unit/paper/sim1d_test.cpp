@@ -7,7 +7,9 @@
 #include <cmath>
 #include <tuple>
 
+#include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
+#include "engine/kernels/kernel_registry.h"
 #include "tools/paper/study1d.h"
 
 namespace darb {
@@ -19,7 +21,11 @@ double true_profile(int kernel, double q, double shape) {
 }
 
 TEST(Sim1d, Sum_isTheProfileInFloat32) {
-    for (int kernel = 0; kernel < kKernels1d; ++kernel) {
+    std::vector<int> kernels = kernels_1d();  // and those beyond the list
+    kernels.push_back(KERNEL_BETA);
+    kernels.push_back(
+        register_kernel("sim1d_own", 9, [](double q) { return (1 - q / 9) * (1 - q / 9); }));
+    for (const int kernel : kernels) {
         const Primitive1d p{0.37f, 1.3f, 0.8f, 1.4f};
         const std::vector<float> y = evaluate_1d(kernel, std::vector{p}, 1000);
         for (int i = 0; i < 1000; ++i) {
@@ -34,7 +40,7 @@ TEST(Sim1d, Sum_isTheProfileInFloat32) {
 
 TEST(Sim1d, Gradient_isThatOfDifferences) {
     const std::vector<float> target = sample_signal(signals_1d()[1], 1000);
-    for (int kernel = 0; kernel < kKernels1d; ++kernel) {
+    for (const int kernel : kernels_1d()) {
         if (kernel == KERNEL_INVERSE_QUADRATIC || kernel == KERNEL_INVERSE_MULTIQUADRIC)
             continue;  // their jump moves from sample to sample
         const std::vector<Primitive1d> at{{-0.8f, 1.1f, 0.6f, 1.7f}, {1.3f, 0.7f, 0.5f, 2.5f}};
@@ -96,6 +102,9 @@ TEST(Study1d, Result_repeatsOnAnyNumberOfThreadsAndCountsFailures) {
         EXPECT_EQ(one.rows[r].median, three.rows[r].median);
         EXPECT_LE(one.rows[r].low, one.rows[r].median);
     }
+    options.kernels = {KERNEL_RAISED_COSINE_2_PULSES};
+    EXPECT_THROW(study_1d(options, none), Error);
+    options.kernels = one.options.kernels;
     options.fit.steps = 1;  // nothing is learned in a step
     options.primitives = {1};
     options.signals = {0};
