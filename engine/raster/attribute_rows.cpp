@@ -5,6 +5,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/on_threads.h"
+#include "engine/core/streaming.h"
 #include "engine/scene/splat_attributes.h"
 
 namespace darb {
@@ -52,29 +53,82 @@ BufferRange bound_rows(const Buffer& buffer, const AttributeRows& rows, const Sp
     return rows.columns > 0 ? range_of_rows(buffer, rows, range) : buffer;
 }
 
-void put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
-              std::size_t count, std::byte* to) {
+namespace {
+
+// What lies row by row; `to` is where the first of the rows comes.
+void put_plain(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t count,
+               std::byte* to) {
     const std::size_t row_bytes = rows.floats * sizeof(float);
-    if (rows.floats == 0) return;
-    if (rows.columns == 0) {
-        for (std::size_t i = first; i < first + count; ++i)
-            std::memcpy(to + i * row_bytes, values + i * pitch, row_bytes);
+    if (pitch == rows.floats) {
+        if (can_stream(to)) return stream_floats(to, values, count * rows.floats);
+        std::memcpy(to, values, count * row_bytes);
         return;
     }
-    constexpr std::size_t kStep = kBlockRows * kColumnBytes;  // from a column to the next
-    const std::size_t whole = rows.floats / kColumnFloats, last = floats_in(rows, whole);
-    for (std::size_t i = first; i < first + rows.rows_held(count); ++i) {
-        const bool there = i < first + count;
-        std::byte* const at = to + column_at(rows, i, 0);
-        const float* const row = there ? values + i * pitch : nullptr;
-        if (there)
-            for (std::size_t c = 0; c < whole; ++c)
-                std::memcpy(at + c * kStep, row + c * kColumnFloats, kColumnBytes);
-        for (std::size_t c = there ? whole : 0; c < rows.columns; ++c)
-            std::memset(at + c * kStep, 0, kColumnBytes);
-        if (there && last > 0)
-            std::memcpy(at + whole * kStep, row + whole * kColumnFloats, last * sizeof(float));
+    constexpr std::size_t kColour = 3;  // of a length that is known, as a copy of so few is a word
+    for (std::size_t i = 0; i < count; ++i)
+        if (rows.floats == kColour)
+            std::memcpy(to + i * kColour * sizeof(float), values + i * pitch,
+                        kColour * sizeof(float));
+        else
+            std::memcpy(to + i * row_bytes, values + i * pitch, row_bytes);
+}
+
+// A block of which all rows are there; `to` and values are its begin.
+void stream_block(const AttributeRows& rows, const float* values, std::size_t pitch,
+                  std::byte* to) {
+    const auto each = [&](std::size_t column, const auto& put) {
+        for (std::size_t k = 0; k < kBlockRows; ++k)
+            put(to + (column * kBlockRows + k) * kColumnBytes,
+                values + k * pitch + column * kColumnFloats);
+    };
+    for (std::size_t c = 0; c < rows.columns; ++c) {
+        const std::size_t floats = floats_in(rows, c);
+        if (floats == kColumnFloats) {
+            each(c, stream_four);
+        } else if (floats == 1) {
+            each(c, stream_one);
+        } else {
+            each(c, [&](std::byte* at, const float* from) {
+                float four[kColumnFloats] = {};
+                for (std::size_t j = 0; j < floats; ++j) four[j] = from[j];
+                stream_four(at, four);
+            });
+        }
     }
+}
+
+// Any rows of a block.
+void put_block(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t count,
+               std::byte* to) {
+    std::memset(to, 0, kBlockRows * rows.columns * kColumnBytes);
+    for (std::size_t k = 0; k < count; ++k)
+        for (std::size_t c = 0; c < rows.columns; ++c)
+            if (const std::size_t floats = floats_in(rows, c); floats > 0)
+                std::memcpy(to + (c * kBlockRows + k) * kColumnBytes,
+                            values + k * pitch + c * kColumnFloats, floats * sizeof(float));
+}
+
+}  // namespace
+
+void put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
+              std::size_t count, std::byte* to) {
+    if (rows.floats == 0 || count == 0) return;
+    to += first * rows.floats_held() * sizeof(float);
+    values += first * pitch;
+    if (rows.columns == 0) {
+        put_plain(rows, values, pitch, count, to);
+    } else {
+        const bool streams = can_stream(to);
+        for (std::size_t i = 0; i < count; i += kBlockRows) {
+            std::byte* const at = to + i * rows.floats_held() * sizeof(float);
+            const float* const from = values + i * pitch;
+            if (streams && count - i >= kBlockRows)
+                stream_block(rows, from, pitch, at);
+            else
+                put_block(rows, from, pitch, std::min(kBlockRows, count - i), at);
+        }
+    }
+    stream_fence();
 }
 
 namespace {

@@ -211,40 +211,91 @@ bool GradientRenderer::holds(std::size_t count, int sh_degree) const {
 
 namespace {
 
-void check_count(const char* name, std::size_t given, std::size_t splats, std::size_t floats) {
-    if (given == splats * floats) return;
-    throw Error(name, fmt::format("{} values, {} splats need {}", given, splats, splats * floats),
-                "Give the values of all splats.");
+// Rows of a buffer, and where it begins while it is written.
+struct RowsTo {
+    int attribute;
+    AttributeRows rows;
+    const float* from;
+    std::byte* to = nullptr;
+};
+
+// An array of the caller's, and what it is for.
+struct Source {
+    int attribute;
+    std::span<const float> values;
+    std::size_t floats = 0;  // of a splat
+    std::vector<RowsTo> targets{};
+
+    void add(const GpuSplats& splats, int target) {
+        const AttributeRows rows = splats.rows(target);
+        targets.push_back({target, rows, values.data() + floats});
+        floats += rows.floats;
+    }
+};
+
+std::vector<Source> sources_of(const GpuSplats& splats, const GivenValues& given) {
+    std::vector<Source> sources;
+    for (int a = 0; a < kAttributeCount; ++a) {
+        const bool bands = !given.harmonics.empty() && (a == kShDc || a == kShRest);
+        if (!bands || a == kShDc)
+            sources.push_back(
+                {a, bands ? given.harmonics : given.attributes[static_cast<std::size_t>(a)]});
+        sources.back().add(splats, a);
+    }
+    for (const Source& source : sources)
+        if (const std::size_t wanted = splats.count() * source.floats;
+            source.values.size() != wanted)
+            throw Error(attribute_name(source.attribute),
+                        fmt::format("{} values, {} splats need {}", source.values.size(),
+                                    splats.count(), wanted),
+                        "Give the values of all splats.");
+    return sources;
 }
 
-constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK;  // of their 400 kB a cache holds all
+// Calls write() where the begin of each buffer is known.
+void with_buffers(GpuSplats& splats, std::span<RowsTo* const> targets,
+                  const std::function<void()>& write) {
+    if (targets.empty()) return write();
+    RowsTo& first = *targets.front();
+    splats.parameters(first.attribute)
+        .upload_by(first.rows.bytes(splats.count()), [&](std::byte* to) {
+            first.to = to;
+            with_buffers(splats, targets.subspan(1), write);
+        });
+}
+
+// Of a thread, and of what it checks and writes while the first level of the caches holds it.
+constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK, kSplatsAtOnce = 16 * ROW_BLOCK;
 
 }  // namespace
 
-void GradientRenderer::set_values(int attribute, std::span<const float> values) {
+bool GradientRenderer::set_values(const GivenValues& values,
+                                  const std::function<bool(int, std::span<const float>)>& accept) {
     State& s = *state_;
-    check_count(attribute_name(attribute), values.size(), s.splats.count(),
-                s.splats.stride(attribute));
+    std::vector<Source> sources = sources_of(s.splats, values);
+    std::vector<RowsTo*> targets;
+    for (Source& source : sources)
+        for (RowsTo& target : source.targets)
+            if (target.rows.floats > 0) targets.push_back(&target);
     s.image = {};
-    upload_rows(s.splats.parameters(attribute), s.splats.rows(attribute), values);
-}
-
-bool GradientRenderer::set_harmonics(std::span<const float> values,
-                                     const std::function<bool(std::span<const float>)>& accept) {
-    State& s = *state_;
-    const AttributeRows first = s.splats.rows(kShDc), others = s.splats.rows(kShRest);
-    const std::size_t n = s.splats.count(), all = first.floats + others.floats;
-    check_count("harmonics", values.size(), n, all);
-    s.image = {};
+    const std::size_t n = s.splats.count();
+    if (n == 0) return true;
     std::atomic<bool> accepted{true};
-    s.splats.parameters(kShDc).upload_by(first.bytes(n), [&](std::byte* to_first) {
-        s.splats.parameters(kShRest).upload_by(others.bytes(n), [&](std::byte* to_others) {
-            in_pieces(n, kSplatsOfPiece, [&](std::size_t begin, std::size_t count) {
-                if (!accept(values.subspan(begin * all, count * all))) accepted = false;
-                if (!accepted) return;
-                put_rows(first, values.data(), all, begin, count, to_first);
-                put_rows(others, values.data() + first.floats, all, begin, count, to_others);
-            });
+    const auto put = [&](const Source& source, std::size_t first, std::size_t count) {
+        if (source.floats == 0) return;
+        if (!accept(source.attribute,
+                    source.values.subspan(first * source.floats, count * source.floats)))
+            accepted = false;
+        if (!accepted) return;
+        for (const RowsTo& target : source.targets)
+            put_rows(target.rows, target.from, source.floats, first, count, target.to);
+    };
+    with_buffers(s.splats, targets, [&] {
+        in_pieces(n, kSplatsOfPiece, [&](std::size_t first, std::size_t count) {
+            for (const std::size_t end = first + count; first < end && accepted;
+                 first += kSplatsAtOnce)
+                for (const Source& source : sources)
+                    put(source, first, std::min(kSplatsAtOnce, end - first));
         });
     });
     return accepted;
@@ -292,6 +343,17 @@ const ImageF& GradientRenderer::render(const Camera& camera, const glm::vec3& ba
 
 const ImageF& GradientRenderer::alpha() const {
     return state_->alpha;
+}
+ImageF GradientRenderer::release_image() {
+    ImageF& kept = state_->image;  // its size says that there is a picture
+    ImageF image = std::exchange(kept, {});
+    kept.width = image.width;
+    kept.height = image.height;
+    kept.channels = image.channels;
+    return image;
+}
+ImageF GradientRenderer::release_alpha() {
+    return std::exchange(state_->alpha, {});
 }
 gpu::FrameStatus GradientRenderer::status() const {
     return state_->exchange.status();

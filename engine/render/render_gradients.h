@@ -3,6 +3,7 @@
 // drawn; engine/reference has the same in double.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -47,6 +48,12 @@ struct GradientOptions {
     bool camera = false;  // d_camera; of pinholes
 };
 
+/// The values of all splats, where a caller has them.
+struct GivenValues {
+    std::array<std::span<const float>, kAttributeCount> attributes;  // [N][floats] each
+    std::span<const float> harmonics{};  // [N][K][3], all bands: for kShDc and kShRest, or none
+};
+
 /// One model on a device for many views. Kernel, footprint and anti-aliasing are the model's.
 class GradientRenderer {
   public:
@@ -64,14 +71,12 @@ class GradientRenderer {
     void replace(const SplatModel& model);
     /// Whether the splats are of this count and degree, and of origin 0.
     bool holds(std::size_t count, int sh_degree) const;
-    /// Other values of one attribute for the same splats, from where the caller has them. Throws
-    /// Error for another number of them.
-    void set_values(int attribute, std::span<const float> values);
-    /// The same of all bands of harmonics, [N][K][3], a piece at a time: each is written where
-    /// accept(piece) says so. It is called by several threads and must not throw. False where a
-    /// piece was not: the harmonics are undefined until they are set again.
-    bool set_harmonics(std::span<const float> values,
-                       const std::function<bool(std::span<const float>)>& accept);
+    /// Other values for the same splats, a piece at a time: each is written where
+    /// accept(attribute, piece) says so, kShDc for `harmonics`. It is called by several threads and
+    /// must not throw. False where a piece was not: all is undefined until it is set again. Throws
+    /// Error for another number of values.
+    bool set_values(const GivenValues& values,
+                    const std::function<bool(int, std::span<const float>)>& accept);
     /// From the next picture on, in place of what the options say.
     void set_view(int sh_degree, float near_plane);
 
@@ -80,6 +85,10 @@ class GradientRenderer {
     const ImageF& render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f));
     /// [H][W][1], of the same picture: 1 - transmittance.
     const ImageF& alpha() const;
+    /// The two of the last picture for the caller to keep, without a copy: render() and alpha()
+    /// have no pixels then, nor has ViewGradients::image. backward() may follow all the same.
+    ImageF release_image();
+    ImageF release_alpha();
     /// [H][W][2] of the same picture, as Renderer::render_depth; there are no gradients of it then.
     ImageF depth();
     /// Of the picture that render() last made, once for each; d_image [H][W][3] is dL/d(image),

@@ -243,7 +243,7 @@ TEST(ViewInputs, other_splats_take_the_place_of_those_on_the_device) {
     EXPECT_THROW(renderer.replace(cosine), Error);
 }
 
-TEST(ViewInputs, attributes_come_one_at_a_time) {
+TEST(ViewInputs, values_come_from_where_a_caller_has_them) {
     const TestScene scene = small_scene();
     SplatModel moved = scene.model;
     for (int a = 0; a < kAttributeCount; ++a)
@@ -251,11 +251,31 @@ TEST(ViewInputs, attributes_come_one_at_a_time) {
     GradientRenderer renderer(shared_device(), scene.model);
     EXPECT_TRUE(renderer.holds(moved.size(), moved.sh_degree));
     EXPECT_FALSE(renderer.holds(moved.size() + 1, moved.sh_degree));
-    for (int a = 0; a < kAttributeCount; ++a) renderer.set_values(a, attribute_values(moved, a));
-    EXPECT_EQ(renderer.render(scene.camera).data,
-              GradientRenderer(shared_device(), moved).render(scene.camera).data);
+    const ImageF wanted = GradientRenderer(shared_device(), moved).render(scene.camera);
+    GivenValues given;
+    for (size_t a = 0; a < kAttributeCount; ++a)
+        given.attributes[a] = attribute_values(moved, static_cast<int>(a));
+    const auto any = [](int, std::span<const float>) { return true; };
+    EXPECT_TRUE(renderer.set_values(given, any));
+    EXPECT_EQ(renderer.render(scene.camera).data, wanted.data);
+
+    const size_t rest = moved.sh_rest.size() / moved.size();
+    std::vector<float> bands;
+    for (size_t i = 0; i < moved.size(); ++i) {
+        bands.insert(bands.end(), &moved.sh_dc[3 * i], &moved.sh_dc[3 * i] + 3);
+        bands.insert(bands.end(), &moved.sh_rest[rest * i], &moved.sh_rest[rest * i] + rest);
+    }
+    given.attributes[kShDc] = given.attributes[kShRest] = {};
+    given.harmonics = bands;
+    renderer.replace(scene.model);
+    EXPECT_TRUE(renderer.set_values(given, any));
+    EXPECT_EQ(renderer.render(scene.camera).data, wanted.data);
+    for (const int refused : {int(kPosition), int(kShDc)})
+        EXPECT_FALSE(renderer.set_values(
+            given, [&](int attribute, std::span<const float>) { return attribute != refused; }));
     moved.position.pop_back();
-    EXPECT_THROW(renderer.set_values(ATTRIBUTE_POSITION, moved.position), Error);
+    given.attributes[kPosition] = moved.position;
+    EXPECT_THROW(renderer.set_values(given, any), Error);
 }
 
 TEST(ViewInputs, depths_are_those_of_the_renderer) {

@@ -19,14 +19,14 @@ try:
     import darb
 except ImportError as error:
     support.skip(f"the module is not here: {error}")
-from support import camera, relative, rms, splats, weights
+from support import camera, relative, rms, shapes, splats, weights
 
 INPUTS = ("means", "quats", "scales", "opacities")
 
 
 def reference(arrays, pictures, d_image, d_alpha, **options):
-    names = dict.fromkeys(("colors", "sh", "kernel", "footprint", "background", "sh_degree",
-                           "antialiased"))
+    names = dict.fromkeys(("colors", "sh", "shapes", "kernel", "footprint", "background",
+                           "sh_degree", "antialiased"))
     settings = {"near": 0.2, "accuracy": "balanced", "depth": False}
     return darb._darb.reference({**names, **settings, **arrays, **pictures, **options}, d_image,
                                 d_alpha)
@@ -49,7 +49,7 @@ class Rasterize(unittest.TestCase):
                 self.assertLess(relative(image, truth), 2e-5)
                 self.assertLess(relative(alpha, true_alpha), 2e-5)
                 d = darb.rasterize_backward(d_image, d_alpha, **arrays, **pictures, **options)
-                for name in INPUTS + ("backgrounds",):
+                for name in INPUTS + ("backgrounds",) + (("shapes",) if kernel == "beta" else ()):
                     self.assertLess(relative(d[name], d_true[name]), 2e-3, name)
                 colours = d["colors"] if sh is None else d["sh"][:, 0]
                 self.assertLess(
@@ -78,6 +78,31 @@ class Rasterize(unittest.TestCase):
             wanted = float((np.float64(d[name]) * u).sum())
             self.assertLess(abs(difference - wanted), 0.03 * abs(wanted) + 0.02, name)
         self.camera_differences(pictures, d, loss)
+
+    def test_gradients_of_shapes_are_central_differences(self):
+        pictures = {**camera(), "kernel": "beta", "accuracy": "exact"}
+        arrays = {**splats(count=12), "shapes": shapes(12)}
+        d_image, d_alpha = weights(pictures)
+        for footprint in ("psi", "exact"):
+            d = darb.rasterize_backward(d_image, d_alpha, **arrays, **pictures, footprint=footprint)
+
+            def loss(value):
+                image, alpha, _ = darb.rasterize(**{**arrays, "shapes": value}, **pictures,
+                                                 footprint=footprint)
+                return (np.float64(image) * d_image).sum() + (np.float64(alpha) * d_alpha).sum()
+
+            u = (d["shapes"] / rms(d["shapes"]) * 1e-2).astype(np.float32)
+            difference = (loss(arrays["shapes"] + u) - loss(arrays["shapes"] - u)) / 2
+            wanted = float((np.float64(d["shapes"]) * u).sum())
+            self.assertLess(abs(difference - wanted), 0.02 * abs(wanted) + 1e-3, footprint)
+
+    def test_shapes_are_0_where_none_are_given(self):
+        pictures, arrays = camera(), splats()
+        image = darb.rasterize(**arrays, **pictures, kernel="beta")[0]
+        given = darb.rasterize(**arrays, **pictures, kernel="beta", shapes=np.zeros(24, np.float32))
+        np.testing.assert_array_equal(image, given[0])
+        self.assertGreater(relative(darb.rasterize(**arrays, **pictures, kernel="beta",
+                                                   shapes=shapes())[0], image), 0.01)
 
     def camera_differences(self, pictures, d, loss):
         h = 2e-3
@@ -198,6 +223,36 @@ class Scenes(unittest.TestCase):
         del scene
         self.assertTrue(np.isfinite(looked_at).all(), "a look keeps the scene alive")
 
+    def test_shapes_are_an_attribute_of_the_kernel_beta(self):
+        given = splats(count=60, sh=4)
+        scene = darb.Scene.from_arrays(**given, kernel="beta", shapes=shapes(60))
+        pictures = camera()
+        np.testing.assert_array_equal(scene.shapes, shapes(60))
+        by_arrays = darb.rasterize(**given, shapes=shapes(60), kernel="beta", **pictures)[0]
+        self.assertLess(relative(scene.render(**pictures)[0], by_arrays), 1e-5)
+        scene.shapes = scene.shapes * 0
+        start = darb.rasterize(**given, kernel="beta", **pictures)[0]
+        self.assertLess(relative(scene.render(**pictures)[0], start), 1e-5)
+        d_image, d_alpha = weights(pictures)
+        d = darb.rasterize_backward(d_image, d_alpha, means=scene, **pictures)
+        self.assertEqual(d["shapes"].shape, (60,))
+        self.assertGreater(rms(d["shapes"]), 0)
+        looked_at = scene.shapes
+        with tempfile.TemporaryDirectory() as folder:
+            scene.shapes = shapes(60)
+            scene.write(f"{folder}/beta.ply")
+            again = darb.Scene.read(f"{folder}/beta.ply")
+            self.assertEqual(again.kernel, "beta")
+            np.testing.assert_array_equal(again.shapes, shapes(60))
+        scene.kernel = "gaussian"
+        self.assertIsNone(scene.shapes)
+        with self.assertRaisesRegex(darb.Error, "shapes: has no place in the kernel gaussian"):
+            scene.shapes = shapes(60)
+        scene.kernel = "beta"
+        np.testing.assert_array_equal(scene.shapes, np.zeros(60, np.float32))
+        np.testing.assert_array_equal(looked_at, scene.shapes, "a look stays one")
+        self.assertLess(relative(scene.render(**pictures)[0], start), 1e-5)
+
     def test_files_come_back_as_they_were_written(self):
         scene = self.scene(kernel="raised_cosine")
         with tempfile.TemporaryDirectory() as folder:
@@ -267,6 +322,7 @@ class Kernels(unittest.TestCase):
             self.assertLess(relative(d[name], d_true[name]), 3e-3, name)
         self.assertGreater(relative(image, darb.rasterize(**arrays, **pictures)[0]), 0.01)
         self.assertIn("own_cubic", darb.kernel_names())
+        self.assertIn("beta", darb.kernel_names())
         np.testing.assert_array_equal(
             image, darb.rasterize(**arrays, **pictures, kernel="own_cubic")[0])
         scene = darb.Scene.from_arrays(**splats(sh=1), kernel=cubic)
@@ -322,10 +378,31 @@ class Refused(unittest.TestCase):
                 (r"opacities: is 2 at \[0\]\n.*not logits", {"opacities": a["opacities"] * 0 + 2}),
                 ("colors and sh: are both given", {"sh": np.zeros((24, 1, 3), np.float32)}),
                 ("colors and sh: are both left out", {"colors": None}),
+                ("shapes: are given to the kernel gaussian", {"shapes": shapes()}),
+                (r"shapes: has the shape \(3,\), not \(24,\)", {"kernel": "beta",
+                                                                "shapes": shapes(3)}),
+                (r"shapes: is nan at \[5\]", {"kernel": "beta", "shapes": np.where(
+                    np.arange(24) == 5, np.float32("nan"), shapes())}),
                 ("sh: has 5 coefficients", {"colors": None,
                                             "sh": np.zeros((24, 5, 3), np.float32)})):
             with self.subTest(text):
                 self.refuse(text, **changed)
+
+    def test_of_values_in_a_later_call_where_they_are_checked_while_they_are_copied(self):
+        for sh in (None, 9):
+            arrays = splats(count=3000, seed=5, sh=sh)
+            image = darb.rasterize(**arrays, **camera())[0]
+            for name, wrong in (("means", np.nan), ("quats", np.inf), ("scales", -1e-9),
+                                ("scales", np.nan), ("opacities", 1.0001), ("opacities", -1e-9),
+                                ("sh" if sh else "colors", -np.inf),
+                                ("sh" if sh else "colors", np.nan)):
+                for at in (0, 128, 2999):
+                    values = arrays[name].copy()
+                    values.reshape(3000, -1)[at, -1] = wrong
+                    with self.subTest(name, wrong=wrong, at=at):
+                        with self.assertRaisesRegex(darb.Error, rf"{name}: is \S+ at \[{at}\b"):
+                            darb.rasterize(**{**arrays, name: values}, **camera())
+            np.testing.assert_array_equal(darb.rasterize(**arrays, **camera())[0], image)
 
     def test_of_cameras_and_settings(self):
         view, K = camera()["viewmats"], camera()["Ks"]

@@ -65,6 +65,32 @@ class Examples(unittest.TestCase):
                     if isinstance(part, ast.FunctionDef):
                         self.documented(node.name, part.name)
 
+    def test_what_is_there_is_in_the_stubs(self):
+        import ast
+        folder = pathlib.Path(darb.__file__).parent
+        tree = ast.parse((folder / "__init__.pyi").read_text())
+        for node in tree.body:
+            if not isinstance(node, ast.ClassDef) or node.name in ("Error", "Info"):
+                continue
+            named = {part.name for part in node.body if isinstance(part, ast.FunctionDef)}
+            named |= {part.target.id for part in node.body if isinstance(part, ast.AnnAssign)}
+            there = {name for name in dir(getattr(darb, node.name)) if not name.startswith("_")}
+            self.assertEqual(there - named, set(), node.name)
+
+    def test_the_stub_of_torch_has_its_signature(self):
+        import ast
+        folder = pathlib.Path(darb.__file__).parent
+
+        def arguments(name):
+            for node in ast.parse((folder / name).read_text()).body:
+                if isinstance(node, ast.FunctionDef) and node.name == "rasterize":
+                    return [a.arg for a in node.args.args + node.args.kwonlyargs]
+            return None
+
+        self.assertEqual(arguments("torch.pyi"), arguments("torch.py"))
+        inputs = set(arguments("__init__.pyi"))
+        self.assertEqual(inputs, set(arguments("torch.pyi")))
+
     def documented(self, kind, name):
         member = getattr(getattr(darb, kind), name, None)
         self.assertIsNotNone(member, f"{kind}.{name}")

@@ -110,7 +110,7 @@ def random_call(rng):
         {}, {}, {"kernel": rng.choice(darb.kernel_names())}, {"footprint": "exact"},
         {"background": [0.1, 0.2, 0.3]}, {"antialiased": True}, {"near": 1e-3},
         {"accuracy": rng.choice(("fast", "exact", "balanced"))}, {"sh_degree": rng.randrange(4)},
-        {"depth": True})))
+        {"depth": True}, {"kernel": "beta", "shapes": support.shapes(count)})))
     return arguments
 
 
@@ -150,12 +150,15 @@ def scene(rng, world):
         one = darb.Scene.from_arrays(**spoil(rng, support.splats(rng.choice((0, 3, 9)), 3, 4)))
         world["scenes"][rng.randrange(len(world["scenes"]))] = one
     elif what == 1:
-        name = rng.choice(("means", "log_scales", "quats", "opacity_logits", "sh_dc", "sh_rest"))
+        name = rng.choice(("means", "log_scales", "quats", "opacity_logits", "sh_dc", "sh_rest",
+                           "shapes"))
         value = getattr(one, name)
+        if value is None:
+            value = support.shapes(len(one))
         setattr(one, name, odd_array(rng, value) if rng.random() < 0.8 else odd_objects(rng))
     elif what == 2:
         setattr(one, rng.choice(("kernel", "footprint", "antialiased")), rng.choice(
-            ("gaussian", "sinc", "exact", "psi", True, False, odd_objects(rng))))
+            ("gaussian", "sinc", "beta", "exact", "psi", True, False, odd_objects(rng))))
     elif what == 3:
         pictures = support.camera(1, 20, 20)
         return one.render(**spoil(rng, pictures))

@@ -51,6 +51,11 @@ def splats(count=24, seed=1, sh=None):
     return {name: value.astype(np.float32) for name, value in arrays.items()}
 
 
+def shapes(count=24, seed=6):
+    """[N] of the kernel beta: exponents from about 1.5 to 11."""
+    return np.random.default_rng(seed).uniform(-1, 1, count).astype(np.float32)
+
+
 def weights(pictures, seed=2):
     """Random dL/d(image) [C, H, W, 3] and dL/d(alpha) [C, H, W] for a loss of one's own."""
     rng = np.random.default_rng(seed)

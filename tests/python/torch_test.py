@@ -40,8 +40,8 @@ class Autograd(unittest.TestCase):
                 self.assertEqual(tensor.grad.shape, tensor.shape, name)
                 wanted = (want["backgrounds"].sum(0) if name == "background" else want[name])
                 self.assertLess(relative(tensor.grad.numpy(), wanted), 1e-6, name)
-            names = dict.fromkeys(("colors", "sh", "kernel", "footprint", "sh_degree",
-                                   "antialiased"))
+            names = dict.fromkeys(("colors", "sh", "shapes", "kernel", "footprint",
+                                   "sh_degree", "antialiased"))
             truth, _, d_true = darb._darb.reference(
                 {**names, "near": 0.2, "accuracy": "balanced", "depth": False, **arrays,
                  **pictures, "background": np.float32([0.2, 0.5, 0.7])}, d_image, d_alpha)
@@ -52,8 +52,15 @@ class Autograd(unittest.TestCase):
 
     def test_central_differences_of_every_input(self):
         # A splat that grows crosses the cut-off of alphas, which is lower in "exact".
-        pictures, arrays = {**camera(), "accuracy": "exact"}, splats(count=10)
+        for kernel in ("gaussian", "beta"):
+            with self.subTest(kernel):
+                self.central_differences(kernel)
+
+    def central_differences(self, kernel):
+        pictures, arrays = {**camera(), "accuracy": "exact", "kernel": kernel}, splats(count=10)
         arrays["background"] = np.float32([0.3, 0.1, 0.6])
+        if kernel == "beta":
+            arrays["shapes"] = support.shapes(10)
         weight = torch.from_numpy(weights(pictures)[0])
         given = tensors(arrays)
         image, _, _ = darb.torch.rasterize(**given, **pictures)

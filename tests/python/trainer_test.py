@@ -68,6 +68,39 @@ class Training(unittest.TestCase):
         resumed.step(100)
         self.assertEqual(self.bytes_of(resumed), want)
 
+    @unittest.skipUnless(os.path.exists(support.COMMAND), "the command is not built")
+    def test_a_batch_has_the_bytes_of_darb_train(self):
+        options = {**OPTIONS, "batch": 4, "iterations": 12}
+        subprocess.run([support.COMMAND, "train", str(SCENE), "-o", str(self.path / "run"), "-q",
+                        "--no-report", "--kernel=beta", *words(options)], check=True,
+                       capture_output=True)
+        want = (self.path / "run/point_cloud/iteration_12/point_cloud.ply").read_bytes()
+        trainer = darb.Trainer(SCENE, **options, kernel="beta")
+        self.assertEqual(trainer.step(5)["iteration"], 8)  # iterations count views
+        trainer.checkpoint(self.path / "eight.darb")
+        self.assertTrue(trainer.step(4)["done"])
+        self.assertEqual(self.bytes_of(trainer), want)
+        self.assertGreater(float(np.abs(trainer.scene().shapes).max()), 0)
+        resumed = darb.Trainer(SCENE, **options, kernel="beta",
+                               start_checkpoint=self.path / "eight.darb")
+        resumed.step(4)
+        self.assertEqual(self.bytes_of(resumed), want)
+        single = darb.Trainer(SCENE, **{**options, "batch": 1}, kernel="beta")
+        single.step(12)
+        self.assertNotEqual(self.bytes_of(single), want)
+
+    def test_a_loss_of_ones_own_sees_each_view_of_a_batch(self):
+        trainer = self.trained(batch=2, iterations=6)
+        seen = []
+
+        def loss(image, view):
+            seen.append((view["iteration"], view["name"]))
+            return np.zeros_like(image)
+
+        trainer.step(3, loss=loss)
+        self.assertEqual([i for i, _ in seen], [1, 2, 3, 4])
+        self.assertEqual(len({name for _, name in seen}), 4)
+
     def test_a_loss_of_ones_own_takes_the_place_of_the_built_in_one(self):
         data = darb.Dataset.read(SCENE, resolution=32)
         options = {name: value for name, value in OPTIONS.items() if name != "resolution"}
@@ -123,7 +156,7 @@ class Training(unittest.TestCase):
     def test_mistakes_are_errors_of_the_command(self):
         for text, options in (("--kernel foo: no such kernel", {"kernel": "foo"}),
                               ("--iterations", {"iterations": -5}),
-                              ("not expected: --shape-lr", {"shape_lr": 1}),
+                              ("not expected: --no-such", {"no_such": 1}),
                               ("output: is an option of the command alone", {"output": "x"}),
                               ("strategy", {"strategy": "none"}),
                               ("noise.lr.*means nothing", {"noise_lr": 3.0}),
@@ -177,6 +210,13 @@ class Studies(unittest.TestCase):
                             primitives=[1, 2], seeds=2, steps=200, samples=64)
         self.assertEqual([r["primitives"] for r in result["rows"]], [1, 2, 1, 2])
         self.assertLess(result["rows"][0]["loss"]["median"], 0.05)
+        own = darb.Kernel(lambda q: (1 - q / 9) ** 2, support=9, name="own_of_sim1d")
+        rows = darb.sim1d(signals="parabolic", kernels=[own, "beta", "generalised_exponential"],
+                          primitives=1, seeds=2, steps=400, samples=64)["rows"]
+        self.assertEqual([r["kernel"] for r in rows],
+                         ["own_of_sim1d", "beta", "generalised_exponential"])
+        self.assertEqual(len({r["loss"]["median"] for r in rows}), 3)
+        self.assertLess(max(r["loss"]["median"] for r in rows), 0.1)
         with self.assertRaisesRegex(darb.Error, "seeds: is 0"):
             darb.sim1d(seeds=0)
 

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include "engine/core/on_threads.h"
 
@@ -68,12 +71,21 @@ void check_shape(const py::array& array, const char* name,
 }
 
 // Of a fixed length, and without a way out, so that compilers take several at once.
-constexpr std::size_t kBlock = 1024, kFloatsOfPiece = 256 * kBlock;
+constexpr std::size_t kBlock = 128, kFloatsOfPiece = 2048 * kBlock;
 bool block_is_within(const float* values, float least, float most) {
     int inside = 1;
     for (std::size_t i = 0; i < kBlock; ++i)
         inside &= int(values[i] >= least) & int(values[i] <= most);
     return inside != 0;
+}
+
+// The exponent of what is infinite or no number is all ones, and one more reaches the sign.
+bool block_is_finite(const float* values) {
+    constexpr std::uint32_t kExponent = 0x7f800000, kOne = 0x00800000, kSign = 0x80000000;
+    std::uint32_t all = 0;
+    for (std::size_t i = 0; i < kBlock; ++i)
+        all |= (std::bit_cast<std::uint32_t>(values[i]) & kExponent) + kOne;
+    return (all & kSign) == 0;
 }
 
 void check_layout(const py::array& array, const char* name) {
@@ -159,9 +171,14 @@ std::vector<double> take_doubles(const py::object& value, const char* name,
 }
 
 bool are_within(std::span<const float> values, float least, float most) {
+    constexpr float kMost = std::numeric_limits<float>::max();
+    const bool any_number = least == -kMost && most == kMost;
     std::size_t i = 0;
-    for (; i + kBlock <= values.size(); i += kBlock)
-        if (!block_is_within(values.data() + i, least, most)) return false;
+    for (; i + kBlock <= values.size(); i += kBlock) {
+        const float* const block = values.data() + i;
+        if (!(any_number ? block_is_finite(block) : block_is_within(block, least, most)))
+            return false;
+    }
     return std::all_of(values.begin() + static_cast<std::ptrdiff_t>(i), values.end(),
                        [&](float v) { return v >= least && v <= most; });
 }

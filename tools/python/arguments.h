@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,7 +28,9 @@ struct Floats {
     const float* data = nullptr;
     std::vector<py::ssize_t> shape;
 
-    std::size_t size() const { return static_cast<std::size_t>(holder.size()); }
+    std::size_t size() const {
+        return data == nullptr ? 0 : static_cast<std::size_t>(holder.size());
+    }
     std::span<const float> values() const { return {data, size()}; }
     std::vector<float> copy() const { return {data, data + size()}; }
 };
@@ -73,6 +76,20 @@ py::array_t<T> to_array(const std::vector<T>& values, std::vector<py::ssize_t> s
     DARB_CHECK(static_cast<std::size_t>(array.size()) == values.size(), "{} values for {}",
                values.size(), array.size());
     std::copy(values.begin(), values.end(), array.mutable_data());
+    return array;
+}
+
+/// The same without a copy: the array owns the values.
+template <class T>
+py::array_t<T> into_array(std::vector<T> values, std::vector<py::ssize_t> shape) {
+    auto owned = std::make_unique<std::vector<T>>(std::move(values));
+    T* const data = owned->data();
+    const py::capsule owner(owned.get(),
+                            [](void* held) { delete static_cast<std::vector<T>*>(held); });
+    const std::size_t size = owned.release()->size();
+    py::array_t<T> array(std::move(shape), data, owner);
+    DARB_CHECK(static_cast<std::size_t>(array.size()) == size, "{} values for {}", size,
+               array.size());
     return array;
 }
 

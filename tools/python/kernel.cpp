@@ -20,9 +20,16 @@ struct PyKernel {
     const KernelDefinition& definition() const { return *kernel_definition(id); }
 };
 
+// Beta is no row of the list, as its shape is of each splat.
+std::vector<int> named_kernels() {
+    std::vector<int> kernels = known_kernels();
+    kernels.insert(kernels.begin() + KERNEL_COUNT, KERNEL_BETA);
+    return kernels;
+}
+
 std::string names() {
     std::string text;
-    for (const int k : known_kernels())
+    for (const int k : named_kernels())
         text += fmt::format("{}{}", text.empty() ? "" : ", ", kernel_name(k));
     return text;
 }
@@ -98,7 +105,7 @@ void bind_kernel(py::module_& module) {
         });
     module.def("kernel_names", [] {
         py::list list;
-        for (const int k : known_kernels()) list.append(std::string(kernel_name(k)));
+        for (const int k : named_kernels()) list.append(std::string(kernel_name(k)));
         return list;
     });
 }

@@ -5,8 +5,10 @@
 #include <chrono>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "engine/kernels/kernel_family.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/frame_limit.h"
 #include "tools/python/cameras.h"
 #include "tools/python/kernel.h"
@@ -43,20 +45,9 @@ void put(KeptRenderer& kept, const SplatArraysGiven& given) {
     GradientRenderer& renderer = kept.renderer;
     if (!renderer.holds(given.count(), given.header.sh_degree))
         return renderer.replace(given.model());
-    renderer.set_values(ATTRIBUTE_POSITION, given.means.values());
-    renderer.set_values(ATTRIBUTE_ROTATION, given.quats.values());
-    renderer.set_values(ATTRIBUTE_LOG_SCALE, given.scales.values());
-    renderer.set_values(ATTRIBUTE_OPACITY_LOGIT, given.opacities.values());
-    if (given.direct_colour) {
-        given.check_colours();
-        return renderer.set_values(ATTRIBUTE_SH_DC, given.colours.values());
-    }
-    const auto finite = [](std::span<const float> values) {
-        return are_within(values, -kMostFloat, kMostFloat);
-    };
-    if (renderer.set_harmonics(given.colours.values(), finite)) return;
-    given.check_colours();
-    throw Error("sh", "changed while it was read", "Do not write to it during a call.");
+    if (renderer.set_values(given.values(), SplatArraysGiven::accepts)) return;
+    given.check_values();
+    throw Error("splats", "changed while they were read", "Do not write to them during a call.");
 }
 
 // The renderer with the splats that a call is of, on the device. drawn: the number of a picture of
@@ -66,7 +57,10 @@ KeptRenderer& ready(PyDevice& device, const RendererKey& key, const SplatArraysG
     if (scene != nullptr) return scene->renderer(key);
     KeptRenderer* const kept = device.renderers().find(key);
     if (kept == nullptr) return device.renderers().make(device.device(), key, given->model());
-    if (drawn != 0 && kept->picture == drawn) return *kept;
+    if (drawn != 0 && kept->picture == drawn) {
+        given->check_values();
+        return *kept;
+    }
     kept->picture = 0;
     put(*kept, *given);
     return *kept;
@@ -75,8 +69,8 @@ KeptRenderer& ready(PyDevice& device, const RendererKey& key, const SplatArraysG
 PyScene* scene_of(const std::shared_ptr<PyDevice>& device, const py::dict& options) {
     const py::object first = options["means"];
     if (!py::isinstance<PyScene>(first)) return nullptr;
-    for (const char* other :
-         {"quats", "scales", "opacities", "colors", "sh", "kernel", "footprint", "antialiased"})
+    for (const char* other : {"quats", "scales", "opacities", "colors", "sh", "shapes", "kernel",
+                              "footprint", "antialiased"})
         if (!options[other].is_none())
             throw Error(other, "is given beside a Scene, which has its own",
                         "Leave it out, or change the Scene.");
@@ -85,11 +79,27 @@ PyScene* scene_of(const std::shared_ptr<PyDevice>& device, const py::dict& optio
     return scene;
 }
 
-py::array image_array(const Pictures& p, std::size_t channels) {
-    std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(p.cameras.size()), p.height(),
-                                   p.width()};
-    if (channels > 1) shape.push_back(static_cast<py::ssize_t>(channels));
-    return py::array_t<float>(shape);
+// Of all cameras one after the other; of a single one without a copy.
+py::array image_array(std::vector<ImageF> images, bool with_channels) {
+    const ImageF& first = images.front();
+    std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(images.size()), first.height,
+                                   first.width};
+    if (with_channels) shape.push_back(first.channels);
+    if (images.size() == 1) return into_array(std::move(images.front().data), std::move(shape));
+    py::array_t<float> array(std::move(shape));
+    float* to = array.mutable_data();
+    for (ImageF& one : images) {
+        const ImageF image = std::exchange(one, {});
+        to = std::copy(image.data.begin(), image.data.end(), to);
+    }
+    return array;
+}
+
+// Of [H][W][2] the first.
+ImageF depth_alone(const ImageF& both) {
+    ImageF depth(both.width, both.height, 1);
+    for (std::size_t i = 0; i < depth.data.size(); ++i) depth.data[i] = both.data[2 * i];
+    return depth;
 }
 
 ImageF one_image(const Floats& all, std::size_t camera, const Pictures& p, int channels) {
@@ -175,7 +185,7 @@ std::vector<float> narrowed(const std::vector<double>& values) {
     return {values.begin(), values.end()};
 }
 
-py::dict gradients_dict(const Sums& sums, int sh_degree, const Pictures& pictures,
+py::dict gradients_dict(const Sums& sums, int kernel, int sh_degree, const Pictures& pictures,
                         const SplatArraysGiven* given) {
     const auto n = static_cast<py::ssize_t>(sums.mean_ndc.size());
     const auto c = static_cast<py::ssize_t>(pictures.cameras.size());
@@ -190,6 +200,7 @@ py::dict gradients_dict(const Sums& sums, int sh_degree, const Pictures& picture
         d["colors"] = to_array(sums.d.sh_dc, {n, 3});
     else
         d["sh"] = to_array(harmonics(sums.d, sh_degree), {n, bands, 3});
+    if (kernel_has_shape(kernel)) d["shapes"] = to_array(sums.d.shape, {n});
     d["backgrounds"] = to_array(narrowed(sums.backgrounds), {c, 3});
     if (!sums.viewmats.empty()) {
         d["viewmats"] = to_array(narrowed(sums.viewmats), {c, 4, 4});
@@ -219,12 +230,13 @@ py::dict rasterize_backward(const std::shared_ptr<PyDevice>& device, const py::d
     const bool camera = take_flag(with_camera, "camera");
     Sums sums;
     const SplatArraysGiven* const arrays = given ? &*given : nullptr;
-    int sh_degree = 0;
+    int sh_degree = 0, kernel = 0;
     {
         const py::gil_scoped_release free;
         const auto lock = device->lock();
         const SplatModel& header = scene != nullptr ? scene->model() : given->header;
         sh_degree = header.sh_degree;
+        kernel = header.kernel;
         KeptRenderer& kept =
             ready(*device, key_of(header, pictures, arrays, camera), arrays, scene, drawn);
         const bool there = scene == nullptr && drawn != 0 && kept.picture == drawn && count == 1;
@@ -238,7 +250,7 @@ py::dict rasterize_backward(const std::shared_ptr<PyDevice>& device, const py::d
                                of_alpha ? one_image(*of_alpha, c, pictures, 1) : ImageF()));
         }
     }
-    return gradients_dict(sums, sh_degree, pictures, arrays);
+    return gradients_dict(sums, kernel, sh_degree, pictures, arrays);
 }
 
 }  // namespace
@@ -261,12 +273,7 @@ Pictures take_pictures(const py::dict& options) {
 }
 
 py::tuple draw(PyDevice& device, KeptRenderer& kept, const Pictures& pictures) {
-    py::array image = image_array(pictures, 3), alpha = image_array(pictures, 1), depth;
-    if (pictures.depth) depth = image_array(pictures, 1);
-    auto* const rgb = static_cast<float*>(image.mutable_data());
-    auto* const opacity = static_cast<float*>(alpha.mutable_data());
-    auto* const z = pictures.depth ? static_cast<float*>(depth.mutable_data()) : nullptr;
-    const std::size_t pixels = std::size_t(pictures.width()) * std::size_t(pictures.height());
+    std::vector<ImageF> images, alphas, depths;
     std::vector<std::uint32_t> visible, intersections;
     double device_ms = 0, frame_ms = 0;
     const std::uint64_t number = device.next_picture();
@@ -278,21 +285,19 @@ py::tuple draw(PyDevice& device, KeptRenderer& kept, const Pictures& pictures) {
             if (c > 0) check_signals();
             kept.picture = 0;
             const auto begin = std::chrono::steady_clock::now();
-            const ImageF& one = renderer.render(pictures.cameras[c], pictures.backgrounds[c]);
+            renderer.render(pictures.cameras[c], pictures.backgrounds[c]);
             frame_ms +=
                 std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
                     .count();
-            std::copy(one.data.begin(), one.data.end(), rgb + 3 * pixels * c);
-            const ImageF& a = renderer.alpha();
-            std::copy(a.data.begin(), a.data.end(), opacity + pixels * c);
+            images.push_back(renderer.release_image());
+            alphas.push_back(renderer.release_alpha());
             visible.push_back(renderer.status().visible);
             intersections.push_back(renderer.status().intersections);
             for (const PassTime& pass : renderer.pass_times()) device_ms += pass.ms;
-            kept.picture = number;
-            if (z == nullptr) continue;
-            kept.picture = 0;
-            const ImageF d = renderer.depth();
-            for (std::size_t i = 0; i < pixels; ++i) z[pixels * c + i] = d.data[2 * i];
+            if (pictures.depth)
+                depths.push_back(depth_alone(renderer.depth()));
+            else
+                kept.picture = number;
         }
     }
     const auto count = static_cast<py::ssize_t>(pictures.cameras.size());
@@ -302,8 +307,9 @@ py::tuple draw(PyDevice& device, KeptRenderer& kept, const Pictures& pictures) {
     info["device_ms"] = device_ms;
     info["frame_ms"] = frame_ms;
     info["picture"] = number;
-    if (pictures.depth) info["depth"] = depth;
-    return py::make_tuple(image, alpha, info);
+    if (pictures.depth) info["depth"] = image_array(std::move(depths), false);
+    return py::make_tuple(image_array(std::move(images), true),
+                          image_array(std::move(alphas), false), info);
 }
 
 void bind_rasterize(py::module_& module) {

@@ -92,6 +92,7 @@ py::tuple reference_pictures(const py::dict& options, const py::object& d_image,
     d["scales"] = to_array(sum.log_scale, {n, 3});
     d["opacities"] = to_array(attribute_values(sum, ATTRIBUTE_OPACITY_LOGIT), {n});
     d[given.direct_colour ? "colors" : "sh_dc"] = to_array(sum.sh_dc, {n, 3});
+    if (!sum.shape.empty()) d["shapes"] = to_array(sum.shape, {n});
     d["backgrounds"] = to_array(backgrounds, {count, 3});
     return py::make_tuple(to_array(image, {count, h, w, 3}), to_array(alpha, {count, h, w}), d);
 }

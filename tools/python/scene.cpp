@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/kernels/kernel_family.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/splat_shapes.h"
 #include "tools/python/kernel.h"
@@ -90,19 +91,26 @@ void bind_attribute(py::class_<PyScene>& scene, const char* name, const char* do
     const auto shape = [](const SplatModel& model) {
         const auto n = static_cast<py::ssize_t>(model.size());
         const auto floats = static_cast<py::ssize_t>(model.floats(Attribute));
-        if constexpr (Attribute == ATTRIBUTE_OPACITY_LOGIT) return std::vector<py::ssize_t>{n};
+        if constexpr (Attribute == kOpacityLogit || Attribute == kShape)
+            return std::vector<py::ssize_t>{n};
         if constexpr (Attribute == ATTRIBUTE_SH_REST)
             return std::vector<py::ssize_t>{n, floats / 3, 3};
         return std::vector<py::ssize_t>{n, floats};
     };
     scene.def_property(
         name,
-        [shape](const py::object& self) {
+        [shape](const py::object& self) -> py::object {
             const SplatModel& model = scene_in(self).model();
+            if (!kernel_takes(model.kernel, Attribute)) return py::none();
             return view_of(self, attribute_values(model, Attribute), shape(model));
         },
         [shape, name](PyScene& self, const py::object& value) {
             const std::vector<py::ssize_t> wanted = shape(self.model());
+            if (!kernel_takes(self.model().kernel, Attribute))
+                throw Error(
+                    name,
+                    fmt::format("has no place in the kernel {}", kernel_name(self.model().kernel)),
+                    "Assign kernel = \"beta\" first.");
             const Floats floats = wanted.size() == 1 ? take_floats(value, name, {wanted[0]})
                                   : wanted.size() == 2
                                       ? take_floats(value, name, {wanted[0], wanted[1]})
@@ -140,7 +148,11 @@ PyScene scene_of_arrays(const py::dict& options) {
         model.opacity_logit.push_back(static_cast<float>(std::log(o / (1 - o))));
     }
     split_harmonics(sh, model.sh_dc, model.sh_rest);
-    set_kernel(model, take_kernel(options["kernel"], "kernel"));
+    const int kernel = take_kernel(options["kernel"], "kernel");
+    const Floats shapes = take_shapes(options["shapes"], kernel, n);
+    check_values(shapes, "shapes", -most, most, "Check what it was computed from.");
+    model.shape = shapes.copy();
+    set_kernel(model, kernel);
     model.footprint = take_footprint(options["footprint"]);
     model.antialias = take_flag(options["antialiased"], "antialiased");
     PyScene scene(std::move(model));
@@ -217,6 +229,9 @@ void bind_scene(py::module_& module) {
                                     "[N, 3] float32: colour = 0.5 + 0.2821 sh_dc + other bands.");
     bind_attribute<ATTRIBUTE_SH_REST>(scene, "sh_rest",
                                       "[N, K - 1, 3] float32, the bands above the first.");
+    bind_attribute<ATTRIBUTE_SHAPE>(scene, "shapes",
+                                    "[N] float32, ln(b / 4) of the kernel beta, (1 - q/13)^b; None "
+                                    "with another kernel, and 0 from where one takes beta.");
 }
 
 }  // namespace darb::python

@@ -28,7 +28,8 @@ class PyScene {
   private:
     void change(const std::function<void()>& change);
 
-    SplatModel model_;  // its arrays never move: numpy looks at them
+    // Its arrays never move, as numpy looks at them: that of shapes grows once, from none.
+    SplatModel model_;
     Renderers renderers_;
     std::shared_ptr<PyDevice> device_;  // of the renderers
     std::uint64_t changes_ = 1;

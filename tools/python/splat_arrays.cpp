@@ -38,22 +38,75 @@ void split_harmonics(const Floats& sh, std::vector<float>& first, std::vector<fl
     }
 }
 
-void SplatArraysGiven::check_colours() const {
-    check_values(colours, direct_colour ? "colors" : "sh", -kMost, kMost, kFinite);
+namespace {
+
+struct Range {
+    float least, most;
+    const char* hint;
+};
+
+Range range_of(int attribute) {
+    if (attribute == kLogScale)
+        return {0, kMost, "Scales are standard deviations, not logarithms."};
+    if (attribute == kOpacityLogit) return {0, 1, "Opacities are from 0 to 1, not logits."};
+    return {-kMost, kMost, kFinite};
+}
+
+}  // namespace
+
+bool SplatArraysGiven::accepts(int attribute, std::span<const float> values) {
+    const Range range = range_of(attribute);
+    return are_within(values, range.least, range.most);
+}
+
+void SplatArraysGiven::check_values() const {
+    const auto check = [](int attribute, const Floats& values, const char* name) {
+        const Range range = range_of(attribute);
+        python::check_values(values, name, range.least, range.most, range.hint);
+    };
+    check(kPosition, means, "means");
+    check(kRotation, quats, "quats");
+    check(kLogScale, scales, "scales");
+    check(kOpacityLogit, opacities, "opacities");
+    check(kShDc, colours, direct_colour ? "colors" : "sh");
+    check(kShape, shapes, "shapes");
+}
+
+GivenValues SplatArraysGiven::values() const {
+    GivenValues all;
+    all.attributes[kPosition] = means.values();
+    all.attributes[kRotation] = quats.values();
+    all.attributes[kLogScale] = scales.values();
+    all.attributes[kOpacityLogit] = opacities.values();
+    all.attributes[kShape] = shapes.values();
+    (direct_colour ? all.attributes[kShDc] : all.harmonics) = colours.values();
+    return all;
 }
 
 SplatModel SplatArraysGiven::model() const {
-    check_colours();
+    check_values();
     SplatModel model = header;
     model.position = means.copy();
     model.rotation = quats.copy();
     model.log_scale = scales.copy();
-    attribute_values(model, ATTRIBUTE_OPACITY_LOGIT) = opacities.copy();
+    attribute_values(model, kOpacityLogit) = opacities.copy();
+    attribute_values(model, kShape) = shapes.copy();
     if (direct_colour)
         model.sh_dc = colours.copy();
     else
         split_harmonics(colours, model.sh_dc, model.sh_rest);
     return model;
+}
+
+Floats take_shapes(const py::object& value, int kernel, py::ssize_t count) {
+    if (kernel_has_shape(kernel)) {
+        if (!value.is_none()) return take_floats(value, "shapes", {count});
+        const std::vector<float> start(static_cast<std::size_t>(count));
+        return take_floats(to_array(start, {count}), "shapes", {count});
+    }
+    if (value.is_none()) return {};
+    throw Error("shapes", fmt::format("are given to the kernel {}", kernel_name(kernel)),
+                "Leave them out: only the kernel beta takes a shape of each splat.");
 }
 
 SplatArraysGiven take_splats(const py::dict& options) {
@@ -71,10 +124,7 @@ SplatArraysGiven take_splats(const py::dict& options) {
     given.colours = given.direct_colour ? take_floats(options["colors"], "colors", {n, 3})
                                         : take_floats(options["sh"], "sh", {n, kAny, 3});
     if (!options["kernel"].is_none()) header.kernel = take_kernel(options["kernel"], "kernel");
-    if (kernel_has_shape(header.kernel))
-        throw Error(fmt::format("kernel {}", kernel_name(header.kernel)),
-                    "takes a shape of each splat, which this call has no place for",
-                    "Load or train a scene of it: darb.Scene, darb.Trainer.");
+    given.shapes = take_shapes(options["shapes"], header.kernel, n);
     if (!options["footprint"].is_none()) header.footprint = take_footprint(options["footprint"]);
     if (!options["antialiased"].is_none())
         header.antialias = take_flag(options["antialiased"], "antialiased");
@@ -82,11 +132,6 @@ SplatArraysGiven take_splats(const py::dict& options) {
         throw Error("footprint exact",
                     fmt::format("is not there for the kernel {}", kernel_name(header.kernel)),
                     "Use psi, or a kernel of one pulse.");
-    check_values(given.means, "means", -kMost, kMost, kFinite);
-    check_values(given.quats, "quats", -kMost, kMost, kFinite);
-    check_values(given.scales, "scales", 0, kMost,
-                 "Scales are standard deviations, not logarithms.");
-    check_values(given.opacities, "opacities", 0, 1, "Opacities are from 0 to 1, not logits.");
     if (!given.direct_colour) header.sh_degree = degree_of_coefficients(given.colours.shape[1]);
     return given;
 }

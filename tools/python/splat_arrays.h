@@ -1,6 +1,7 @@
 // The splats of a call, given as arrays.
 #pragma once
 
+#include "engine/render/render_gradients.h"
 #include "engine/scene/splat_model.h"
 #include "tools/python/arguments.h"
 
@@ -11,21 +12,29 @@ namespace darb::python {
 struct SplatArraysGiven {
     SplatModel header;  // of no splats
     Floats means, quats, scales, opacities, colours;
+    Floats shapes;               // of a kernel that takes them; else none
     bool direct_colour = false;  // colours is `colors`, not `sh`
 
     std::size_t count() const { return opacities.size(); }
-    /// Of colours, the largest array, which take_splats leaves to whoever takes it to the device.
-    void check_colours() const;
-    /// A copy with all; sh_dc holds `colors` where these are given.
+    /// Throws Error with the place of the first number that is none or out of its range, which
+    /// take_splats leaves to whoever reads the arrays anyway.
+    void check_values() const;
+    /// Whether values of the attribute, kShDc for colours, have none of these. Needs no GIL.
+    static bool accepts(int attribute, std::span<const float> values);
+    GivenValues values() const;
+    /// A copy with all, checked; sh_dc holds `colors` where these are given.
     SplatModel model() const;
 };
 
 /// Of 1, 4, 9 or 16 coefficients; Error for others.
 int degree_of_coefficients(py::ssize_t coefficients);
+/// [N] of a kernel with shapes: zeros, at which training starts, where it is None. Throws Error
+/// where the kernel takes none.
+Floats take_shapes(const py::object& value, int kernel, py::ssize_t count);
 /// sh [N,K,3] into the first band [N,3] and the others [N,K-1,3].
 void split_harmonics(const Floats& sh, std::vector<float>& first, std::vector<float>& others);
 
-/// options: means, quats, scales, opacities, colors or sh, kernel, footprint, antialiased.
+/// options: means, quats, scales, opacities, colors or sh, shapes, kernel, footprint, antialiased.
 SplatArraysGiven take_splats(const py::dict& options);
 
 }  // namespace darb::python

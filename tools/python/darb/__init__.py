@@ -66,20 +66,21 @@ def _close():
     _devices.clear()
 
 
-def _options(means, quats, scales, opacities, colors, sh, viewmats, Ks, width, height, kernel,
-             footprint, background, sh_degree, antialiased, near, accuracy, depth):
+def _options(means, quats, scales, opacities, colors, sh, shapes, viewmats, Ks, width, height,
+             kernel, footprint, background, sh_degree, antialiased, near, accuracy, depth):
     return {
         "means": means, "quats": quats, "scales": scales, "opacities": opacities,
-        "colors": colors, "sh": sh, "viewmats": viewmats, "Ks": Ks, "width": width,
-        "height": height, "kernel": kernel, "footprint": footprint, "background": background,
-        "sh_degree": sh_degree, "antialiased": antialiased, "near": near, "accuracy": accuracy,
-        "depth": depth,
+        "colors": colors, "sh": sh, "shapes": shapes, "viewmats": viewmats, "Ks": Ks,
+        "width": width, "height": height, "kernel": kernel, "footprint": footprint,
+        "background": background, "sh_degree": sh_degree, "antialiased": antialiased, "near": near,
+        "accuracy": accuracy, "depth": depth,
     }
 
 
-def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh=None, viewmats,
-              Ks, width, height, kernel=None, footprint=None, background=None, sh_degree=None,
-              antialiased=None, near=0.2, accuracy="balanced", depth=False, device=""):
+def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh=None, shapes=None,
+              viewmats, Ks, width, height, kernel=None, footprint=None, background=None,
+              sh_degree=None, antialiased=None, near=0.2, accuracy="balanced", depth=False,
+              device=""):
     """Pictures of splats through C cameras -> (image, alpha, info).
 
     Splats, N of them, float32 in C order:
@@ -91,6 +92,8 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
         colors     [N, 3]  RGB of any sign, as they are: nothing is added and nothing clamped
         sh         [N, K, 3]  harmonics instead, K = 1, 4, 9 or 16, the first band first:
                            colour = max(0, 0.5 + sum over k of sh[k] Y_k(direction)), as 3DGS has it
+        shapes     [N]     of kernel="beta" alone: t of its profile (1 - q/13)^b, b = 4 exp(t); 0
+                           of all by default
     Cameras, float32 or float64:
         viewmats   [C, 4, 4]  world to camera, rigid; x right, y down, z forward
         Ks         [C, 3, 3]  pinholes, px; the centre of the top left pixel is (0.5, 0.5)
@@ -109,20 +112,20 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
     """
     return _darb.rasterize(
         _device(device),
-        _options(means, quats, scales, opacities, colors, sh, viewmats, Ks, width, height, kernel,
-                 footprint, background, sh_degree, antialiased, near, accuracy, depth))
+        _options(means, quats, scales, opacities, colors, sh, shapes, viewmats, Ks, width, height,
+                 kernel, footprint, background, sh_degree, antialiased, near, accuracy, depth))
 
 
 def rasterize_backward(d_image, d_alpha=None, *, means, quats=None, scales=None, opacities=None,
-                       colors=None, sh=None, viewmats, Ks, width, height, kernel=None,
+                       colors=None, sh=None, shapes=None, viewmats, Ks, width, height, kernel=None,
                        footprint=None, background=None, sh_degree=None, antialiased=None, near=0.2,
                        accuracy="balanced", device="", camera=False, picture=0):
     """What a loss of rasterize's pictures says of its inputs: a dict of gradients.
 
     d_image [C, H, W, 3] is dL/d(image), d_alpha [C, H, W] or None dL/d(alpha), float32. The other
-    arguments are those of rasterize. "means", "quats", "scales", "opacities", "colors" or "sh" are
-    of the shapes of the inputs and added over the cameras, "backgrounds" is [C, 3]. A Scene has
-    "log_scales" and "opacity_logits" instead of scales and opacities.
+    arguments are those of rasterize. "means", "quats", "scales", "opacities", "colors" or "sh", and
+    "shapes" of the kernel beta are as large as the inputs and added over the cameras, "backgrounds"
+    is [C, 3]. A Scene has "log_scales" and "opacity_logits" instead of scales and opacities.
 
     With camera "viewmats" [C, 4, 4] and "Ks" [C, 3, 3], too: their numbers are taken freely, as
     gsplat does; of a rotation that counts which is along rotations.
@@ -133,8 +136,8 @@ def rasterize_backward(d_image, d_alpha=None, *, means, quats=None, scales=None,
     """
     return _darb.rasterize_backward(
         _device(device),
-        _options(means, quats, scales, opacities, colors, sh, viewmats, Ks, width, height, kernel,
-                 footprint, background, sh_degree, antialiased, near, accuracy, False),
+        _options(means, quats, scales, opacities, colors, sh, shapes, viewmats, Ks, width, height,
+                 kernel, footprint, background, sh_degree, antialiased, near, accuracy, False),
         d_image, d_alpha, picture, camera)
 
 
@@ -148,7 +151,7 @@ def devices():
 
 
 def kernel_names():
-    """The names of the kernels of the family, as on the command line."""
+    """The names of the kernels, as on the command line, and of those that were made since."""
     return _darb.kernel_names()
 
 
@@ -167,13 +170,13 @@ Scene.__doc__ = """A splat scene in memory.
 
 Attributes are read-only looks at the scene's own float32; assign an array of the same shape to
 change one: means [N, 3], log_scales [N, 3], quats [N, 4] (w x y z), opacity_logits [N], sh_dc
-[N, 3], sh_rest [N, K - 1, 3]. kernel, footprint and antialiased say how it is drawn. The splats
+[N, 3], sh_rest [N, K - 1, 3], shapes [N] (of the kernel beta, else None). kernel, footprint and antialiased say how it is drawn. The splats
 stay on the device between calls until one is assigned. A notebook shows a scene as a picture.
 """
 
 
-def _scene_from_arrays(means, quats, scales, opacities, *, sh, kernel="gaussian", footprint="psi",
-                       antialiased=False):
+def _scene_from_arrays(means, quats, scales, opacities, *, sh, shapes=None, kernel="gaussian",
+                       footprint="psi", antialiased=False):
     """A Scene of arrays as darb.rasterize takes them: scales and opacities themselves.
 
     Opacities are clamped to 1e-6 and 1 - 1e-6, scales to 1e-8 and more, as files hold logits and
@@ -181,7 +184,7 @@ def _scene_from_arrays(means, quats, scales, opacities, *, sh, kernel="gaussian"
     """
     return _scene_of_arrays({
         "means": means, "quats": quats, "scales": scales, "opacities": opacities, "sh": sh,
-        "kernel": kernel, "footprint": footprint, "antialiased": antialiased})
+        "shapes": shapes, "kernel": kernel, "footprint": footprint, "antialiased": antialiased})
 
 
 def _scene_render(self, viewmats, Ks, width, height, **options):
@@ -289,7 +292,8 @@ class Trainer(_darb.Trainer):
     start_checkpoint=path goes on from a checkpoint, of this class or of the command.
 
     step(n=1, loss=None) -> dict: iteration, loss, psnr (dB, of the training view), splats,
-        visible, intersections, done. With loss, dL/dimage = loss(image, view) takes the place of
+        visible, intersections, done. With batch=B iterations count views: whole batches until n
+        of them are done, a loss of your own for each view. With loss, dL/dimage = loss(image, view) takes the place of
         the built-in loss: image [H, W, 3] float32 as it is compared, not clamped; view a dict of
         name, iteration, photo (uint8 [H, W, 4], of the image's size) and background [3].
         "loss" is then still that of the built-in one.
@@ -316,7 +320,7 @@ class Trainer(_darb.Trainer):
 def psi(kernels=None, *, samples=24, cells=64, seed=0):
     """The correction factor psi of kernels three ways: what `darb psi --json` writes, as a dict.
 
-    kernels: names, or None for the family. samples: random covariances of the grid; cells: of it
+    kernels: names or Kernels, or None for the family. samples: random covariances of the grid; cells: of it
     along each axis. ["kernels"][i]["exact"] is the ratio of moments, "grid" the paper's
     experiment, "least_squares" the best scale, "distance_from_projection" how far each is off.
     """
@@ -327,7 +331,7 @@ def sim1d(*, signals=None, kernels=None, primitives=(1, 5, 10), seeds=20, steps=
           samples=1000, lr=0.01):
     """Signals as sums of N kernels, fitted by Adam: what `darb sim1d --json` writes, as a dict.
 
-    signals, kernels: names, or None for all. ["rows"] has one for each signal, kernel and number
+    signals: names, or None for all; kernels: these or Kernels. ["rows"] has one for each signal, kernel and number
     of primitives, with the median loss over the seeds.
     """
     return _darb.sim1d({"signals": signals, "kernels": kernels, "primitives": primitives,

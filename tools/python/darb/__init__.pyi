@@ -61,6 +61,7 @@ class Scene:
     opacity_logits: Floats
     sh_dc: Floats
     sh_rest: Floats
+    shapes: Optional[Floats]
     footprint: str
     antialiased: bool
     @property
@@ -75,7 +76,8 @@ class Scene:
     def read(path: Path) -> Scene: ...
     @staticmethod
     def from_arrays(means: ArrayLike, quats: ArrayLike, scales: ArrayLike, opacities: ArrayLike, *,
-                    sh: ArrayLike, kernel: KernelLike = "gaussian", footprint: str = "psi",
+                    sh: ArrayLike, shapes: Optional[ArrayLike] = None,
+                    kernel: KernelLike = "gaussian", footprint: str = "psi",
                     antialiased: bool = False) -> Scene: ...
     def write(self, path: Path) -> None: ...
     def render(self, viewmats: ArrayLike, Ks: ArrayLike, width: int, height: int, *,
@@ -130,7 +132,8 @@ def write_png(path: Path, image: Union[Floats, Bytes]) -> None: ...
 def rasterize(means: Union[ArrayLike, Scene], quats: Optional[ArrayLike] = None,
               scales: Optional[ArrayLike] = None, opacities: Optional[ArrayLike] = None, *,
               colors: Optional[ArrayLike] = None, sh: Optional[ArrayLike] = None,
-              viewmats: ArrayLike, Ks: ArrayLike, width: int, height: int,
+              shapes: Optional[ArrayLike] = None, viewmats: ArrayLike, Ks: ArrayLike, width: int,
+              height: int,
               kernel: Optional[KernelLike] = None, footprint: Optional[str] = None,
               background: Any = None, sh_degree: Optional[int] = None,
               antialiased: Optional[bool] = None, near: float = 0.2, accuracy: str = "balanced",
@@ -140,7 +143,7 @@ def rasterize_backward(d_image: ArrayLike, d_alpha: Optional[ArrayLike] = None, 
                        means: Union[ArrayLike, Scene], quats: Optional[ArrayLike] = None,
                        scales: Optional[ArrayLike] = None, opacities: Optional[ArrayLike] = None,
                        colors: Optional[ArrayLike] = None, sh: Optional[ArrayLike] = None,
-                       viewmats: ArrayLike, Ks: ArrayLike, width: int, height: int,
+                       shapes: Optional[ArrayLike] = None, viewmats: ArrayLike, Ks: ArrayLike, width: int, height: int,
                        kernel: Optional[KernelLike] = None, footprint: Optional[str] = None,
                        background: Any = None, sh_degree: Optional[int] = None,
                        antialiased: Optional[bool] = None, near: float = 0.2,

@@ -5,8 +5,8 @@
                                               viewmats=viewmats, Ks=Ks, width=640, height=480)
     ((image - target) ** 2).mean().backward()
 
-Gradients reach means, quats, scales, opacities, colors or sh, background, viewmats and Ks, each
-where it asks for one.
+Gradients reach means, quats, scales, opacities, colors or sh, shapes, background, viewmats and Ks,
+each where it asks for one.
 """
 
 import torch as _torch
@@ -15,7 +15,8 @@ import darb as _darb
 
 __all__ = ["rasterize"]
 
-_INPUTS = ("means", "quats", "scales", "opacities", "colors", "sh", "viewmats", "Ks", "background")
+_INPUTS = ("means", "quats", "scales", "opacities", "colors", "sh", "shapes", "viewmats", "Ks",
+           "background")
 
 
 def _array(name, value):
@@ -63,9 +64,10 @@ class _Rasterize(_torch.autograd.Function):
         return (None, *gradients)
 
 
-def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh=None, viewmats,
-              Ks, width, height, kernel=None, footprint=None, background=None, sh_degree=None,
-              antialiased=None, near=0.2, accuracy="balanced", depth=False, device=""):
+def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh=None, shapes=None,
+              viewmats, Ks, width, height, kernel=None, footprint=None, background=None,
+              sh_degree=None, antialiased=None, near=0.2, accuracy="balanced", depth=False,
+              device=""):
     """darb.rasterize of tensors -> (image, alpha, info), image and alpha with gradients.
 
     All arguments, shapes and units are those of darb.rasterize; help(darb.rasterize) has them.
@@ -76,5 +78,5 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
     settings = dict(width=width, height=height, kernel=kernel, footprint=footprint,
                     sh_degree=sh_degree, antialiased=antialiased, near=near, accuracy=accuracy,
                     depth=depth, device=device)
-    return _Rasterize.apply(settings, means, quats, scales, opacities, colors, sh, viewmats, Ks,
-                            background)
+    return _Rasterize.apply(settings, means, quats, scales, opacities, colors, sh, shapes, viewmats,
+                            Ks, background)
