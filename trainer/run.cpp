@@ -304,7 +304,7 @@ void Run::save_what_is_there(bool failed) {
 
 // Of the backward blend, where that holds more intersections.
 std::string Run::other_way() const {
-    if (result_tuning(device_) == "backward=subgroup") return "";
+    if (device_.tuning().backward == BackwardBlend::subgroup) return "";
     return fmt::format(
         ", and so does --tune backward=subgroup, which holds {}, in a run that "
         "starts again",

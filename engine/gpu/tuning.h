@@ -28,13 +28,20 @@ inline constexpr const char* kSortScatters[] = {"ballot", "columns"};
 enum class LossWay { strips, tiles };
 inline constexpr const char* kLossWays[] = {"strips", "tiles"};
 
-/// Each a specialization constant or a shader.
+/// Where training photos lie: where the plan of memory says; on the device; on the host, from where
+/// each is copied for its step. In the order of their names.
+enum class PhotoPlace { automatic, resident, streamed };
+inline constexpr const char* kPhotoPlaces[] = {"auto", "resident", "streamed"};
+
+/// Each a specialization constant or a shader, but for the photos' place.
 struct Tuning {
     bool scan_by_thread = false;  // Scan::Strategy::team_is_thread
     SortScatter scatter = SortScatter::ballot;
     std::uint32_t blend_threads = 0;  // of the forward blend's workgroup, which has a tile
+    std::uint32_t blend_lanes = 0;    // of a subgroup of both blends; 0: the device's own
     BackwardBlend backward = BackwardBlend::subgroup;
     LossWay loss = LossWay::strips;
+    PhotoPlace photos = PhotoPlace::automatic;
     bool operator==(const Tuning&) const = default;
 };
 

@@ -107,6 +107,12 @@ std::filesystem::path file_of(const DeviceInfo& info, const std::filesystem::pat
            fmt::format("tuning-{:016x}.json", fnv1a(kHashStart, std::span<const char>(key)));
 }
 
+std::vector<TuningGroup> measured_groups(const DeviceInfo& info) {
+    std::vector<TuningGroup> groups = tuning_groups(info);
+    std::erase_if(groups, [](const TuningGroup& group) { return group.passes.empty(); });
+    return groups;
+}
+
 // The least of the frames' times for each of several sets of passes.
 std::vector<double> measure(Device& device, const TuningNames& names,
                             const std::vector<TuningGroup>& groups) {
@@ -186,7 +192,7 @@ std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
 
 TuningRecord measure_tuning(Device& device) {
     const Tuning before = device.tuning();
-    const std::vector<TuningGroup> groups = tuning_groups(device.info());
+    const std::vector<TuningGroup> groups = measured_groups(device.info());
     const TuningNames usual_names = tuning_names(usual_tuning(device.info()));
     TuningRecord record;
     const std::vector<double> usual = measure(device, usual_names, groups);
@@ -259,7 +265,10 @@ void tune(Device& device, const TuneRequest& request) {
     };
     TuningNames names = parse_tuning(info, request.forced, "--tune " + request.forced);
     names.merge(parse_tuning(info, request.environment, "DARB_TUNE"));
-    const bool open = names.size() < tuning_groups(info).size();
+    const std::vector<TuningGroup> measured = measured_groups(info);
+    const bool open = !std::all_of(measured.begin(), measured.end(), [&](const TuningGroup& group) {
+        return names.contains(group.name);
+    });
     std::optional<TuningRecord> record;
     if (!request.retune) record = read_tuning(info, device.cache_folder());
     if (request.retune || (open && !record && !is_known_device(info))) {

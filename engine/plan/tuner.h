@@ -24,7 +24,7 @@ struct TuningTime {
 };
 
 struct TuningRecord {
-    TuningNames choice;             // of every group
+    TuningNames choice;             // of every group that is measured
     std::vector<TuningTime> times;  // of all
 };
 

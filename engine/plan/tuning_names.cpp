@@ -38,6 +38,17 @@ std::vector<std::string> blend_shapes(const DeviceInfo& info) {
     return shapes;
 }
 
+// The device's own first. A subgroup's list of a tile is in shared memory. One size is no choice.
+std::vector<std::string> blend_lanes(const DeviceInfo& info) {
+    const std::uint32_t own = clamped_subgroup(info);
+    std::vector<std::string> lanes{std::to_string(own)};
+    const std::uint32_t most = std::min(info.max_subgroup_size, 64u);
+    for (std::uint32_t size = std::max(info.min_subgroup_size, 4u); size <= most; size *= 2)
+        if (size != own && kTilePixels / size * kListBytes <= info.shared_memory_bytes)
+            lanes.push_back(std::to_string(size));
+    return lanes;
+}
+
 std::string known_names(const std::vector<TuningGroup>& groups) {
     std::string text;
     for (const TuningGroup& group : groups)
@@ -76,30 +87,7 @@ Enum named(const char* const (&all)[count], const std::string& name) {
     return static_cast<Enum>(std::find(std::begin(all), std::end(all), name) - std::begin(all));
 }
 
-}  // namespace
-
-bool is_known_device(const DeviceInfo& info) {
-    return info.driver.starts_with("llvmpipe");
-}
-
-std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
-    using Names = std::vector<std::string>;
-    const bool lavapipe = is_known_device(info);
-    return {{"scan",
-             lavapipe ? Names{"thread", "subgroup"} : Names{"subgroup", "thread"},
-             {"compact", "depth sort", "emit", "tile sort"}},
-            {"scatter",
-             usual_first(kSortScatters, usual_tuning(info).scatter),
-             {"depth sort", "tile sort"}},
-            {"blend", blend_shapes(info), {"blend"}},
-            {"backward",
-             usual_first(kBackwardBlends, usual_tuning(info).backward),
-             {"blend", "blend backward"},
-             true},
-            {"loss", usual_first(kLossWays, usual_tuning(info).loss), {"loss"}}};
-}
-
-TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const std::string& where) {
+TuningNames split_names(const DeviceInfo& info, std::string_view text, const std::string& where) {
     TuningNames names;
     while (!text.empty()) {
         const std::string_view one = text.substr(0, text.find(','));
@@ -110,24 +98,72 @@ TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const st
                         "Known here: " + known_names(tuning_groups(info)) + ".");
         names[std::string(one.substr(0, equals))] = one.substr(equals + 1);
     }
+    return names;
+}
+
+}  // namespace
+
+bool is_known_device(const DeviceInfo& info) {
+    return info.driver.starts_with("llvmpipe");
+}
+
+std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
+    using Names = std::vector<std::string>;
+    const bool lavapipe = is_known_device(info);
+    std::vector<TuningGroup> groups{
+        {"scan",
+         lavapipe ? Names{"thread", "subgroup"} : Names{"subgroup", "thread"},
+         {"compact", "depth sort", "emit", "tile sort"}},
+        {"scatter",
+         usual_first(kSortScatters, usual_tuning(info).scatter),
+         {"depth sort", "tile sort"}},
+        {"blend", blend_shapes(info), {"blend"}},
+        {"backward",
+         usual_first(kBackwardBlends, usual_tuning(info).backward),
+         {"blend", "blend backward"},
+         true},
+        {"loss", usual_first(kLossWays, usual_tuning(info).loss), {"loss"}},
+        {"photos", usual_first(kPhotoPlaces, usual_tuning(info).photos), {}}};
+    if (const std::vector<std::string> lanes = blend_lanes(info); lanes.size() > 1)
+        groups.push_back({"lanes", lanes, {"blend", "blend backward"}, true});
+    return groups;
+}
+
+TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const std::string& where) {
+    TuningNames names = split_names(info, text, where);
+    check_names(info, names, where);
+    return names;
+}
+
+TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
+                              const std::string& where) {
+    TuningNames names = split_names(info, text, where);
+    const std::vector<std::string> lanes = blend_lanes(info);
+    if (const auto named = names.find("lanes");
+        named != names.end() &&
+        (lanes.size() == 1 || std::find(lanes.begin(), lanes.end(), named->second) == lanes.end()))
+        names.erase(named);
     check_names(info, names, where);
     return names;
 }
 
 std::string names_text(const TuningNames& names) {
     std::string text;
-    for (const char* name : {"scan", "scatter", "blend", "backward", "loss"})
+    for (const char* name : {"scan", "scatter", "blend", "backward", "loss", "photos", "lanes"})
         if (const auto found = names.find(name); found != names.end())
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, found->second);
     return text;
 }
 
 TuningNames tuning_names(const Tuning& tuning) {
-    return {{"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
-            {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
-            {"blend", shape_name(tuning.blend_threads)},
-            {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
-            {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]}};
+    TuningNames names{{"scan", tuning.scan_by_thread ? "thread" : "subgroup"},
+                      {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
+                      {"blend", shape_name(tuning.blend_threads)},
+                      {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
+                      {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]},
+                      {"photos", kPhotoPlaces[static_cast<std::size_t>(tuning.photos)]}};
+    if (tuning.blend_lanes != 0) names["lanes"] = std::to_string(tuning.blend_lanes);
+    return names;
 }
 
 Tuning with_names(Tuning tuning, const TuningNames& names) {
@@ -136,8 +172,11 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
         if (name == "scatter") tuning.scatter = named<SortScatter>(kSortScatters, choice);
         if (name == "blend")
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_threads);
+        if (name == "lanes")
+            std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_lanes);
         if (name == "backward") tuning.backward = named<BackwardBlend>(kBackwardBlends, choice);
         if (name == "loss") tuning.loss = named<LossWay>(kLossWays, choice);
+        if (name == "photos") tuning.photos = named<PhotoPlace>(kPhotoPlaces, choice);
     }
     return tuning;
 }

@@ -18,11 +18,13 @@ using TuningNames = std::map<std::string, std::string, std::less<>>;
 struct TuningGroup {
     std::string name;
     std::vector<std::string> choices;  // the usual one first
-    std::vector<std::string> passes;   // whose time it decides, as Commands::pass names them
-    bool changes_bits = false;         // results differ by the order of sums of floats
+    // Whose time it decides, as Commands::pass names them; none: it is never measured.
+    std::vector<std::string> passes;
+    bool changes_bits = false;  // results differ by the order of sums of floats
 };
 
-/// scan, scatter, blend, backward and loss, with what the device allows.
+/// scan, scatter, blend, backward, loss and photos, with what the device allows; lanes where it has
+/// several sizes of subgroups.
 std::vector<TuningGroup> tuning_groups(const DeviceInfo& info);
 
 /// Whether the fastest choices are known without measuring: lavapipe, where measuring would take
@@ -32,6 +34,9 @@ bool is_known_device(const DeviceInfo& info);
 /// "scatter=ballot,backward=buckets"; "" names none. Throws Error{where, ...} that lists the known
 /// names.
 TuningNames parse_tuning(const DeviceInfo& info, std::string_view text, const std::string& where);
+/// What a checkpoint names, less the lanes where this device has no such subgroups.
+TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
+                              const std::string& where);
 /// In the same form, in the order of the groups.
 std::string names_text(const TuningNames& names);
 

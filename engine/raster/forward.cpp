@@ -43,7 +43,8 @@ SpecConstants projection_constants(const ForwardOptions& options, int sh_degree,
 }
 
 std::uint32_t blend_subgroup(const Device& device) {
-    return std::clamp(device.info().subgroup_size, 4u, 64u);
+    const std::uint32_t chosen = device.tuning().blend_lanes;
+    return chosen != 0 ? chosen : std::clamp(device.info().subgroup_size, 4u, 64u);
 }
 
 std::uint32_t bucket_length(const Device& device) {
@@ -59,7 +60,9 @@ std::uint32_t add_block_constants(const Device& device, SpecConstants& constants
 }
 
 Forward::Forward(Device& device, const ForwardOptions& options)
-    : device_(&device), options_(options), blend_threads_(device.tuning().blend_threads) {
+    : device_(&device),
+      options_(options),
+      blend_threads_(std::max(device.tuning().blend_threads, blend_subgroup(device))) {
     if (options.store_for_backward && options.depth_order == DEPTH_ORDER_PIXEL)
         throw Error("frame", "a resorted pixel cannot be walked back",
                     "Use another depth order, or do not store for a backward pass.");
