@@ -35,6 +35,9 @@ std::vector<StepOutcome> run_part(TrainingStep& step, GradientTree& tree,
     for (int place = part.begin; place < part.end; ++place) {
         StepInput& view = views[static_cast<std::size_t>(place)];
         view.gradients = &tree.leaf();
+        if (place + 1 < part.end)
+            view.next_view =
+                static_cast<int>(views[static_cast<std::size_t>(place) + 1].view.frame.index);
         StepOutcome outcome = step.run_view(view);
         add_times(step.work([&](Commands& commands) {
             tree.record_view(commands);

@@ -22,6 +22,7 @@ constexpr float kTrainedLogit = 0;  // of an opacity of a half
 // Trainer's buffers grow to 1.5 times the intersections that did not fit.
 constexpr double kIntersectionRoom = 1.5;
 constexpr std::uint32_t kMinIntersectionsPerSplat = 4;
+constexpr double kMemoryShare = 0.85;  // of the device's memory that a run can hope to have
 
 // The measurement: enough to average over, no more than a moment.
 constexpr int kViews = 4, kIterations = 10;
@@ -119,6 +120,16 @@ double intersections_per_splat(const Measurement& m, const SplatModel& model) {
 // Room that the buffers will have for the intersections of a splat.
 double intersection_room(double intersections) {
     return std::max(double{kMinIntersectionsPerSplat}, kIntersectionRoom * intersections);
+}
+
+// At the end, whatever memory says.
+std::uint32_t wanted_splats(const Device& device, const Dataset& dataset,
+                            const TrainOptions& options, const MemoryDemand& photos,
+                            std::uint32_t start) {
+    const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
+                                         GpuSplats::max_count(device, options.sh_degree, true));
+    return predict_splats(start, photos.photo_pixels, options, limit,
+                          starts_random(dataset, options));
 }
 
 // Splats and intersections at the end: of the splats that are wanted no more than a budget of
@@ -274,6 +285,35 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
         .forecast_end(options, {start, photo_pixels, limit, random_start});
 }
 
+std::uint64_t usable_bytes(const DeviceInfo& info) {
+    return static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(info.heap_bytes));
+}
+
+bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
+                   const MemoryDemand& photos, std::uint32_t start_splats) {
+    const PhotoPlace place = device.tuning().photos;
+    if (place != PhotoPlace::automatic) return place == PhotoPlace::streamed;
+    const bool shared = device.info().unified_memory;
+    if (shared && !options.max_memory_bytes) return false;
+    MemoryDemand all = photos;
+    all.splats = start_splats;
+    all.densifies = false;
+    if (!shared) {
+        const Schedule schedule(options);
+        all.splats =
+            std::max(start_splats, wanted_splats(device, dataset, options, photos, start_splats));
+        all.densifies = has_rounds(schedule);
+        all.averages = schedule.averages();
+    }
+    all.intersections =
+        static_cast<std::uint64_t>(intersection_room(0) * static_cast<double>(all.splats));
+    MemoryDemand streamed = all;
+    streamed.streams = true;
+    const std::uint64_t total = plan_memory(device, all).total();
+    return total > options.max_memory_bytes.value_or(usable_bytes(device.info())) &&
+           plan_memory(device, streamed).total() < total;
+}
+
 int predict_degree(const TrainOptions& options, int iterations) {
     if (!options.probe_sh) return options.sh_degree;
     return std::min(options.sh_degree,
@@ -340,19 +380,24 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
             std::min(start.sh_degree, options.iterations / 2 / schedule.degree_interval);
     start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
     f.start_splats = static_cast<std::uint32_t>(start.size());
-    const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
-                                         GpuSplats::max_count(scratch, options.sh_degree, true));
-    f.splats = predict_splats(f.start_splats, f.demand.photo_pixels, options, limit,
-                              starts_random(dataset, options));
+    f.demand.streams = photos_stream(scratch, dataset, options, photos, f.start_splats);
+    f.splats = wanted_splats(scratch, dataset, options, photos, f.start_splats);
     f.demand.densifies = has_rounds(schedule);
     f.falls = starts_random(dataset, options) && has_rounds(schedule) &&
               strategy_row(options.strategy).prunes_random_start;
     f.demand.averages = schedule.averages();
     fit_size(scratch, options, f.splats, 0, f);
+    const Tuning tuning = scratch.tuning();
+    if (f.demand.streams) {  // so do the few photos that are measured
+        Tuning as_run = tuning;
+        as_run.photos = PhotoPlace::streamed;
+        scratch.set_tuning(as_run);
+    }
     if (measure && f.demand.photo_pixels > 0) try {
             measure_both(scratch, dataset, start, options, f);
         } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
         }
+    scratch.set_tuning(tuning);
     find_peak(scratch, options, photos, f);
     return f;
 }

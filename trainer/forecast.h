@@ -37,6 +37,16 @@ std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
                              const TrainOptions& options, std::uint32_t limit,
                              bool random_start = false);
 
+/// Whether training photos wait on the host and stream: as Tuning::photos says, else where a run
+/// from so many splats has no room for them. A device with memory of its own has it where all that
+/// the run is forecast to come to fits into options.max_memory_bytes, or the most of the device
+/// that a run can hope for. Where host and device share theirs streaming frees nothing, and a
+/// budget alone calls for it, where it does not hold the start. photos: as add_photos gives them.
+bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
+                   const MemoryDemand& photos, std::uint32_t start_splats);
+/// Of the device's memory, what a run can hope to have.
+std::uint64_t usable_bytes(const DeviceInfo& info);
+
 /// The degree of colour that a run has after so many iterations, where options.probe_sh does not
 /// refuse the first.
 int predict_degree(const TrainOptions& options, int iterations);

@@ -15,9 +15,10 @@ constexpr double kMostIntersections = 0.7;
 }  // namespace
 
 MemoryBudget::MemoryBudget(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const Schedule& schedule)
+                           const Schedule& schedule, std::uint32_t start_splats)
     : device_(&device), options_(options), schedule_(schedule) {
     add_photos(dataset.views, options, photos_);
+    photos_.streams = photos_stream(device, dataset, options, photos_, start_splats);
 }
 
 MemoryDemand MemoryBudget::demand(const HeldMemory& held) const {

@@ -29,7 +29,10 @@ struct HeldMemory {
 class MemoryBudget {
   public:
     MemoryBudget(Device& device, const Dataset& dataset, const TrainOptions& options,
-                 const Schedule& schedule);
+                 const Schedule& schedule, std::uint32_t start_splats);
+
+    /// Whether photos are to wait on the host: photos_stream() of forecast.h.
+    bool streams_photos() const { return photos_.streams; }
 
     /// What plan_memory() asks for.
     MemoryDemand demand(const HeldMemory& held) const;

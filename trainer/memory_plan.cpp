@@ -78,7 +78,7 @@ std::uint64_t effect_bytes(const MemoryDemand& demand) {
 }
 
 std::uint64_t strategy_bytes(const MemoryDemand& demand) {
-    std::uint64_t bytes = demand.small_pixels * 4;
+    std::uint64_t bytes = demand.streams ? 0 : demand.small_pixels * 4;
     if (demand.small_cameras > 0) bytes += cameras_bytes(demand.small_cameras);
     const std::uint64_t pixels = std::uint64_t(demand.width) * demand.height;
     return bytes +
@@ -102,6 +102,10 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
                                        demand.batch, strategy_row(demand.strategy).scores_views);
     plan.intersections = bytes.intersections;
     plan.photos = demand.photo_pixels * 4;
+    if (demand.streams) {
+        plan.photos = 2 * Buffer::charged_bytes(demand.image_pixels * 4);
+        plan.waiting_photos = (demand.photo_pixels + demand.small_pixels) * 4;
+    }
     plan.images = bytes.images + image_bytes(device, demand);
     plan.effects = effect_bytes(demand) + strategy_bytes(demand);
     return plan;

@@ -37,6 +37,7 @@ struct MemoryDemand {
     // Of the resolution ramp: its smaller photos, of all training photos together, and cameras.
     std::uint64_t small_pixels = 0;
     std::uint32_t small_cameras = 0;
+    bool streams = false;  // photos wait on the host
 };
 
 /// Bytes of device memory, by what they are for.
@@ -44,12 +45,13 @@ struct MemoryPlan {
     std::uint64_t parameters = 0, moments = 0;
     std::uint64_t frame = 0;          // per splat, of the forward and backward passes
     std::uint64_t intersections = 0;  // per splat-tile intersection
-    std::uint64_t photos = 0;         // ground truth
+    std::uint64_t photos = 0;         // ground truth, or the two of them that are there at a time
     std::uint64_t images = 0;         // picture, its gradient, what the passes share
     std::uint64_t effects = 0;        // of per-photo exposure, of the 3D filter and of the strategy
     // For a time, beyond the rest: while density control runs; after it, the mean of the last
     // iterations, and while host and device copy.
     std::uint64_t densify = 0, average = 0, staging = 0;
+    std::uint64_t waiting_photos = 0;  // on the host, in no sum here
 
     /// What is there between iterations, before the mean is.
     std::uint64_t resident() const {

@@ -17,8 +17,12 @@ constexpr const char* kFromLoadPhotos =
 }  // namespace
 
 TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
-                               const std::vector<ImageU8>& photos, const glm::dvec3& origin)
-    : device_(&device), origin_(origin), nearest_(nearest_points(dataset)) {
+                               const std::vector<ImageU8>& photos, const glm::dvec3& origin,
+                               bool stream)
+    : device_(&device),
+      origin_(origin),
+      nearest_(nearest_points(dataset)),
+      memory_(stream ? Memory::waiting : Memory::device) {
     if (photos.size() != dataset.views.size())
         throw Error("training photos",
                     fmt::format("{} for {} views", photos.size(), dataset.views.size()),
@@ -40,7 +44,7 @@ TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
                 fmt::format("is {}x{}x{} for a camera of {}x{}", photos[i].width, photos[i].height,
                             photos[i].channels, view.camera.width, view.camera.height),
                 kFromLoadPhotos);
-        whole_.photos.back() = Buffer(device, "photo " + view.name, count * 4);
+        whole_.photos.back() = Buffer(device, "photo " + view.name, count * 4, memory_);
         whole_.photos.back().upload(std::as_bytes(std::span(photos[i].data)));
         pixels_ = std::max(pixels_, count);
     }
@@ -49,6 +53,8 @@ TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
         throw Error(dataset.root.string(), "no photo is left to train on",
                     "Every view is held out: add photos, or leave out --eval of darb train.");
     whole_.cameras = upload_cameras(device, whole_.data);
+    if (!stream) return;
+    for (Place& place : places_) place.pixels = Buffer(device, "photo of a step", pixels_ * 4);
 }
 
 TrainingView TrainingPhotos::view(int view, int sh_degree, const glm::vec3& background) const {
@@ -58,6 +64,24 @@ TrainingView TrainingPhotos::view(int view, int sh_degree, const glm::vec3& back
         {size.data[view], &size.cameras, static_cast<std::uint32_t>(view), sh_degree, background},
         static_cast<std::uint32_t>(photo),
         &size.photos[view]};
+}
+
+void TrainingPhotos::fill(Commands& commands, Place& place, int view) {
+    const Buffer& photo = (divisor_ > 1 ? small_ : whole_).photos[view];
+    commands.copy(photo, place.pixels, photo.bytes());
+    place.view = view;
+}
+
+const Buffer& TrainingPhotos::place(Commands& commands, const TrainingView& view, int next) {
+    if (!stream()) return *view.pixels;
+    const int wanted = static_cast<int>(view.frame.index);
+    commands.pass("photo");
+    const bool second = places_[1].view == wanted ||
+                        (places_[0].view != wanted && next >= 0 && places_[0].view == next);
+    Place &own = places_[second ? 1 : 0], &other = places_[second ? 0 : 1];
+    if (own.view != wanted) fill(commands, own, wanted);
+    if (next >= 0 && next != wanted && other.view != next) fill(commands, other, next);
+    return own.pixels;
 }
 
 std::vector<gpu::CameraData> TrainingPhotos::training_cameras() const {
@@ -77,6 +101,7 @@ void TrainingPhotos::set_divisor(int divisor) {
     const auto make_whole = [this] {
         divisor_ = 1;
         small_ = {};
+        for (Place& place : places_) place.view = -1;
     };
     make_whole();
     if (divisor == 1) return;
@@ -97,7 +122,7 @@ void TrainingPhotos::make_smaller(ResolutionRamp& ramp, int divisor) {
         small_.data.push_back(camera_data(smaller, origin_));
         small_.photos.emplace_back();
         if (whole_.photos[v])
-            small_.photos.back() = ramp.downsample(whole_.photos[v], camera, smaller);
+            small_.photos.back() = ramp.downsample(whole_.photos[v], camera, smaller, memory_);
     }
     small_.cameras = upload_cameras(*device_, small_.data);
 }

@@ -1,13 +1,16 @@
 // TrainingPhotos: photos and cameras on the device, whole or, while the resolution ramp lasts, with
-// their sides divided.
+// their sides divided. Photos that do not fit wait on the host: a step copies its own to one of two
+// places on the device, and the next one's to the other.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "engine/core/image.h"
 #include "engine/data/dataset.h"
+#include "engine/gpu/commands.h"
 #include "engine/raster/frame_view.h"
 #include "trainer/resolution_ramp.h"
 
@@ -18,7 +21,7 @@ namespace darb {
 struct TrainingView {
     FrameView frame;
     std::uint32_t photo = 0;         // among the training photos
-    const Buffer* pixels = nullptr;  // uint [H][W], R in the low byte
+    const Buffer* pixels = nullptr;  // uint [H][W], R in the low byte; on the host where they wait
 
     int width() const { return static_cast<int>(frame.camera.width); }
     int height() const { return static_cast<int>(frame.camera.height); }
@@ -28,14 +31,19 @@ struct TrainingView {
 class TrainingPhotos {
   public:
     /// photos: as load_photos gives them, in the order of dataset.views. origin: of the splats.
-    /// Throws Error where no view is left to train on.
+    /// stream: they wait on the host. Throws Error where no view is left to train on.
     TrainingPhotos(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-                   const glm::dvec3& origin);
+                   const glm::dvec3& origin, bool stream);
 
     /// The training views among all, ascending.
     const std::vector<int>& views() const { return views_; }
     std::uint32_t count() const { return static_cast<std::uint32_t>(views_.size()); }
     TrainingView view(int view, int sh_degree, const glm::vec3& background) const;
+    /// The photo of a view, where what is recorded next reads it: copied there first where it
+    /// waits, with that of the view `next` after it; -1: not known. Recordings are submitted in the
+    /// order of these calls.
+    const Buffer& place(Commands& commands, const TrainingView& view, int next = -1);
+    bool stream() const { return memory_ == Memory::waiting; }
     /// The name of a view.
     const std::string& name(int view) const { return names_[view]; }
     /// Distance of the nearest points from the camera of a view; infinity: there are none.
@@ -70,7 +78,12 @@ class TrainingPhotos {
         Buffer cameras;
         std::vector<Buffer> photos;  // [view]; empty for views that are held out
     };
+    struct Place {
+        Buffer pixels;
+        int view = -1;  // whose photo is there, after all that was recorded
+    };
     void make_smaller(ResolutionRamp& ramp, int divisor);
+    void fill(Commands& commands, Place& place, int view);
 
     Device* device_;
     glm::dvec3 origin_;
@@ -80,7 +93,9 @@ class TrainingPhotos {
     std::vector<int> views_;
     int longest_side_ = 1, width_ = 1, height_ = 1;
     std::uint64_t pixels_ = 1;
+    Memory memory_;  // of the photos
     Size whole_, small_;
+    std::array<Place, 2> places_;
     int divisor_ = 1;
     bool room_for_smaller_ = true;
 };

@@ -26,13 +26,13 @@ ResolutionRamp::ResolutionRamp(Device& device)
       commands_(device),
       pipeline_(device, "downsample_photo", {{"THREADS", SPLAT_GROUP}}) {}
 
-Buffer ResolutionRamp::downsample(const Buffer& photo, const Camera& camera,
-                                  const Camera& smaller) {
+Buffer ResolutionRamp::downsample(const Buffer& photo, const Camera& camera, const Camera& smaller,
+                                  Memory memory) {
     const gpu::DownsampleArgs args{
         static_cast<std::uint32_t>(camera.width), static_cast<std::uint32_t>(camera.height),
         static_cast<std::uint32_t>(smaller.width), static_cast<std::uint32_t>(smaller.height)};
     const std::uint64_t pixels = std::uint64_t{args.out_width} * args.out_height;
-    Buffer result(*device_, "smaller " + photo.name(), pixels * 4);
+    Buffer result(*device_, "smaller " + photo.name(), pixels * 4, memory);
     const Groups g = groups_for(pixels);
     commands_.begin();
     commands_.pass("downsample");

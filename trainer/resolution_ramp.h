@@ -18,7 +18,8 @@ class ResolutionRamp {
     explicit ResolutionRamp(Device& device);
 
     /// A smaller photo: area means, colours weighted by alpha. photo: [H][W] R G B A of `camera`.
-    Buffer downsample(const Buffer& photo, const Camera& camera, const Camera& smaller);
+    Buffer downsample(const Buffer& photo, const Camera& camera, const Camera& smaller,
+                      Memory memory = Memory::device);
 
   private:
     Device* device_;

@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/memory.h"
 #include "engine/raster/gpu_splats.h"
+#include "trainer/forecast.h"
 #include "trainer/initial_model.h"
 #include "trainer/memory_plan.h"
 #include "trainer/progress.h"
@@ -35,10 +36,11 @@ std::uint64_t address_space() {
     return std::numeric_limits<std::uint64_t>::max();
 }
 
-MemoryDemand demand_at_start(const Dataset& dataset, const TrainOptions& options,
-                             std::uint64_t splats) {
+MemoryDemand demand_at_start(const Device& device, const Dataset& dataset,
+                             const TrainOptions& options, std::uint32_t splats) {
     MemoryDemand demand;
     add_photos(dataset.views, options, demand);
+    demand.streams = photos_stream(device, dataset, options, demand, splats);
     demand.splats = splats;
     demand.intersections = splats;  // at least, where a photo sees them
     demand.densifies = false;
@@ -62,21 +64,23 @@ void check_start_memory(const Device& device, const Dataset& dataset, const Trai
                         std::uint64_t host_bytes) {
     const bool random = starts_random(dataset, options);
     const std::uint64_t points = random ? start_points(dataset, options) : 0;  // others are there
-    const std::uint64_t splats = initial_count(dataset, options);
-    const MemoryDemand demand = demand_at_start(dataset, options, splats);
-    const std::uint64_t device_bytes = plan_memory(device, demand).total();
+    const std::uint32_t splats = initial_count(dataset, options);
+    const MemoryDemand demand = demand_at_start(device, dataset, options, splats);
+    const MemoryPlan plan = plan_memory(device, demand);
+    const std::uint64_t device_bytes = plan.total();
     const bool shared = device.info().unified_memory;
     const std::uint64_t host = points * kPointBytes + splats * kSplatBytes;
+    const std::uint64_t left = host_bytes - std::min(host_bytes, plan.waiting_photos);
     const std::uint64_t room = device.info().heap_bytes;
     const std::uint64_t most = GpuSplats::max_count(device, demand.sh_degree, true);
-    std::uint64_t fit = std::min(splats, most);
+    std::uint64_t fit = std::min<std::uint64_t>(splats, most);
     if (device_bytes > room) fit = std::min(fit, splats_within(device, demand, room));
     const double needed = double(host) + (shared ? double(device_bytes) : 0);
-    if (needed > double(host_bytes)) {
-        const double each = needed / double(std::max<std::uint64_t>(std::max(points, splats), 1));
-        fit = std::min(fit, static_cast<std::uint64_t>(double(host_bytes) / each));
+    if (needed > double(left)) {
+        const double each = needed / double(std::max<std::uint64_t>({points, splats, 1}));
+        fit = std::min(fit, static_cast<std::uint64_t>(double(left) / each));
     }
-    const bool too_many_points = needed > double(host_bytes) && points > splats;
+    const bool too_many_points = needed > double(left) && points > splats;
     if (fit >= splats && !too_many_points) return;
     const std::string option = random ? "--random-points" : "--cap-max";
     throw Error(
@@ -84,9 +88,11 @@ void check_start_memory(const Device& device, const Dataset& dataset, const Trai
                : fmt::format("{}: {} points", dataset.root.string(), splats),
         fmt::format("the start alone takes {} of device memory and {} of host memory; the device "
                     "has {}, the host {} left",
-                    format_bytes(double(device_bytes)), format_bytes(double(host)),
-                    format_bytes(double(room)), format_bytes(double(host_bytes))),
-        fmt::format("{} {} fits.", option, fit));
+                    format_bytes(double(device_bytes)),
+                    format_bytes(double(host + plan.waiting_photos)), format_bytes(double(room)),
+                    format_bytes(double(host_bytes))),
+        fit > 0 ? fmt::format("{} {} fits.", option, fit)
+                : "Smaller photos do: -r 2 takes a quarter of their memory.");
 }
 
 }  // namespace darb

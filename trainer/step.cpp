@@ -38,10 +38,11 @@ TrainingStep::Flight::Flight(Device& device)
       status(device, "status result", sizeof(gpu::FrameStatus), Memory::host),
       commands(device) {}
 
-TrainingStep::TrainingStep(Device& device, GpuSplats& splats, const TrainingPhotos& photos,
+TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& photos,
                            const LossOptions& loss, const TrainOptions& options)
     : device_(&device),
       splats_(&splats),
+      photos_(&photos),
       buffers_(device, forward_options(options)),
       forward_(device, forward_options(options)),
       backward_(device, forward_options(options)),
@@ -90,15 +91,23 @@ void TrainingStep::launch(Flight& flight, const StepInput& input) {
     if (picture_gradient) ask_for_gradient(flight);
     flight.busy = true;
     flight.commands.begin();
-    if (!picture_gradient) record_picture(flight.commands, input);
-    record_before_loss(flight.commands, input);
+    const StepInput placed = with_photo(flight.commands, input);
+    if (!picture_gradient) record_picture(flight.commands, placed);
+    record_before_loss(flight.commands, placed);
     if (picture_gradient)
         flight.commands.copy(given_d_image_, d_image_, std::uint64_t{input.view.size()} * 12);
     else
-        record_loss(flight.commands, input, flight.loss);
-    record_back(flight.commands, input);
+        record_loss(flight.commands, placed, flight.loss);
+    record_back(flight.commands, placed);
     flight.commands.copy(buffers_.frame().counters.status, flight.status, sizeof(gpu::FrameStatus));
     flight.commands.submit();
+}
+
+// The input of what is recorded next, which reads the photo where it is placed.
+StepInput TrainingStep::with_photo(Commands& commands, const StepInput& input) {
+    StepInput placed = input;
+    placed.view.pixels = &photos_->place(commands, input.view, input.next_view);
+    return placed;
 }
 
 StepFrame TrainingStep::step_frame(Commands& commands, const StepInput& input) {
@@ -190,8 +199,9 @@ void TrainingStep::ask_for_gradient(Flight& flight) {
     const TrainingView& view = flight.input.view;
     do {
         flight.commands.begin();
-        record_picture(flight.commands, flight.input);
-        record_loss(flight.commands, flight.input, flight.loss);
+        const StepInput placed = with_photo(flight.commands, flight.input);
+        record_picture(flight.commands, placed);
+        record_loss(flight.commands, placed, flight.loss);
         flight.commands.submit_and_wait();
     } while (make_room(buffers_.frame().read_status()));
     const Buffer& compared = exposure_ ? exposure_->mapped() : buffers_.frame().images.image;
@@ -297,10 +307,11 @@ double TrainingStep::photo_mse(const TrainingView& view) {
     reserve(view.width(), view.height());
     do {
         flight.commands.begin();
+        const Buffer& photo = photos_->place(flight.commands, view);
         forward_.record(flight.commands, *splats_, view.frame, frame);
         if (exposure_) exposure_->record(flight.commands, image, view.photo, view.size());
         loss_.record(flight.commands,
-                     {exposure_ ? exposure_->mapped() : image, *view.pixels, d_image_, flight.loss},
+                     {exposure_ ? exposure_->mapped() : image, photo, d_image_, flight.loss},
                      view.width(), view.height(), view.frame.background, lambda_dssim_);
         flight.commands.submit_and_wait();
     } while (make_room(frame.read_status()));

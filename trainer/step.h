@@ -34,6 +34,7 @@ LossOptions loss_options(const TrainOptions& options, const Dataset& dataset);
 struct StepInput {
     int iteration = 0;  // from 1
     TrainingView view;
+    int next_view = -1;  // of the step after it, where that is known
     AdamStep adam;
     float exposure_rate = 0;
     int exposure_visits = 1;              // of this photo, this step counted
@@ -59,8 +60,8 @@ class TrainingStep {
   public:
     /// splats: trained by run(); the object must outlive the step, its buffers may change between
     /// two steps. photos: of the largest sizes that steps will have.
-    TrainingStep(Device& device, GpuSplats& splats, const TrainingPhotos& photos,
-                 const LossOptions& loss, const TrainOptions& options);
+    TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& photos, const LossOptions& loss,
+                 const TrainOptions& options);
 
     /// A view of a batch, with input.gradients: these, and those of its exposure; nothing is
     /// updated and nobody told. Drains, and waits for it.
@@ -117,6 +118,7 @@ class TrainingStep {
     };
     void reserve_backward();
     void launch(Flight& flight, const StepInput& input);
+    StepInput with_photo(Commands& commands, const StepInput& input);
     void record_picture(Commands& commands, const StepInput& input);
     void record_before_loss(Commands& commands, const StepInput& input);
     void record_loss(Commands& commands, const StepInput& input, const Buffer& loss);
@@ -133,6 +135,7 @@ class TrainingStep {
 
     Device* device_;
     GpuSplats* splats_;
+    TrainingPhotos* photos_;
     FrameBuffers buffers_;
     Forward forward_;
     Backward backward_;

@@ -70,9 +70,9 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       schedule_(options),
       background_(options.white_background ? 1.0f : 0.0f),
       extent_(scene_extent(dataset)),
-      memory_(device, dataset, options, schedule_),
+      memory_(device, dataset, options, schedule_, static_cast<std::uint32_t>(start.size())),
       splats_(device, start_model(start, options), true, schedule_.rest_every > 1),
-      photos_(device, dataset, photos, splats_.origin()),
+      photos_(device, dataset, photos, splats_.origin(), memory_.streams_photos()),
       order_(photos_.views(), options.seed),
       optimizer_(options, schedule_, extent_, scene_reach(dataset), photos_.count()),
       density_(device, options.kernel, options.footprint),
@@ -134,7 +134,8 @@ void Trainer::step() {
 }
 
 void Trainer::run_step() {
-    const StepInput input = input_for(iteration_ + 1, order_.view(iteration_ + 1), iteration_ + 1);
+    StepInput input = input_for(iteration_ + 1, order_.view(iteration_ + 1), iteration_ + 1);
+    if (photos_.stream()) input.next_view = order_.view(iteration_ + 2);
     if (step_.picture_gradient) step_.run(input);
     ++iteration_;
     if (!step_.picture_gradient) step_.run(input);

@@ -41,22 +41,23 @@ VkBuffer create_handle(const Device::State& state, std::uint64_t bytes, const st
     return buffer;
 }
 
+// charged: of these bytes, what counts as the device's.
 void check_limits(const Device::State& state, const std::string& name, std::uint64_t bytes,
-                  const std::string& what) {
+                  std::uint64_t charged, const std::string& what) {
     const std::uint64_t limit = state.info.max_allocation_bytes;
     if (bytes > limit)
         throw Error(what,
                     fmt::format("{} allows at most {} MiB a buffer", state.info.name, limit >> 20),
                     "Use smaller images or fewer splats, or choose another device (darb devices).");
     const std::uint64_t budget = state.budget, in_use = state.allocated;
-    if (budget != 0 && in_use + bytes > budget)
+    if (budget != 0 && charged != 0 && in_use + charged > budget)
         throw Error(
             what,
             fmt::format("out of device memory: {:.1f} MiB are in use of a budget of {:.1f}",
                         static_cast<double>(in_use) / (1 << 20),
                         static_cast<double>(budget) / (1 << 20)),
             "Raise the memory budget (--max-memory), or use smaller images or fewer splats.");
-    if (state.faults.fails_allocation(name, in_use + bytes))
+    if (state.faults.fails_allocation(name, charged == 0 ? 0 : in_use + charged))
         check_vulkan(VK_ERROR_OUT_OF_DEVICE_MEMORY, what);
 }
 
@@ -75,7 +76,8 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
         (pass.empty() ? "" : fmt::format("pass {}, ", pass)) + describe(name_, bytes_);
     // Copies and fills work on words.
     const std::uint64_t whole_words = charged_bytes(bytes);
-    check_limits(state, name_, whole_words, what);
+    const std::uint64_t charged = kind == Memory::waiting ? 0 : whole_words;
+    check_limits(state, name_, whole_words, charged, what);
     try {
         buffer_ = create_handle(state, whole_words, what);
         VkMemoryRequirements needs{};
@@ -83,13 +85,13 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
         *memory_ = state.device_memory->take(needs, kind, what);
         check_vulkan(vkBindBufferMemory(state.device, buffer_, memory_->handle, memory_->offset),
                      what);
-        if (kind == Memory::host || (memory_->flags & kCached) != 0) direct_ = memory_->mapped;
-        if (kind == Memory::host) mapped_ = direct_;
+        if (kind != Memory::device || (memory_->flags & kCached) != 0) direct_ = memory_->mapped;
+        if (kind != Memory::device) mapped_ = direct_;
     } catch (...) {
         release();
         throw;
     }
-    allocated_ = whole_words;
+    allocated_ = charged;
     const std::uint64_t now = state.allocated += allocated_;
     if (now > state.peak) state.peak = now;
     state.set_name(VK_OBJECT_TYPE_BUFFER, reinterpret_cast<std::uint64_t>(buffer_), name_);

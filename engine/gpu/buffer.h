@@ -17,8 +17,9 @@
 namespace darb {
 
 enum class Memory {
-    device,  // fastest for shaders; host access through staging (or directly on unified memory)
-    host,    // host-visible, coherent, cached where there is such: results that the CPU reads
+    device,   // fastest for shaders; host access through staging (or directly on unified memory)
+    host,     // host-visible, coherent, cached where there is such: results that the CPU reads
+    waiting,  // as host, but for data that waits there to be copied: no part of the device's budget
 };
 
 struct MemoryPiece;  // private to engine/gpu
@@ -35,7 +36,8 @@ class Buffer {
     Buffer(Buffer&&) noexcept;
     Buffer& operator=(Buffer&&) noexcept;
 
-    /// What a buffer of so many bytes adds to Device::allocated_bytes: whole words, 16 bytes for 0.
+    /// What a buffer of so many bytes adds to Device::allocated_bytes: whole words, 16 bytes for 0;
+    /// nothing where it is Memory::waiting.
     static constexpr std::uint64_t charged_bytes(std::uint64_t bytes) {
         return bytes == 0 ? 16 : (bytes + 3) / 4 * 4;
     }
@@ -45,7 +47,7 @@ class Buffer {
     const std::string& name() const { return name_; }
     explicit operator bool() const { return buffer_ != VK_NULL_HANDLE; }
 
-    /// The mapped memory of a Memory::host buffer. The caller orders access with fences.
+    /// The mapped memory of a Memory::host or waiting buffer. The caller orders access with fences.
     void* mapped() const { return mapped_; }
 
     /// Blocking copies through staging; the queue is idle afterwards. offset and size in bytes.
@@ -76,7 +78,7 @@ class Buffer {
     std::string name_;
     VkBuffer buffer_ = VK_NULL_HANDLE;
     std::unique_ptr<MemoryPiece> memory_;
-    void* mapped_ = nullptr;  // Memory::host
+    void* mapped_ = nullptr;  // of all but Memory::device
     void* direct_ = nullptr;  // either kind where the host may copy without staging
     std::uint64_t bytes_ = 0;
     std::uint64_t allocated_ = 0;  // bytes charged to the device

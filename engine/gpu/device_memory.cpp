@@ -72,7 +72,7 @@ void join(MemoryBlock& block, VkDeviceSize offset, VkDeviceSize bytes) {
 int DeviceMemory::choose_type(std::uint32_t allowed, Memory kind, const std::string& what) const {
     const VkPhysicalDeviceMemoryProperties& memory = state_.memory;
     int type = -1;
-    if (kind == Memory::host)
+    if (kind != Memory::device)
         type = find_memory_type(memory, allowed, {kMappable | kCached, kMappable});
     else if (state_.info.unified_memory)
         type = find_memory_type(memory, allowed,

@@ -55,6 +55,7 @@ void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats,
     demand.splats = splats;
     demand.intersections = trainer.memory_demand().intersections;
     demand.densifies = false;
+    demand.streams = ways.find("photos=streamed") != std::string::npos;
     ASSERT_GE(demand.intersections, 4U * splats);
     EXPECT_EQ(plan_memory(device, demand).resident(), device.allocated_bytes())
         << splats << " splats, degree " << options.sh_degree << ", effects " << options.exposure
@@ -84,6 +85,13 @@ TEST(MemoryPlan, exposure_and_antialiasing_are_met_to_the_byte) {
 
 TEST(MemoryPlan, checkpoints_of_buckets_are_met_to_the_byte) {
     compare_to_the_byte(options_of(0), 4'000, "backward=buckets");
+}
+
+TEST(MemoryPlan, photos_that_stream_are_met_to_the_byte) {
+    TrainOptions options = options_of(1);
+    options.iterations = 10;
+    options.resolution_ramp = true;
+    compare_to_the_byte(options, 4'000, "photos=streamed", 1);
 }
 
 TEST(MemoryPlan, strategies_are_met_to_the_byte) {

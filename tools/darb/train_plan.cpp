@@ -20,7 +20,6 @@ namespace {
 
 constexpr int kShortRun = 200;          // iterations: over sooner than the measurement
 constexpr double kLongSeconds = 3'600;  // from here on a smaller -r is suggested
-constexpr double kMemoryShare = 0.85;   // of the device's memory that a run can hope to have
 constexpr int kSmallSide = 400;         // px: no smaller photos are suggested
 
 // The next -r that divides the photos' sides by two, where that leaves enough of them.
@@ -68,13 +67,19 @@ std::string memory_text(const Device& device, const Forecast& f) {
     MemoryDemand empty = f.peak;
     empty.splats = empty.intersections = 0;
     const double all = bytes(f.peak), fixed = bytes(empty);
-    return fmt::format("{} of device memory ({} and {:.0f} bytes a splat)", format_bytes(all),
-                       format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.peak.splats)));
+    const MemoryPlan plan = plan_memory(device, f.peak);
+    const std::string photos = format_bytes(static_cast<double>(plan.photos));
+    const std::string where =
+        f.peak.streams ? fmt::format("photos stream from {} of host memory through {}",
+                                     format_bytes(static_cast<double>(plan.waiting_photos)), photos)
+                       : fmt::format("photos are {} of it", photos);
+    return fmt::format("{} of device memory ({} and {:.0f} bytes a splat); {}", format_bytes(all),
+                       format_bytes(fixed), (all - fixed) / std::max(1.0, double(f.peak.splats)),
+                       where);
 }
 
 void print_advice(const Device& device, const Dataset& dataset, const Forecast& f) {
-    const auto budget =
-        static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(device.info().heap_bytes));
+    const std::uint64_t budget = usable_bytes(device.info());
     const bool too_large = plan_memory(device, f.peak).total() > budget;
     if (!too_large && f.seconds < kLongSeconds) return;
     std::string advice;
