@@ -298,7 +298,9 @@ bool photos_stream(const Device& device, const Dataset& dataset, const TrainOpti
     MemoryDemand all = photos;
     all.splats = start_splats;
     all.densifies = false;
-    if (!shared) {
+    if (shared) {  // the ramp does without its smaller photos where there is no room
+        all.small_pixels = all.small_cameras = 0;
+    } else {
         const Schedule schedule(options);
         all.splats =
             std::max(start_splats, wanted_splats(device, dataset, options, photos, start_splats));
