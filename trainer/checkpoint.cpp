@@ -354,9 +354,11 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
         throw Error(path.string(), "was written with other settings:" + differences,
                     "Repeat the options of that run, or start without --resume.");
     if (checkpoint.dataset != fingerprint)
-        throw Error(path.string(),
-                    "the data set " + dataset.root.string() + " is not the one it was trained on",
-                    "Restore the photos and cameras of that run, or start without --resume.");
+        throw Error(
+            path.string(),
+            "the data set " + dataset.root.string() + " is not the one it was trained on",
+            "Restore the photos, cameras and held-out views (--eval, --hold-out) of that run, "
+            "or start without --resume.");
     const auto photos = static_cast<size_t>(
         std::ranges::count_if(dataset.views, [](const View& v) { return !v.is_test; }));
     if (const std::string what = contradiction(checkpoint.state, options, photos); !what.empty())

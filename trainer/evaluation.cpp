@@ -7,17 +7,36 @@
 
 namespace darb {
 
-void take_means(Evaluation& evaluation) {
-    double psnr_sum = 0, ssim_sum = 0, count = 0;
-    for (const ViewMetrics& v : evaluation.views) {
+namespace {
+
+// Of the views in the arc, or of the others.
+ArcMeans means_of(const std::vector<ViewMetrics>& views, bool in_arc) {
+    ArcMeans means;
+    double count = 0;
+    for (const ViewMetrics& v : views) {
+        if (v.in_arc != in_arc) continue;
+        ++means.views;
         if (std::isnan(v.psnr_db)) continue;
-        psnr_sum += v.psnr_db;
-        ssim_sum += v.ssim;
+        means.psnr_db += v.psnr_db;
+        means.ssim += v.ssim;
         ++count;
     }
-    if (evaluation.views.empty()) count = 1;
-    evaluation.psnr_db = psnr_sum / count;
-    evaluation.ssim = ssim_sum / count;
+    if (means.views == 0) return means;
+    means.psnr_db /= count;
+    means.ssim /= count;
+    return means;
+}
+
+}  // namespace
+
+void take_means(Evaluation& evaluation) {
+    const ArcMeans arc = means_of(evaluation.views, true);
+    const ArcMeans others = means_of(evaluation.views, false);
+    evaluation.arc.reset();
+    if (arc.views > 0 && others.views > 0) evaluation.arc = arc;
+    const ArcMeans& means = others.views > 0 ? others : arc;
+    evaluation.psnr_db = means.psnr_db;
+    evaluation.ssim = means.ssim;
 }
 
 Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
@@ -25,10 +44,10 @@ Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
     Evaluation evaluation;
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
-        if (view.is_test)
-            evaluation.views.push_back(compare_view(view.name, trainer.render(view.camera),
-                                                    photos[i], trainer.background(),
-                                                    dataset.alpha_is_mask));
+        if (!view.is_test) continue;
+        evaluation.views.push_back(compare_view(view.name, trainer.render(view.camera), photos[i],
+                                                trainer.background(), dataset.alpha_is_mask));
+        evaluation.views.back().in_arc = view.in_arc;
     }
     take_means(evaluation);
     return evaluation;

@@ -12,8 +12,8 @@
 
 namespace darb {
 
-/// Mean of the views into evaluation.psnr_db and ssim, but for those that are masked throughout:
-/// NaN where all are.
+/// Means of the views, those of an arc apart where others are there, too; but for views that are
+/// masked throughout: NaN where all are.
 void take_means(Evaluation& evaluation);
 
 /// Only views, means: iteration, seconds and splats are the caller's. photos: all views' in order.

@@ -183,7 +183,11 @@ void Run::evaluate(int iteration) {
                                      evaluation.views[v].psnr_db, evaluation.views[v].ssim});
     progress_.note(fmt::format(
         "iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats", iteration,
-        evaluation.psnr_db, evaluation.ssim, evaluation.views.size(), evaluation.splats));
+        evaluation.psnr_db, evaluation.ssim,
+        evaluation.views.size() - (evaluation.arc ? evaluation.arc->views : 0), evaluation.splats));
+    if (const auto& arc = evaluation.arc)
+        progress_.note(fmt::format("the arc: PSNR {:.2f} dB, SSIM {:.4f} over {} views",
+                                   arc->psnr_db, arc->ssim, arc->views));
     log_.evaluation(evaluation);
     summary_.evaluations.push_back(std::move(evaluation));
     stopwatch(true);

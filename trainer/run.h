@@ -57,12 +57,18 @@ struct RunOptions {
     std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
 };
 
+struct ArcMeans {  // over the views of an arc that was held out
+    std::size_t views = 0;
+    double psnr_db = 0, ssim = 0;
+};
+
 struct Evaluation {
     int iteration = 0;
     double seconds = 0;  // of training, evaluation left out
     std::uint32_t splats = 0;
     std::vector<ViewMetrics> views;
-    double psnr_db = 0, ssim = 0;  // means over the views
+    double psnr_db = 0, ssim = 0;  // means over the views; but for an arc, where others are there
+    std::optional<ArcMeans> arc;   // where others are there
 };
 
 struct RunSummary {

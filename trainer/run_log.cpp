@@ -43,11 +43,16 @@ constexpr const char* kCullNames[CULL_REASONS] = {"near",    "rotation", "opacit
 
 Json evaluation_json(const Evaluation& e) {
     Json views = Json::array();
-    for (const ViewMetrics& v : e.views)
+    for (const ViewMetrics& v : e.views) {
         views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
-    return {{"event", "evaluation"}, {"iteration", e.iteration}, {"seconds", e.seconds},
-            {"splats", e.splats},    {"psnr_db", e.psnr_db},     {"ssim", e.ssim},
-            {"views", views}};
+        if (v.in_arc) views.back()["in_arc"] = true;
+    }
+    Json json{{"event", "evaluation"}, {"iteration", e.iteration}, {"seconds", e.seconds},
+              {"splats", e.splats},    {"psnr_db", e.psnr_db},     {"ssim", e.ssim},
+              {"views", views}};
+    if (e.arc)
+        json["arc"] = {{"views", e.arc->views}, {"psnr_db", e.arc->psnr_db}, {"ssim", e.arc->ssim}};
+    return json;
 }
 
 Json culled_json(const TrainCounters& counters) {
@@ -147,6 +152,7 @@ void RunLog::start(const Device& device, const DeviceRates& rates, const Dataset
               {"notes", notes},
               {"train_views", dataset.views.size() - held_out},
               {"held_out_views", held_out},
+              {"hold_out", dataset.options.hold_out ? hold_out_text(dataset.options.held_out) : ""},
               {"splats", splats},
               {"strategy", strategy_name(options.strategy)},
               {"copy_bytes_per_s", rates_.bytes_per_s},
@@ -267,6 +273,9 @@ void add_events(const std::vector<Json>& events, ReportData& data) {
             data.evaluations.push_back({e.value("iteration", 0), number(e, "seconds"),
                                         number(e, "psnr_db"), number(e, "ssim"),
                                         e.value("splats", 0u)});
+        if (const Json arc = e.value("arc", Json::object()); kind == "evaluation" && !arc.empty())
+            data.arcs.push_back({e.value("iteration", 0), number(arc, "psnr_db"),
+                                 number(arc, "ssim"), arc.value("views", 0u)});
         if (kind == "resolution") {
             const int divisor = e.value("divisor", 1);
             sizes += fmt::format("{}{} from iteration {}", sizes.empty() ? "" : ", ",

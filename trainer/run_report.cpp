@@ -109,6 +109,18 @@ std::string cards(const ReportData& data) {
     return html.empty() ? "" : "<div class='cards'>" + html + "</div>\n";
 }
 
+std::string arc_table(const ReportData& data) {
+    if (data.arcs.empty()) return {};
+    std::string html =
+        "<h2>The arc that was held out</h2><div class='wide'><table><tr><th>iteration</th>"
+        "<th>PSNR (dB)</th><th>SSIM</th><th>views</th></tr>\n";
+    for (const ReportArc& arc : data.arcs)
+        html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                            format_number(arc.iteration), format_number(arc.psnr_db, 2),
+                            format_number(arc.ssim, 4), arc.views);
+    return html + "</table></div>\n";
+}
+
 std::string evaluation_table(const ReportData& data) {
     if (data.evaluations.empty()) return {};
     std::string html =
@@ -196,7 +208,7 @@ std::string notes(const ReportData& data) {
 std::string report_html(const ReportData& data) {
     return html_page(data.title, data.device,
                      cards(data) + plots(data) + pictures(data) + evaluation_table(data) +
-                         pass_table(data) + settings(data) + notes(data));
+                         arc_table(data) + pass_table(data) + settings(data) + notes(data));
 }
 
 void write_report(const std::filesystem::path& path, const ReportData& data) {

@@ -28,6 +28,12 @@ struct ReportEvaluation {  // means over the held-out views
     std::uint32_t splats = 0;
 };
 
+struct ReportArc {  // means over an arc that was held out beside other views
+    int iteration = 0;
+    double psnr_db = 0, ssim = 0;
+    std::uint32_t views = 0;
+};
+
 struct ReportPass {
     std::string name;
     double ms = 0;                   // per iteration
@@ -45,6 +51,7 @@ struct ReportData {
     std::string device;                         // name and driver
     std::vector<ReportSample> samples;          // by iteration, ascending
     std::vector<ReportEvaluation> evaluations;  // by iteration, ascending
+    std::vector<ReportArc> arcs;                // likewise
     std::vector<ReportPass> passes;             // in the order they run
     std::vector<std::pair<std::string, std::string>> settings;
     std::vector<ReportPicture> pictures;

@@ -11,6 +11,7 @@ namespace darb {
 struct ViewMetrics {
     std::string name;
     double psnr_db = 0, ssim = 0;
+    bool in_arc = false;  // View::in_arc, which the caller sets
 };
 
 /// The photo as float RGB over a background, value / 255, straight alpha composited.

@@ -22,7 +22,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t kHoldOutEvery = 8;
 constexpr double kStrayPoints = 0.01;  // the share that may lie before the others by mistake
 constexpr size_t kPointsLookedAt = 20'000;
 constexpr double kExtentMargin = 1.1;
@@ -162,13 +161,6 @@ Dataset load_source(const fs::path& path, DatasetOptions& options) {
         "Reconstruct the cameras first, for example with colmap.");
 }
 
-void hold_out(std::vector<View>& views) {
-    const bool own_test =
-        std::any_of(views.begin(), views.end(), [](const View& view) { return view.is_test; });
-    if (own_test) return;
-    for (std::size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].is_test = true;
-}
-
 // Image ids of the tracks to indices of the sorted views, each once a point.
 void index_tracks(Dataset& dataset) {
     PointCloud& points = dataset.points;
@@ -235,7 +227,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
     std::stable_sort(dataset.views.begin(), dataset.views.end(),
                      [](const View& a, const View& b) { return a.name < b.name; });
     index_tracks(dataset);
-    if (options.hold_out) hold_out(dataset.views);
+    if (options.hold_out) mark_held_out(dataset.views, options.held_out);
     fit_views(dataset, options);
     note_odd_cameras(dataset);
     return dataset;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/core/image.h"
+#include "engine/data/hold_out.h"
 #include "engine/scene/camera.h"
 
 namespace darb {
@@ -30,6 +31,7 @@ struct View {
     Camera camera;                // of the photo as load_photo returns it
     LensModel lens;               // of the file on disk, turned by orientation; see load_photo
     bool is_test = false;         // held out
+    bool in_arc = false;          // of the arc of HoldOut, is_test as well
     int orientation = 1;          // EXIF number that load_photo applies, 1 = as stored
     std::uint32_t source_id = 0;  // COLMAP's image id
 };
@@ -52,8 +54,9 @@ struct DatasetOptions {
     std::string images_folder = "images";  // COLMAP: images, images_2, ...
     int resolution =
         -1;  // 1, 2, 4, 8: divisor; > 8: width in px; -1: as is, but at most 1,600 wide
-    bool hold_out = false;  // --eval: every 8th view by name from the first on is test; sources
-                            // with a test file of their own use that in either case
+    bool hold_out = false;       // --eval: what held_out says is test; sources with a test file of
+                                 // their own use that in either case
+    HoldOut held_out;            // --hold-out
     bool require_photos = true;  // false: cameras only (render)
     bool original_lens = false;  // true: distorted photos stay so, and their cameras have the lens
     bool original_where_wide = false;  // true: so do those of too_wide_to_undistort

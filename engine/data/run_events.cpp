@@ -73,18 +73,39 @@ const char* name_of(Kind kind) {
 }
 
 // Of any event; a key that is missing has its default where it is read.
-constexpr Field kEventFields[] = {
-    {"event", Kind::text},      {"iteration", Kind::whole},      {"seconds", Kind::number},
-    {"loss", Kind::number},     {"psnr_db", Kind::number},       {"ssim", Kind::number},
-    {"splats", Kind::count},    {"passes_ms", Kind::object},     {"views", Kind::list},
-    {"divisor", Kind::whole},   {"after", Kind::whole},          {"degree", Kind::whole},
-    {"gain_db", Kind::number},  {"admitted", Kind::truth},       {"limit", Kind::text},
-    {"dataset", Kind::text},    {"device", Kind::text},          {"driver", Kind::text},
-    {"strategy", Kind::text},   {"settings", Kind::object},      {"notes", Kind::list},
-    {"effects", Kind::list},    {"held_out_views", Kind::count}, {"copy_bytes_per_s", Kind::number},
-    {"fma_per_s", Kind::number}};
-constexpr Field kViewFields[] = {
-    {"name", Kind::text}, {"psnr_db", Kind::number}, {"ssim", Kind::number}};
+constexpr Field kEventFields[] = {{"event", Kind::text},
+                                  {"iteration", Kind::whole},
+                                  {"seconds", Kind::number},
+                                  {"loss", Kind::number},
+                                  {"psnr_db", Kind::number},
+                                  {"ssim", Kind::number},
+                                  {"splats", Kind::count},
+                                  {"passes_ms", Kind::object},
+                                  {"views", Kind::list},
+                                  {"divisor", Kind::whole},
+                                  {"after", Kind::whole},
+                                  {"degree", Kind::whole},
+                                  {"gain_db", Kind::number},
+                                  {"admitted", Kind::truth},
+                                  {"limit", Kind::text},
+                                  {"dataset", Kind::text},
+                                  {"device", Kind::text},
+                                  {"driver", Kind::text},
+                                  {"strategy", Kind::text},
+                                  {"settings", Kind::object},
+                                  {"notes", Kind::list},
+                                  {"effects", Kind::list},
+                                  {"held_out_views", Kind::count},
+                                  {"copy_bytes_per_s", Kind::number},
+                                  {"fma_per_s", Kind::number},
+                                  {"hold_out", Kind::text},
+                                  {"arc", Kind::object}};
+constexpr Field kViewFields[] = {{"name", Kind::text},
+                                 {"psnr_db", Kind::number},
+                                 {"ssim", Kind::number},
+                                 {"in_arc", Kind::truth}};
+constexpr Field kArcFields[] = {
+    {"views", Kind::count}, {"psnr_db", Kind::number}, {"ssim", Kind::number}};
 constexpr Field kEffectFields[] = {
     {"effect", Kind::text}, {"on", Kind::truth}, {"reason", Kind::text}};
 constexpr Field kPassFields[] = {
@@ -110,6 +131,7 @@ class Checker {
         fields(event, kEventFields);
         if (event.contains("views"))
             for (const EventJson& view : event["views"]) fields(view, kViewFields);
+        if (event.contains("arc")) fields(event["arc"], kArcFields);
         if (event.contains("effects"))
             for (const EventJson& effect : event["effects"]) fields(effect, kEffectFields);
         if (event.contains("notes"))

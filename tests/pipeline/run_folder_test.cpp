@@ -17,7 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-const std::string kTrain = "train " + std::string(DARB_SOURCE_DIR) + "/assets/scene -r 8 ";
+const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+const std::string kTrain = "train " + kScene + " -r 8 ";
 
 class RunFolder : public testing::Test {
   protected:
@@ -187,6 +188,32 @@ TEST_F(RunFolder, without_held_out_photos_there_is_no_evaluation) {
     fs::remove_all(whole);
     ASSERT_EQ(o.code, 0) << o.err;
     EXPECT_EQ(json::parse(read_text_file(folder_ / "metrics.json"))["evaluations"].size(), 0U);
+}
+
+// Held out in training, so measured.
+TEST_F(RunFolder, an_arc_is_held_out_and_measured_apart) {
+    const std::string arc = "--iterations 1 -q --hold-out arc:6";
+    ASSERT_EQ(train(arc).code, 0);
+    const json metrics = json::parse(read_text_file(folder_ / "metrics.json"));
+    EXPECT_EQ(metrics["start"]["hold_out"], "arc:6");
+    const json trained = metrics["evaluations"][0];
+    const fs::path file = scratch() / "arc.json";
+    const auto measured = [&](const std::string& options) {
+        const Outcome o = darb(fmt::format("eval {} {} -r 8 --json {} {}", folder_.string(), kScene,
+                                           file.string(), options));
+        EXPECT_EQ(o.code, 0) << o.err;
+        return json::parse(read_text_file(file));
+    };
+    const json eval = measured("");
+    ASSERT_EQ(eval["views"].size(), trained["views"].size());
+    EXPECT_EQ(eval["arc"]["views"], 8) << "a sixth of 48";
+    EXPECT_EQ(trained["arc"]["views"], 8);
+    EXPECT_NEAR(eval["arc"]["psnr_db"].get<double>(), trained["arc"]["psnr_db"].get<double>(),
+                1e-6);
+    EXPECT_NEAR(eval["mean"]["psnr_db"].get<double>(), trained["psnr_db"].get<double>(), 1e-6);
+    EXPECT_FALSE(measured("--hold-out every:8").contains("arc"));
+    EXPECT_EQ(train("--resume --iterations 1 -q --hold-out arc:3").code, 2) << "another split";
+    EXPECT_EQ(train("--iterations 1 -q --hold-out ring").code, 2);
 }
 
 TEST_F(RunFolder, the_plan_knows_the_kernel_slow) {

@@ -1,5 +1,6 @@
 // The command line of `darb compare`, and that of each of its runs.
 #include "tools/darb/compare_flags.h"
+#include "tools/darb/evaluation_flags.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +10,6 @@
 #include "engine/kernels/kernel_family.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/scene_evaluation.h"
 #include "trainer/strategy.h"
 
 namespace darb {
@@ -58,6 +58,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
         ->check(CLI::PositiveNumber);
     forward(command, flags, "-r,--resolution", "--resolution", "as in darb train");
     add_scales_flag(command, flags.scales);
+    forward(command, flags, "--hold-out", "--hold-out", "as in darb train");
     forward(command, flags, "-i,--images", "--images", "as in darb train");
     forward(command, flags, "--effects", "--effects", "as in darb train");
     forward(command, flags, "--footprint", "--footprint", "psi or exact");

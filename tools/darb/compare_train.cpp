@@ -63,9 +63,9 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     plan_effects(dataset_, f);
     plan_strategy(dataset_, f);
     f.run.photos = photos_;
-    const std::string settings = settings_text(f.train);
-    const RunState state = run_state(f.run.output, settings, format_camera_list(dataset_.views),
-                                     f.train.iterations, held_out().size());
+    const RunState state =
+        run_state(f.run.output, settings_text(f.train), format_camera_list(dataset_.views),
+                  f.train.iterations, held_out().size(), hold_out_text(f.data.held_out));
     const std::string title = fmt::format("{}: {}, seed {}", dataset_name(name_),
                                           kernel_name(f.train.kernel), f.train.seed);
     if (state == RunState::finished) return say_note(title + ": is there");

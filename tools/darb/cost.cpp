@@ -13,6 +13,7 @@
 #include "tools/darb/cost_flags.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/devices.h"
+#include "tools/darb/evaluation_flags.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
@@ -117,6 +118,7 @@ void add_cost(CLI::App& app, Action& action) {
         ->capture_default_str();
     command->add_option("-r,--resolution", flags->data.resolution,
                         "as in training: 1, 2, 4, 8 or a width in px");
+    add_hold_out_flag(*command, flags->data);
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
     add_quiet_flag(*command, flags->quiet);
     add_kernel_flags(*command, flags->kernel,

@@ -26,6 +26,7 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
     words.push_back(fmt::format("--iterations={}", iterations));
     if (flags.data.resolution != DatasetOptions{}.resolution)
         words.push_back(fmt::format("--resolution={}", flags.data.resolution));
+    if (flags.data.hold_out) words.push_back("--hold-out=" + hold_out_text(flags.data.held_out));
     if (flags.white_background) words.emplace_back("--white-background");
     TrainFlags run = parse_train_flags(words, flags.train_options, "darb cost --train");
     if (run.train.accuracy != Accuracy{})

@@ -12,6 +12,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/evaluation_flags.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
@@ -51,7 +52,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
     SceneEvaluation options;
     options.ranks = &ranks;
     options.accuracy = chosen_accuracy(flags.accuracy);
-    flags.data.hold_out = true;  // sources without a split of their own: every 8th view
+    hold_out_as_trained(flags.scene, flags.data);
     options.effects = choose_effects(flags.effects, EffectUse::measuring, flags.data);
     options.background = glm::vec3(flags.white_background ? 1.0f : 0.0f);
     options.fit_exposure = flags.eval_exposure;
@@ -77,12 +78,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
         json = evaluation_json(evaluation);
         print_evaluation(out, evaluation);
     } else {
-        std::vector<AtScale> scales;
-        for (size_t i = 0; i < sizes.size(); ++i) {
-            const Camera& camera = sizes[i].front().camera;
-            scales.push_back({flags.scales[i], camera.width, camera.height,
-                              evaluate_scene(device, model, sizes[i], options)});
-        }
+        const auto scales = evaluate_scales(device, model, flags.scales, sizes, options);
         json = evaluation_json(scales);
         print_evaluation(out, scales);
     }
@@ -111,8 +107,7 @@ void add_eval(CLI::App& app, Action& action) {
         ->required();
     command
         ->add_option("--split", flags->split,
-                     "test: the data set's own test views, else every 8th by name; train: the "
-                     "others; all")
+                     "test: the views that are held out; train: the others; all")
         ->capture_default_str()
         ->check(CLI::IsMember({"test", "train", "all"}));
     add_json_option(*command, flags->json);
@@ -122,6 +117,7 @@ void add_eval(CLI::App& app, Action& action) {
     command->add_option("-r,--resolution", flags->data.resolution,
                         "as in training: 1, 2, 4, 8 or a width in px");
     add_scales_flag(*command, flags->scales);
+    add_hold_out_flag(*command, flags->data)->default_str("as the scene was trained, else every:8");
     command->add_flag("-w,--white-background", flags->white_background,
                       "white behind alpha, not black");
     add_accuracy_flags(*command, flags->accuracy);

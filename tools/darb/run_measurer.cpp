@@ -4,6 +4,7 @@
 
 #include "engine/scene/splat_file.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/evaluation_flags.h"
 #include "tools/darb/tune_flags.h"
 
 namespace darb {

@@ -68,18 +68,38 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
         own.push_back({metrics.psnr_db, metrics.ssim});
     }
     Evaluation evaluation;
-    for (const ViewNumbers& m : by_turns(ranks, own))
-        evaluation.views.push_back({views[evaluation.views.size()].name, m.psnr_db, m.ssim});
+    for (const ViewNumbers& m : by_turns(ranks, own)) {
+        const View& view = views[evaluation.views.size()];
+        evaluation.views.push_back({view.name, m.psnr_db, m.ssim, view.in_arc});
+    }
     take_means(evaluation);
     return evaluation;
 }
 
+std::vector<AtScale> evaluate_scales(Device& device, const SplatModel& model,
+                                     const std::vector<double>& scales,
+                                     const std::vector<std::vector<View>>& sizes,
+                                     const SceneEvaluation& options) {
+    std::vector<AtScale> rows;
+    for (size_t i = 0; i < sizes.size(); ++i) {
+        const Camera& camera = sizes[i].front().camera;
+        rows.push_back({scales[i], camera.width, camera.height,
+                        evaluate_scene(device, model, sizes[i], options)});
+    }
+    return rows;
+}
+
 nlohmann::json evaluation_json(const Evaluation& evaluation) {
     nlohmann::json views = nlohmann::json::array();
-    for (const ViewMetrics& v : evaluation.views)
+    for (const ViewMetrics& v : evaluation.views) {
         views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
-    return {{"mean", {{"psnr_db", evaluation.psnr_db}, {"ssim", evaluation.ssim}}},
-            {"views", views}};
+        if (v.in_arc) views.back()["in_arc"] = true;
+    }
+    nlohmann::json json{{"mean", {{"psnr_db", evaluation.psnr_db}, {"ssim", evaluation.ssim}}},
+                        {"views", views}};
+    if (const auto& arc = evaluation.arc)
+        json["arc"] = {{"views", arc->views}, {"psnr_db", arc->psnr_db}, {"ssim", arc->ssim}};
+    return json;
 }
 
 nlohmann::json evaluation_json(const std::vector<AtScale>& scales) {
@@ -95,8 +115,10 @@ nlohmann::json evaluation_json(const std::vector<AtScale>& scales) {
 }
 
 void print_evaluation(std::FILE* out, const Evaluation& evaluation) {
-    const std::string mean = fmt::format("mean of {}", evaluation.views.size());
-    size_t width = mean.size();
+    const size_t in_arc = evaluation.arc ? evaluation.arc->views : 0;
+    const std::string mean = fmt::format("mean of {}", evaluation.views.size() - in_arc);
+    const std::string arc = in_arc > 0 ? fmt::format("arc, mean of {}", in_arc) : "";
+    size_t width = std::max(mean.size(), arc.size());
     for (const ViewMetrics& v : evaluation.views) width = std::max(width, printable(v.name).size());
     const auto row = [&](const std::string& name, double psnr_db, double ssim) {
         tell(out, "{:<{}}  {:>8.3f}  {:>7.4f}\n", name, width, psnr_db, ssim);
@@ -104,31 +126,19 @@ void print_evaluation(std::FILE* out, const Evaluation& evaluation) {
     tell(out, "{:<{}}  {:>8}  {:>7}\n", "view", width, "PSNR dB", "SSIM");
     for (const ViewMetrics& v : evaluation.views) row(printable(v.name), v.psnr_db, v.ssim);
     row(mean, evaluation.psnr_db, evaluation.ssim);
+    if (in_arc > 0) row(arc, evaluation.arc->psnr_db, evaluation.arc->ssim);
 }
 
 void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales) {
-    tell(out, "{:<8}  {:<11}  {:>8}  {:>7}\n", "scale", "size px", "PSNR dB", "SSIM");
-    for (const AtScale& at : scales)
-        tell(out, "{:<8}  {:<11}  {:>8.3f}  {:>7.4f}\n", scale_text(at.scale),
-             fmt::format("{} x {}", at.width, at.height), at.evaluation.psnr_db,
-             at.evaluation.ssim);
-}
-
-Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& options) {
-    const std::filesystem::path folder = dataset / "off_path";
-    if (!std::filesystem::exists(folder / "transforms_test.json")) return {};
-    DatasetOptions own = options;
-    own.images_folder = DatasetOptions{}.images_folder;  // --images is of the data set's photos
-    return load_dataset(folder, own);
-}
-
-CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales) {
-    return command
-        .add_option("--scales", scales,
-                    "sizes to measure at, as multiples of that of -r, with commas: 0.5,1,2,4")
-        ->delimiter(',')
-        ->allow_extra_args(false)
-        ->check(CLI::Range(0.01, 100.0));
+    const bool arcs = !scales.empty() && scales.front().evaluation.arc.has_value();
+    tell(out, "{:<8}  {:<11}  {:>8}  {:>7}{}\n", "scale", "size px", "PSNR dB", "SSIM",
+         arcs ? "  arc, dB     SSIM" : "");
+    for (const AtScale& at : scales) {
+        const auto& arc = at.evaluation.arc;
+        tell(out, "{:<8}  {:<11}  {:>8.3f}  {:>7.4f}{}\n", scale_text(at.scale),
+             fmt::format("{} x {}", at.width, at.height), at.evaluation.psnr_db, at.evaluation.ssim,
+             arc ? fmt::format("  {:>7.3f}  {:>7.4f}", arc->psnr_db, arc->ssim) : "");
+    }
 }
 
 }  // namespace darb

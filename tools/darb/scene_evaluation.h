@@ -1,9 +1,7 @@
 // A scene's pictures measured against photos, at the photos' size and at others.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
-#include <filesystem>
 #include <glm/vec3.hpp>
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
@@ -32,12 +30,6 @@ struct SceneEvaluation {
 Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<View> views,
                           const SceneEvaluation& options);
 
-/// --scales: sizes to measure at, as multiples of that of -r, each above 0.
-CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales);
-
-/// DATASET/off_path, a data set that is all held out, at the size of -r: pictures away from the
-/// path of the photos. Without views where that folder has no transforms_test.json.
-Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& options);
 /// An evaluation at one of the scales.
 struct AtScale {
     double scale = 1;
@@ -46,6 +38,12 @@ struct AtScale {
 };
 
 /// {"mean": ..., "views": ...}, or {"scales": [the same with scale, width and height]}.
+/// The same at several sizes: scales[i] is of sizes[i].
+std::vector<AtScale> evaluate_scales(Device& device, const SplatModel& model,
+                                     const std::vector<double>& scales,
+                                     const std::vector<std::vector<View>>& sizes,
+                                     const SceneEvaluation& options);
+
 nlohmann::json evaluation_json(const Evaluation& evaluation);
 nlohmann::json evaluation_json(const std::vector<AtScale>& scales);
 /// A line a view, and their mean.

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -12,6 +14,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/core/text.h"
+#include "tools/darb/outputs.h"
 
 namespace darb {
 
@@ -42,7 +45,32 @@ long last_iteration(const fs::path& output) {
     return at != metrics.end() && at->is_number_integer() ? at->get<long>() : -1;
 }
 
+// None where there is no such run or it held nothing out.
+std::optional<HoldOut> hold_out_of_run(const fs::path& scene) {
+    fs::path log = scene / "run.jsonl";
+    if (fs::is_regular_file(scene))  // OUT/point_cloud/iteration_N/point_cloud.ply
+        log = fs::absolute(scene).parent_path().parent_path().parent_path() / "run.jsonl";
+    std::error_code none;
+    if (!fs::is_regular_file(log, none)) return std::nullopt;
+    std::ifstream lines(log);
+    std::string text;
+    for (std::string line; std::getline(lines, line);) {
+        const auto event = nlohmann::json::parse(line, nullptr, false);
+        if (!event.is_object() || event.value("event", nlohmann::json()) != "start") continue;
+        const auto at = event.find("hold_out");  // of the last start: a run may go on
+        text = at != event.end() && at->is_string() ? at->get<std::string>() : "";
+    }
+    if (text.empty()) return std::nullopt;
+    return while_doing(log.string(), [&] { return parse_hold_out(text); });
+}
+
 }  // namespace
+
+void hold_out_as_trained(const fs::path& scene, DatasetOptions& data) {
+    if (!data.hold_out) data.held_out = hold_out_of_run(scene).value_or(HoldOut{});
+    data.hold_out = true;
+    if (data.held_out != HoldOut{}) say_note("held out: " + hold_out_text(data.held_out));
+}
 
 fs::path scene_of_run(const fs::path& output) {
     fs::path found;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "engine/data/dataset.h"
 #include "engine/scene/splat_file.h"
 
 namespace darb {
@@ -20,5 +21,9 @@ std::filesystem::path scene_of_run(const std::filesystem::path& output);
 
 /// load_splats of find_scene(path), with a warning on stderr for what was dropped or left out.
 SplatModel load_scene(const std::filesystem::path& path, SplatFile* facts = nullptr);
+
+/// Holds out what the command line says, else what the run did that wrote the scene, its output
+/// folder or a file in it, else every eighth view; an arc is noted.
+void hold_out_as_trained(const std::filesystem::path& scene, DatasetOptions& data);
 
 }  // namespace darb

@@ -3,6 +3,7 @@
 
 #include "engine/core/error.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/evaluation_flags.h"
 #include "tools/darb/help.h"
 #include "tools/darb/train_flags.h"
 #include "trainer/presets.h"
@@ -54,6 +55,7 @@ void add_data_flags(CLI::App& command, TrainFlags& f) {
         .add_flag("--eval", f.data.hold_out,
                   "hold out every 8th view, or the source's own test views")
         ->group(help_group::kInput);
+    add_hold_out_flag(command, f.data)->group(help_group::kInput);
     command.add_option("-i,--images", f.data.images_folder, "photo folder of a COLMAP project")
         ->capture_default_str()
         ->group(option_group::kPhotos);

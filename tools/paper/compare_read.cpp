@@ -44,6 +44,7 @@ ComparedAt evaluation_of(const Json& e, const fs::path& folder) {
     at.psnr_db = number(e, "psnr_db");
     at.ssim = number(e, "ssim");
     at.splats = e.at("splats");
+    if (const auto arc = e.find("arc"); arc != e.end()) at.arc_db = number(*arc, "psnr_db");
     const fs::path pictures = folder / "held_out" / std::to_string(at.iteration);
     std::set<std::string> used;  // in the order in which the run named them
     for (const Json& v : e.at("views"))
@@ -75,7 +76,7 @@ void take_evaluation(const Json& e, const std::vector<int>& iterations, Compared
 }  // namespace
 
 RunState run_state(const fs::path& folder, const std::string& settings, const std::string& cameras,
-                   int iterations, std::size_t held_out) {
+                   int iterations, std::size_t held_out, const std::string& hold_out) {
     const fs::path metrics_path = folder / "metrics.json";
     if (fs::exists(metrics_path)) {
         const Json metrics = read_metrics(metrics_path);
@@ -86,7 +87,8 @@ RunState run_state(const fs::path& folder, const std::string& settings, const st
                         kOtherFolder);
         const fs::path list = folder / "cameras.json";
         if (!fs::exists(list) || read_text_file(list) != cameras ||
-            start.value("held_out_views", std::size_t{0}) != held_out)
+            start.value("held_out_views", std::size_t{0}) != held_out ||
+            start.value("hold_out", hold_out_text({})) != hold_out)
             throw Error(list.string(),
                         "the run there had other photos, another size or other held-out views",
                         kOtherFolder);

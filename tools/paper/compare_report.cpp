@@ -37,6 +37,7 @@ Json at_json(const ComparedAt& at) {
             {"model_mb", optional_json(at.model_mb)},
             {"views", views},
             {"scales", scales},
+            {"arc_psnr_db", optional_json(at.arc_db)},
             {"off_path_psnr_db", optional_json(at.off_path_db)}};
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/image.h"
+#include "engine/data/hold_out.h"
 #include "tools/paper/blending.h"
 
 namespace darb {
@@ -35,6 +36,7 @@ struct ComparedAt {  // an evaluation of one run
     std::filesystem::path model;     // that file
     std::vector<ComparedView> views;
     std::vector<ComparedScale> scales;  // of --scales, where the model was saved
+    std::optional<double> arc_db;       // PSNR of an arc that was held out beside other views
     std::optional<double> off_path_db;  // PSNR there, where the data set has such views
 };
 
@@ -77,9 +79,11 @@ enum class RunState { none, partial, finished };
 
 /// What lies in the output folder of a training run that was to have these settings (settings_text)
 /// and this list of cameras. finished: metrics.json of a whole run. partial: a checkpoint alone.
-/// Throws Error where what is there has other settings, cameras or numbers of views.
+/// Throws Error where what is there has other settings, cameras, numbers of views or a
+/// choice of held-out ones (hold_out_text).
 RunState run_state(const std::filesystem::path& folder, const std::string& settings,
-                   const std::string& cameras, int iterations, std::size_t held_out);
+                   const std::string& cameras, int iterations, std::size_t held_out,
+                   const std::string& hold_out = hold_out_text({}));
 
 /// Fills at, curve and peak_mb from metrics.json and run.jsonl in run.folder, for those of
 /// `iterations` that were evaluated, and notes with those that were not. Throws Error naming the

@@ -61,22 +61,27 @@ std::vector<Column> every_column(const Comparison& comparison) {
                                   if (s.scale == scale) return Value(s.psnr_db);
                               return Value();
                           }});
+    at = 1 +
+         columns.insert(at, {"arc", "dB", "arc_psnr_db", 2, true,
+                             [](const ComparedRun&, const ComparedAt& run) { return run.arc_db; }});
     columns.insert(at, {"off path", "dB", "off_path_psnr_db", 2, true,
                         [](const ComparedRun&, const ComparedAt& run) { return run.off_path_db; }});
     return columns;
 }
 
 std::vector<Column> shown_columns(const Comparison& comparison) {
-    bool lpips = false, off_path = false;
+    bool lpips = false, arc = false, off_path = false;
     for (const ComparedDataset& dataset : comparison.datasets)
         for (const ComparedRun& run : dataset.runs)
             for (const ComparedAt& at : run.at) {
                 lpips |= at.lpips.has_value();
+                arc |= at.arc_db.has_value();
                 off_path |= at.off_path_db.has_value();
             }
     std::vector<Column> columns;
     for (const Column& column : every_column(comparison))
-        if ((lpips || column.json != "lpips") && (off_path || column.json != "off_path_psnr_db"))
+        if ((lpips || column.json != "lpips") && (arc || column.json != "arc_psnr_db") &&
+            (off_path || column.json != "off_path_psnr_db"))
             columns.push_back(column);
     return columns;
 }

@@ -1,0 +1,146 @@
+#include "engine/data/hold_out.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <numeric>
+
+#include "engine/core/error.h"
+#include "engine/data/dataset.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kUsual = 8;
+constexpr int kMost = 100'000;
+// Pulls the point that cameras look at to their mean, where their axes are parallel.
+constexpr double kPull = 1e-3;
+constexpr double kLeastUp = 1e-3;   // mean of the cameras' up vectors: below, they have none
+constexpr double kOnePlace = 1e-9;  // of the distance to the origin, at least 1: no distance
+constexpr double kTurn = 6.283185307179586;
+
+glm::dvec3 row(const glm::dmat3& m, int r) {
+    return {m[0][r], m[1][r], m[2][r]};
+}
+
+[[noreturn]] void refuse(std::string_view text, std::string_view word) {
+    throw Error(fmt::format("--hold-out {}", text),
+                fmt::format("'{}' is neither every:N nor arc:N with N from 2", word),
+                "Use every:8, arc:8, or both: every:8,arc:8.");
+}
+
+/// The point nearest to all axes of sight.
+glm::dvec3 looked_at(const std::vector<View>& views, const glm::dvec3& mean) {
+    glm::dmat3 sum(kPull * double(views.size()));
+    glm::dvec3 right = sum * mean;
+    for (const View& view : views) {
+        const glm::dvec3 axis = row(view.camera.rotation, 2);
+        const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(axis, axis);
+        sum += across;
+        right += across * view.camera.centre();
+    }
+    return glm::inverse(sum) * right;
+}
+
+struct Ring {  // what angles are measured in
+    glm::dvec3 centre, right, ahead;
+    bool one_place = false;  // of the cameras: their directions of sight tell them apart
+    double angle(const Camera& camera) const {
+        const glm::dvec3 at = one_place ? row(camera.rotation, 2) : camera.centre() - centre;
+        return std::atan2(glm::dot(at, ahead), glm::dot(at, right));
+    }
+};
+
+Ring ring_of(const std::vector<View>& views) {
+    glm::dvec3 mean(0.0), up(0.0);
+    for (const View& view : views) {
+        mean += view.camera.centre() / double(views.size());
+        up -= row(view.camera.rotation, 1) / double(views.size());
+    }
+    double widest = 0;
+    for (const View& view : views)
+        widest = std::max(widest, glm::distance(view.camera.centre(), mean));
+    Ring ring;
+    ring.one_place = widest < kOnePlace * std::max(1.0, glm::length(mean));
+    ring.centre = ring.one_place ? mean : looked_at(views, mean);
+    // Rolled to all sides: any axis does.
+    up = glm::length(up) > kLeastUp ? glm::normalize(up) : glm::dvec3(0, 0, 1);
+    const glm::dvec3 other = std::abs(up.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+    ring.right = glm::normalize(glm::cross(up, other));
+    ring.ahead = glm::cross(up, ring.right);
+    return ring;
+}
+
+}  // namespace
+
+HoldOut parse_hold_out(std::string_view text) {
+    HoldOut hold_out{0, 0};
+    for (std::size_t at = 0; at <= text.size();) {
+        const std::size_t end = std::min(text.find(',', at), text.size());
+        const std::string_view word = text.substr(at, end - at);
+        at = end + 1;
+        const std::size_t colon = std::min(word.find(':'), word.size());
+        int count = kUsual;
+        if (colon < word.size()) {
+            const char* const last = word.data() + word.size();
+            const auto [stop, error] = std::from_chars(word.data() + colon + 1, last, count);
+            if (error != std::errc{} || stop != last) refuse(text, word);
+        }
+        int* const part = word.substr(0, colon) == "every" ? &hold_out.every
+                          : word.substr(0, colon) == "arc" ? &hold_out.arc
+                                                           : nullptr;
+        if (part == nullptr || *part != 0 || count < 2 || count > kMost) refuse(text, word);
+        *part = count;
+    }
+    return hold_out;
+}
+
+std::string hold_out_text(const HoldOut& hold_out) {
+    std::string text;
+    if (hold_out.every > 0) text = fmt::format("every:{}", hold_out.every);
+    if (hold_out.arc > 0) text += fmt::format("{}arc:{}", text.empty() ? "" : ",", hold_out.arc);
+    return text;
+}
+
+std::vector<std::size_t> way_round(const std::vector<View>& views) {
+    std::vector<std::size_t> order(views.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    if (views.empty()) return order;
+    const Ring ring = ring_of(views);
+    std::vector<double> angle;
+    for (const View& view : views) angle.push_back(ring.angle(view.camera));
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return angle[a] < angle[b]; });
+    std::size_t first = 0;
+    double widest = kTurn + angle[order.front()] - angle[order.back()];
+    for (std::size_t i = 1; i < order.size(); ++i)
+        if (const double gap = angle[order[i]] - angle[order[i - 1]]; gap > widest) {
+            widest = gap;
+            first = i;
+        }
+    std::rotate(order.begin(), order.begin() + std::ptrdiff_t(first), order.end());
+    return order;
+}
+
+void mark_held_out(std::vector<View>& views, const HoldOut& hold_out) {
+    const bool own_test = std::ranges::any_of(views, &View::is_test);
+    if (hold_out.arc > 0 && views.size() > 1) {
+        const std::vector<std::size_t> order = way_round(views);
+        const std::size_t count = std::clamp<std::size_t>(
+            (order.size() + std::size_t(hold_out.arc) / 2) / std::size_t(hold_out.arc), 1,
+            order.size() - 1);
+        const std::size_t first = (order.size() - count) / 2;
+        for (std::size_t i = first; i < first + count; ++i)
+            views[order[i]].is_test = views[order[i]].in_arc = true;
+    }
+    if (own_test || hold_out.every == 0) return;
+    std::size_t place = 0;
+    for (View& view : views)
+        if (!view.in_arc && place++ % std::size_t(hold_out.every) == 0) view.is_test = true;
+}
+
+}  // namespace darb

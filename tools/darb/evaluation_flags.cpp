@@ -1,0 +1,38 @@
+#include "tools/darb/evaluation_flags.h"
+
+#include <string>
+
+namespace darb {
+
+Dataset off_path_of(const std::filesystem::path& dataset, const DatasetOptions& options) {
+    const std::filesystem::path folder = dataset / "off_path";
+    if (!std::filesystem::exists(folder / "transforms_test.json")) return {};
+    DatasetOptions own = options;
+    own.images_folder = DatasetOptions{}.images_folder;  // --images is of the data set's photos
+    own.held_out = {};
+    return load_dataset(folder, own);
+}
+
+CLI::Option* add_hold_out_flag(CLI::App& command, DatasetOptions& data) {
+    return command
+        .add_option_function<std::string>(
+            "--hold-out",
+            [&data](const std::string& text) {
+                data.held_out = parse_hold_out(text);
+                data.hold_out = true;
+            },
+            "which views: every:N by name, or the source's own test views; arc:N, one in N of "
+            "them, all of one stretch of the way around the scene; or both with a comma")
+        ->default_str("every:8");
+}
+
+CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales) {
+    return command
+        .add_option("--scales", scales,
+                    "sizes to measure at, as multiples of that of -r, with commas: 0.5,1,2,4")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->check(CLI::Range(0.01, 100.0));
+}
+
+}  // namespace darb
