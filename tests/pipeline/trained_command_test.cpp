@@ -76,6 +76,34 @@ TEST_F(TrainedCommand, eval_measures_at_other_sizes) {
     expect_refused({{command + "-r 2 --scales 4", "4 times 100 px is 400 px"}});
 }
 
+TEST_F(TrainedCommand, eval_tells_the_light_that_few_views_prove) {
+    const std::string file = scratch() / "light.json";
+    const Outcome o = darb(fmt::format(
+        "eval {} {} -r 4 -w --hold-out arc:4 --light-share --json {}", ply(), kScene, file));
+    ASSERT_EQ(o.code, 0) << o.err;
+    const json eval = json::parse(read_text_file(file)), light = eval.at("light_of_few_views");
+    EXPECT_EQ(light.at("fewer_than"), 3);
+    EXPECT_EQ(light.at("of_splats"), read_ply(ply()).size());
+    EXPECT_LT(light.at("splats").get<int>(), light.at("of_splats").get<int>());
+    for (const char* mean : {"mean", "arc", "off_path"}) {
+        EXPECT_GE(light.at(mean).get<double>(), 0) << mean;
+        EXPECT_LT(light.at(mean).get<double>(), 1) << mean;
+    }
+    EXPECT_GT(light.at("off_path").get<double>(), light.at("mean").get<double>());
+    EXPECT_NE(o.out.find("fewer than 3 training views see"), std::string::npos) << o.out;
+    // An arc beside the data set's own test views.
+    double sum = 0;
+    int in_arc = 0;
+    for (const json& view : eval.at("views"))
+        if (view.value("in_arc", false)) {
+            sum += view.at("psnr_db").get<double>();
+            ++in_arc;
+        }
+    EXPECT_EQ(in_arc, 12) << "a quarter of 48";
+    EXPECT_EQ(eval.at("arc").at("views"), 12);
+    EXPECT_NEAR(eval.at("arc").at("psnr_db").get<double>(), sum / 12, 1e-9);
+}
+
 TEST_F(TrainedCommand, eval_takes_the_split_asked_for) {
     const std::string command = fmt::format("eval {} {} -r 4 --split ", output(), kScene);
     EXPECT_NE(darb(command + "train").out.find("mean of 40"), std::string::npos);

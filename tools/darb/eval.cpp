@@ -12,6 +12,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/eval_light.h"
 #include "tools/darb/evaluation_flags.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
@@ -27,7 +28,7 @@ namespace {
 struct EvalFlags {
     std::filesystem::path scene, dataset, json;
     std::string split = "test", device, effects = "auto";
-    bool eval_exposure = false, quiet = false;
+    bool eval_exposure = false, quiet = false, light = false;
     bool white_background = false;
     std::vector<double> scales;  // none: as the photos are
     DatasetOptions data;
@@ -91,6 +92,10 @@ int eval(Ranks& ranks, EvalFlags flags) {
              evaluation.psnr_db, evaluation.ssim);
     }
     if (!ranks.is_first()) return 0;
+    if (flags.light)
+        json["light_of_few_views"] =
+            told_light(out, measure_light(device, model, options.effects, dataset.views, views,
+                                          held_out_views(away.views)));
     write_json(flags.json, json);
     tell_paths(flags.quiet, {flags.json});
     return 0;
@@ -118,6 +123,9 @@ void add_eval(CLI::App& app, Action& action) {
                         "as in training: 1, 2, 4, 8 or a width in px");
     add_scales_flag(*command, flags->scales);
     add_hold_out_flag(*command, flags->data)->default_str("as the scene was trained, else every:8");
+    command->add_flag("--light-share", flags->light,
+                      "also the share of the light that comes from splats which fewer than three "
+                      "training views see");
     command->add_flag("-w,--white-background", flags->white_background,
                       "white behind alpha, not black");
     add_accuracy_flags(*command, flags->accuracy);

@@ -1,0 +1,25 @@
+// How much of a picture's light comes from splats that few of the training views prove: what a
+// splat adds to the pixels (the sum of its T alpha over them) is its light in a view.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/gpu/device.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/splat_model.h"
+
+namespace darb {
+
+/// [N] in how many of the cameras' pictures a splat is blended into some pixel: one that others
+/// hide is not. A picture and its gradients a camera.
+std::vector<std::uint32_t> views_that_see(Device& device, const SplatModel& model,
+                                          const std::vector<Camera>& cameras);
+
+/// For each camera the share, 0 to 1, of its picture's light that is of the chosen splats; 0 where
+/// there is none. chosen: [N], 0 or 1.
+std::vector<double> light_shares(Device& device, const SplatModel& model,
+                                 const std::vector<std::uint8_t>& chosen,
+                                 const std::vector<Camera>& cameras);
+
+}  // namespace darb
