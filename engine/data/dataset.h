@@ -104,6 +104,9 @@ std::vector<View> held_out_views(const std::vector<View>& views);
 /// smaller.
 std::vector<View> scaled_views(std::vector<View> views, double scale);
 
+/// Whether no photo of them is too small for scaled_views.
+bool photos_reach(const std::vector<View>& views, double scale);
+
 /// Loads all, on `threads` threads (0 = all cores), in the order of views. As many at a time as
 /// take half of `memory` (bytes; 0: what is free) while they are read. Throws Error, before it
 /// reads the first, where all of them or one take more than that.

@@ -164,15 +164,34 @@ PhotoSize size_at_resolution(int width, int height, int resolution) {
                 "Use 1, 2, 4 or 8 (a divisor), a width in pixels above 8, or -1.");
 }
 
+namespace {
+
+// As the photo is, its lens taken off where the view's is.
+Camera whole_camera(const View& view) {
+    return view.camera.lens.active || !view.lens.distorted()
+               ? pinhole_camera(view.lens)
+               : undistorted_frame(view.lens, view.name).camera;
+}
+
+bool is_too_small(const Camera& whole, const Camera& now, double scale) {
+    return scale != 1 &&
+           scale * now.width >= whole.width + 0.5 + 0.5 * scale;  // half a pixel of what it is now
+}
+
+}  // namespace
+
+bool photos_reach(const std::vector<View>& views, double scale) {
+    return std::ranges::none_of(views, [&](const View& view) {
+        return is_too_small(whole_camera(view), view.camera, scale);
+    });
+}
+
 std::vector<View> scaled_views(std::vector<View> views, double scale) {
     if (scale == 1) return views;
     for (View& view : views) {
-        const Camera now = view.camera;
-        const Camera full = now.lens.active || !view.lens.distorted()
-                                ? pinhole_camera(view.lens)
-                                : undistorted_frame(view.lens, view.name).camera;
+        const Camera now = view.camera, full = whole_camera(view);
         const double width = scale * now.width;
-        if (width >= full.width + 0.5 + 0.5 * scale)  // half a pixel of what it is now
+        if (is_too_small(full, now, scale))
             throw Error(view.name,
                         fmt::format("is {} px wide, and {} times {} px is {:.0f} px", full.width,
                                     scale, now.width, width),

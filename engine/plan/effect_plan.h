@@ -83,10 +83,8 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
 
 /// For training. photos: as load_photos gives them, for the exposure's rule; empty: that effect is
 /// off. The degree of view-dependent colour is found while training: see TrainOptions::probe_sh.
-/// kernel: a row of engine/kernels; all but the Gaussian call for anti-aliasing where the data set
-/// has points.
 EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& photos, int sh_degree,
-                         const EffectChoice& choice = {}, int kernel = KERNEL_GAUSSIAN);
+                         const EffectChoice& choice = {});
 
 /// The model as the plan wants it: higher bands dropped, the render mode as planned.
 void apply_plan(const EffectPlan& plan, SplatModel& model);

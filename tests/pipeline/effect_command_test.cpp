@@ -47,6 +47,26 @@ TEST(EffectCommand, effects_that_a_command_cannot_do_are_refused) {
     EXPECT_EQ(darb(plan + "none,+lens --lens original").code, 0);
 }
 
+TEST(EffectCommand, a_probe_decides_by_every_size_that_the_photos_have) {
+    const std::string plan =
+        "plan " + kScene + " --no-price --probe --probe-iterations 20 --json - ";
+    const Outcome o = darb(plan + "-r 4");
+    ASSERT_EQ(o.code, 0) << o.err;
+    const json result = json::parse(o.out), probe = result.at("probe");
+    ASSERT_EQ(probe.at("sizes").size(), 4u);
+    double gain = 0;
+    for (const json& size : probe.at("sizes"))
+        gain += size.at("with_psnr_db").get<double>() - size.at("without_psnr_db").get<double>();
+    EXPECT_NEAR(probe.at("gain_db").get<double>(), gain / 4, 1e-9);
+    EXPECT_EQ(probe.at("sizes")[3].at("width"), 200);
+    for (const json& row : result.at("effects"))
+        if (row["effect"] == "antialias") {
+            EXPECT_TRUE(row["reason"].get<std::string>().starts_with("a probe: ")) << row;
+        }
+    expect_refused({{"plan " + kScene + "/none.ply --probe", "none.ply"},
+                    {"plan " + kScene + " --probe-iterations 20", "--probe"}});
+}
+
 // Flat pictures of a fisheye have another size and another focal length than its photos.
 TEST(EffectCommand, without_the_lens_effect_a_wide_fisheye_is_straightened_as_by_lens_undistort) {
     json cameras = json::parse(read_text_file(kScene + "/transforms_train.json"));

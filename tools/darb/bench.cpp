@@ -64,7 +64,7 @@ int bench(BenchFlags flags) {
     options.program = std::filesystem::read_symlink("/proc/self/exe");
     options.plan_training = [](Dataset& dataset, const std::vector<ImageU8>& photos,
                                TrainOptions& train) {
-        const EffectPlan plan = plan_training(dataset, photos, train.sh_degree, {}, train.kernel);
+        const EffectPlan plan = plan_training(dataset, photos, train.sh_degree);
         apply_plan(plan, train);
         apply_plan(plan, dataset.views);
     };

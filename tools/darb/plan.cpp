@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "engine/core/say.h"
 #include "tools/darb/command_list.h"
@@ -41,6 +42,11 @@ int run_plan(PlanFlags flags) {
     const PlanSubject s = open_subject(flags);
     refuse_to_overwrite_inputs({flags.json}, files_of(s.training ? s.dataset.views : s.views));
     EffectPlan plan = plan_of(s, flags, choice);
+    std::optional<AntialiasProbe> probe;
+    if (flags.probe) {
+        probe = probe_subject(s, flags, plan);
+        take_probe(*probe, plan);
+    }
     const bool empty = !s.training && s.model.size() == 0;
     EffectPrices prices;
     if (!empty && (!flags.no_price || flags.compare)) {
@@ -51,11 +57,14 @@ int run_plan(PlanFlags flags) {
                 price_effects(plan, base, switchable_effects(s, flags), degree_of(s, flags),
                               [&](const EffectPlan& p) { return measure_subject(s, flags, p); });
     }
-    print_priced(stream_beside_json(flags.json, flags.quiet), plan, prices, s.training);
+    std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
+    print_priced(out, plan, prices, s.training);
+    if (probe) print_probe(out, *probe);
     const char* kind = s.training ? "data set" : "scene";
     json result{{"path", name_in_json(flags.json, flags.what)},
                 {"kind", kind},
                 {"effects", priced_json(plan, prices)}};
+    if (probe) result["probe"] = probe_json(*probe);
     if (flags.compare && !empty) result["compared"] = compare_choices(s, flags);
     write_json(flags.json, result);
     tell_paths(flags.quiet, {flags.json});
@@ -86,6 +95,14 @@ void add_plan(CLI::App& app, Action& action) {
     add_lens_flag(*command, flags->data);
     command->add_flag("--no-price", flags->no_price, "measure no times");
     command->add_flag("--compare", flags->compare, "time and memory of none, auto and all");
+    auto* probe = command->add_flag(
+        "--probe", flags->probe,
+        "of a data set: decide on anti-aliasing by two short runs, measured at 1/2, 1, 2 and 4 "
+        "times the size of -r");
+    command->add_option("--probe-iterations", flags->probe_iterations, "of each of the two")
+        ->capture_default_str()
+        ->check(CLI::Range(20, 1'000'000))
+        ->needs(probe);
     add_json_option(*command, flags->json);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);

@@ -55,6 +55,7 @@ PlanSubject open_subject(const PlanFlags& flags) {
     refuse(flags.sh_degree.has_value(), "--sh-degree");
     refuse(!flags.kernel.kernel.empty(), "--kernel");
     refuse(!flags.kernel.files.empty(), "--kernel-file");
+    refuse(flags.probe, "--probe");
     s.model = load_scene(flags.what);
     if (!flags.cameras.empty()) s.views = open_cameras(flags.cameras, flags.data);
     return s;
@@ -65,9 +66,8 @@ int degree_of(const PlanSubject& s, const PlanFlags& flags) {
 }
 
 EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectChoice& choice) {
-    return s.training
-               ? plan_training(s.dataset, s.photos, degree_of(s, flags), choice, kernel_of(flags))
-               : plan_rendering(s.model, s.views, {.depth = flags.depth}, choice);
+    return s.training ? plan_training(s.dataset, s.photos, degree_of(s, flags), choice)
+                      : plan_rendering(s.model, s.views, {.depth = flags.depth}, choice);
 }
 
 std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags) {
@@ -82,6 +82,15 @@ std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags
     for (int e = 0; e < EFFECT_COUNT; ++e)
         if (has(e)) effects.push_back(e);
     return effects;
+}
+
+AntialiasProbe probe_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {
+    TrainOptions train;
+    train.kernel = kernel_of(flags);
+    train.iterations = flags.probe_iterations;
+    const bool lens = plan.on(EFFECT_LENS) && distorted(s.dataset);
+    return probe_antialias(command_device(flags.device), lens ? through_the_lens(flags) : s.dataset,
+                           train, plan);
 }
 
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {

@@ -12,13 +12,15 @@
 #include "engine/scene/splat_model.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/plan_price.h"
+#include "tools/darb/plan_probe.h"
 
 namespace darb {
 
 struct PlanFlags {
     std::filesystem::path what, cameras, json;
     std::string device, effects = "auto";
-    bool quiet = false, no_price = false, compare = false, depth = false;
+    bool quiet = false, no_price = false, compare = false, depth = false, probe = false;
+    int probe_iterations = 400;
     std::optional<int> sh_degree;
     KernelFlags kernel;
     DatasetOptions data;
@@ -38,6 +40,8 @@ int degree_of(const PlanSubject& s, const PlanFlags& flags);
 EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectChoice& choice);
 /// Those of EFFECT_COUNT that can be on or off for this subject.
 std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags);
+/// Of a data set, see plan_probe.h.
+AntialiasProbe probe_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan);
 /// On the device that the flags name; a scene without cameras is looked at from around it.
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan);
 

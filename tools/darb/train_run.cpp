@@ -26,8 +26,8 @@ EffectChoice training_choice(const TrainFlags& flags) {
 void plan_effects(Dataset& dataset, TrainFlags& flags) {
     if ((!dataset.points.seen_begin.empty() || dataset.has_alpha) && flags.run.photos.empty())
         flags.run.photos = load_photos(dataset.views);
-    const EffectPlan plan = plan_training(dataset, flags.run.photos, flags.train.sh_degree,
-                                          training_choice(flags), flags.train.kernel);
+    const EffectPlan plan =
+        plan_training(dataset, flags.run.photos, flags.train.sh_degree, training_choice(flags));
     apply_plan(plan, flags.train);
     apply_plan(plan, dataset.views);
     flags.run.effects = plan_line(plan);

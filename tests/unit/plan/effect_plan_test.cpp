@@ -1,5 +1,6 @@
 // The effect plan: scenes and data sets made to need exactly one effect get exactly that one.
 #include "engine/plan/effect_plan.h"
+#include "engine/plan/antialias_probe.h"
 
 #include <gtest/gtest.h>
 
@@ -202,36 +203,62 @@ struct Capture {
         dataset.points.seen_by.clear();
     }
     EffectPlan plan() const { return plan_training(dataset, photos, 0); }
-    /// Beside near-plane care, which training always has.
+    /// Beside near-plane care, which training always has, and anti-aliasing, which points call for.
     On on() const {
         On on = effects_on(plan());
         std::erase(on, EFFECT_NEAR);
+        std::erase(on, EFFECT_ANTIALIAS);
         return on;
     }
 };
 
-TEST(EffectPlanOfDataset, footprints_that_differ_call_for_antialiasing) {
-    EXPECT_EQ(effects_on(Capture().plan()), On{EFFECT_NEAR}) << "splats that move need it";
-    EXPECT_EQ(Capture().on(), On{});
-    EXPECT_EQ(Capture(1.3).on(), On{});
-    EXPECT_EQ(Capture(1.6).on(), On{});
+TEST(EffectPlanOfDataset, points_call_for_antialiasing) {
+    EXPECT_EQ(effects_on(Capture().plan()), (On{EFFECT_ANTIALIAS, EFFECT_NEAR}))
+        << "splats that move need the care";
     Capture wide(4.0);
-    EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
+    EXPECT_TRUE(wide.plan().on(EFFECT_ANTIALIAS));
+    EXPECT_NE(wide.plan().row(EFFECT_ANTIALIAS).reason.find("% of the points"), std::string::npos);
     wide.forget_tracks();
-    EXPECT_EQ(wide.on(), On{EFFECT_ANTIALIAS});
+    EXPECT_GT(wide.plan().row(EFFECT_ANTIALIAS).measured, 0.05);
+    EXPECT_LT(Capture(1.6).plan().row(EFFECT_ANTIALIAS).measured, 0.05);
+    Capture without;
+    without.dataset.points = {};
+    EXPECT_FALSE(without.plan().on(EFFECT_ANTIALIAS));
+    EXPECT_FALSE(plan_training(wide.dataset, wide.photos, 0, parse_effects("-antialias"))
+                     .on(EFFECT_ANTIALIAS));
 }
 
-TEST(EffectPlanOfDataset, kernels_but_the_gaussian_call_for_antialiasing_where_there_are_points) {
+AntialiasProbe probe_of(std::vector<ProbedSize> sizes) {
+    return {400, {}, {}, std::move(sizes)};
+}
+
+TEST(AntialiasProbe, every_size_counts_and_the_trained_one_may_not_lose_much) {
+    const AntialiasProbe gains =
+        probe_of({{0.5, 50, 50, 26, 31}, {1, 100, 100, 32.5, 32.1}, {2, 200, 200, 28, 30}});
+    EXPECT_NEAR(gains.gain_db(), (5 - 0.4 + 2) / 3, 1e-9);
+    EXPECT_TRUE(gains.pays());
+    const AntialiasProbe too_dear = probe_of({{0.5, 50, 50, 22, 28}, {1, 100, 100, 31.4, 30}});
+    EXPECT_GT(too_dear.gain_db(), 0);
+    EXPECT_FALSE(too_dear.pays());
+    EXPECT_FALSE(probe_of({{0.5, 50, 50, 30, 29}, {1, 100, 100, 30, 30.1}}).pays());
+}
+
+TEST(AntialiasProbe, the_plan_follows_but_for_the_command_line) {
+    const AntialiasProbe loses = probe_of({{0.5, 50, 50, 30, 29}, {1, 100, 100, 30, 30.1}});
+    const AntialiasProbe gains = probe_of({{1, 100, 100, 30, 30.1}, {4, 400, 400, 26, 29}});
+    EffectPlan plan = Capture().plan();
+    take_probe(loses, plan);
+    EXPECT_FALSE(plan.on(EFFECT_ANTIALIAS));
+    EXPECT_NE(plan.row(EFFECT_ANTIALIAS).reason.find("-1.00 dB at 0.5x"), std::string::npos);
+    EXPECT_NE(plan.row(EFFECT_ANTIALIAS).reason.find("no larger"), std::string::npos);
+    take_probe(gains, plan);
+    EXPECT_TRUE(plan.on(EFFECT_ANTIALIAS));
+    EXPECT_EQ(plan.row(EFFECT_ANTIALIAS).reason.find("no larger"), std::string::npos);
     const Capture c;
-    Dataset without = c.dataset;
-    without.points = {};
-    for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel) {
-        EXPECT_FALSE(plan_training(without, c.photos, 0, {}, kernel).on(EFFECT_ANTIALIAS));
-        const EffectPlan plan = plan_training(c.dataset, c.photos, 0, {}, kernel);
-        EXPECT_EQ(plan.on(EFFECT_ANTIALIAS), kernel != KERNEL_GAUSSIAN) << kernel;
-        EXPECT_FALSE(plan_training(c.dataset, c.photos, 0, parse_effects("-antialias"), kernel)
-                         .on(EFFECT_ANTIALIAS));
-    }
+    plan = plan_training(c.dataset, c.photos, 0, parse_effects("-antialias"));
+    take_probe(gains, plan);
+    EXPECT_FALSE(plan.on(EFFECT_ANTIALIAS));
+    EXPECT_TRUE(plan.row(EFFECT_ANTIALIAS).reason.starts_with("--effects; a probe"));
 }
 
 TEST(EffectPlanOfDataset, gains_that_differ_call_for_exposure_where_tracks_say_so) {
@@ -260,7 +287,7 @@ TEST(EffectPlanOfDataset, alpha_centre_and_degree_each_alone) {
     EXPECT_EQ(off.on(), On{EFFECT_OFF_CENTRE});
     const Capture plain;
     EXPECT_EQ(effects_on(plan_training(plain.dataset, plain.photos, 2)),
-              (On{EFFECT_VIEW_COLOUR, EFFECT_NEAR}));
+              (On{EFFECT_VIEW_COLOUR, EFFECT_ANTIALIAS, EFFECT_NEAR}));
 }
 
 TEST(EffectChoice, words_override_the_rules) {
