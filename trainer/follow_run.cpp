@@ -22,8 +22,8 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run) {
     if (file.empty() && (path.empty() || !reads)) return std::nullopt;
     Checkpoint checkpoint =
         while_doing(path.string(), [&] { return parse_checkpoint(file, path.string()); });
-    const TuningNames names = checkpoint_tuning(device.info(), checkpoint.tuning, path.string());
-    device.set_tuning(with_names(device.tuning(), names));
+    device.set_tuning(
+        resumed_tuning(device.info(), device.tuning(), checkpoint.tuning, path.string()));
     return checkpoint;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "engine/core/error.h"
 
@@ -74,6 +75,8 @@ void TrainingPhotos::fill(Commands& commands, Place& place, int view) {
 
 const Buffer& TrainingPhotos::place(Commands& commands, const TrainingView& view, int next) {
     if (!stream()) return *view.pixels;
+    if (std::exchange(pending_, true))
+        for (Place& place : places_) place.view = -1;
     const int wanted = static_cast<int>(view.frame.index);
     commands.pass("photo");
     const bool second = places_[1].view == wanted ||

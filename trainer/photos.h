@@ -43,6 +43,8 @@ class TrainingPhotos {
     /// waits, with that of the view `next` after it; -1: not known. Recordings are submitted in the
     /// order of these calls.
     const Buffer& place(Commands& commands, const TrainingView& view, int next = -1);
+    /// What was recorded last goes to the queue: else the next place() copies anew.
+    void submitted() { pending_ = false; }
     bool stream() const { return memory_ == Memory::waiting; }
     /// The name of a view.
     const std::string& name(int view) const { return names_[view]; }
@@ -96,6 +98,7 @@ class TrainingPhotos {
     Memory memory_;  // of the photos
     Size whole_, small_;
     std::array<Place, 2> places_;
+    bool pending_ = false;  // recorded, and not yet submitted
     int divisor_ = 1;
     bool room_for_smaller_ = true;
 };

@@ -101,6 +101,7 @@ void TrainingStep::launch(Flight& flight, const StepInput& input) {
     record_back(flight.commands, placed);
     flight.commands.copy(buffers_.frame().counters.status, flight.status, sizeof(gpu::FrameStatus));
     flight.commands.submit();
+    photos_->submitted();
 }
 
 // The input of what is recorded next, which reads the photo where it is placed.
@@ -203,6 +204,7 @@ void TrainingStep::ask_for_gradient(Flight& flight) {
         record_picture(flight.commands, placed);
         record_loss(flight.commands, placed, flight.loss);
         flight.commands.submit_and_wait();
+        photos_->submitted();
     } while (make_room(buffers_.frame().read_status()));
     const Buffer& compared = exposure_ ? exposure_->mapped() : buffers_.frame().images.image;
     const size_t floats = 3 * size_t{view.size()};
@@ -314,6 +316,7 @@ double TrainingStep::photo_mse(const TrainingView& view) {
                      {exposure_ ? exposure_->mapped() : image, photo, d_image_, flight.loss},
                      view.width(), view.height(), view.frame.background, lambda_dssim_);
         flight.commands.submit_and_wait();
+        photos_->submitted();
     } while (make_room(frame.read_status()));
     gpu::LossResult loss;
     std::memcpy(&loss, flight.loss.mapped(), sizeof loss);

@@ -19,7 +19,7 @@ namespace darb {
 namespace {
 
 constexpr double kGain = 0.97;  // less is not worth another way
-constexpr int kFormat = 3;
+constexpr int kFormat = 4;
 
 // A frame of a CPU must not take long, one of a GPU must not be too short to tell ways apart.
 struct Size {
@@ -89,12 +89,13 @@ std::string shader_hash() {
 
 // What a record must agree with, but for the shaders.
 nlohmann::json key_of(const DeviceInfo& info) {
-    return {{"format", kFormat},
-            {"device", info.name},
-            {"driver", info.driver},
-            {"driver_version", info.driver_version},
-            {"pipeline_cache", info.cache_uuid},
-            {"subgroup_size", info.subgroup_size}};
+    return {
+        {"format", kFormat},
+        {"device", info.name},
+        {"driver", info.driver},
+        {"driver_version", info.driver_version},
+        {"pipeline_cache", info.cache_uuid},
+        {"subgroup_sizes", {info.subgroup_size, info.min_subgroup_size, info.max_subgroup_size}}};
 }
 
 std::string dumped(const nlohmann::json& json, int indent = -1) {

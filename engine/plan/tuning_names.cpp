@@ -181,6 +181,12 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
     return tuning;
 }
 
+Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
+                      const std::string& where) {
+    tuning.blend_lanes = 0;
+    return with_names(tuning, checkpoint_tuning(info, text, where));
+}
+
 std::string result_tuning(const Device& device) {
     TuningNames names = tuning_names(device.tuning());
     for (const TuningGroup& group : tuning_groups(device.info()))

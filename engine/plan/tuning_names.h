@@ -44,6 +44,10 @@ std::string names_text(const TuningNames& names);
 TuningNames tuning_names(const Tuning& tuning);
 /// names as parse_tuning gives them.
 Tuning with_names(Tuning tuning, const TuningNames& names);
+/// The tuning of who goes on with what began with this text: the same bits. Lanes that it does not
+/// name were the device's own. Throws as parse_tuning.
+Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
+                      const std::string& where);
 
 /// Of the groups that change bits, as text: what a run must keep to repeat.
 std::string result_tuning(const Device& device);

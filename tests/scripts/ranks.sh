@@ -34,6 +34,7 @@ same 'two ranks leave what one leaves' "$folder/one" "$folder/two" 30
 for ranks in 1 2; do
     mpirun -n "$ranks" "$darb" eval "$folder/one" "$data" -r 50 -q --json "$folder/eval.$ranks" >"$folder/eval.log" 2>&1
 done
+[[ -s $folder/eval.1 && -s $folder/eval.2 ]] || { echo "FAILED  eval: no figures"; cat "$folder/eval.log"; failed=1; }
 check 'two ranks measure what one measures' "^$(sha256sum <"$folder/eval.1")\$" "$(sha256sum <"$folder/eval.2")"
 [[ $what == long ]] || exit "$failed"
 

@@ -11,6 +11,8 @@ namespace darb {
 CostViews dataset_views(const Dataset& dataset, size_t most) {
     std::vector<View> all = held_out_views(dataset.views);
     if (all.empty()) all = dataset.views;
+    const auto in_arc = [](const View& view) { return view.in_arc; };
+    if (!std::all_of(all.begin(), all.end(), in_arc)) std::erase_if(all, in_arc);
     CostViews views;
     views.alpha_is_mask = dataset.alpha_is_mask;
     const size_t count = std::min(most, all.size());

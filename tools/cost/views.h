@@ -17,7 +17,8 @@ struct CostViews {
     bool alpha_is_mask = false;
 };
 
-/// Up to `most` test views, evenly picked; all views where none is held out. Loads the photos.
+/// Up to `most` test views, evenly picked; all views where none is held out.
+/// Those of an arc only where there are no others. Loads the photos.
 CostViews dataset_views(const Dataset& dataset, size_t most);
 
 /// `count` cameras on a circle that look slightly down (y is down) at the splats' centre, far

@@ -44,7 +44,7 @@ CostViews views_of(const CostFlags& flags, const SplatModel& model, size_t most)
                            size.height);
     }
     DatasetOptions options = flags.data;
-    options.hold_out = true;
+    hold_out_as_trained(flags.scene, options);
     const Dataset dataset = load_dataset(flags.dataset, options);
     print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(dataset.views));

@@ -29,7 +29,7 @@ struct LightReport {
 };
 
 /// all: of the data set; those that are not held out see the splats. views: to measure, as are
-/// off_path, which may be empty. At the size that the views have.
+/// off_path, which may be empty. At the size that the views have, with the default accuracy.
 LightReport measure_light(Device& device, const SplatModel& model, const EffectChoice& effects,
                           const std::vector<View>& all, const std::vector<View>& views,
                           const std::vector<View>& off_path);

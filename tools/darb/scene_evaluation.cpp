@@ -26,7 +26,8 @@ struct ViewNumbers {  // of a view, on its way from another rank
 
 // What decides which views are measured, and the pictures.
 void check_agreement(Ranks& ranks, const Device& device, const SplatModel& model,
-                     const std::vector<View>& views) {
+                     const std::vector<View>& views, const SceneEvaluation& options,
+                     const EffectPlan& plan) {
     if (ranks.count() == 1) return;
     RankFacts facts = rank_facts(device);
     std::string names, scene(kernel_name(model.kernel));
@@ -38,6 +39,11 @@ void check_agreement(Ranks& ranks, const Device& device, const SplatModel& model
         "views", fmt::format("{} ({})", views.size(), fact_of(std::as_bytes(std::span(names)))));
     facts.emplace_back("scene", fmt::format("{} splats ({})", model.size(),
                                             fact_of(std::as_bytes(std::span(scene)))));
+    std::string settings = plan_line(plan);
+    for (const int choice : options.accuracy.choice) settings += fmt::format(" {}", choice);
+    facts.emplace_back(
+        "settings", fmt::format("{}, background {}, exposure {}, alpha as a mask {}", settings,
+                                options.background.r, options.fit_exposure, options.alpha_is_mask));
     check_same(ranks, facts);
 }
 }  // namespace
@@ -53,7 +59,7 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
     Renderer renderer(device, planned, options.accuracy, plan.projection(), plan.huge_splat_path());
     OneRank alone;
     Ranks& ranks = options.ranks ? *options.ranks : static_cast<Ranks&>(alone);
-    check_agreement(ranks, device, planned, views);
+    check_agreement(ranks, device, planned, views, options, plan);
     std::vector<ViewNumbers> own;
     for (size_t v = 0; v < views.size(); ++v) {
         if (!has_turn(ranks, v)) continue;

@@ -47,10 +47,13 @@ long last_iteration(const fs::path& output) {
 
 // None where there is no such run or it held nothing out.
 std::optional<HoldOut> hold_out_of_run(const fs::path& scene) {
-    fs::path log = scene / "run.jsonl";
-    if (fs::is_regular_file(scene))  // OUT/point_cloud/iteration_N/point_cloud.ply
-        log = fs::absolute(scene).parent_path().parent_path().parent_path() / "run.jsonl";
     std::error_code none;
+    fs::path folder = fs::absolute(scene, none), log = folder / "run.jsonl";
+    constexpr int kDeepest = 3;  // OUT/point_cloud/iteration_N/point_cloud.ply
+    for (int up = 0; up < kDeepest && !fs::is_regular_file(log, none); ++up) {
+        folder = folder.parent_path();
+        log = folder / "run.jsonl";
+    }
     if (!fs::is_regular_file(log, none)) return std::nullopt;
     std::ifstream lines(log);
     std::string text;

@@ -69,8 +69,7 @@ void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own) {
     const Bytes first = from_first(ranks, std::as_bytes(std::span(own)));
     if (keeps_own) return;
     const std::string_view names(reinterpret_cast<const char*>(first.data()), first.size());
-    device.set_tuning(
-        with_names(device.tuning(), checkpoint_tuning(device.info(), names, "tuning of rank 0")));
+    device.set_tuning(resumed_tuning(device.info(), device.tuning(), names, "tuning of rank 0"));
 }
 
 int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {

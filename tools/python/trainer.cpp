@@ -108,9 +108,8 @@ void PyTrainer::make_trainer() {
     if (!flags_.run.resume_from.empty()) {
         start = read_checkpoint(flags_.run.resume_from);
         check_resumable(*start, flags_.run.resume_from, flags_.train, dataset_, fingerprint());
-        device.set_tuning(with_names(
-            device.tuning(),
-            parse_tuning(device.info(), start->tuning, flags_.run.resume_from.string())));
+        device.set_tuning(resumed_tuning(device.info(), device.tuning(), start->tuning,
+                                         flags_.run.resume_from.string()));
     } else {
         check_start_memory(device, dataset_, flags_.train);
     }
@@ -200,6 +199,7 @@ py::dict PyTrainer::evaluate() {
             evaluation.views.push_back(compare_view(view.name, trainer_->render(view.camera),
                                                     photos_[i], trainer_->background(),
                                                     dataset_.alpha_is_mask));
+            evaluation.views.back().in_arc = view.in_arc;
         }
         if (evaluation.views.empty())
             throw Error("darb.Trainer", "no view is held out",
