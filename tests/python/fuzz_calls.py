@@ -75,7 +75,7 @@ def odd_array(rng, good):
         return a.astype(rng.choice(("f8", "f2", "i4", "u1", "bool", ">f4", "c8", "O")))
     if kind == 1 and a.ndim > 1:
         return np.asfortranarray(a)
-    if kind == 2:
+    if kind == 2 and a.ndim:
         return a[..., ::-1]
     if kind == 3 and a.size:
         a.flat[rng.randrange(a.size)] = rng.choice(
