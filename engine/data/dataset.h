@@ -56,7 +56,7 @@ struct DatasetOptions {
         -1;  // 1, 2, 4, 8: divisor; > 8: width in px; -1: as is, but at most 1,600 wide
     bool hold_out = false;       // --eval: what held_out says is test; sources with a test file of
                                  // their own use that in either case
-    HoldOut held_out{};            // --hold-out
+    HoldOut held_out{};          // --hold-out
     bool require_photos = true;  // false: cameras only (render)
     bool original_lens = false;  // true: distorted photos stay so, and their cameras have the lens
     bool original_where_wide = false;  // true: so do those of too_wide_to_undistort
