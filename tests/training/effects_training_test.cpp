@@ -91,6 +91,9 @@ TEST(SphericalHarmonicsProbe, a_degree_without_room_is_refused_unmeasured) {
     roomy.drain();
     t.options.max_memory_bytes = device.allocated_bytes() + 1024;
     Device narrow{test::device_options()};
+    Tuning tuning = narrow.tuning();
+    tuning.photos = PhotoPlace::resident;  // else they make room
+    narrow.set_tuning(tuning);
     Trainer trainer(narrow, t.dataset, t.photos, t.start(), t.options);
     for (int i = 0; i < 200; ++i) trainer.step();
     ASSERT_EQ(trainer.probes().size(), 1u);

@@ -21,8 +21,7 @@ CLI::Option* add_hold_out_flag(CLI::App& command, DatasetOptions& data) {
                 data.held_out = parse_hold_out(text);
                 data.hold_out = true;
             },
-            "which views: every:N by name, or the source's own test views; arc:N, one in N of "
-            "them, all of one stretch of the way around the scene; or both with a comma")
+            "which: every:N, arc:N of the way around, or both")
         ->default_str("every:8");
 }
 
