@@ -45,8 +45,8 @@ trap 'rm -rf "$logs"' EXIT
 # those in _long in the step of that name.
 long='_long(/|$)'
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
-# Of the device, with no more host code than others: not under sanitizers.
-numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)\.|for_every_kernel$|Accuracy_switch_changes'
+# Of the device, with no more host code than others, or the same host code for long: not under sanitizers.
+numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)\.|for_every_kernel$|Accuracy_switch_changes|^trained_command_test$|splats_far_off_coarsen'
 # Of processes and of scripts, seconds each: they find nothing new under sanitizers or validation.
 once='^(scripts|pages|Outputs)\.'
 # Passes that other tests also record, with other numbers: without validation.
