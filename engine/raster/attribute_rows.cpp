@@ -57,25 +57,20 @@ namespace {
 
 // What lies row by row; `to` is where the first of the rows comes.
 void put_plain(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t count,
-               std::byte* to) {
-    const std::size_t row_bytes = rows.floats * sizeof(float);
-    if (pitch == rows.floats) {
-        if (can_stream(to)) return stream_floats(to, values, count * rows.floats);
-        std::memcpy(to, values, count * row_bytes);
-        return;
-    }
+               std::byte* to, FloatStream& stream) {
+    if (pitch == rows.floats && can_stream(to))
+        return stream.floats(to, values, count * rows.floats);
     constexpr std::size_t kColour = 3;  // of a length that is known, as a copy of so few is a word
     for (std::size_t i = 0; i < count; ++i)
         if (rows.floats == kColour)
-            std::memcpy(to + i * kColour * sizeof(float), values + i * pitch,
-                        kColour * sizeof(float));
+            stream.plain(to + i * kColour * sizeof(float), values + i * pitch, kColour);
         else
-            std::memcpy(to + i * row_bytes, values + i * pitch, row_bytes);
+            stream.plain(to + i * rows.floats * sizeof(float), values + i * pitch, rows.floats);
 }
 
 // A block of which all rows are there; `to` and values are its begin.
-void stream_block(const AttributeRows& rows, const float* values, std::size_t pitch,
-                  std::byte* to) {
+void stream_block(const AttributeRows& rows, const float* values, std::size_t pitch, std::byte* to,
+                  FloatStream& stream) {
     const auto each = [&](std::size_t column, const auto& put) {
         for (std::size_t k = 0; k < kBlockRows; ++k)
             put(to + (column * kBlockRows + k) * kColumnBytes,
@@ -84,14 +79,14 @@ void stream_block(const AttributeRows& rows, const float* values, std::size_t pi
     for (std::size_t c = 0; c < rows.columns; ++c) {
         const std::size_t floats = floats_in(rows, c);
         if (floats == kColumnFloats) {
-            each(c, stream_four);
+            each(c, [&](std::byte* at, const float* from) { stream.four(at, from); });
         } else if (floats == 1) {
-            each(c, stream_one);
+            each(c, [&](std::byte* at, const float* from) { stream.one(at, from); });
         } else {
             each(c, [&](std::byte* at, const float* from) {
                 float four[kColumnFloats] = {};
                 for (std::size_t j = 0; j < floats; ++j) four[j] = from[j];
-                stream_four(at, four);
+                stream.four(at, four);
             });
         }
     }
@@ -99,36 +94,37 @@ void stream_block(const AttributeRows& rows, const float* values, std::size_t pi
 
 // Any rows of a block.
 void put_block(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t count,
-               std::byte* to) {
+               std::byte* to, FloatStream& stream) {
     std::memset(to, 0, kBlockRows * rows.columns * kColumnBytes);
     for (std::size_t k = 0; k < count; ++k)
         for (std::size_t c = 0; c < rows.columns; ++c)
             if (const std::size_t floats = floats_in(rows, c); floats > 0)
-                std::memcpy(to + (c * kBlockRows + k) * kColumnBytes,
-                            values + k * pitch + c * kColumnFloats, floats * sizeof(float));
+                stream.plain(to + (c * kBlockRows + k) * kColumnBytes,
+                             values + k * pitch + c * kColumnFloats, floats);
 }
 
 }  // namespace
 
-void put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
+bool put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
               std::size_t count, std::byte* to) {
-    if (rows.floats == 0 || count == 0) return;
+    if (rows.floats == 0 || count == 0) return true;
+    FloatStream stream;
     to += first * rows.floats_held() * sizeof(float);
     values += first * pitch;
     if (rows.columns == 0) {
-        put_plain(rows, values, pitch, count, to);
+        put_plain(rows, values, pitch, count, to, stream);
     } else {
         const bool streams = can_stream(to);
         for (std::size_t i = 0; i < count; i += kBlockRows) {
             std::byte* const at = to + i * rows.floats_held() * sizeof(float);
             const float* const from = values + i * pitch;
             if (streams && count - i >= kBlockRows)
-                stream_block(rows, from, pitch, at);
+                stream_block(rows, from, pitch, at, stream);
             else
-                put_block(rows, from, pitch, std::min(kBlockRows, count - i), at);
+                put_block(rows, from, pitch, std::min(kBlockRows, count - i), at, stream);
         }
     }
-    stream_fence();
+    return stream.finite();
 }
 
 namespace {
@@ -139,6 +135,7 @@ void put_all(const AttributeRows& rows, std::span<const float> values, std::size
                rows.floats);
     in_pieces(splats, kBlocksOfPiece * kBlockRows, [&](std::size_t first, std::size_t count) {
         put_rows(rows, values.data(), rows.floats, first, count, to);
+        stream_fence();
     });
 }
 

@@ -12,6 +12,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/on_threads.h"
+#include "engine/core/streaming.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
@@ -264,8 +265,7 @@ void with_buffers(GpuSplats& splats, std::span<RowsTo* const> targets,
         });
 }
 
-// Of a thread, and of what it checks and writes while the first level of the caches holds it.
-constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK, kSplatsAtOnce = 16 * ROW_BLOCK;
+constexpr std::size_t kSplatsOfPiece = 256 * ROW_BLOCK;  // of a thread
 
 }  // namespace
 
@@ -282,20 +282,19 @@ bool GradientRenderer::set_values(const GivenValues& values,
     if (n == 0) return true;
     std::atomic<bool> accepted{true};
     const auto put = [&](const Source& source, std::size_t first, std::size_t count) {
-        if (source.floats == 0) return;
+        if (source.floats == 0) return true;
         if (!accept(source.attribute,
                     source.values.subspan(first * source.floats, count * source.floats)))
-            accepted = false;
-        if (!accepted) return;
-        for (const RowsTo& target : source.targets)
-            put_rows(target.rows, target.from, source.floats, first, count, target.to);
+            return false;
+        return std::ranges::all_of(source.targets, [&](const RowsTo& target) {
+            return put_rows(target.rows, target.from, source.floats, first, count, target.to);
+        });
     };
     with_buffers(s.splats, targets, [&] {
         in_pieces(n, kSplatsOfPiece, [&](std::size_t first, std::size_t count) {
-            for (const std::size_t end = first + count; first < end && accepted;
-                 first += kSplatsAtOnce)
-                for (const Source& source : sources)
-                    put(source, first, std::min(kSplatsAtOnce, end - first));
+            for (const Source& source : sources)
+                if (accepted && !put(source, first, count)) accepted = false;
+            stream_fence();
         });
     });
     return accepted;

@@ -71,10 +71,10 @@ class GradientRenderer {
     void replace(const SplatModel& model);
     /// Whether the splats are of this count and degree, and of origin 0.
     bool holds(std::size_t count, int sh_degree) const;
-    /// Other values for the same splats, a piece at a time: each is written where
+    /// Other values for the same splats, a piece at a time, where they are finite and
     /// accept(attribute, piece) says so, kShDc for `harmonics`. It is called by several threads and
-    /// must not throw. False where a piece was not: all is undefined until it is set again. Throws
-    /// Error for another number of values.
+    /// must not throw. False where a piece was refused: all is undefined until it is set again.
+    /// Throws Error for another number of values.
     bool set_values(const GivenValues& values,
                     const std::function<bool(int, std::span<const float>)>& accept);
     /// From the next picture on, in place of what the options say.

@@ -273,6 +273,15 @@ TEST(ViewInputs, values_come_from_where_a_caller_has_them) {
     for (const int refused : {int(kPosition), int(kShDc)})
         EXPECT_FALSE(renderer.set_values(
             given, [&](int attribute, std::span<const float>) { return attribute != refused; }));
+    for (float& value : {std::ref(bands.front()), std::ref(bands.back()), std::ref(bands[20])}) {
+        const float kept = std::exchange(value, std::nanf(""));
+        EXPECT_FALSE(renderer.set_values(given, any));
+        value = -std::numeric_limits<float>::infinity();
+        EXPECT_FALSE(renderer.set_values(given, any));
+        value = kept;
+    }
+    moved.opacity_logit.back() = std::numeric_limits<float>::infinity();
+    EXPECT_FALSE(renderer.set_values(given, any));
     moved.position.pop_back();
     given.attributes[kPosition] = moved.position;
     EXPECT_THROW(renderer.set_values(given, any), Error);

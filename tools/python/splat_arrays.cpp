@@ -56,7 +56,7 @@ Range range_of(int attribute) {
 
 bool SplatArraysGiven::accepts(int attribute, std::span<const float> values) {
     const Range range = range_of(attribute);
-    return are_within(values, range.least, range.most);
+    return range.least == -kMost || are_within(values, range.least, range.most);
 }
 
 void SplatArraysGiven::check_values() const {

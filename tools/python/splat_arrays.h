@@ -19,7 +19,7 @@ struct SplatArraysGiven {
     /// Throws Error with the place of the first number that is none or out of its range, which
     /// take_splats leaves to whoever reads the arrays anyway.
     void check_values() const;
-    /// Whether values of the attribute, kShDc for colours, have none of these. Needs no GIL.
+    /// Whether finite values of the attribute, kShDc for colours, are in its range. Needs no GIL.
     static bool accepts(int attribute, std::span<const float> values);
     GivenValues values() const;
     /// A copy with all, checked; sh_dc holds `colors` where these are given.
