@@ -63,7 +63,8 @@ class ShownMean {
 }  // namespace
 
 Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-                 const SplatModel& start, const TrainOptions& options, RankGroup ranks)
+                 const SplatModel& start, const TrainOptions& options, RankGroup ranks,
+                 std::uint32_t frozen)
     : device_(&with_budget(device, options)),
       ranks_(ranks.all ? ranks : RankGroup{&alone_}),
       options_(options),
@@ -83,6 +84,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       probe_(options, schedule_),
       step_(device, splats_, photos_, loss_options(options, dataset), options) {
     check_batch(*ranks_.all, options.batch);
+    splats_.freeze(frozen);
     step_.on_finished = [this](const StepOutcome& outcome) { finish(outcome); };
     step_.on_reserved = [this] { memory_.record(held()); };
     if (options_.antialias)
@@ -371,8 +373,10 @@ void Trainer::restore(const State& s) {
     DARB_CHECK(s.model.origin == photos_.origin(), "splats of another origin than the cameras'");
     drain();
     if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
+    const std::uint32_t frozen = splats_.frozen();
     splats_ = GpuSplats();  // first, so that there are never two
     splats_ = GpuSplats(*device_, s.model, true, schedule_.rest_every > 1);
+    splats_.freeze(frozen);
     probe_.set_next(s.next_probe);
     if (smoothing_) {
         smoothing_->update(splats_);

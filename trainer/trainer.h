@@ -57,11 +57,13 @@ class Trainer {
     using State = TrainerState;
     using Probe = ProbeResult;
 
-    /// photos: as load_photos gives them, in the order of dataset.views. ranks: that train
+    /// photos: as load_photos gives them, in the order of dataset.views. frozen: of the start, the
+    /// first splats that are drawn and not trained (GpuSplats::freeze). ranks: that train
     /// together, each with such a trainer; null: this one alone. Throws Error where the batch has
     /// no equal parts for them.
     Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-            const SplatModel& start, const TrainOptions& options, RankGroup ranks = {});
+            const SplatModel& start, const TrainOptions& options, RankGroup ranks = {},
+            std::uint32_t frozen = 0);
     Trainer(const Trainer&) = delete;
     Trainer& operator=(const Trainer&) = delete;
 

@@ -68,7 +68,7 @@ void AdamUpdate::record(Commands& commands, GpuSplats& splats, const GradientBuf
         args.largest = step.largest_log_scale;
         args.rest_share = 1.0f / static_cast<float>(step.rest_every);
         const int rest = rule == STEP_REST ? step.rest : REST_EACH;
-        for (const SplatRange& range : splats.ranges()) {
+        for (const SplatRange& range : splats.trained_ranges()) {
             args.first_splat = range.first;
             args.splat_count = range.count;
             const AttributeRows rows = splats.rows(a);
@@ -88,12 +88,14 @@ void AdamUpdate::record(Commands& commands, GpuSplats& splats, const GradientBuf
 void AdamUpdate::record_fading(Commands& commands, GpuSplats& splats,
                                const GradientBuffers& gradients, const Buffer& status,
                                const FrameView& view, float clearance) {
-    if (!(clearance > 0) || splats.count() == 0) return;
-    const Groups g = groups_for(splats.count());
+    const std::uint32_t n = splats.trained_count();
+    if (!(clearance > 0) || n == 0) return;
+    const Groups g = groups_for(n);
     commands.pass("adam");
-    commands.dispatch(fade_, gpu::FadeNearArgs{splats.count(), view.index, clearance},
-                      {*view.cameras, splats.parameters(kPosition),
-                       splats.parameters(kOpacityLogit), gradients.views(), status},
+    commands.dispatch(fade_, gpu::FadeNearArgs{n, view.index, clearance},
+                      {*view.cameras, splats.trained(splats.parameters(kPosition), 3),
+                       splats.trained(splats.parameters(kOpacityLogit), 1),
+                       splats.trained(gradients.views(), 2), status},
                       g.x, g.y);
 }
 

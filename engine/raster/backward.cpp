@@ -109,7 +109,7 @@ void Backward::record(Commands& commands, const FrameView& view, const Frame& fr
     args.rest_share = 1.0f / static_cast<float>(step.rest_every);
     const int rest = view.sh_degree > 0 ? step.rest : REST_EACH;  // nothing to step at degree 0
     Pipeline& pipeline = project_pipeline(view.sh_degree, splats.sh_degree(), UPDATE_ADAM, rest);
-    for (const SplatRange& range : splats.ranges()) {
+    for (const SplatRange& range : splats.trained_ranges()) {
         args.first_splat = range.first;
         args.splat_end = range.first + range.count;
         ProjectBuffers extra{{}, gradient_sum_, splats.rest_sum(range)};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "engine/core/check.h"
 #include "engine/scene/splat_shapes.h"
 
 namespace darb {
@@ -73,6 +74,19 @@ void GpuSplats::upload_rest_sum(const std::vector<float>& values) {
 
 std::vector<SplatRange> GpuSplats::ranges() const {
     return splat_ranges(count_, rows(kShRest, has_moments() ? 2 : 1).floats_held(), binding_bytes_);
+}
+
+std::vector<SplatRange> GpuSplats::trained_ranges() const {
+    std::vector<SplatRange> trained = splat_ranges(
+        trained_count(), rows(kShRest, has_moments() ? 2 : 1).floats_held(), binding_bytes_);
+    for (SplatRange& range : trained) range.first += frozen_;
+    return trained;
+}
+
+void GpuSplats::freeze(std::uint32_t count) {
+    DARB_CHECK(count <= count_ && count % kFrozenUnit == 0, "{} of {} splats to freeze", count,
+               count_);
+    frozen_ = count;
 }
 
 void GpuSplats::bind_parameters(const SplatRange& range, std::vector<BufferRange>& to) const {

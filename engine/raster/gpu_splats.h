@@ -62,9 +62,22 @@ class GpuSplats {
     /// After an attribute's buffers were replaced by ones of another count (density control).
     void set_count(std::uint32_t count) { count_ = count; }
 
+    /// The first `count` splats, a multiple of kFrozenUnit, are drawn and never change: no step of
+    /// the optimizer and no round of density control touches them, and they stay the first.
+    void freeze(std::uint32_t count);
+    std::uint32_t frozen() const { return frozen_; }
+    static constexpr std::uint32_t kFrozenUnit = 64;  // whose rows begin where bindings may
+    /// The rows of the others, of so many floats each, which do not lie in blocks.
+    BufferRange trained(const Buffer& rows, std::uint32_t floats) const {
+        return {rows, std::uint64_t{frozen_} * floats * sizeof(float)};
+    }
+    std::uint32_t trained_count() const { return count_ - frozen_; }
+
     /// What passes over splats work off one dispatch at a time, as the harmonics and their moments
     /// are bound by range where one binding of the device does not hold them all.
     std::vector<SplatRange> ranges() const;
+    /// The same of those that are not frozen.
+    std::vector<SplatRange> trained_ranges() const;
     /// Appends a buffer an attribute, in the order of ATTRIBUTE_*, as the passes over a range bind
     /// them: the rows of the range of what is too wide to be bound whole.
     void bind_parameters(const SplatRange& range, std::vector<BufferRange>& to) const;
@@ -84,6 +97,7 @@ class GpuSplats {
   private:
     SplatModel header_;  // no splats, only what is not per splat
     std::uint32_t count_ = 0;
+    std::uint32_t frozen_ = 0;
     std::uint64_t binding_bytes_ = 0;  // the most that one binding holds
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> parameters_;

@@ -49,6 +49,12 @@ std::vector<float> radius_quantiles(int kernel, Footprint footprint) {
 }
 }  // namespace
 
+void keep_frozen(Commands& commands, std::uint32_t frozen,
+                 std::initializer_list<FrozenWord> words) {
+    for (const auto& [values, word] : words)
+        if (frozen > 0) commands.fill({*values, 0, std::uint64_t{frozen} * 4}, word);
+}
+
 DensityControl::DensityControl(Device& device, int kernel, Footprint footprint)
     : device_(&device), commands_(device) {
     const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
@@ -90,6 +96,7 @@ DensityResult DensityControl::run(GpuSplats& splats, const Buffer& gradient_sum,
                        {splats.parameters(kLogScale), splats.parameters(kOpacityLogit),
                         gradient_sum, keep, grow, action},
                        g.x, g.y);
+    keep_frozen(commands_, splats.frozen(), {{&keep, 1}, {&grow, 0}, {&action, DENSIFY_KEEP}});
     scan.record(commands_, keep, keep_offset, count, 0, keep_total);
     scan.record(commands_, grow, grow_offset, count, 0, grow_total);
     commands_.submit_and_wait();
@@ -167,23 +174,27 @@ void DensityControl::gather(const Move& all, const AttributeRows& rows, bool cle
 }
 
 void DensityControl::reset_opacity(GpuSplats& splats, float opacity) {
-    if (splats.count() == 0) return;
-    const Groups g = groups_for(splats.count());
+    const std::uint32_t n = splats.trained_count();
+    if (n == 0) return;
+    const Groups g = groups_for(n);
     const auto logit = static_cast<float>(std::log(opacity / (1.0 - opacity)));
     commands_.begin();
     commands_.pass("reset opacity");
-    commands_.dispatch(reset_, gpu::ResetOpacityArgs{splats.count(), logit},
-                       {splats.parameters(kOpacityLogit), splats.moments(kOpacityLogit)}, g.x, g.y);
+    commands_.dispatch(reset_, gpu::ResetOpacityArgs{n, logit},
+                       {splats.trained(splats.parameters(kOpacityLogit), 1),
+                        splats.trained(splats.moments(kOpacityLogit), 2)},
+                       g.x, g.y);
     commands_.submit_and_wait();
 }
 
 void DensityControl::decay_opacity(GpuSplats& splats, float keep) {
-    if (splats.count() == 0) return;
-    const Groups g = groups_for(splats.count());
+    const std::uint32_t n = splats.trained_count();
+    if (n == 0) return;
+    const Groups g = groups_for(n);
     commands_.begin();
     commands_.pass("decay opacity");
-    commands_.dispatch(decay_, gpu::DecayOpacityArgs{splats.count(), keep},
-                       {splats.parameters(kOpacityLogit)}, g.x, g.y);
+    commands_.dispatch(decay_, gpu::DecayOpacityArgs{n, keep},
+                       {splats.trained(splats.parameters(kOpacityLogit), 1)}, g.x, g.y);
     commands_.submit_and_wait();
 }
 

@@ -3,6 +3,9 @@
 // density.
 #pragma once
 
+#include <cstdint>
+#include <initializer_list>
+
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
@@ -16,6 +19,14 @@ struct DensityResult {
     std::uint32_t before = 0, after = 0;
     std::uint32_t pruned = 0, grown = 0;
 };
+
+/// A word a splat that a round has decided on, and what it is to be of frozen ones.
+struct FrozenWord {
+    const Buffer* values;
+    std::uint32_t word;
+};
+/// Puts these in place of what was decided on the first `frozen` splats.
+void keep_frozen(Commands& commands, std::uint32_t frozen, std::initializer_list<FrozenWord> words);
 
 class DensityControl {
   public:

@@ -26,6 +26,7 @@ void MortonOrder::run(GpuSplats& splats, DensityControl& density, const MortonGr
     commands_.pass("order");
     commands_.fill(count, n);
     commands_.dispatch(key_, args, {splats.parameters(kPosition), key}, g.x, g.y);
+    keep_frozen(commands_, splats.frozen(), {{&key, 0}});  // stable: they stay the first
     sort.record(commands_, key, order, count, 0, 3 * MORTON_AXIS_BITS, true);
     commands_.dispatch(sources_, gpu::SplatArgs{n}, {order, sources}, g.x, g.y);
     commands_.submit_and_wait();

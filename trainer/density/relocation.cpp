@@ -60,6 +60,7 @@ DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float 
     commands_.fill(count, n);
     commands_.dispatch(weight_, args, {splats.parameters(kOpacityLogit), dead, weight, copies}, g.x,
                        g.y);
+    keep_frozen(commands_, splats.frozen(), {{&dead, 0}, {&weight, 0}});
     scan.record(commands_, dead, dead_offset, count, 0, dead_total);
     scan.record(commands_, weight, weight_offset, count, 0, weight_total);
     commands_.submit_and_wait();
@@ -93,12 +94,15 @@ DensityResult Relocation::run(GpuSplats& splats, DensityControl& density, float 
 
 void Relocation::record_noise(Commands& commands, GpuSplats& splats, const Buffer& status,
                               float rate, float dead_opacity, std::uint32_t seed) {
-    if (splats.count() == 0 || rate <= 0) return;
-    const Groups g = groups_for(splats.count());
+    const std::uint32_t n = splats.trained_count();
+    if (n == 0 || rate <= 0) return;
+    const Groups g = groups_for(n);
     commands.pass("position noise");
-    commands.dispatch(noise_, gpu::NoiseArgs{splats.count(), seed, rate, dead_opacity},
-                      {splats.parameters(kPosition), splats.parameters(kLogScale),
-                       splats.parameters(kRotation), splats.parameters(kOpacityLogit), status},
+    commands.dispatch(noise_, gpu::NoiseArgs{n, seed, rate, dead_opacity},
+                      {splats.trained(splats.parameters(kPosition), 3),
+                       splats.trained(splats.parameters(kLogScale), 3),
+                       splats.trained(splats.parameters(kRotation), 4),
+                       splats.trained(splats.parameters(kOpacityLogit), 1), status},
                       g.x, g.y);
 }
 
