@@ -34,6 +34,8 @@ void SmoothingFilter::update(GpuSplats& splats, const Buffer& cameras, std::uint
     commands_.pass("smoothing filter");
     commands_.dispatch(filter_, gpu::SmoothingArgs{splats.count(), camera_count},
                        {cameras, splats.parameters(kPosition), splats.smoothing()}, g.x, g.y);
+    if (splats.frozen() > 0)  // they are as a file holds them: the filter is worked in
+        commands_.fill({splats.smoothing(), 0, std::uint64_t{splats.frozen()} * 4}, 0);
     commands_.submit_and_wait();
 }
 
