@@ -328,17 +328,7 @@ Json settings_of(const Checkpoint& checkpoint, const std::string& where) {
 
 }  // namespace
 
-void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
-                     const TrainOptions& options, const Dataset& dataset,
-                     const std::string& fingerprint) {
-    const Json before = settings_of(checkpoint, path.string());
-    const Json now = Json::parse(settings_text(options));
-    const std::string strategy = before.value("strategy", std::string(strategy_name(Strategy{})));
-    if (strategy != strategy_name(options.strategy))
-        throw Error(path.string(),
-                    fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
-                                strategy_name(options.strategy)),
-                    "Repeat the strategy of that run, or start without --resume.");
+std::string settings_differences(const Json& before, const Json& now) {
     Json both = before;
     both.update(now);
     std::string differences;
@@ -350,7 +340,21 @@ void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& 
         if (in(before) != in(now))
             differences += fmt::format(" {}: {} then, {} now;", name, in(before), in(now));
     }
-    if (!differences.empty())
+    return differences;
+}
+
+void check_resumable(const Checkpoint& checkpoint, const std::filesystem::path& path,
+                     const TrainOptions& options, const Dataset& dataset,
+                     const std::string& fingerprint) {
+    const Json before = settings_of(checkpoint, path.string());
+    const Json now = Json::parse(settings_text(options));
+    const std::string strategy = before.value("strategy", std::string(strategy_name(Strategy{})));
+    if (strategy != strategy_name(options.strategy))
+        throw Error(path.string(),
+                    fmt::format("was written with --strategy {}, this is --strategy {}", strategy,
+                                strategy_name(options.strategy)),
+                    "Repeat the strategy of that run, or start without --resume.");
+    if (const std::string differences = settings_differences(before, now); !differences.empty())
         throw Error(path.string(), "was written with other settings:" + differences,
                     "Repeat the options of that run, or start without --resume.");
     if (checkpoint.dataset != fingerprint)

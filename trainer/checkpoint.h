@@ -33,8 +33,10 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
 
 /// Every option that changes the result, as one JSON object in text.
 std::string settings_text(const TrainOptions& options);
-/// Names, sizes, cameras and points of a data set and the pixels of its photos, hashed; about a
-/// second for a gigabyte of pixels.
+/// Each setting that differs between two objects of settings, with both values; "": none does.
+std::string settings_differences(const nlohmann::json& before, const nlohmann::json& now);
+/// Names, sizes, cameras and points of a data set and the pixels of its photos (or none), hashed;
+/// about a second for a gigabyte of pixels.
 std::string dataset_fingerprint(const Dataset& dataset, const std::vector<ImageU8>& photos);
 
 /// Throws Error naming each difference when the checkpoint is of other settings or another data

@@ -19,7 +19,7 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run);
 
 /// What a Trainer is made with: the start, with the origin of the checkpoint that it will restore,
 /// as photos are seen from there.
-SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
+SplatModel first_model(const Dataset& dataset, const TrainOptions& options, const RunOptions& run,
                        const std::optional<Checkpoint>& checkpoint);
 
 /// Throws Error where ranks train other things, or on devices that may round differently.

@@ -60,8 +60,8 @@ class Run {
           trainer_(while_doing("the splats of the start",
                                [&] {
                                    return Trainer(device, dataset, photos_,
-                                                  first_model(dataset, options, checkpoint_),
-                                                  options, run.ranks);
+                                                  first_model(dataset, options, run, checkpoint_),
+                                                  options, run.ranks, run.frozen);
                                })),
           log_(run.output),
           progress_(1, options.iterations, run.quiet) {}
@@ -431,7 +431,7 @@ RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptio
     if (run.ranks.several() && !run.ranks.all->is_first())
         return follow_training(device, dataset, options, run, stop);
     check_run_folder(run.output, dataset);
-    if (run.resume_from.empty()) check_start_memory(device, dataset, options);
+    if (run.resume_from.empty() && !run.start) check_start_memory(device, dataset, options);
     return Run(device, dataset, options, run).execute(stop);
 }
 

@@ -55,6 +55,10 @@ struct RunOptions {
     /// empty.
     std::function<void(const std::filesystem::path& folder)> write_start;
     std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
+    /// What splats start from in place of points, and how many of the first are frozen; null:
+    /// initial_model().
+    const SplatModel* start = nullptr;
+    std::uint32_t frozen = 0;
 };
 
 struct ArcMeans {  // over the views of an arc that was held out

@@ -28,9 +28,10 @@ constexpr const char* kOtherFolder = "Name another output folder with -o.";
 constexpr const char* kHolder = "process ";
 constexpr const char* kNobody = "another process";
 constexpr size_t kLongestHolder = 512;  // bytes of the lock file that are shown
-constexpr std::array<std::string_view, 12> kRunNames{
-    "checkpoint.darb", "metrics.json", "exposure.json", "report.html", "run.jsonl",  "cameras.json",
-    "cfg_args",        "command.json", "point_cloud",   "held_out",    "scene.html", "dense_start"};
+constexpr std::array<std::string_view, 13> kRunNames{
+    "checkpoint.darb", "metrics.json", "exposure.json", "report.html", "run.jsonl",
+    "cameras.json",    "cfg_args",     "command.json",  "point_cloud", "held_out",
+    "scene.html",      "dense_start",  "blocks"};
 
 bool is_numbered(const std::string& name, std::string_view before, std::string_view behind) {
     if (name.size() <= before.size() + behind.size() || !name.starts_with(before) ||
@@ -163,7 +164,7 @@ void remove_temporaries_in(const fs::path& parent, std::string_view before, IsTa
 void remove_leftovers(const fs::path& output) {
     remove_temporaries(output, [](const std::string& name) {
         return is_of_run(name) && name != "point_cloud" && name != "held_out" &&
-               name != "dense_start";
+               name != "dense_start" && name != "blocks";
     });
     remove_temporaries_in(output / "point_cloud", "iteration_",
                           [](const std::string& name) { return name == "point_cloud.ply"; });

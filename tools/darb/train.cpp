@@ -18,6 +18,7 @@
 #include "tools/darb/page_output.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/stop_signals.h"
+#include "tools/darb/train_blocks.h"
 #include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
@@ -75,9 +76,13 @@ void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own) {
 int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
     const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
     if (recalled) recall_arguments(arguments, flags, tune);
+    if (!flags.blocks.empty()) check_for_blocks(flags);
     finish_train_flags(flags);
     if (flags.dataset.empty())
         throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
+    if (!flags.blocks.empty())
+        return train_blocks(ranks, flags, tune,
+                            recalled ? "" : command_text(std::move(arguments), flags));
     check_for_ranks(ranks, flags);
     flags.run.ranks = {&ranks, flags.allow_mixed};
 

@@ -24,6 +24,7 @@ struct TrainFlags {
     bool allow_mixed = false;  // devices of several ranks
     bool view = false;         // follow in a window
     bool page = false;         // OUT/scene.html at the end
+    std::string blocks;        // auto, or columns x rows; empty: the scene as a whole
     bool sequential = false;
     int frames = 0;              // of a video; 0: by its length
     bool deterministic = false;  // every run is; the flag only lets scripts say so

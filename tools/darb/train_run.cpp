@@ -23,8 +23,9 @@ EffectChoice training_choice(const TrainFlags& flags) {
 }  // namespace
 
 // The photos stay for the run where the plan had to look at them.
-void plan_effects(Dataset& dataset, TrainFlags& flags) {
-    if ((!dataset.points.seen_begin.empty() || dataset.has_alpha) && flags.run.photos.empty())
+void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos) {
+    if (sees_photos && (!dataset.points.seen_begin.empty() || dataset.has_alpha) &&
+        flags.run.photos.empty())
         flags.run.photos = load_photos(dataset.views);
     const EffectPlan plan =
         plan_training(dataset, flags.run.photos, flags.train.sh_degree, training_choice(flags));

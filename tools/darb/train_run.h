@@ -9,8 +9,8 @@ namespace darb {
 
 /// Plans the effects of the run and sets flags.train, flags.run and the views as it wants them.
 /// Loads the photos into flags.run.photos where the plan has to look at them and they are not there
-/// yet.
-void plan_effects(Dataset& dataset, TrainFlags& flags);
+/// yet; sees_photos false: the plan does without.
+void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos = true);
 
 /// Finds the points that --start asks for and leaves them in dataset.start, in flags.start_note
 /// what that brought, and what writes its pictures in flags.run; after plan_effects. Throws Error

@@ -17,22 +17,6 @@ using glm::dvec3;
 
 constexpr double kFocal = 235;        // px
 constexpr double kPointNoise = 1e-3;  // world units, standard deviation
-constexpr double kPointReach = 6;     // world units from the origin; the floor fades out beyond
-
-Camera look_at(const dvec3& eye, const dvec3& target, int scale) {
-    const dvec3 forward = glm::normalize(target - eye);
-    const dvec3 right = glm::normalize(glm::cross(forward, dvec3(0, 0, 1)));
-    const dvec3 down = glm::cross(forward, right);
-    Camera camera;
-    camera.width = kWidth * scale;
-    camera.height = kHeight * scale;
-    camera.fx = camera.fy = kFocal * scale;
-    camera.cx = camera.width / 2.0;
-    camera.cy = camera.height / 2.0;
-    camera.rotation = glm::transpose(glm::dmat3(right, down, forward));
-    camera.translation = -(camera.rotation * eye);
-    return camera;
-}
 
 Ray ray_through(const Camera& camera, double x, double y) {
     const dvec3 local((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1);
@@ -45,8 +29,8 @@ std::uint8_t to_byte(double linear) {
         std::lround(255 * std::pow(std::clamp(soft, 0.0, 1.0), 1 / 2.2)));
 }
 
-dvec3 pixel_colour(const World& world, const Camera& camera, int x, int y, Pcg32& rng) {
-    const int samples = std::max(kSamples * kWidth / camera.width, 16);
+dvec3 pixel_colour(const World& world, const Camera& camera, int x, int y, int samples,
+                   Pcg32& rng) {
     dvec3 sum(0.0);
     for (int i = 0; i < samples; ++i) {  // R2 sequence over the pixel
         const double u = 0.7548776662466927 * (i + 1), v = 0.5698402909980532 * (i + 1);
@@ -56,12 +40,13 @@ dvec3 pixel_colour(const World& world, const Camera& camera, int x, int y, Pcg32
     return sum / static_cast<double>(samples);
 }
 
-ImageU8 take_photo(const World& world, const Camera& camera, std::uint64_t seed) {
+ImageU8 take_photo(const World& world, const Camera& camera, std::uint64_t seed, int samples) {
+    if (samples == 0) samples = std::max(kSamples * kWidth / camera.width, 16);
     ImageU8 photo(camera.width, camera.height, 3);
     for (int y = 0; y < camera.height; ++y) {
         Pcg32 rng(seed, static_cast<std::uint64_t>(y));
         for (int x = 0; x < camera.width; ++x) {
-            const dvec3 colour = pixel_colour(world, camera, x, y, rng);
+            const dvec3 colour = pixel_colour(world, camera, x, y, samples, rng);
             for (int c = 0; c < 3; ++c) photo.at(x, y, c) = to_byte(colour[c]);
         }
     }
@@ -69,16 +54,16 @@ ImageU8 take_photo(const World& world, const Camera& camera, std::uint64_t seed)
 }
 
 PointCloud sample_points(const World& world, const std::vector<View>& views,
-                         const std::vector<ImageU8>& photos) {
+                         const std::vector<ImageU8>& photos, const CaptureSettings& settings) {
     PointCloud points;
     Pcg32 rng(7);
-    while (points.size() < kPoints) {
+    while (points.size() < std::size_t(settings.points)) {
         const std::size_t v = rng.below(static_cast<std::uint32_t>(views.size()));
         const double x = rng.uniform(0, views[v].camera.width);
         const double y = rng.uniform(0, views[v].camera.height);
         const Ray ray = ray_through(views[v].camera, x, y);
         const double t = depth_along(world, ray);
-        if (views[v].is_test || t < 0 || glm::length(ray.at(t)) > kPointReach) continue;
+        if (views[v].is_test || t < 0 || glm::length(ray.at(t)) > settings.reach) continue;
         for (int i = 0; i < 3; ++i) {
             points.position.push_back(ray.at(t)[i] + kPointNoise * rng.normal());
             points.colour.push_back(photos[v].at(static_cast<int>(x), static_cast<int>(y), i));
@@ -122,6 +107,21 @@ double between_turns(double share) {
 
 }  // namespace
 
+Camera look_at(const dvec3& eye, const dvec3& target, double scale) {
+    const dvec3 forward = glm::normalize(target - eye);
+    const dvec3 right = glm::normalize(glm::cross(forward, dvec3(0, 0, 1)));
+    const dvec3 down = glm::cross(forward, right);
+    Camera camera;
+    camera.width = static_cast<int>(std::lround(kWidth * scale));
+    camera.height = static_cast<int>(std::lround(kHeight * scale));
+    camera.fx = camera.fy = kFocal * scale;
+    camera.cx = camera.width / 2.0;
+    camera.cy = camera.height / 2.0;
+    camera.rotation = glm::transpose(glm::dmat3(right, down, forward));
+    camera.translation = -(camera.rotation * eye);
+    return camera;
+}
+
 std::vector<View> camera_path(int scale) {
     std::vector<View> views;
     for (int i = 0; i < kViews; ++i) {
@@ -159,12 +159,12 @@ std::vector<View> off_path_views(int scale) {
 }
 
 std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& views,
-                                 std::uint64_t seed) {
+                                 std::uint64_t seed, int samples) {
     std::vector<ImageU8> photos(views.size());
     std::atomic<std::size_t> next{0};
     const auto work = [&] {
         for (std::size_t i = next++; i < views.size(); i = next++)
-            photos[i] = take_photo(world, views[i].camera, seed + i);
+            photos[i] = take_photo(world, views[i].camera, seed + i, samples);
     };
     std::vector<std::jthread> threads;
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
@@ -173,10 +173,11 @@ std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& vi
     return photos;
 }
 
-Capture capture_views(const World& world, const std::vector<View>& views) {
+Capture capture_views(const World& world, const std::vector<View>& views,
+                      const CaptureSettings& settings) {
     Capture capture;
-    capture.photos = take_photos(world, views, 0);
-    capture.points = sample_points(world, views, capture.photos);
+    capture.photos = take_photos(world, views, 0, settings.samples);
+    capture.points = sample_points(world, views, capture.photos, settings);
     return capture;
 }
 

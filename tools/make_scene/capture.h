@@ -16,6 +16,18 @@ constexpr int kWidth = 200, kHeight = 150;  // px, of the shipped photos
 constexpr int kSamples = 64;                // per pixel of these; larger photos share them out
 constexpr int kPoints = 4000;
 
+constexpr double kPointReach =
+    6;  // world units from 0; the floor of the still life fades out beyond
+
+struct CaptureSettings {
+    int points = kPoints;
+    double reach = kPointReach;  // of points
+    int samples = 0;             // per pixel; 0: kSamples shared out
+};
+
+/// From eye to target, z up; the photo's sides are scaled.
+Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, double scale);
+
 struct Capture {
     std::vector<ImageU8> photos;  // [views], RGB
     PointCloud points;
@@ -31,10 +43,11 @@ std::vector<View> off_path_views(int scale = 1);
 
 /// Their pictures (gamma 2.2, 8 bits). Uses all cores; the result does not depend on their number.
 std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& views,
-                                 std::uint64_t seed);
+                                 std::uint64_t seed, int samples = 0);
 
-/// Photos (gamma 2.2, 8 bits) and kPoints surface points, evenly spread over the pixels of the
+/// Photos (gamma 2.2, 8 bits) and so many surface points, evenly spread over the pixels of the
 /// training views, with 1 mm of noise. Uses all cores; the result does not depend on their number.
-Capture capture_views(const World& world, const std::vector<View>& views);
+Capture capture_views(const World& world, const std::vector<View>& views,
+                      const CaptureSettings& settings = {});
 
 }  // namespace darb::make_scene

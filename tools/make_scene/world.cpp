@@ -99,7 +99,8 @@ dvec3 shade(const World& world, const Ray& ray, int bounces, Pcg32& rng) {
         colour += fresnel * (m.metal ? base : dvec3(1)) * shade(world, next, bounces - 1, rng);
     }
     if (!hit.floor) return colour;
-    const double away = glm::smoothstep(2.6, 7.5, glm::length(glm::dvec2(point)));
+    const double away =
+        glm::smoothstep(world.fades_from, world.fades_to, glm::length(glm::dvec2(point)));
     return glm::mix(colour, sky(dvec3(ray.direction.x, ray.direction.y, 0)) * 0.92, away);
 }
 

@@ -32,6 +32,7 @@ struct World {
     std::vector<Object> objects;
     Material floor;
     double floor_z = 0;
+    double fades_from = 2.6, fades_to = 7.5;  // the floor into the sky, by the distance from 0
 };
 
 World still_life();

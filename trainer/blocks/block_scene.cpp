@@ -1,0 +1,117 @@
+#include "trainer/blocks/block_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/check.h"
+#include "engine/raster/gpu_splats.h"
+#include "engine/scene/edit_splats.h"
+
+namespace darb {
+
+namespace {
+
+// Of the half picture, to each side: splats beyond may still reach into it.
+constexpr double kBesidePicture = 1.3;
+constexpr double kDeviations = 3;
+
+// Bands up to `degree`, those that are not there yet 0.
+void widen_sh(int degree, SplatModel& model) {
+    limit_sh_degree(degree, model);
+    const std::size_t before = attribute_floats(kShRest, model.sh_degree);
+    const std::size_t after = attribute_floats(kShRest, degree);
+    std::vector<float> rest(model.size() * after, 0.0f);
+    for (std::size_t i = 0; i < model.size(); ++i)
+        std::copy_n(model.sh_rest.begin() + std::ptrdiff_t(i * before), before,
+                    rest.begin() + std::ptrdiff_t(i * after));
+    model.sh_degree = degree;
+    model.sh_rest = std::move(rest);
+}
+
+// Whatever the lens: a pinhole's frame with room beside it.
+bool may_see(const Camera& camera, const glm::dvec3& centre, double radius) {
+    const glm::dvec3 at = camera.rotation * centre + camera.translation;
+    if (at.z < -radius) return false;
+    const double x = kBesidePicture * camera.width / (2 * camera.fx);
+    const double y = kBesidePicture * camera.height / (2 * camera.fy);
+    const double off_x = std::abs(camera.cx - camera.width / 2.0) / camera.fx;
+    const double off_y = std::abs(camera.cy - camera.height / 2.0) / camera.fy;
+    const double depth = std::max(at.z, 0.0);
+    return std::abs(at.x) <= (x + off_x) * depth + radius * (1 + x) &&
+           std::abs(at.y) <= (y + off_y) * depth + radius * (1 + y);
+}
+
+}  // namespace
+
+Dataset block_dataset(const Dataset& whole, const std::vector<std::size_t>& views) {
+    Dataset block = whole;
+    block.views.clear();
+    for (const std::size_t v : views) block.views.push_back(whole.views[v]);
+    block.points.seen_begin.clear();  // of all views
+    block.points.seen_by.clear();
+    return block;
+}
+
+BlockStart block_start(const SplatModel& coarse, const Partition& cells, std::size_t cell,
+                       const std::vector<View>& views, int sh_degree) {
+    std::vector<std::uint32_t> trained, around;
+    for (std::uint32_t i = 0; i < coarse.size(); ++i) {
+        const glm::dvec3 centre = position_of(coarse, i);
+        if (cells.cells[cell].holds_with_margin(cells.plane.at(centre))) {
+            trained.push_back(i);
+            continue;
+        }
+        const float* scale = &coarse.log_scale[3 * std::size_t{i}];
+        const double radius = kDeviations * std::exp(std::max({scale[0], scale[1], scale[2]}));
+        if (std::any_of(views.begin(), views.end(),
+                        [&](const View& view) { return may_see(view.camera, centre, radius); }))
+            around.push_back(i);
+    }
+    const std::size_t most = around.size() / GpuSplats::kFrozenUnit * GpuSplats::kFrozenUnit;
+    std::stable_sort(around.begin(), around.end(), [&](std::uint32_t a, std::uint32_t b) {
+        return coarse.opacity_logit[a] > coarse.opacity_logit[b];
+    });
+    around.resize(most);
+    std::sort(around.begin(), around.end());
+    BlockStart start;
+    start.frozen = static_cast<std::uint32_t>(around.size());
+    around.insert(around.end(), trained.begin(), trained.end());
+    start.model = pick_splats(coarse, around);
+    widen_sh(sh_degree, start.model);
+    return start;
+}
+
+SplatModel cut_to_cell(const SplatModel& trained, std::uint32_t frozen, const Partition& cells,
+                       std::size_t cell) {
+    SplatModel cut = trained;
+    keep_splats(
+        [&](std::size_t i) {
+            return i >= frozen && cells.cells[cell].holds(cells.plane.at(position_of(trained, i)));
+        },
+        cut);
+    return cut;
+}
+
+SplatModel join_parts(const std::vector<SplatModel>& parts) {
+    DARB_CHECK(!parts.empty());
+    int degree = 0;
+    for (const SplatModel& part : parts) degree = std::max(degree, part.sh_degree);
+    SplatModel joined = parts.front();
+    std::vector<double> positions;
+    for (int a = 0; a < kAttributeCount; ++a) attribute_values(joined, a).clear();
+    for (SplatModel part : parts) {
+        widen_sh(degree, part);
+        for (std::size_t i = 0; i < part.size(); ++i)
+            for (int a = 0; a < 3; ++a) positions.push_back(position_of(part, i)[a]);
+        for (int a = 0; a < kAttributeCount; ++a) {
+            const std::vector<float>& values = attribute_values(part, a);
+            std::vector<float>& all = attribute_values(joined, a);
+            all.insert(all.end(), values.begin(), values.end());
+        }
+    }
+    joined.sh_degree = degree;
+    set_positions(positions, joined);
+    return joined;
+}
+
+}  // namespace darb

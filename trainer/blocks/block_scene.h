@@ -1,0 +1,36 @@
+// What a block is trained on and what is left of it: its photos, the splats that it begins with
+// and its frozen surroundings, the cut to its cell, and the joined scene.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/scene/splat_model.h"
+#include "trainer/blocks/partition.h"
+
+namespace darb {
+
+/// The data set with these of its views alone, all to train on, and all of its points.
+Dataset block_dataset(const Dataset& whole, const std::vector<std::size_t>& views);
+
+struct BlockStart {
+    SplatModel model;          // the surroundings first
+    std::uint32_t frozen = 0;  // of these, a multiple of GpuSplats::kFrozenUnit
+};
+
+/// From the coarse model: its splats within the cell and its margin, to train, and the others that
+/// one of the cameras may see, frozen. Of the latter the few least opaque ones are left out that
+/// make no whole unit. sh_degree: that of the model, whose further bands are 0.
+BlockStart block_start(const SplatModel& coarse, const Partition& cells, std::size_t cell,
+                       const std::vector<View>& views, int sh_degree);
+
+/// Splats behind the first `frozen` whose centres lie in the cell.
+SplatModel cut_to_cell(const SplatModel& trained, std::uint32_t frozen, const Partition& cells,
+                       std::size_t cell);
+
+/// All splats of the parts, in their order, with the highest of their degrees of colour.
+SplatModel join_parts(const std::vector<SplatModel>& parts);
+
+}  // namespace darb

@@ -1,0 +1,361 @@
+#include "trainer/blocks/run_blocks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/core/say.h"
+#include "engine/data/camera_list.h"
+#include "engine/scene/ply.h"
+#include "engine/scene/splat_file.h"
+#include "trainer/blocks/block_scene.h"
+#include "trainer/blocks/camera_choice.h"
+#include "trainer/blocks/part_options.h"
+#include "trainer/checkpoint.h"
+#include "trainer/forecast.h"
+#include "trainer/progress.h"
+#include "trainer/run_folder.h"
+#include "trainer/run_log.h"
+
+namespace darb {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kFewestCameras = 3;
+constexpr double kCoarseScale = 0.5;        // of the photos' sides, at most
+constexpr std::uint64_t kCoarsePhotos = 4;  // 1 / share of the memory that its photos may take
+
+class BlocksRun {
+  public:
+    explicit BlocksRun(const BlocksJob& job)
+        : job_(job), folder_(job.run.output / "blocks"), path_(folder_ / "manifest.json") {
+        for (std::size_t v = 0; v < job.dataset.views.size(); ++v)
+            if (!job.dataset.views[v].is_test) training_.push_back(v);
+    }
+
+    BlocksSummary execute(const std::atomic<bool>& stop);
+
+  private:
+    void open();
+    Grid grid(const GroundPlane& plane) const;
+    void train_coarse(const std::atomic<bool>& stop);
+    void choose_cameras();
+    void train_block(std::size_t cell, const std::atomic<bool>& stop);
+    void try_block(std::size_t cell, const std::atomic<bool>& stop);
+    void exchange_records();
+    void refuse_failed() const;
+    void join();
+    void train_part(const Dataset& dataset, const TrainOptions& options, RunOptions run,
+                    PartRecord& part, const std::atomic<bool>& stop);
+    void save() const {
+        if (job_.ranks.is_first()) write_manifest(path_, manifest_);
+    }
+    void note(const std::string& text) const {
+        if (!job_.run.quiet) say("{}\n", text);
+    }
+    Dataset coarse_dataset() const;
+    std::vector<std::size_t> views_of(const BlockRecord& block) const;
+    const SplatModel& coarse();
+    fs::path scene_in(const fs::path& folder, int iterations) const {
+        return folder / "point_cloud" / fmt::format("iteration_{}", iterations) / "point_cloud.ply";
+    }
+
+    const BlocksJob& job_;
+    const fs::path folder_, path_;
+    std::vector<std::size_t> training_;  // views
+    BlocksManifest manifest_;
+    std::vector<CellCount> counts_;
+    std::optional<SplatModel> coarse_;
+};
+
+Grid BlocksRun::grid(const GroundPlane& plane) const {
+    if (job_.asked.columns > 0) return job_.asked;
+    const std::unique_ptr<Device> device = job_.device();
+    const std::uint64_t bytes =
+        job_.options.max_memory_bytes.value_or(usable_bytes(device->info()));
+    return blocks_for_memory(*device, job_.dataset, job_.options, plane, bytes);
+}
+
+// The cells follow from data set and grid; the rest is what the manifest says, or new.
+void BlocksRun::open() {
+    const PointCloud& points = job_.dataset.points;
+    if (points.size() == 0)
+        throw Error(job_.dataset.root.string(), "has no points to divide the ground by",
+                    "Leave --blocks out, or give the data set points, as COLMAP finds them.");
+    const GroundPlane plane = ground_plane(job_.dataset.views, points.position);
+    manifest_.settings = settings_text(job_.options);
+    manifest_.dataset = dataset_fingerprint(job_.dataset, {});
+    Grid grid;
+    if (job_.resume) {
+        BlocksManifest before = read_manifest(path_);
+        check_manifest(before, path_, manifest_, job_.asked);
+        grid = {before.cells.columns, before.cells.rows};
+        manifest_ = std::move(before);
+    } else {
+        grid = this->grid(plane);
+    }
+    manifest_.cells = partition(plane, points.position, grid.columns, grid.rows);
+    manifest_.max_memory = job_.options.max_memory_bytes.value_or(0);
+    counts_ = count_points(manifest_.cells, points.position);
+    manifest_.blocks.resize(manifest_.cells.cells.size());
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c) {
+        manifest_.blocks[c].name = block_name(manifest_.cells, c);
+        manifest_.blocks[c].points = counts_[c].own;
+    }
+    if (!job_.ranks.is_first()) return;
+    if (!job_.resume) set_aside(job_.run.output);
+    save();
+    write_camera_list(job_.run.output / "cameras.json", job_.dataset.views);
+    write_file_atomic(job_.run.output / "cfg_args",
+                      cfg_args(job_.dataset, job_.options, job_.run.output));
+    if (!job_.run.command.empty())
+        write_file_atomic(job_.run.output / "command.json", job_.run.command);
+}
+
+// All training views, at half their sides or less: their pixels take a part of the memory.
+Dataset BlocksRun::coarse_dataset() const {
+    Dataset dataset = block_dataset(job_.dataset, training_);
+    double bytes = 0;
+    for (const View& view : dataset.views) bytes += 4.0 * view.camera.width * view.camera.height;
+    double scale = kCoarseScale;
+    if (job_.options.max_memory_bytes)
+        scale = std::min(scale,
+                         std::sqrt(double(*job_.options.max_memory_bytes / kCoarsePhotos) / bytes));
+    dataset.views = scaled_views(dataset.views, scale);
+    return dataset;
+}
+
+// Goes on from the part's own checkpoint, where there is one.
+void BlocksRun::train_part(const Dataset& dataset, const TrainOptions& options, RunOptions run,
+                           PartRecord& part, const std::atomic<bool>& stop) {
+    run.test_iterations = run.save_iterations = run.checkpoint_iterations = {};
+    run.command.clear();
+    run.checkpoint_interval = job_.run.checkpoint_interval;
+    run.quiet = job_.run.quiet;
+    run.report = job_.run.report;
+    run.effects = job_.run.effects;
+    run.effects_json = job_.run.effects_json;
+    if (const fs::path own = run.output / "checkpoint.darb"; fs::exists(own)) run.resume_from = own;
+    part.state = PartState::training;
+    part.error.clear();
+    save();
+    const std::unique_ptr<Device> device = job_.device();
+    const RunSummary summary = run_training(*device, dataset, options, run, &stop);
+    part.peak_bytes = std::max(part.peak_bytes, device->peak_bytes());
+    part.seconds = summary.seconds;
+    if (!summary.interrupted) part.state = PartState::done;
+}
+
+void BlocksRun::train_coarse(const std::atomic<bool>& stop) {
+    PartRecord& part = manifest_.coarse;
+    const TrainOptions options = coarse_options(job_.dataset, job_.options);
+    if (part.state != PartState::done) {
+        const Dataset dataset = coarse_dataset();
+        const Camera& first = dataset.views.front().camera;
+        note(
+            fmt::format("blocks: {}x{}; first a coarse model, {} photos of {} x {} px, up to {} "
+                        "splats",
+                        manifest_.cells.columns, manifest_.cells.rows, dataset.views.size(),
+                        first.width, first.height, *options.max_splats));
+        RunOptions run;
+        run.output = folder_ / "coarse";
+        train_part(dataset, options, run, part, stop);
+        if (part.state == PartState::done)
+            part.splats = part.kept = static_cast<std::uint32_t>(coarse().size());
+        save();
+    }
+    if (part.state == PartState::done) choose_cameras();
+}
+
+const SplatModel& BlocksRun::coarse() {
+    if (!coarse_) {
+        const int iterations = coarse_options(job_.dataset, job_.options).iterations;
+        coarse_ = load_splats(scene_in(folder_ / "coarse", iterations));
+    }
+    return *coarse_;
+}
+
+void BlocksRun::choose_cameras() {
+    std::vector<BlockRecord>& blocks = manifest_.blocks;
+    if (std::any_of(blocks.begin(), blocks.end(),
+                    [](const BlockRecord& block) { return block.cameras.empty(); })) {
+        const Dataset dataset = coarse_dataset();
+        const std::unique_ptr<Device> device = job_.device();
+        ProjectionEffects effects = job_.options.projection;
+        effects.antialias = coarse().antialias;
+        const auto chosen =
+            choose_views(cell_shares(*device, coarse(), manifest_.cells, dataset.views, effects));
+        for (std::size_t c = 0; c < blocks.size(); ++c) {
+            blocks[c].cameras.clear();
+            for (const std::size_t v : chosen[c])
+                blocks[c].cameras.push_back(dataset.views[v].name);
+        }
+    }
+    for (const BlockRecord& block : blocks)
+        if (block.cameras.size() < kFewestCameras)
+            throw Error("block " + block.name,
+                        fmt::format("{} cameras see its cell in {:.0f} % of their picture; it "
+                                    "takes {}",
+                                    block.cameras.size(), 100 * kLeastShare, kFewestCameras),
+                        "Use fewer blocks.");
+    save();
+}
+
+std::vector<std::size_t> BlocksRun::views_of(const BlockRecord& block) const {
+    std::map<std::string, std::size_t> places;
+    for (const std::size_t v : training_) places[job_.dataset.views[v].name] = v;
+    std::vector<std::size_t> views;
+    for (const std::string& name : block.cameras) {
+        const auto at = places.find(name);
+        if (at == places.end())
+            throw Error(path_.string(), "names a camera that is not there: " + name,
+                        "Start without --resume.");
+        views.push_back(at->second);
+    }
+    return views;
+}
+
+void BlocksRun::train_block(std::size_t cell, const std::atomic<bool>& stop) {
+    BlockRecord& block = manifest_.blocks[cell];
+    const Dataset dataset = block_dataset(job_.dataset, views_of(block));
+    const BlockStart start =
+        block_start(coarse(), manifest_.cells, cell, dataset.views, job_.options.sh_degree);
+    const auto splats = static_cast<std::uint32_t>(start.model.size());
+    const TrainOptions options = block_options(job_.options, counts_[cell],
+                                               job_.dataset.points.size(), start.frozen, splats);
+    block.part.frozen = start.frozen;
+    note(fmt::format("block {}: {} photos, {} splats to begin with and {} frozen around them",
+                     block.name, dataset.views.size(), splats - start.frozen, start.frozen));
+    RunOptions run;
+    run.output = folder_ / block.name;
+    run.start = &start.model;
+    run.frozen = start.frozen;
+    train_part(dataset, options, run, block.part, stop);
+    if (block.part.state != PartState::done) return;
+    const SplatModel trained = load_splats(scene_in(run.output, options.iterations));
+    block.part.splats = static_cast<std::uint32_t>(trained.size());
+    block.part.kept = static_cast<std::uint32_t>(
+        cut_to_cell(trained, start.frozen, manifest_.cells, cell).size());
+}
+
+// A block that fails leaves the others to go on; where not even that can be written, all ends.
+void BlocksRun::try_block(std::size_t cell, const std::atomic<bool>& stop) {
+    PartRecord& part = manifest_.blocks[cell].part;
+    try {
+        train_block(cell, stop);
+    } catch (const std::exception& e) {
+        part.state = PartState::failed;
+        part.error = e.what();
+        say("block {} failed: {}\n", manifest_.blocks[cell].name, e.what());
+    }
+    save();
+}
+
+// What each rank did goes to all.
+void BlocksRun::exchange_records() {
+    if (job_.ranks.count() == 1) return;
+    std::string own;
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c)
+        if (has_turn(job_.ranks, c)) {
+            const PartRecord& p = manifest_.blocks[c].part;
+            own += fmt::format("{} {} {} {} {} {} {}", int(p.state), p.frozen, p.splats, p.kept,
+                               p.peak_bytes, p.seconds, p.error);
+            own += '\0';
+        }
+    const std::vector<Bytes> all = job_.ranks.gather(std::as_bytes(std::span(own)));
+    std::vector<std::size_t> at(all.size());
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c) {
+        const std::size_t rank = c % all.size();
+        const char* text = reinterpret_cast<const char*>(all[rank].data()) + at[rank];
+        at[rank] += std::strlen(text) + 1;
+        PartRecord p;
+        int state = 0, read = 0;
+        std::sscanf(text, "%d %u %u %u %lu %lf %n", &state, &p.frozen, &p.splats, &p.kept,
+                    &p.peak_bytes, &p.seconds, &read);
+        p.state = static_cast<PartState>(state);
+        p.error = text + read;
+        manifest_.blocks[c].part = std::move(p);
+    }
+    save();
+}
+
+void BlocksRun::refuse_failed() const {
+    std::string failed;
+    for (const BlockRecord& block : manifest_.blocks)
+        if (block.part.state == PartState::failed)
+            failed += fmt::format("\n  block {}: {}", block.name, block.part.error);
+    if (!failed.empty())
+        throw Error(job_.run.output.string(), "blocks failed; the others are done:" + failed,
+                    fmt::format("darb train --resume -o '{}' tries these alone again.",
+                                job_.run.output.string()));
+}
+
+void BlocksRun::join() {
+    std::vector<SplatModel> parts;
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c) {
+        const BlockRecord& block = manifest_.blocks[c];
+        parts.push_back(
+            cut_to_cell(load_splats(scene_in(folder_ / block.name, job_.options.iterations)),
+                        block.part.frozen, manifest_.cells, c));
+    }
+    const SplatModel joined = join_parts(parts);
+    write_ply(scene_in(job_.run.output, job_.options.iterations), joined);
+    manifest_.joined = static_cast<std::uint32_t>(joined.size());
+    const Evaluation evaluation = job_.evaluate(joined);
+    manifest_.held_out = evaluation.views.size();
+    manifest_.psnr_db = evaluation.psnr_db;
+    manifest_.ssim = evaluation.ssim;
+    save();
+}
+
+BlocksSummary BlocksRun::execute(const std::atomic<bool>& stop) {
+    Ranks& ranks = job_.ranks;
+    if (ranks.is_first()) {
+        open();
+        train_coarse(stop);
+    }
+    ranks.gather({});  // the manifest has the cameras
+    if (!ranks.is_first()) {
+        BlocksJob again = job_;
+        again.resume = true;
+        BlocksRun as_written(again);
+        as_written.open();
+        manifest_ = std::move(as_written.manifest_);
+        counts_ = std::move(as_written.counts_);
+    }
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c)
+        if (has_turn(ranks, c) && manifest_.blocks[c].part.state != PartState::done && !stop &&
+            manifest_.coarse.state == PartState::done)
+            try_block(c, stop);
+    exchange_records();
+    BlocksSummary summary;
+    summary.interrupted =
+        manifest_.coarse.state != PartState::done ||
+        std::any_of(manifest_.blocks.begin(), manifest_.blocks.end(), [](const BlockRecord& b) {
+            return b.part.state == PartState::waiting || b.part.state == PartState::training;
+        });
+    if (ranks.is_first() && !summary.interrupted) {
+        refuse_failed();
+        join();
+        summary.scene = scene_in(job_.run.output, job_.options.iterations);
+    }
+    summary.manifest = manifest_;
+    return summary;
+}
+
+}  // namespace
+
+BlocksSummary run_blocks(const BlocksJob& job, const std::atomic<bool>& stop) {
+    return BlocksRun(job).execute(stop);
+}
+
+}  // namespace darb
