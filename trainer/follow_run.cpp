@@ -27,9 +27,9 @@ std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run) {
     return checkpoint;
 }
 
-SplatModel first_model(const Dataset& dataset, const TrainOptions& options, const RunOptions& run,
-                       const std::optional<Checkpoint>& checkpoint) {
-    SplatModel model = run.start ? *run.start : initial_model(dataset, options);
+SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
+                       const std::optional<Checkpoint>& checkpoint, const SplatModel* given) {
+    SplatModel model = given ? *given : initial_model(dataset, options);
     if (checkpoint) model.origin = checkpoint->state.model.origin;
     return model;
 }
@@ -74,8 +74,8 @@ RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOp
     const std::vector<ImageU8>& photos = loaded.empty() ? run.photos : loaded;
     const std::string fingerprint = dataset_fingerprint(dataset, photos);
     const std::optional<Checkpoint> checkpoint = checkpoint_of(device, run);
-    Trainer trainer(device, dataset, photos, first_model(dataset, options, run, checkpoint),
-                    options, run.ranks);
+    Trainer trainer(device, dataset, photos, first_model(dataset, options, checkpoint), options,
+                    run.ranks);
     check_ranks(device, options, run.ranks, fingerprint);
     if (checkpoint) {
         check_resumable(*checkpoint, run.resume_from, options, dataset, fingerprint);

@@ -18,9 +18,10 @@ namespace darb {
 std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run);
 
 /// What a Trainer is made with: the start, with the origin of the checkpoint that it will restore,
-/// as photos are seen from there.
-SplatModel first_model(const Dataset& dataset, const TrainOptions& options, const RunOptions& run,
-                       const std::optional<Checkpoint>& checkpoint);
+/// as photos are seen from there. given: what it starts from in place of initial_model().
+SplatModel first_model(const Dataset& dataset, const TrainOptions& options,
+                       const std::optional<Checkpoint>& checkpoint,
+                       const SplatModel* given = nullptr);
 
 /// Throws Error where ranks train other things, or on devices that may round differently.
 void check_ranks(const Device& device, const TrainOptions& options, const RankGroup& ranks,

@@ -59,9 +59,10 @@ class Run {
           checkpoint_(checkpoint_of(device, run)),
           trainer_(while_doing("the splats of the start",
                                [&] {
-                                   return Trainer(device, dataset, photos_,
-                                                  first_model(dataset, options, run, checkpoint_),
-                                                  options, run.ranks, run.frozen);
+                                   return Trainer(
+                                       device, dataset, photos_,
+                                       first_model(dataset, options, checkpoint_, run.start),
+                                       options, run.ranks, run.frozen);
                                })),
           log_(run.output),
           progress_(1, options.iterations, run.quiet) {}

@@ -70,10 +70,7 @@ void add_scene_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::Range(1, KERNEL_MAX_PULSES))
         ->group(help_group::kAccuracy);
     add_accuracy_flags(command, f.accuracy, true);
-    command
-        .add_option("--blocks", f.blocks,
-                    "a scene larger than one memory: train parts of the ground, each within "
-                    "--max-memory, and join them")
+    command.add_option("--blocks", f.blocks, "train a scene too large for the memory in parts")
         ->type_name("TEXT:{auto,NxM}")
         ->group(option_group::kScene);
 }

@@ -29,6 +29,9 @@ TrainFlags parse_train_flags(std::vector<std::string> words, const std::string& 
     } catch (const CLI::ParseError& e) {
         throw Error(command, e.what(), "`darb train --help` lists what --train-options takes.");
     }
+    if (!f.blocks.empty())
+        throw Error(command + " --blocks " + f.blocks, "is an option of darb train alone",
+                    "Leave it out.");
     finish_train_flags(f);
     return f;
 }

@@ -6,6 +6,7 @@
 #include "engine/core/check.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/scene/edit_splats.h"
+#include "trainer/initial_model.h"
 
 namespace darb {
 
@@ -79,6 +80,26 @@ BlockStart block_start(const SplatModel& coarse, const Partition& cells, std::si
     start.model = pick_splats(coarse, around);
     widen_sh(sh_degree, start.model);
     return start;
+}
+
+void add_points(const Dataset& whole, const Partition& cells, std::size_t cell,
+                const TrainOptions& options, std::uint32_t most, BlockStart& start) {
+    const PointCloud& points = whole.points;
+    Dataset part;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+        const double* at = &points.position[3 * p];
+        if (!cells.cells[cell].holds_with_margin(cells.plane.at({at[0], at[1], at[2]}))) continue;
+        part.points.position.insert(part.points.position.end(), at, at + 3);
+        const std::uint8_t* colour = &points.colour[3 * p];
+        part.points.colour.insert(part.points.colour.end(), colour, colour + 3);
+    }
+    const auto held = static_cast<std::uint32_t>(start.model.size());
+    if (part.points.size() == 0 || held >= most) return;
+    TrainOptions room = options;
+    room.max_splats = most - held;
+    SplatModel added = initial_model(part, room);
+    added.antialias = start.model.antialias;
+    start.model = join_parts({start.model, added});
 }
 
 SplatModel cut_to_cell(const SplatModel& trained, std::uint32_t frozen, const Partition& cells,

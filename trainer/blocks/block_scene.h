@@ -9,6 +9,7 @@
 #include "engine/data/dataset.h"
 #include "engine/scene/splat_model.h"
 #include "trainer/blocks/partition.h"
+#include "trainer/options.h"
 
 namespace darb {
 
@@ -25,6 +26,11 @@ struct BlockStart {
 /// make no whole unit. sh_degree: that of the model, whose further bands are 0.
 BlockStart block_start(const SplatModel& coarse, const Partition& cells, std::size_t cell,
                        const std::vector<View>& views, int sh_degree);
+
+/// Behind these, to train: splats of the data set's points within the cell and its margin, as a run
+/// of the whole begins with them; of more than leave `most` splats in all, a drawn part.
+void add_points(const Dataset& whole, const Partition& cells, std::size_t cell,
+                const TrainOptions& options, std::uint32_t most, BlockStart& start);
 
 /// Splats behind the first `frozen` whose centres lie in the cell.
 SplatModel cut_to_cell(const SplatModel& trained, std::uint32_t frozen, const Partition& cells,

@@ -103,6 +103,8 @@ void BlocksRun::open() {
     } else {
         grid = this->grid(plane);
     }
+    if (grid.columns * grid.rows == 1 && !job_.resume)
+        note("blocks: one holds it all; without --blocks the run takes less time");
     manifest_.cells = partition(plane, points.position, grid.columns, grid.rows);
     manifest_.max_memory = job_.options.max_memory_bytes.value_or(0);
     counts_ = count_points(manifest_.cells, points.position);
@@ -227,11 +229,14 @@ std::vector<std::size_t> BlocksRun::views_of(const BlockRecord& block) const {
 void BlocksRun::train_block(std::size_t cell, const std::atomic<bool>& stop) {
     BlockRecord& block = manifest_.blocks[cell];
     const Dataset dataset = block_dataset(job_.dataset, views_of(block));
-    const BlockStart start =
+    BlockStart start =
         block_start(coarse(), manifest_.cells, cell, dataset.views, job_.options.sh_degree);
+    const TrainOptions options =
+        block_options(job_.options, counts_[cell], job_.dataset.points.size(), start.frozen,
+                      static_cast<std::uint32_t>(start.model.size()));
+    add_points(job_.dataset, manifest_.cells, cell, job_.options,
+               options.max_splats.value_or(kAnyNumberOfSplats), start);
     const auto splats = static_cast<std::uint32_t>(start.model.size());
-    const TrainOptions options = block_options(job_.options, counts_[cell],
-                                               job_.dataset.points.size(), start.frozen, splats);
     block.part.frozen = start.frozen;
     note(fmt::format("block {}: {} photos, {} splats to begin with and {} frozen around them",
                      block.name, dataset.views.size(), splats - start.frozen, start.frozen));
