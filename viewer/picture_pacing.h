@@ -49,6 +49,7 @@ class PicturePacing {
     void forget() { drawn_.reset(); }
     /// Of the last frame. Its time says how good the next may be.
     bool in_motion() const { return step_ == PictureStep::in_motion; }
+    bool rehearses() const { return step_ == PictureStep::rehearsal; }
 
     /// It has all pixels, and the most important splats at least.
     bool refined() const;

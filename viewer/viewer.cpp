@@ -72,7 +72,7 @@ bool Viewer::refined() const {
 }
 
 bool Viewer::at_rest() const {
-    return !loading() && !warm_up_ && pacing_.is_whole() && ready_to_move();
+    return !loading() && !warm_up_ && pacing_.is_whole() && ready_to_move() && rehearsals_ == 0;
 }
 
 double Viewer::frame(const Input& input, int width, int height, bool full) {
@@ -112,6 +112,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
         work_.exports() ? kLook_s : std::numeric_limits<double>::infinity(), expire_toasts());
     continuous_ = session_.path.playing || (!shows_nothing() && (works || holds_a_key(input)));
     if (continuous_) return 0;
+    if (pacing_.rehearses() && rehearsals_ > 0) return 0;
     const double refine_s = pacing_.seconds_to_refine(frame_start_);
     if (!picture_.empty() && std::isfinite(refine_s)) return std::min(look_s, refine_s);
     return std::min(look_s, pacing_.count_still_frame());

@@ -152,6 +152,7 @@ class Viewer {
     BufferPicture drawn() const;  // of the scene, while the run's last picture is still shown too
     void draw_picture(const PictureKey& key, PictureStep step);
     void rehearse_motion(const PictureKey& key);
+    void rehearse_once(const PictureKey& key, const MotionQuality& quality, double splats);
     void start_levels();
     void take_levels();
     void lose_levels();
@@ -172,6 +173,8 @@ class Viewer {
     Buffer live_pixels_;       // of the run's last picture
     glm::ivec2 live_size_{0};  // px
     PicturePacing pacing_;
+    int rehearsals_ = 0;             // of motion, still to come
+    double besides_picture_ms_ = 0;  // what a frame took beside its picture, before them
     PictureWork work_;
     RememberedUp remembered_;
     RecentFiles recent_;

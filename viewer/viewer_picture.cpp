@@ -15,7 +15,8 @@ constexpr double kLong_ms = 500;            // for a whole picture
 constexpr std::size_t kFewSplats = 20'000;  // half of them are always drawn
 constexpr double kQuick_ms = 20;            // it will be drawn in motion, too
 constexpr size_t kTimesKept = 60;           // frames in motion that the panel averages over
-constexpr int kRehearsals = 8;              // of motion, after the one that compiles
+constexpr int kRehearsals = 9;              // of motion; the first compiles
+constexpr double kRehearsing_ms = 40;       // of a frame: the window is to answer meanwhile
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
     return 1000 * seconds_since(start);
@@ -82,10 +83,11 @@ void Viewer::pace_picture(int width, int height, bool full, bool works) {
         photo_beside(photos, session_.display),
         session_.panes.kernels,
         version_};
-    const bool ready = ready_to_move();
+    if (!ready_to_move()) rehearsals_ = kRehearsals;
     const PicturePacing::Frame frame{
-        full, works, session_.times.full_ms > kLong_ms && picture_.most_moving() < 1 && ready,
-        session_.error.empty() && !ready};
+        full, works,
+        session_.times.full_ms > kLong_ms && picture_.most_moving() < 1 && ready_to_move(),
+        session_.error.empty() && rehearsals_ > 0};
     const PictureStep step = pacing_.next(key, frame, frame_start_);
     if (step == PictureStep::rehearsal)
         rehearse_motion(key);
@@ -144,6 +146,7 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
                                       : pacing_.motion().quality();
     const Camera camera = at_scale(key.camera, quality.scale);
     pacing_.drew(step, quality);
+    if (step == PictureStep::in_motion) rehearsals_ = 0;  // it measures the same
     const bool drawn = attempt([&] {
         render_shown(camera, free_area(session_, key.camera.width, key.camera.height),
                      whole ? std::nullopt : std::optional(quality.splats));
@@ -162,31 +165,38 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
         session_.plan->note_frame(picture_.status().huge_splats, picture_.status().longest_list);
 }
 
-// Once after what a picture needs has changed: pipelines compile at their first use, and the first
+// After what a picture needs has changed: pipelines compile at their first use, and the first
 // frames in motion are drawn at a quality that was found before them.
 void Viewer::rehearse_motion(const PictureKey& key) {
+    const auto begin = Clock::now();
+    const bool first = rehearsals_ == kRehearsals;
     const FrameTimes& t = session_.times;
-    const std::vector<DisplaySettings> displays = shown_displays();
-    const double besides_ms = std::max(0.0, t.frame_ms - t.picture_ms);
+    if (first) besides_picture_ms_ = std::max(0.0, t.frame_ms - t.picture_ms);
     attempt([&] {
-        for (int i = 0; i <= kRehearsals; ++i) {
+        do {
             const MotionQuality quality = pacing_.motion().quality();
             // The first makes the copy of the important splats, also where all are wanted now.
-            const double splats =
-                i == 0 ? std::min(quality.splats, picture_.most_moving()) : quality.splats;
-            const auto start = Clock::now();
-            std::vector<PassTime> passes;
-            bool compiled = false;
-            for (size_t p = 0; p < displays.size(); ++p) {
-                add_times(picture_.rehearse(at_scale(key.camera, quality.scale), displays[p],
-                                            splats, static_cast<int>(p)),
-                          passes);
-                compiled |= picture_.compiled();
-            }
-            if (compiled || splats < quality.splats) continue;
-            pacing_.motion().measured(motion_cost(besides_ms + milliseconds_since(start), passes));
-        }
+            rehearse_once(key, quality,
+                          rehearsals_ == kRehearsals
+                              ? std::min(quality.splats, picture_.most_moving())
+                              : quality.splats);
+        } while (--rehearsals_ > 0 && !first && milliseconds_since(begin) < kRehearsing_ms);
     });
+}
+
+void Viewer::rehearse_once(const PictureKey& key, const MotionQuality& quality, double splats) {
+    const auto start = Clock::now();
+    const std::vector<DisplaySettings> displays = shown_displays();
+    std::vector<PassTime> passes;
+    bool compiled = false;
+    for (size_t p = 0; p < displays.size(); ++p) {
+        add_times(picture_.rehearse(at_scale(key.camera, quality.scale), displays[p], splats,
+                                    static_cast<int>(p)),
+                  passes);
+        compiled |= picture_.compiled();
+    }
+    if (compiled || splats < quality.splats) return;
+    pacing_.motion().measured(motion_cost(besides_picture_ms_ + milliseconds_since(start), passes));
 }
 
 void Viewer::presented() {
