@@ -53,13 +53,19 @@ Dataset block_dataset(const Dataset& whole, const std::vector<std::size_t>& view
     return block;
 }
 
-BlockStart block_start(const SplatModel& coarse, const Partition& cells, std::size_t cell,
-                       const std::vector<View>& views, int sh_degree) {
+bool BlockRegion::holds(const glm::dvec3& world) const {
+    return cells.cells[cell].holds_with_margin(cells.plane.at(world)) &&
+           !done[cells.cell_of(world)];
+}
+
+BlockStart block_start(const SplatModel& coarse, const BlockRegion& region,
+                       const SplatModel& beside, const std::vector<View>& views, int sh_degree) {
+    const Partition& cells = region.cells;
     std::vector<std::uint32_t> trained, around;
     for (std::uint32_t i = 0; i < coarse.size(); ++i) {
         const glm::dvec3 centre = position_of(coarse, i);
-        if (cells.cells[cell].holds_with_margin(cells.plane.at(centre))) {
-            trained.push_back(i);
+        if (cells.cells[region.cell].holds_with_margin(cells.plane.at(centre))) {
+            if (region.holds(centre)) trained.push_back(i);  // else one of `beside` stands there
             continue;
         }
         const float* scale = &coarse.log_scale[3 * std::size_t{i}];
@@ -68,27 +74,31 @@ BlockStart block_start(const SplatModel& coarse, const Partition& cells, std::si
                         [&](const View& view) { return may_see(view.camera, centre, radius); }))
             around.push_back(i);
     }
-    const std::size_t most = around.size() / GpuSplats::kFrozenUnit * GpuSplats::kFrozenUnit;
     std::stable_sort(around.begin(), around.end(), [&](std::uint32_t a, std::uint32_t b) {
         return coarse.opacity_logit[a] > coarse.opacity_logit[b];
     });
-    around.resize(most);
+    const std::size_t spare = (around.size() + beside.size()) % GpuSplats::kFrozenUnit;
+    const std::size_t spare_beside = spare - std::min(spare, around.size());
+    around.resize(around.size() - (spare - spare_beside));
     std::sort(around.begin(), around.end());
+    SplatModel fixed = beside;
+    keep_splats([&](std::size_t i) { return i + spare_beside < beside.size(); }, fixed);
     BlockStart start;
-    start.frozen = static_cast<std::uint32_t>(around.size());
-    around.insert(around.end(), trained.begin(), trained.end());
+    start.frozen = static_cast<std::uint32_t>(around.size() + fixed.size());
     start.model = pick_splats(coarse, around);
+    if (fixed.size() > 0) start.model = join_parts({start.model, fixed});
+    start.model = join_parts({start.model, pick_splats(coarse, trained)});
     widen_sh(sh_degree, start.model);
     return start;
 }
 
-void add_points(const Dataset& whole, const Partition& cells, std::size_t cell,
-                const TrainOptions& options, std::uint32_t most, BlockStart& start) {
+void add_points(const Dataset& whole, const BlockRegion& region, const TrainOptions& options,
+                std::uint32_t most, BlockStart& start) {
     const PointCloud& points = whole.points;
     Dataset part;
     for (std::size_t p = 0; p < points.size(); ++p) {
         const double* at = &points.position[3 * p];
-        if (!cells.cells[cell].holds_with_margin(cells.plane.at({at[0], at[1], at[2]}))) continue;
+        if (!region.holds({at[0], at[1], at[2]})) continue;
         part.points.position.insert(part.points.position.end(), at, at + 3);
         const std::uint8_t* colour = &points.colour[3 * p];
         part.points.colour.insert(part.points.colour.end(), colour, colour + 3);
@@ -111,6 +121,14 @@ SplatModel cut_to_cell(const SplatModel& trained, std::uint32_t frozen, const Pa
         },
         cut);
     return cut;
+}
+
+SplatModel cut_to_margin(SplatModel model, const Cell& cell, const GroundPlane& plane) {
+    const SplatModel whole = model;
+    keep_splats(
+        [&](std::size_t i) { return cell.holds_with_margin(plane.at(position_of(whole, i))); },
+        model);
+    return model;
 }
 
 SplatModel join_parts(const std::vector<SplatModel>& parts) {

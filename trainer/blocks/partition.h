@@ -46,6 +46,12 @@ struct Partition {
 
     /// The one cell that a place lies in.
     std::size_t cell_of(const glm::dvec3& world) const;
+    /// Of kRounds, the one in which a cell has its turn: cells of a round touch in corners at most.
+    int round_of(std::size_t cell) const {
+        const auto in_column = static_cast<std::size_t>(rows);
+        return static_cast<int>(cell / in_column % 2 * 2 + cell % in_column % 2);
+    }
+    static constexpr int kRounds = 4;
 };
 
 /// `columns` strips across u with as many points each, and each strip in `rows` cells with as many.

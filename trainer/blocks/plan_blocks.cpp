@@ -45,6 +45,7 @@ TrainOptions coarse_options(const Dataset& dataset, const TrainOptions& options)
 TrainOptions block_options(const TrainOptions& options, const CellCount& count, std::size_t points,
                            std::uint32_t frozen, std::uint32_t start) {
     TrainOptions block = options;
+    block.probe_sh = false;  // what stands around has colours of every degree from the start
     if (!options.max_splats) return block;
     const double share = double(count.with_margin) / double(std::max<std::size_t>(points, 1));
     const auto own = static_cast<std::uint32_t>(share * *options.max_splats);
@@ -56,6 +57,7 @@ Grid blocks_for_memory(Device& device, const Dataset& dataset, const TrainOption
                        const GroundPlane& plane, std::uint64_t bytes) {
     TrainOptions free = options;
     free.max_memory_bytes.reset();
+    free.probe_sh = false;
     const MemoryDemand whole = forecast_training(device, dataset, free, false).peak;
     const double coarse = coarse_splats(whole_splats(dataset, options));
     for (int blocks = 1; blocks <= kMostBlocks; ++blocks) {

@@ -50,6 +50,15 @@ class BlocksRun {
     void train_coarse(const std::atomic<bool>& stop);
     void choose_cameras();
     void train_block(std::size_t cell, const std::atomic<bool>& stop);
+    std::vector<bool> done_before(std::size_t cell) const;
+    SplatModel final_splats(std::size_t cell) const;
+    SplatModel splats_beside(const BlockRegion& region) const;
+    void train_round(int round, const std::atomic<bool>& stop);
+    bool is_own(std::size_t cell) const {
+        return job_.ranks.rank() == static_cast<int>(turn_of(cell)) % job_.ranks.count();
+    }
+    std::size_t turn_of(std::size_t cell) const;
+    bool is_done(int round) const;
     void try_block(std::size_t cell, const std::atomic<bool>& stop);
     void exchange_records();
     void refuse_failed() const;
@@ -226,16 +235,45 @@ std::vector<std::size_t> BlocksRun::views_of(const BlockRecord& block) const {
     return views;
 }
 
+// Those of earlier rounds: which they are depends on no order within a round.
+std::vector<bool> BlocksRun::done_before(std::size_t cell) const {
+    std::vector<bool> done;
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c)
+        done.push_back(manifest_.cells.round_of(c) < manifest_.cells.round_of(cell));
+    return done;
+}
+
+SplatModel BlocksRun::final_splats(std::size_t cell) const {
+    const BlockRecord& block = manifest_.blocks[cell];
+    return cut_to_cell(load_splats(scene_in(folder_ / block.name, job_.options.iterations)),
+                       block.part.frozen, manifest_.cells, cell);
+}
+
+// Of cells that are done, in the margin of this one; none where no cell has any there.
+SplatModel BlocksRun::splats_beside(const BlockRegion& region) const {
+    const Cell& own = manifest_.cells.cells[region.cell];
+    std::vector<SplatModel> parts;
+    for (std::size_t c = 0; c < region.done.size(); ++c) {
+        const Cell& other = manifest_.cells.cells[c];
+        const glm::dvec2 low = own.low - own.margin, high = own.high + own.margin;
+        if (region.done[c] && other.low.x < high.x && other.high.x > low.x &&
+            other.low.y < high.y && other.high.y > low.y)
+            parts.push_back(cut_to_margin(final_splats(c), own, manifest_.cells.plane));
+    }
+    return parts.empty() ? SplatModel{} : join_parts(parts);
+}
+
 void BlocksRun::train_block(std::size_t cell, const std::atomic<bool>& stop) {
     BlockRecord& block = manifest_.blocks[cell];
     const Dataset dataset = block_dataset(job_.dataset, views_of(block));
+    const BlockRegion region{manifest_.cells, cell, done_before(cell)};
     BlockStart start =
-        block_start(coarse(), manifest_.cells, cell, dataset.views, job_.options.sh_degree);
+        block_start(coarse(), region, splats_beside(region), dataset.views, job_.options.sh_degree);
     const TrainOptions options =
         block_options(job_.options, counts_[cell], job_.dataset.points.size(), start.frozen,
                       static_cast<std::uint32_t>(start.model.size()));
-    add_points(job_.dataset, manifest_.cells, cell, job_.options,
-               options.max_splats.value_or(kAnyNumberOfSplats), start);
+    add_points(job_.dataset, region, job_.options, options.max_splats.value_or(kAnyNumberOfSplats),
+               start);
     const auto splats = static_cast<std::uint32_t>(start.model.size());
     block.part.frozen = start.frozen;
     note(fmt::format("block {}: {} photos, {} splats to begin with and {} frozen around them",
@@ -252,7 +290,8 @@ void BlocksRun::train_block(std::size_t cell, const std::atomic<bool>& stop) {
         cut_to_cell(trained, start.frozen, manifest_.cells, cell).size());
 }
 
-// A block that fails leaves the others to go on; where not even that can be written, all ends.
+// A block that fails leaves the others of its round to go on; where not even that can be written,
+// all ends.
 void BlocksRun::try_block(std::size_t cell, const std::atomic<bool>& stop) {
     PartRecord& part = manifest_.blocks[cell].part;
     try {
@@ -265,12 +304,36 @@ void BlocksRun::try_block(std::size_t cell, const std::atomic<bool>& stop) {
     save();
 }
 
+// Among the cells of its round.
+std::size_t BlocksRun::turn_of(std::size_t cell) const {
+    std::size_t turn = 0;
+    for (std::size_t c = 0; c < cell; ++c)
+        turn += manifest_.cells.round_of(c) == manifest_.cells.round_of(cell) ? 1 : 0;
+    return turn;
+}
+
+bool BlocksRun::is_done(int round) const {
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c)
+        if (manifest_.cells.round_of(c) == round &&
+            manifest_.blocks[c].part.state != PartState::done)
+            return false;
+    return true;
+}
+
+void BlocksRun::train_round(int round, const std::atomic<bool>& stop) {
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c)
+        if (manifest_.cells.round_of(c) == round && is_own(c) &&
+            manifest_.blocks[c].part.state != PartState::done && !stop)
+            try_block(c, stop);
+    exchange_records();
+}
+
 // What each rank did goes to all.
 void BlocksRun::exchange_records() {
     if (job_.ranks.count() == 1) return;
     std::string own;
     for (std::size_t c = 0; c < manifest_.blocks.size(); ++c)
-        if (has_turn(job_.ranks, c)) {
+        if (is_own(c)) {
             const PartRecord& p = manifest_.blocks[c].part;
             own += fmt::format("{} {} {} {} {} {} {}", int(p.state), p.frozen, p.splats, p.kept,
                                p.peak_bytes, p.seconds, p.error);
@@ -279,7 +342,7 @@ void BlocksRun::exchange_records() {
     const std::vector<Bytes> all = job_.ranks.gather(std::as_bytes(std::span(own)));
     std::vector<std::size_t> at(all.size());
     for (std::size_t c = 0; c < manifest_.blocks.size(); ++c) {
-        const std::size_t rank = c % all.size();
+        const std::size_t rank = turn_of(c) % all.size();
         const char* text = reinterpret_cast<const char*>(all[rank].data()) + at[rank];
         at[rank] += std::strlen(text) + 1;
         PartRecord p;
@@ -299,19 +362,15 @@ void BlocksRun::refuse_failed() const {
         if (block.part.state == PartState::failed)
             failed += fmt::format("\n  block {}: {}", block.name, block.part.error);
     if (!failed.empty())
-        throw Error(job_.run.output.string(), "blocks failed; the others are done:" + failed,
-                    fmt::format("darb train --resume -o '{}' tries these alone again.",
+        throw Error(job_.run.output.string(),
+                    "blocks failed, and what comes after them waits:" + failed,
+                    fmt::format("darb train --resume -o '{}' tries these again and goes on.",
                                 job_.run.output.string()));
 }
 
 void BlocksRun::join() {
     std::vector<SplatModel> parts;
-    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c) {
-        const BlockRecord& block = manifest_.blocks[c];
-        parts.push_back(
-            cut_to_cell(load_splats(scene_in(folder_ / block.name, job_.options.iterations)),
-                        block.part.frozen, manifest_.cells, c));
-    }
+    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c) parts.push_back(final_splats(c));
     const SplatModel joined = join_parts(parts);
     write_ply(scene_in(job_.run.output, job_.options.iterations), joined);
     manifest_.joined = static_cast<std::uint32_t>(joined.size());
@@ -337,17 +396,20 @@ BlocksSummary BlocksRun::execute(const std::atomic<bool>& stop) {
         manifest_ = std::move(as_written.manifest_);
         counts_ = std::move(as_written.counts_);
     }
-    for (std::size_t c = 0; c < manifest_.blocks.size(); ++c)
-        if (has_turn(ranks, c) && manifest_.blocks[c].part.state != PartState::done && !stop &&
-            manifest_.coarse.state == PartState::done)
-            try_block(c, stop);
-    exchange_records();
+    for (BlockRecord& block : manifest_.blocks)  // they are tried again
+        if (block.part.state == PartState::failed) block.part.state = PartState::waiting;
+    const bool begins = manifest_.coarse.state == PartState::done;
+    for (int round = 0; begins && round < Partition::kRounds; ++round) {
+        train_round(round, stop);
+        if (!is_done(round)) break;  // the next ones need all of these beside them
+    }
+    bool done = begins, failed = false;
+    for (const BlockRecord& block : manifest_.blocks) {
+        done = done && block.part.state == PartState::done;
+        failed = failed || block.part.state == PartState::failed;
+    }
     BlocksSummary summary;
-    summary.interrupted =
-        manifest_.coarse.state != PartState::done ||
-        std::any_of(manifest_.blocks.begin(), manifest_.blocks.end(), [](const BlockRecord& b) {
-            return b.part.state == PartState::waiting || b.part.state == PartState::training;
-        });
+    summary.interrupted = !done && !failed;
     if (ranks.is_first() && !summary.interrupted) {
         refuse_failed();
         join();

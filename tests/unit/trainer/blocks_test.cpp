@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 
 #include "engine/core/error.h"
@@ -153,7 +154,8 @@ TEST(BlockScene, trains_cell_and_margin_and_freezes_what_cameras_see_around) {
     const SplatModel coarse = flat_model();
     const Partition cells = two_cells();
     const std::vector<View> high{flying_view({10, 10, 100}, 0, 1.5707)};
-    const BlockStart all = block_start(coarse, cells, 0, high, 2);
+    const BlockRegion region{cells, 0, {false, false}};
+    const BlockStart all = block_start(coarse, region, {}, high, 2);
     EXPECT_EQ(all.frozen, 128u) << "of the 160 beyond 12, in whole units";
     EXPECT_EQ(all.model.size(), 128u + 240u);
     EXPECT_EQ(all.model.sh_degree, 2);
@@ -163,7 +165,48 @@ TEST(BlockScene, trains_cell_and_margin_and_freezes_what_cameras_see_around) {
     for (std::size_t i = 0; i < all.frozen; ++i)
         EXPECT_GT(all.model.opacity_logit[i], 0) << "the least opaque are left out";
     const std::vector<View> away{flying_view({-50, 10, 20}, 3.14159, 0.5)};
-    EXPECT_EQ(block_start(coarse, cells, 0, away, 0).frozen, 0u);
+    EXPECT_EQ(block_start(coarse, region, {}, away, 0).frozen, 0u);
+}
+
+// 20 splats of a cell that is done stand in the margin of the next, in place of the coarse ones.
+TEST(BlockScene, what_is_done_beside_a_block_is_frozen_and_not_trained_again) {
+    const SplatModel coarse = flat_model();
+    const Partition cells = two_cells();
+    const std::vector<View> high{flying_view({10, 10, 100}, 0, 1.5707)};
+    SplatModel beside =
+        cut_to_margin(cut_to_cell(coarse, 0, cells, 0), cells.cells[1], cells.plane);
+    ASSERT_EQ(beside.size(), 40u) << "of 8 to 10";
+    for (float& dc : beside.sh_dc) dc = 7;
+    const BlockRegion region{cells, 1, {true, false}};
+    const BlockStart start = block_start(coarse, region, beside, high, 0);
+    EXPECT_EQ(start.frozen, 192u) << "of 160 up to 8 and 40, in whole units";
+    EXPECT_EQ(start.model.size(), 192u + 200u);
+    std::size_t fixed = 0;
+    for (std::size_t i = 0; i < start.frozen; ++i) {
+        const double x = position_of(start.model, i).x;
+        EXPECT_EQ(x > 8, start.model.sh_dc[3 * i] == 7);
+        fixed += x > 8 ? 1 : 0;
+    }
+    EXPECT_EQ(fixed, 40u) << "none of these is left out";
+    for (std::size_t i = start.frozen; i < start.model.size(); ++i)
+        EXPECT_GT(position_of(start.model, i).x, 10);
+}
+
+TEST(Partition, cells_of_a_round_do_not_lie_side_by_side) {
+    Pcg32 rng(6);
+    const std::vector<double> points = ground_points(9'000, rng);
+    const Partition cells = partition(plane_of(points), points, 5, 4);
+    std::array<int, Partition::kRounds> members{};
+    for (std::size_t a = 0; a < cells.cells.size(); ++a) {
+        ++members[std::size_t(cells.round_of(a))];
+        for (std::size_t b = 0; b < a; ++b) {
+            const Cell &one = cells.cells[a], &two = cells.cells[b];
+            const bool touch = one.low.x <= two.high.x && two.low.x <= one.high.x &&
+                               one.low.y <= two.high.y && two.low.y <= one.high.y;
+            EXPECT_FALSE(touch && cells.round_of(a) == cells.round_of(b)) << a << " " << b;
+        }
+    }
+    for (const int count : members) EXPECT_GE(count, 4);
 }
 
 TEST(BlockScene, cut_and_joined_parts_hold_each_place_once) {
@@ -172,7 +215,8 @@ TEST(BlockScene, cut_and_joined_parts_hold_each_place_once) {
     const std::vector<View> high{flying_view({10, 10, 100}, 0, 1.5707)};
     std::vector<SplatModel> parts;
     for (std::size_t c = 0; c < 2; ++c) {
-        const BlockStart start = block_start(coarse, cells, c, high, static_cast<int>(c));
+        const BlockStart start =
+            block_start(coarse, {cells, c, {false, false}}, {}, high, static_cast<int>(c));
         parts.push_back(cut_to_cell(start.model, start.frozen, cells, c));
         EXPECT_EQ(parts.back().size(), 200u);
         for (std::size_t i = 0; i < 200; ++i)
