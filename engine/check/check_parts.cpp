@@ -92,21 +92,22 @@ Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
 Row shaped_row(Device& device, int kernel, Footprint footprint, double exponent, Row& slope_row) {
     const std::vector<Probe> probes = ramp(kernel);
     const auto answers = probe(device, kernel, footprint, probes, static_cast<float>(exponent));
+    const ShapedKernel& shaped = shaped_kernel(kernel);
+    const double support = kernel_support(kernel), scale = std::isfinite(support) ? support : 1;
     std::vector<double> value, slope, got_value, got_slope;
     for (size_t i = 0; i < probes.size(); ++i) {
-        const double q = probes[i].q, off = std::abs(q / BETA_SUPPORT - 1);
-        const ShapedValue truth = shaped_value(exponent, q);
+        const double q = probes[i].q, off = std::abs(q / support - 1);
+        const ShapedValue truth = shaped.value(footprint, exponent, q);
         value.push_back(truth.w);
         got_value.push_back(answers[i].value);
         if (off < 2e-6) continue;  // the slope of the exponent 1 jumps at the edge
-        slope.push_back(truth.slope * BETA_SUPPORT);
-        got_slope.push_back(answers[i].slope * BETA_SUPPORT);
+        slope.push_back(truth.slope * scale);
+        got_slope.push_back(answers[i].slope * scale);
     }
-    KernelCoefficients k = kernel_coefficients(kernel, footprint, kFullDegree);
-    k.exponent = exponent;
+    const KernelCoefficients& k = kernel_coefficients(kernel, footprint, kFullDegree);
     reference::Tolerance allowed;
     allowed.name = "kernel";
-    allowed.abs = 1.1 * k.value_error + float_rounding(k);
+    allowed.abs = 1.1 * k.value_error + shaped.rounding(exponent);
     const std::string name =
         fmt::format("{} {}, exponent {}", kernel_name(kernel), footprint_name(footprint), exponent);
     const Row row = compare_row("kernels", name + " value", value, got_value, allowed);
@@ -165,8 +166,7 @@ std::vector<Row> check_kernels(Device& device, std::optional<int> kernel) {
             if (footprint == Footprint::exact && !has_exact_footprint(k)) continue;
             Row slope;
             if (kernel_has_shape(k)) {
-                for (const double exponent :
-                     {EXPONENT_LEAST, 2.5, BETA_START, 20.0, EXPONENT_MOST}) {
+                for (const double exponent : shaped_kernel(k).exponents_to_check()) {
                     rows.push_back(shaped_row(device, k, footprint, exponent, slope));
                     rows.push_back(slope);
                 }

@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "engine/check/hard_cases.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb::check {
 
@@ -28,8 +29,12 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
                 {KERNEL_INVERSE_QUADRATIC},
                 {KERNEL_RAISED_COSINE, Footprint::exact},
                 {KERNEL_GAUSSIAN, Footprint::psi, EVALUATION_BUILTIN},
-                {KERNEL_BETA}};
-    std::vector<Variant> all{{KERNEL_BETA}, {KERNEL_BETA, Footprint::exact}};
+                {KERNEL_BETA},
+                {KERNEL_GENERALIZED_EXPONENTIAL}};
+    std::vector<Variant> all;
+    for (const int kernel : shaped_kernels())
+        for (const Footprint f : {Footprint::psi, Footprint::exact})
+            if (f == Footprint::psi || has_exact_footprint(kernel)) all.push_back({kernel, f});
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
         for (const Footprint f : {Footprint::psi, Footprint::exact})
             for (const int e : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})

@@ -85,7 +85,8 @@ DerivedKernel::DerivedKernel(const KernelProfile& row) : row_(row) {
     DARB_CHECK(row.edge_order >= 0 && row.support > 0, "kernel {}", row.name);
     DARB_CHECK((row.form == KERNEL_FORM_RINGS) == (row.pulses.count > 1), "kernel {}", row.name);
     const bool compact = std::isfinite(row.support);
-    DARB_CHECK(compact == (row.form != KERNEL_FORM_GAUSSIAN), "kernel {}", row.name);
+    DARB_CHECK(compact || row.form == KERNEL_FORM_GAUSSIAN || row.form == KERNEL_FORM_EXPONENTIAL,
+               "kernel {}", row.name);
     find_pulses();
     radius_ = compact ? std::sqrt(pulses_.front().end) : kGaussRadius;
     radial_mass_ = radial_moment(radius_, 2);
@@ -149,7 +150,7 @@ void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) 
 
 double DerivedKernel::value(Footprint footprint, double q) const {
     if (q >= row_.support) return 0;
-    if (footprint == Footprint::psi || row_.form == KERNEL_FORM_GAUSSIAN)
+    if (footprint == Footprint::psi || !std::isfinite(row_.support))
         return profile_value(row_, q);
     double u, p, dp;
     footprint_parts(q, u, p, dp);
@@ -158,7 +159,7 @@ double DerivedKernel::value(Footprint footprint, double q) const {
 
 double DerivedKernel::slope(Footprint footprint, double q) const {
     if (q >= row_.support) return 0;
-    if (footprint == Footprint::psi || row_.form == KERNEL_FORM_GAUSSIAN)
+    if (footprint == Footprint::psi || !std::isfinite(row_.support))
         return row_.profile({q, kStep}).imag() / kStep;
     double u, p, dp;
     footprint_parts(q, u, p, dp);
@@ -188,7 +189,7 @@ double DerivedKernel::covariance_scale(Footprint footprint) const {
 }
 
 double DerivedKernel::equal_area_scale(Footprint footprint) const {
-    if (row_.form == KERNEL_FORM_GAUSSIAN) return 1;
+    if (!std::isfinite(row_.support)) return 1;
     // The area element is pi dq, a Gaussian's integral 2 pi; q = end (1 - s^2) makes half powers at
     // the edge analytic.
     const double end = pulses_.front().end;

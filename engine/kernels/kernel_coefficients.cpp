@@ -104,12 +104,14 @@ void fit_quadric(const DerivedKernel& kernel, KernelCoefficients& k) {
 /// Largest errors in double on points between the nodes, edge and centre included.
 void measure(const DerivedKernel& kernel, Footprint footprint, KernelCoefficients& k) {
     constexpr int kSamples = 1000;
-    const bool gaussian = k.form == KERNEL_FORM_GAUSSIAN;
+    const bool gaussian = !std::isfinite(k.support);
     const double end = gaussian ? 16 : k.support;
+    KernelCoefficients drawn = k;  // of an exponential what 2^f alone strays
+    if (gaussian) drawn.form = KERNEL_FORM_GAUSSIAN;
     for (int i = 0; i < kSamples; ++i) {
         const double q = end * i / kSamples;
         double w, slope;
-        evaluate(k, q, w, slope);
+        evaluate(drawn, q, w, slope);
         k.least_value = std::min(k.least_value, w);
         const double truth = kernel.value(footprint, q);
         k.value_error = std::max(k.value_error, std::abs(w - truth) / (gaussian ? truth : 1));
@@ -135,6 +137,9 @@ KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint,
         k.half_power = 2 * row.edge_order + (footprint == Footprint::exact ? 1 : 0);
         k.squared = squared;
         fit_compact(kernel, footprint, slope_share, k);
+    } else if (row.form == KERNEL_FORM_EXPONENTIAL) {
+        fit_gaussian(k);
+        k.exponent = EXPONENTIAL_START;
     } else if (row.form == KERNEL_FORM_GAUSSIAN || row.form == KERNEL_FORM_BETA) {
         fit_gaussian(k);
         k.exponent = row.edge_order + (footprint == Footprint::exact ? 0.5 : 0.0);

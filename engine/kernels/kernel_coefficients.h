@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "engine/kernels/kernel_profile.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb {
 
@@ -24,7 +25,7 @@ struct KernelCoefficients {
     bool squared = false;          // x = t^2 rather than t; compact only
     bool line_integral = false;    // the exact footprint; quadric only
     double support = 0;            // R^2
-    double exponent = 0;           // beta: e of (1 - q/R^2)^e
+    double exponent = 0;           // of a kernel with shapes: that of shape 0
     double inverse_support = 0;    // 1/R^2 as the shaders have it: rounded up to float, so that the
                                    // edge q = R^2 gives u <= 0 with fused and unfused arithmetic
     // of the polynomial, rising powers; rings: q of the peak and of the end of each pulse
@@ -49,7 +50,8 @@ const KernelCoefficients& kernel_coefficients(int kernel, Footprint footprint, i
 /// inversesqrt, and for sqrt both of them, so 7 for 1/sqrt(1+q), each 6e-8 below w = 1. Terms that
 /// cancel leave the rounding of the largest: built-in kernels have none.
 inline double float_rounding(const KernelCoefficients& k) {
-    if (k.form == KERNEL_FORM_BETA) return 2e-7 + 2e-7 * k.exponent;  // of the logarithm
+    if (k.form == KERNEL_FORM_BETA) return beta_kernel().rounding(k.exponent);
+    if (k.form == KERNEL_FORM_EXPONENTIAL) return exponential_kernel().rounding(k.exponent);
     const bool divides = k.form == KERNEL_FORM_QUADRIC;
     const bool compact = k.form == KERNEL_FORM_COMPACT;
     const bool has_root = compact && k.half_power % 2 == 1;
@@ -100,6 +102,26 @@ void evaluate_gaussian(const KernelCoefficients& k, Real q, Real& w, Real& slope
     w = std::ldexp(p, static_cast<int>(n));
     slope = k.degree < 5 ? Real(-0.72134752044448170368) * std::ldexp(dp, static_cast<int>(n))
                          : Real(-0.5) * w;
+}
+
+/// 2^y of the polynomial, as the shaders have it.
+template <class Real>
+Real power_of_two(const KernelCoefficients& k, Real y) {
+    const Real above = std::max(y, Real(-126)), n = std::nearbyint(above);
+    Real p, dp;
+    evaluate_polynomial(k, above - n, p, dp);
+    return std::ldexp(p, static_cast<int>(n));
+}
+
+/// As shaders/kernels/exponential.glsl but for its logarithm.
+template <class Real>
+void evaluate_exponential(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
+    const Real half = Real(0.5) * static_cast<Real>(k.exponent);
+    const Real v = std::min(q, Real(1e30)) + Real(EXPONENTIAL_SOFTENING);
+    const Real p = power_of_two(k, std::min(half * std::log2(v), Real(7)));
+    const Real first = power_of_two(k, half * Real(EXPONENTIAL_SOFTENING_LOG2));
+    w = power_of_two(k, (p - first) * Real(-0.72134752044448170368));
+    slope = Real(-0.5) * half * p / v * w;
 }
 
 /// u^e = 2^(e log2 u), as shaders/kernels/beta.glsl but for its logarithm.
@@ -188,6 +210,8 @@ void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
         evaluate_gaussian(k, q, w, slope);
     } else if (k.form == KERNEL_FORM_BETA) {
         evaluate_beta(k, q, w, slope);
+    } else if (k.form == KERNEL_FORM_EXPONENTIAL) {
+        evaluate_exponential(k, q, w, slope);
     } else if (k.form == KERNEL_FORM_RINGS) {
         evaluate_rings(k, q, w, slope);
     } else {

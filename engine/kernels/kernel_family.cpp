@@ -1,5 +1,7 @@
 #include "engine/kernels/kernel_profile.h"
 
+#include <cmath>
+
 namespace darb {
 
 std::string_view kernel_name(int kernel) {
@@ -40,7 +42,7 @@ double kernel_support(int kernel) {
 
 bool ends_with_a_jump(int kernel) {
     const KernelProfile& row = kernel_profile(kernel);
-    return row.edge_order == 0 && row.form != KERNEL_FORM_GAUSSIAN;
+    return row.edge_order == 0 && std::isfinite(row.support);
 }
 
 double kernel_value(int kernel, Footprint footprint, double q) {

@@ -84,6 +84,8 @@ const std::array<KernelProfile, KERNEL_ROWS> kRows{{
     {"sinc_3_pulses", 81, 1, KERNEL_FORM_RINGS, modulus_of_sinc, KERNEL_SINC, sinc_pulses(3)},
     {"beta", BETA_SUPPORT, 4, KERNEL_FORM_BETA,  // of shape 0; others: shaped_kernel.h
      [](Complex q) { return square(square((BETA_SUPPORT - q) / BETA_SUPPORT)); }},
+    {"generalized_exponential", kInfinity, 0, KERNEL_FORM_EXPONENTIAL,  // of shape 0: a Gaussian
+     [](Complex q) { return std::exp(-q / 2.0); }},
 }};
 
 }  // namespace

@@ -29,7 +29,7 @@ struct Pulses {
 
 struct KernelProfile {
     std::string_view name;
-    double support;  // R^2 in q; infinity only with KERNEL_FORM_GAUSSIAN
+    double support;  // R^2 in q; infinity: the profile is the Gaussian
     int edge_order;  // of the zero at the edge in u = 1 - q/R^2: 0 jump, 1 kink, 2 double zero, ...
     int form;  // KERNEL_FORM_*: the arithmetic of the shaders; COMPACT unless w has poles near
     Profile profile;

@@ -76,7 +76,9 @@ std::optional<int> kernel_from_name(std::string_view name) {
 
 bool has_exact_footprint(int kernel) {
     const Registered* entry = registered(kernel);
-    return entry != nullptr ? entry->exact : listed_profile(kernel).form != KERNEL_FORM_RINGS;
+    if (entry != nullptr) return entry->exact;
+    const int form = listed_profile(kernel).form;
+    return form != KERNEL_FORM_RINGS && form != KERNEL_FORM_EXPONENTIAL;
 }
 
 const KernelDefinition* kernel_definition(int kernel) {

@@ -46,14 +46,15 @@ std::vector<float> relocation_table(int kernel, Footprint footprint, int opaciti
         throw Error("relocation", fmt::format("a table of {} x {}", max_count, opacities),
                     "It wants at least one row and one column.");
     std::vector<float> table;
-    const bool shaped = kernel_has_shape(kernel);
+    const ShapedKernel* shaped = kernel_has_shape(kernel) ? &shaped_kernel(kernel) : nullptr;
     for (int row = 0; row < (shaped ? SHAPE_ROWS : 1); ++row) {
-        const double exponent = shaped ? shape_exponent(footprint, shape_of_row(row)) : 0;
+        const double exponent =
+            shaped ? shaped->exponent(footprint, shaped->shape_of_row(row)) : 0;
         for (int count = 1; count <= max_count; ++count)
             for (int k = 0; k < opacities; ++k) {
                 const double opacity = (k + 0.5) / opacities;
                 table.push_back(static_cast<float>(
-                    shaped ? shaped_relocation_scale(exponent, opacity, count)
+                    shaped ? shaped->relocation_scale(footprint, exponent, opacity, count)
                            : relocation_scale(kernel, footprint, opacity, count)));
             }
     }

@@ -1,5 +1,7 @@
 #include "engine/kernels/second_moment.h"
 
+#include <cmath>
+
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/quadrature.h"
 
@@ -9,7 +11,7 @@ namespace darb {
 // equal_area_scale, q = end (1 - s^2) makes half powers at the edge analytic.
 double rendered_second_moment(int kernel, Footprint footprint) {
     const DerivedKernel& k = derived_kernel(kernel);
-    if (k.row().form == KERNEL_FORM_GAUSSIAN) return 1;
+    if (!std::isfinite(k.row().support)) return 1;
     const double end = k.pulses().front().end;
     const auto integral = [&](int power) {
         return integrate_unit([&](double s) {

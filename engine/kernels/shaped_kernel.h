@@ -1,7 +1,8 @@
-// The kernel whose shape each splat has of its own: `beta`, w = (1 - q/R^2)^b with b = 4 exp(t),
-// R^2 = 13, and t the splat's attribute `shape`. t = 0, where training starts, is the kernel of the
-// list and has the Gaussian's second moment. In closed form, where other kernels have fits and
-// tables. Source: Deformable Beta Splatting (Liu et al. 2025); footprints: docs/math.md, Kernels.
+// Kernels whose shape each splat has of its own. Each is one row of a table: a class that says all
+// that is particular to it, in closed form where other kernels have fits and tables. What a splat
+// is drawn with is its exponent, a function of its attribute `shape`; shape 0, where training
+// starts, is the kernel of the list. shaders/kernels/shaped.glsl is the twin for devices. Formulas:
+// docs/math.md, A shape of each splat.
 #pragma once
 
 #include <vector>
@@ -11,36 +12,69 @@
 
 namespace darb {
 
-bool kernel_has_shape(int kernel);
-
-/// The exponent of the profile that is drawn: b with Footprint::psi, and b + 1/2, the line
-/// integral, with exact; held between EXPONENT_LEAST, below which the slope at the edge has no
-/// bound, and EXPONENT_MOST.
-double shape_exponent(Footprint footprint, double shape);
-/// d shape_exponent / d shape; 0 where it is held.
-double shape_exponent_slope(Footprint footprint, double shape);
-/// The shape with this exponent b of the kernel in space, not held.
-double shape_of_exponent(double b);
-
-/// The profile that is drawn at q >= 0, and its derivatives by q and by the exponent; all 0 from
-/// the edge on.
+/// The profile that is drawn at q >= 0, and its derivatives by q and by the exponent.
 struct ShapedValue {
     double w = 0, slope = 0, by_exponent = 0;
 };
-ShapedValue shaped_value(double exponent, double q);
-/// As kernel_reach.
-double shaped_reach(double exponent, double opacity, double cutoff);
-/// What multiplies the projected covariance: psi = R^2 / (2 b + 5), or 1.
-double shaped_covariance_scale(Footprint footprint, double exponent);
-/// As rendered_second_moment, kernel_radius_quantile, relocation_scale and gaussian_equivalent.
-double shaped_second_moment(Footprint footprint, double exponent);
-/// count of them, at (k + 1/2) / count.
-std::vector<double> shaped_radius_quantiles(Footprint footprint, double exponent, int count);
-double shaped_relocation_scale(double exponent, double opacity, int count);
-GaussianEquivalent shaped_gaussian(Footprint footprint, double exponent, bool keep_opacity);
 
-/// The shapes of the rows of the tables that density control reads: SHAPE_ROWS of them, evenly from
-/// SHAPE_FIRST to SHAPE_LAST.
-double shape_of_row(int row);
+class ShapedKernel {
+  public:
+    virtual ~ShapedKernel() = default;
+    /// The exponent that is drawn of a shape, held between exponent_least and exponent_most.
+    virtual double exponent(Footprint footprint, double shape) const = 0;
+    /// d exponent / d shape; 0 where it is held.
+    virtual double exponent_slope(Footprint footprint, double shape) const = 0;
+    virtual double exponent_least() const = 0;
+    virtual double exponent_most() const = 0;
+    /// Tables over the shape reach from the first to the last: there the exponent is held.
+    virtual double first_shape() const = 0;
+    virtual double last_shape() const = 0;
+
+    virtual ShapedValue value(Footprint footprint, double exponent, double q) const = 0;
+    /// The q beyond which w is 0, or below 1e-9.
+    virtual double extent(double exponent) const = 0;
+    /// As kernel_reach.
+    virtual double reach(Footprint footprint, double exponent, double opacity,
+                         double cutoff) const = 0;
+    /// What multiplies the projected covariance, psi or 1, and half of its logarithm's derivative
+    /// by the exponent: that of the logarithm of lengths.
+    virtual double covariance_scale(Footprint footprint, double exponent) const = 0;
+    virtual double length_slope(Footprint footprint, double exponent) const = 0;
+    /// As rendered_second_moment.
+    virtual double second_moment(Footprint footprint, double exponent) const = 0;
+    /// As kernel_radius_quantile: count of them, at (k + 1/2) / count.
+    virtual std::vector<double> radius_quantiles(Footprint footprint, double exponent,
+                                                 int count) const = 0;
+    /// How far float32 may stray from value(): see float_rounding.
+    virtual double rounding(double exponent) const = 0;
+    /// From the least to the most, the start among them.
+    virtual std::vector<double> exponents_to_check() const = 0;
+
+    /// As relocation_scale and gaussian_equivalent.
+    double relocation_scale(Footprint footprint, double exponent, double opacity, int count) const;
+    GaussianEquivalent gaussian(Footprint footprint, double exponent, bool keep_opacity) const;
+    /// The shapes of the SHAPE_ROWS rows of the tables that density control reads, evenly from
+    /// first_shape to last_shape.
+    double shape_of_row(int row) const;
+};
+
+bool kernel_has_shape(int kernel);
+/// Of a kernel that has a shape.
+const ShapedKernel& shaped_kernel(int kernel);
+std::vector<int> shaped_kernels();
+/// The exponent of the scene's splat, of any kernel: 0 where it has no shape.
+double splat_exponent(int kernel, Footprint footprint, double shape);
+
+/// `beta`: w = (1 - q/R^2)^e, R^2 = BETA_SUPPORT, b = BETA_START exp(shape), e = b with
+/// Footprint::psi and b + 1/2, the line integral, with exact. Source: Deformable Beta Splatting
+/// (Liu et al. 2025).
+const ShapedKernel& beta_kernel();
+/// The shape of beta with this b of the kernel in space, not held.
+double beta_shape_of(double b);
+/// `generalized_exponential`: w = exp(-((q + s)^(t/2) - s^(t/2)) / 2), t = 2 exp(shape) its
+/// exponent. s = EXPONENTIAL_SOFTENING bounds the slope at the centre, which without it is infinite
+/// for t < 2. Its line integral has no closed form: Footprint::psi only. Source: GES (Hamdi et al.
+/// 2024), whose renderer draws Gaussians of another size.
+const ShapedKernel& exponential_kernel();
 
 }  // namespace darb

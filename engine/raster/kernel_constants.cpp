@@ -8,6 +8,7 @@
 #include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_profile.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb {
 namespace {
@@ -34,8 +35,9 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     const KernelCoefficients& k = kernel_coefficients(kernel, footprint, degree);
     if (k.form == KERNEL_FORM_RINGS) evaluation = EVALUATION_BUILTIN;
     double margin = evaluation == EVALUATION_BUILTIN ? kBuiltinMargin : kRoundingMargin;
-    if (k.form == KERNEL_FORM_BETA) margin = kBuiltinMargin;  // of log2 and exp2 in the reach
-    if (k.form == KERNEL_FORM_GAUSSIAN || k.form == KERNEL_FORM_BETA) margin += 1.5 * k.value_error;
+    const bool shaped = kernel_has_shape(kernel);
+    if (shaped) margin = kBuiltinMargin;  // of log2 and exp2 in the reach
+    if (k.form == KERNEL_FORM_GAUSSIAN || shaped) margin += 1.5 * k.value_error;
     DARB_CHECK(k.half_power <= 9, "half_power = {}", k.half_power);  // shaders/kernels/compact.glsl
     SpecConstants constants{
         {"KERNEL", shader_kernel(kernel)},

@@ -12,7 +12,6 @@
 #include <tuple>
 
 #include "engine/core/error.h"
-#include "engine/kernels/shaped_kernel.h"
 
 namespace darb::reference {
 namespace {
@@ -70,11 +69,11 @@ KernelTable::KernelTable(int kernel, Footprint footprint, int polynomial_degree)
           kernel_has_shape(kernel) || (polynomial_degree == 0 && has_exact_footprint(kernel))
               ? nullptr
               : &kernel_coefficients(kernel, footprint, std::max(polynomial_degree, kLeastDegree))),
-      shaped_(kernel_has_shape(kernel)),
+      shaped_(kernel_has_shape(kernel) ? &shaped_kernel(kernel) : nullptr),
       exact_(footprint == Footprint::exact),
       support_(kernel_support(kernel)),
       covariance_scale_(darb::covariance_scale(kernel, footprint)) {
-    if (!std::isfinite(support_) || in_place_ != nullptr || shaped_) {
+    if (!std::isfinite(support_) || in_place_ != nullptr || shaped_ != nullptr) {
         return;
     }
     const auto q_of = [this](double x) {
@@ -98,7 +97,7 @@ double KernelTable::evaluate(const std::vector<double>& table, double x) const {
 }
 
 double KernelTable::value(double q, double exponent) const {
-    if (shaped_) return shaped_value(exponent, q).w;
+    if (shaped_) return shaped_->value(footprint_, exponent, q).w;
     if (in_place_ != nullptr) {
         double w, slope;
         darb::evaluate(*in_place_, q, w, slope);
@@ -112,15 +111,15 @@ double KernelTable::value(double q, double exponent) const {
 }
 
 double KernelTable::by_exponent(double q, double exponent) const {
-    return shaped_ ? shaped_value(exponent, q).by_exponent : 0;
+    return shaped_ ? shaped_->value(footprint_, exponent, q).by_exponent : 0;
 }
 
 double KernelTable::covariance_scale(double exponent) const {
-    return shaped_ ? shaped_covariance_scale(footprint_, exponent) : covariance_scale_;
+    return shaped_ ? shaped_->covariance_scale(footprint_, exponent) : covariance_scale_;
 }
 
 double KernelTable::slope(double q, double exponent) const {
-    if (shaped_) return shaped_value(exponent, q).slope;
+    if (shaped_) return shaped_->value(footprint_, exponent, q).slope;
     if (in_place_ != nullptr) {
         double w, slope;
         darb::evaluate(*in_place_, q, w, slope);
@@ -138,7 +137,7 @@ double KernelTable::slope(double q, double exponent) const {
 }
 
 double KernelTable::reach(double opacity, double cutoff, double exponent) const {
-    if (shaped_) return shaped_reach(exponent, opacity, cutoff);
+    if (shaped_) return shaped_->reach(footprint_, exponent, opacity, cutoff);
     if (!(opacity >= cutoff)) {
         return 0.0;
     }

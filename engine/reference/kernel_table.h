@@ -8,6 +8,7 @@
 
 #include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/kernel_family.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb::reference {
 
@@ -33,7 +34,7 @@ class KernelTable {
     int kernel_;
     Footprint footprint_;
     const KernelCoefficients* in_place_ = nullptr;  // of the tables: a polynomial, or rings
-    bool shaped_;                                   // in closed form, an exponent for each splat
+    const ShapedKernel* shaped_;                    // not tabled: an exponent for each splat
     bool exact_;                                    // tabled in s, else in q / R^2
     double support_;                                // R^2
     double covariance_scale_;

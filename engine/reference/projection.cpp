@@ -37,7 +37,7 @@ T exponent_of(const Splats<T>& splats, size_t index) {
     if (!kernel_has_shape(splats.kernel)) return 0;
     const auto shape = static_cast<double>(splats.shape[index]);
     return std::isnan(shape) ? splats.shape[index]
-                             : static_cast<T>(shape_exponent(splats.footprint, shape));
+                             : static_cast<T>(splat_exponent(splats.kernel, splats.footprint, shape));
 }
 
 template <class T>
@@ -358,13 +358,13 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
         out.rotation[index * 4 + c] = d_rotation[c];
     }
     if (kernel_has_shape(splats.kernel)) {
-        // Through the profile, and through psi = R^2 / (2 e + 5), which scales every row of M by
-        // its root.
+        // Through the profile, and through psi, which scales every row of M by its root.
+        const ShapedKernel& kernel = shaped_kernel(splats.kernel);
         const auto shape = static_cast<double>(splats.shape[index]);
-        const T by_shape = static_cast<T>(shape_exponent_slope(splats.footprint, shape));
+        const T by_shape = static_cast<T>(kernel.exponent_slope(splats.footprint, shape));
         const T d_length = glm::dot(d_scale, terms.scale);
-        const T length_slope =
-            splats.footprint == Footprint::psi ? -1 / (2 * splat.exponent + 5) : T(0);
+        const T length_slope = static_cast<T>(
+            kernel.length_slope(splats.footprint, static_cast<double>(splat.exponent)));
         out.shape[index] = by_shape * (gradient.d_exponent + length_slope * d_length);
     }
     const T sigmoid = sigmoid_of_clamped(splats.opacity_logit[index]);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "engine/core/rng.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/splat_shapes.h"
 
 namespace darb::reference {
@@ -62,7 +63,11 @@ TestScene random_scene(const SceneOptions& options) {
     fill(model.sh_dc, [&] { return rng.uniform(-0.5, 1.5); });
     fill(model.sh_rest, [&] { return rng.uniform(-0.1, 0.1); });
     set_kernel(model, options.kernel);
-    fill(model.shape, [&] { return rng.uniform(-2.2, 3); });  // some are held at either end
+    if (kernel_has_shape(options.kernel)) {
+        const ShapedKernel& kernel = shaped_kernel(options.kernel);
+        const double from = kernel.first_shape() - 0.1, to = kernel.last_shape() + 0.2;
+        fill(model.shape, [&] { return rng.uniform(from, to); });  // some are held at either end
+    }
     return scene;
 }
 

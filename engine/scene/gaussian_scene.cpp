@@ -6,7 +6,6 @@
 
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/splat_shapes.h"
-#include "shaders/shared/kernel_forms.h"
 
 namespace darb {
 
@@ -22,11 +21,13 @@ float scaled_logit(float logit, double factor) {
 /// Each splat by its own shape, between fits at kFits shapes; returns the means.
 GaussianEquivalent convert_shapes(const SplatModel& model, bool keep_opacity, SplatModel& result) {
     constexpr int kFits = 64;
-    const double first = SHAPE_FIRST, step = (SHAPE_LAST - first) / (kFits - 1);
+    const ShapedKernel& kernel = shaped_kernel(model.kernel);
+    const double first = kernel.first_shape(), step = (kernel.last_shape() - first) / (kFits - 1);
     std::vector<GaussianEquivalent> fits;
     for (int k = 0; k < kFits; ++k)
-        fits.push_back(shaped_gaussian(
-            model.footprint, shape_exponent(model.footprint, first + k * step), keep_opacity));
+        fits.push_back(kernel.gaussian(model.footprint,
+                                       kernel.exponent(model.footprint, first + k * step),
+                                       keep_opacity));
     GaussianEquivalent mean{0, 0, 0};
     double weights = 0;
     for (std::size_t i = 0; i < model.size(); ++i) {

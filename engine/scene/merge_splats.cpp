@@ -114,10 +114,11 @@ Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& 
     for (std::size_t i = 0; i < first_; ++i)
         if (is_drawn(model_, i)) moments_[i] = moments_of(model_, i);
     if (!kernel_has_shape(model.kernel)) return;
+    const ShapedKernel& kernel = shaped_kernel(model.kernel);
     // What is merged has the shape 0. A splat counts as the one of this shape that is as wide.
     for (std::size_t i = 0; i < first_; ++i) {
-        const double moment =
-            shaped_second_moment(model.footprint, shape_exponent(model.footprint, model.shape[i]));
+        const double moment = kernel.second_moment(
+            model.footprint, kernel.exponent(model.footprint, model.shape[i]));
         for (double& c : moments_[i].covariance) c *= moment / second_moment_;
         moments_[i].mass *= moment / second_moment_;
     }

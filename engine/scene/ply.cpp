@@ -127,7 +127,7 @@ void said_of_foreign_shapes(std::size_t held, PlyFacts* facts) {
     if (held > 0)
         facts->notes.push_back(
             fmt::format("{} of its exponents lie outside of {} to {} and are held there", held,
-                        EXPONENT_LEAST, EXPONENT_MOST));
+                        BETA_EXPONENT_LEAST, BETA_EXPONENT_MOST));
 }
 
 std::vector<std::string> ply_losses(const SplatModel& model, const std::string&) {

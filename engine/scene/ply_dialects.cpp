@@ -166,9 +166,9 @@ std::size_t take_foreign_shapes(SplatModel& model) {
     std::size_t held = 0;
     for (float& shape : model.shape) {
         const double drawn = BETA_START * std::exp(double{shape});
-        held += drawn < EXPONENT_LEAST || drawn > EXPONENT_MOST ? 1 : 0;
-        const double inside = std::clamp<double>(drawn, EXPONENT_LEAST, EXPONENT_MOST);
-        shape = static_cast<float>(shape_of_exponent(inside - 0.5));
+        held += drawn < BETA_EXPONENT_LEAST || drawn > BETA_EXPONENT_MOST ? 1 : 0;
+        const double inside = std::clamp<double>(drawn, BETA_EXPONENT_LEAST, BETA_EXPONENT_MOST);
+        shape = static_cast<float>(beta_shape_of(inside - 0.5));
     }
     return held;
 }

@@ -88,7 +88,7 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     const Factor f = cholesky_factor(r1, r2, args.low_pass);
     factor_gradient(f, sums, r1, r2, o * kept, d_r1, d_r2, d_log_scale, g.mean);
     g.shape = 0.0;
-    if (SHAPED) g.shape = by_shape * (sums.d_exponent + beta_length_slope(exponent) *
+    if (SHAPED) g.shape = by_shape * (sums.d_exponent + shaped_length_slope(exponent) *
                                       (d_log_scale.x + d_log_scale.y + d_log_scale.z));
     if (ANTIALIAS == 1) kept *= compensation(r1, r2, f);
     if (SMOOTHING == 1)

@@ -1,7 +1,12 @@
 // w = u^e = 2^(e log2 u), u = 1 - q/R^2: the kernel `beta`, whose exponent e each splat has of its own
-// (engine/kernels/shaped_kernel.h). log2 by additions, multiplications and one division, so that a centre has
+// (engine/kernels/shaped_beta.cpp). log2 by additions, multiplications and one division, so that a centre has
 // log2 = 0 and a device the accuracy of float32, where Vulkan's log2 may be off by 2^-21.
-const bool SHAPED = KERNEL_FORM == KERNEL_FORM_BETA;
+
+// log2((1 + s)/(1 - s)).
+float log2_series(float s) {
+    const float s2 = s * s;
+    return s * (2.88539008 + s2 * (0.961796694 + s2 * (0.577078016 + s2 * (0.412198583 + s2 * 0.320598898))));
+}
 
 // log2(1 - t), 0 <= t < 1: 1 - t = 2^k m, m from the root of 1/2 to that of 2, and the series of
 // log((1 + s)/(1 - s)), s = (m - 1)/(m + 1), to 1e-8. For k = 0 m - 1 is -t, without cancellation.
@@ -9,8 +14,7 @@ float log2_of_rest(float t) {
     const float u = 1.0 - t;
     const int k = (floatBitsToInt(u) - 0x3F3504F3) >> 23;
     const float m = intBitsToFloat(floatBitsToInt(u) - (k << 23));
-    const float s = (k == 0 ? -t : m - 1.0) / (m + 1.0), s2 = s * s;
-    return float(k) + s * (2.88539008 + s2 * (0.961796694 + s2 * (0.577078016 + s2 * (0.412198583 + s2 * 0.320598898))));
+    return float(k) + log2_series((k == 0 ? -t : m - 1.0) / (m + 1.0));
 }
 
 // 2^y, y <= 0: as the Gaussian's.
@@ -35,11 +39,11 @@ void beta_value_slope(float q, float exponent, out float w, out float slope, out
 }
 
 // The exponent of a splat's shape, and its derivative, 0 where it is held.
-float shape_exponent(float shape, out float by_shape) {
+float beta_exponent(float shape, out float by_shape) {
     by_shape = BETA_START * exp(min(shape, 80.0));
     const float free = by_shape + (FOOTPRINT == FOOTPRINT_EXACT ? 0.5 : 0.0);
-    if (!(free > EXPONENT_LEAST && free < EXPONENT_MOST)) by_shape = 0.0;
-    return clamp(free, EXPONENT_LEAST, EXPONENT_MOST);
+    if (!(free > BETA_EXPONENT_LEAST && free < BETA_EXPONENT_MOST)) by_shape = 0.0;
+    return clamp(free, BETA_EXPONENT_LEAST, BETA_EXPONENT_MOST);
 }
 
 float beta_reach(float exponent, float least) {

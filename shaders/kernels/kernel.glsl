@@ -36,7 +36,7 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 #include "kernels/polynomial.glsl"
 
 #include "kernels/builtin.glsl"
-#include "kernels/beta.glsl"
+#include "kernels/shaped.glsl"
 #include "kernels/compact.glsl"
 #include "kernels/gaussian.glsl"
 #include "kernels/quadric.glsl"
@@ -46,7 +46,7 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 void kernel_value_slope(float q, float exponent, out float w, out float slope, out float by_exponent) {
     by_exponent = 0.0;
     if (SHAPED) {
-        beta_value_slope(q, exponent, w, slope, by_exponent);
+        shaped_value_slope(q, exponent, w, slope, by_exponent);
     } else if (EVALUATION == EVALUATION_BUILTIN && builtin_exists()) {
         builtin_value_slope(q, w, slope);
     } else if (KERNEL_FORM == KERNEL_FORM_COMPACT) {
@@ -88,7 +88,7 @@ float kernel_reach(float opacity, float exponent) {
     if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
         q = -2.0 * log(least);
     } else if (SHAPED) {
-        q = beta_reach(exponent, least);
+        q = shaped_reach(exponent, least);
     } else if (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI) {
         q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
     } else {
@@ -107,7 +107,7 @@ float kernel_reach(float opacity, float exponent) {
 
 // What multiplies the projected 2x2 covariance before the low-pass.
 float kernel_covariance_scale(float exponent) {
-    return SHAPED ? beta_covariance_scale(exponent) : COVARIANCE_SCALE;
+    return SHAPED ? shaped_covariance_scale(exponent) : COVARIANCE_SCALE;
 }
 
 #endif

@@ -19,13 +19,24 @@
 
 #define BETA_SUPPORT 13.0   // R^2: with BETA_START the second moment is the Gaussian's
 #define BETA_START 4.0      // b of shape 0
-#define EXPONENT_LEAST 1.0  // below it the slope at the edge grows without bound
-#define EXPONENT_MOST 64.0
+#define BETA_EXPONENT_LEAST 1.0  // below it the slope at the edge grows without bound
+#define BETA_EXPONENT_MOST 64.0
 
-// Rows of density control's tables over the shape, evenly from the first to the last.
+// w = exp(-((q + s)^(t/2) - s^(t/2)) / 2), t of each splat: EXPONENTIAL_START exp(shape), held within
+// the bounds; powers of two as BETA's
+#define KERNEL_FORM_EXPONENTIAL 5
+
+#define EXPONENTIAL_START 2.0  // t of shape 0: the Gaussian, whatever s is
+#define EXPONENTIAL_LEAST 1.0  // below it the slope along d is unbounded at the centre
+#define EXPONENTIAL_MOST 8.0
+#define EXPONENTIAL_SOFTENING 0.0009765625  // s = 2^-10
+#define EXPONENTIAL_SOFTENING_LOG2 -10.0
+// P of ln psi = (x - 1/2) P(x), x = 1/t; rising powers
+#define EXPONENTIAL_PSI \
+    3.24274337, 5.40768433, -8.51232766, 12.3217168, -11.9811003, 6.62186212, -1.5554585
+
+// Rows of density control's tables over the shape, evenly from the first to the last of the kernel.
 #define SHAPE_ROWS 16
-#define SHAPE_FIRST -2.1
-#define SHAPE_LAST 2.8
 
 #define KERNEL_MAX_DEGREE 8
 

@@ -20,9 +20,10 @@
 #define KERNEL_RAISED_COSINE_3_PULSES 10
 #define KERNEL_SINC_2_PULSES 11
 #define KERNEL_SINC_3_PULSES 12
-// A row beyond the list whose shape each splat has of its own; kernel_forms.h.
+// Rows beyond the list whose shape each splat has of its own; kernel_forms.h.
 #define KERNEL_BETA 13
-#define KERNEL_ROWS 14
+#define KERNEL_GENERALIZED_EXPONENTIAL 14
+#define KERNEL_ROWS 15
 #define KERNEL_MAX_PULSES 3
 
 #define FOOTPRINT_PSI 0

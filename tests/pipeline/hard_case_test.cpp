@@ -28,6 +28,8 @@ std::vector<Param> every_case() {
         const int other = 1 + static_cast<int>(i % KERNEL_COUNT);
         all.push_back({i, names[i].name, other < KERNEL_COUNT ? other : KERNEL_BETA,
                        i % 3 == 0 ? Footprint::exact : Footprint::psi});
+        if (i % 4 == 1)
+            all.push_back({i, names[i].name, KERNEL_GENERALIZED_EXPONENTIAL, Footprint::psi});
         if (names[i].name == "discs")
             all.push_back({i, names[i].name, KERNEL_PARABOLIC, Footprint::exact});
     }
@@ -53,7 +55,7 @@ INSTANTIATE_TEST_SUITE_P(every, HardCase, testing::ValuesIn(every_case()),
                          [](const auto& p) { return p.param.name; });
 
 TEST(PoisonedSplats, harm_no_other) {
-    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_BETA})
+    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
         for (const check::Row& row : check::check_poison(shared_device(), kernel, "poison"))
             EXPECT_TRUE(row.pass) << row.name << row.detail;
 }

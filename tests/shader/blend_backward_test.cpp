@@ -117,13 +117,17 @@ TEST_P(BlendBackward, random_layers_match_double) {
 }
 
 TEST_P(EveryWay, exponents_of_splats_match_double) {
-    BlendScene scene = BlendVariant{KERNEL_BETA}.scene(53, 37);
-    scene.back = GetParam();
-    scene.add_random(120, 8, 0.01, 0.98);
-    scene.add({5.5, 7.5}, {0.3, 0, 0.3}, 0.7, {1, 0.5, 0},
-              1);  // the centre, and a kink at the edge
-    const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
-    EXPECT_GT(r.lists.intersection_count(), 200U);
+    for (const int kernel : shaped_kernels()) {
+        SCOPED_TRACE(kernel_name(kernel));
+        BlendScene scene = BlendVariant{kernel}.scene(53, 37);
+        scene.back = GetParam();
+        scene.add_random(120, 8, 0.01, 0.98);
+        // On a pixel's centre: a kink at the edge, or the steepest centre.
+        scene.add({5.5, 7.5}, {0.3, 0, 0.3}, 0.7, {1, 0.5, 0},
+                  shaped_kernel(kernel).exponent_least());
+        const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+        EXPECT_GT(r.lists.intersection_count(), 200U);
+    }
 }
 
 // The kernels' own code is that of the other way, so that one case of each is enough.

@@ -261,12 +261,14 @@ std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t 
 }
 
 TEST(Densify, offsets_of_children_follow_the_density_of_their_own_shape) {
-    for (const Footprint footprint : {Footprint::psi, Footprint::exact})
+    for (const int kernel : shaped_kernels())
         for (const float shape : {-3.0f, -0.6f, 0.0f, 1.1f, 4.0f}) {  // the outer ones are held
-            SCOPED_TRACE(shape);
-            const auto offsets = child_offsets(KERNEL_BETA, 10'000, 7, footprint, shape);
-            const auto radii = shaped_radius_quantiles(
-                footprint, shape_exponent(footprint, static_cast<double>(shape)), 20);
+            SCOPED_TRACE(fmt::format("{} {}", kernel_name(kernel), shape));
+            const Footprint footprint =
+                has_exact_footprint(kernel) ? Footprint::exact : Footprint::psi;
+            const auto offsets = child_offsets(kernel, 10'000, 7, footprint, shape);
+            const auto radii = shaped_kernel(kernel).radius_quantiles(
+                footprint, splat_exponent(kernel, footprint, static_cast<double>(shape)), 20);
             for (const int k : {1, 5, 10, 14, 18}) {
                 const auto below = std::count_if(offsets.begin(), offsets.end(), [&](auto& o) {
                     return length(o) < radii[static_cast<size_t>(k)];

@@ -170,7 +170,7 @@ TEST_F(KernelShader, CentreEdgeAndBeyond_areExact) {
 TEST_F(KernelShader, Exponents_of_beta_areThoseOfDoubleFromCentreToEdgeAndBeyond) {
     for (const Footprint footprint : {Footprint::psi, Footprint::exact})
         for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
-            for (const double e : {EXPONENT_LEAST, 1.5, 4.0, 4.5, 20.0, EXPONENT_MOST}) {
+            for (const double e : {BETA_EXPONENT_LEAST, 1.5, 4.0, 4.5, 20.0, BETA_EXPONENT_MOST}) {
                 const Variant v{KERNEL_BETA, footprint, evaluation, kFullDegree};
                 SCOPED_TRACE(fmt::format("{}, exponent {}", v.name(), e));
                 std::vector<Probe> probes = ramp(v, 500);
@@ -182,7 +182,7 @@ TEST_F(KernelShader, Exponents_of_beta_areThoseOfDoubleFromCentreToEdgeAndBeyond
                 EXPECT_NEAR(got[0].value, 1, evaluation == EVALUATION_BUILTIN ? 1e-4 : 0);
                 for (std::size_t i = 0; i < probes.size(); ++i) {
                     const double q = probes[i].q;
-                    const ShapedValue truth = shaped_value(e, q);
+                    const ShapedValue truth = beta_kernel().value(footprint, e, q);
                     const double allowed =
                         evaluation == EVALUATION_BUILTIN ? 1e-4 : 3e-7 + 2e-7 * e;
                     ASSERT_NEAR(got[i].value, truth.w, allowed) << q;
@@ -195,11 +195,44 @@ TEST_F(KernelShader, Exponents_of_beta_areThoseOfDoubleFromCentreToEdgeAndBeyond
                     if (0.5 * got[i].value >= kCutoff) {
                         ASSERT_GE(got[i].reach, q);
                     }
-                    ASSERT_NEAR(got[i].covariance_scale, shaped_covariance_scale(footprint, e),
+                    ASSERT_NEAR(got[i].covariance_scale, beta_kernel().covariance_scale(footprint, e),
                                 1e-6);
                 }
-                EXPECT_NEAR(got[0].reach, shaped_reach(e, 0.5, kCutoff), 2e-3);
+                EXPECT_NEAR(got[0].reach, beta_kernel().reach(footprint, e, 0.5, kCutoff), 2e-3);
             }
+}
+
+TEST_F(KernelShader, Exponents_of_generalized_exponential_areThoseOfDoubleFromCentreOutwards) {
+    const ShapedKernel& kernel = exponential_kernel();
+    for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
+        for (const double t : {EXPONENTIAL_LEAST, 1.2, 2.0, 3.5, EXPONENTIAL_MOST}) {
+            const Variant v{KERNEL_GENERALIZED_EXPONENTIAL, Footprint::psi, evaluation,
+                            kFullDegree};
+            SCOPED_TRACE(fmt::format("{}, exponent {}", v.name(), t));
+            std::vector<Probe> probes = ramp(v, 500);
+            for (const float q : {1e-20f, 1e-7f, 1e-4f, 1e-3f, 1e-2f, 300.0f, 1e4f, 1e30f, 3e38f})
+                probes.push_back({q, 1});
+            for (Probe& p : probes) p.opacity = 0.5f;
+            const std::vector<Answer> got = run(v, probes, static_cast<float>(t));
+            const bool builtin = evaluation == EVALUATION_BUILTIN;
+            const double allowed = builtin ? 1e-4 : kernel.rounding(t);
+            EXPECT_NEAR(got[0].value, 1, builtin ? 1e-4 : 0);
+            for (std::size_t i = 0; i < probes.size(); ++i) {
+                const double q = probes[i].q;
+                const ShapedValue truth = kernel.value(Footprint::psi, t, q);
+                ASSERT_NEAR(got[i].value, truth.w, allowed) << q;
+                ASSERT_NEAR(got[i].slope, truth.slope,
+                            t * allowed + (builtin ? 1e-4 : 2e-6) * std::abs(truth.slope))
+                    << q;
+                if (0.5 * got[i].value >= kCutoff) {
+                    ASSERT_GE(got[i].reach, q);
+                }
+                ASSERT_NEAR(got[i].covariance_scale / kernel.covariance_scale(Footprint::psi, t), 1,
+                            2e-6);
+            }
+            const double reach = kernel.reach(Footprint::psi, t, 0.5, kCutoff);
+            EXPECT_NEAR(got[0].reach / reach, 1, 3e-4);
+        }
 }
 
 TEST_F(KernelShader, CovarianceScale_isPsiOrOne) {

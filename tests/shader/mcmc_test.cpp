@@ -11,10 +11,12 @@
 #include "engine/scene/splat_shapes.h"
 #include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
+#include "trainer/density/shape_rows.h"
 
 namespace darb::test {
 namespace {
@@ -125,8 +127,7 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
         copies[i] = i % 7 == 0 ? 70 : rng.below(8);  // more than the table has rows for
         sources[i] = {static_cast<std::uint32_t>(i), copies[i] > 0 ? DENSIFY_CLONE : DENSIFY_KEEP};
     }
-    for (int k = 0; k <= KERNEL_COUNT; ++k) {
-        const int kernel = k < KERNEL_COUNT ? k : KERNEL_BETA;
+    for (const int kernel : every_kernel()) {
         SCOPED_TRACE(std::string(kernel_name(kernel)));
         const bool shaped = kernel_has_shape(kernel);
         set_kernel(model, kernel);
@@ -140,7 +141,7 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
         const auto count = static_cast<std::uint32_t>(n);
         run_pass("relocate", gpu::RelocationArgs{count, count, 0, 0, kDead, 0, 0},
                  {source, copy, table, scale, opacity, shapes}, count,
-                 {{"SHAPES", shaped ? SHAPE_ROWS : 1}});
+                 shape_row_constants(kernel));
         const auto logit = opacity.read<float>(), log_scale = scale.read<float>();
         for (size_t i = 0; i < n; ++i) {
             if (copies[i] == 0) {
@@ -151,8 +152,9 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
             auto expected =
                 reference::relocated(kernel, Footprint::psi, model.opacity_logit[i], copies[i] + 1);
             if (shaped)
-                expected.log_factor = std::log(shaped_relocation_scale(
-                    shape_exponent(Footprint::psi, static_cast<double>(model.shape[i])),
+                expected.log_factor = std::log(shaped_kernel(kernel).relocation_scale(
+                    Footprint::psi,
+                    splat_exponent(kernel, Footprint::psi, static_cast<double>(model.shape[i])),
                     std::min(sigmoid(static_cast<double>(model.opacity_logit[i])),
                              double{ALPHA_MAX}),
                     static_cast<int>(std::min<std::uint32_t>(copies[i] + 1, RELOCATION_COUNTS))));

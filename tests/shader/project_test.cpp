@@ -4,6 +4,7 @@
 
 #include "engine/core/rng.h"
 #include "engine/reference/reference_render.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/projected_frame.h"
 #include "tests/support/test_scene.h"
@@ -82,9 +83,9 @@ size_t expect_outputs_match(const SplatModel& model, const Camera& camera, int s
 }
 
 TEST(Project, every_kernel_and_footprint_matches_double) {
-    for (int k = 0; k <= KERNEL_COUNT; ++k)
+    for (const int kernel : every_kernel())
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
-            const int kernel = k < KERNEL_COUNT ? k : KERNEL_BETA;
+            if (footprint == Footprint::exact && !has_exact_footprint(kernel)) continue;
             SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
                          std::string(footprint_name(footprint)));
             const TestScene s = random_scene({.count = 200,

@@ -64,7 +64,12 @@ struct BlendScene {
             const double opacity = rng.uniform(min_opacity, max_opacity);
             const glm::dvec3 colour(rng.uniform(), rng.uniform(), rng.uniform());
             // From a kink at the edge to a spike.
-            const double exponent = kernel_has_shape(kernel) ? std::exp2(rng.uniform(0, 6)) : 4;
+            double exponent = 4;
+            if (kernel_has_shape(kernel)) {
+                const ShapedKernel& shaped = shaped_kernel(kernel);
+                const double shape = rng.uniform(shaped.first_shape(), shaped.last_shape());
+                exponent = shaped.exponent(footprint, shape);
+            }
             add(mean, cov, opacity, colour, exponent);
         }
     }
@@ -122,7 +127,8 @@ inline std::vector<BlendVariant> every_blend_variant() {
             for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
                 all.push_back({kernel, footprint, evaluation});
     for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
-        all.push_back({KERNEL_BETA, Footprint::psi, evaluation});  // exact: another exponent alone
+        for (const int kernel : shaped_kernels())  // exact: another exponent alone
+            all.push_back({kernel, Footprint::psi, evaluation});
     return all;
 }
 

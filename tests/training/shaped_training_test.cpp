@@ -1,5 +1,5 @@
-// Training of the kernel beta: every splat learns its shape, under every strategy and with
-// anti-aliasing; a run repeats, and resumes, bit by bit.
+// Training of kernels whose shape each splat has of its own: every splat learns its shape, under
+// every strategy and with anti-aliasing; a run repeats, and resumes, bit by bit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,18 +11,29 @@
 namespace darb::test {
 namespace {
 
-class ShapedTraining : public testing::TestWithParam<Strategy> {
+using Param = std::pair<int, Strategy>;
+
+class ShapedTraining : public testing::TestWithParam<Param> {
   protected:
-    TinyTraining tiny(Footprint footprint = Footprint::exact) const {
+    TinyTraining tiny() const {
+        const auto [kernel, strategy] = GetParam();
         TinyTraining t = tiny_training();
-        t.options.kernel = KERNEL_BETA;
-        t.options.footprint = footprint;
-        t.options.strategy = GetParam();
+        t.options.kernel = kernel;
+        t.options.footprint = has_exact_footprint(kernel) ? Footprint::exact : Footprint::psi;
+        t.options.strategy = strategy;
         t.options.sh_degree = 1;
-        if (GetParam() != Strategy::adc) t.options.max_splats = 90;
+        if (strategy != Strategy::adc) t.options.max_splats = 90;
         return t;
     }
 };
+
+std::vector<Param> every_kernel_and_strategy() {
+    std::vector<Param> all;
+    for (const int kernel : shaped_kernels())
+        for (const Strategy strategy : {Strategy::adc, Strategy::mcmc, Strategy::budget})
+            all.emplace_back(kernel, strategy);
+    return all;
+}
 
 TEST_P(ShapedTraining, shapes_are_learned_and_a_resumed_run_equals_one_that_never_stopped) {
     const TinyTraining t = tiny();
@@ -39,8 +50,45 @@ TEST_P(ShapedTraining, shapes_are_learned_and_a_resumed_run_equals_one_that_neve
 }
 
 INSTANTIATE_TEST_SUITE_P(strategies, ShapedTraining,
-                         testing::Values(Strategy::adc, Strategy::mcmc, Strategy::budget),
-                         [](const auto& p) { return std::string(strategy_name(p.param)); });
+                         testing::ValuesIn(every_kernel_and_strategy()), [](const auto& p) {
+                             return std::string(kernel_name(p.param.first)) + "_" +
+                                    std::string(strategy_name(p.param.second));
+                         });
+
+// Photos of splats of one exponent, and the same splats at the start: training finds it.
+TEST(ShapedTrainingRecovery, a_picture_of_exponent_4_is_fitted_from_2) {
+    TinyTraining t = tiny_training();
+    TestScene truth = random_scene({.count = 60,
+                                    .width = 64,
+                                    .height = 48,
+                                    .sh_degree = 0,
+                                    .min_log_scale = -2.2,
+                                    .max_log_scale = -1.6,
+                                    .seed = 91});
+    set_kernel(truth.model, KERNEL_GENERALIZED_EXPONENTIAL);
+    truth.model.shape.assign(truth.model.size(), std::log(2.0f));
+    Renderer renderer(shared_device(), truth.model);
+    for (std::size_t v = 0; v < t.photos.size(); ++v)
+        t.photos[v] = with_alpha(to_8bit(renderer.render(t.dataset.views[v].camera)));
+    SplatModel start = truth.model;
+    start.shape.assign(start.size(), 0.0f);
+    t.options.kernel = KERNEL_GENERALIZED_EXPONENTIAL;
+    t.options.iterations = 400;
+    t.options.sh_degree = 0;
+    t.options.densify_until = 0;
+    t.options.opacity_reset_interval = 0;
+    t.options.shape_lr = 0.02f;
+    Trainer trainer(shared_device(), t.dataset, t.photos, start, t.options);
+    run_to(trainer, 300);
+    std::vector<float> shapes = trainer.state().model.shape;
+    std::ranges::sort(shapes);
+    const auto exponent = [&](double share) {
+        return 2 * std::exp(shapes[static_cast<std::size_t>(share * shapes.size())]);
+    };
+    EXPECT_NEAR(exponent(0.5), 4, 0.4) << "the median";
+    EXPECT_GT(exponent(0.2), 2.8);
+    EXPECT_LT(exponent(0.8), 5.5);
+}
 
 TEST(ShapedTrainingRate, of_0_leaves_every_shape_where_it_starts) {
     TinyTraining t = tiny_training();

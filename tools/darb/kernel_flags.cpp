@@ -8,6 +8,7 @@
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/splat_shapes.h"
 #include "tools/darb/outputs.h"
 
@@ -101,7 +102,8 @@ std::vector<int> kernels_from_list(const std::string& option, const std::string&
 std::string kernel_names() {
     std::string names;
     for (const int k : known_kernels()) names += std::string(kernel_name(k)) + ", ";
-    return names + std::string(kernel_name(KERNEL_BETA));
+    for (const int k : shaped_kernels()) names += std::string(kernel_name(k)) + ", ";
+    return names.substr(0, names.size() - 2);
 }
 
 }  // namespace darb

@@ -210,10 +210,13 @@ std::vector<float> sample_points_1d(int samples) {
 
 namespace {
 
-// Beta in the form of the others: u^4 alone.
+// Kernels with shapes at their start, in the form of the others: beta is u^4 alone.
 KernelCoefficients coefficients_1d(int kernel) {
     KernelCoefficients k = kernel_coefficients(
-        kernel == kGeneralisedExponential ? KERNEL_GAUSSIAN : kernel, Footprint::psi, kFullDegree);
+        kernel == kGeneralisedExponential || kernel == KERNEL_GENERALIZED_EXPONENTIAL
+            ? KERNEL_GAUSSIAN
+            : kernel,
+        Footprint::psi, kFullDegree);
     if (k.form != KERNEL_FORM_BETA) return k;
     k.form = KERNEL_FORM_COMPACT;
     k.half_power = static_cast<int>(std::lround(2 * k.exponent));

@@ -8,6 +8,7 @@
 #include "engine/kernels/kernel_definition.h"
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb::python {
 
@@ -20,10 +21,11 @@ struct PyKernel {
     const KernelDefinition& definition() const { return *kernel_definition(id); }
 };
 
-// Beta is no row of the list, as its shape is of each splat.
+// Kernels with shapes are no rows of the list.
 std::vector<int> named_kernels() {
     std::vector<int> kernels = known_kernels();
-    kernels.insert(kernels.begin() + KERNEL_COUNT, KERNEL_BETA);
+    const std::vector<int> shaped = shaped_kernels();
+    kernels.insert(kernels.begin() + KERNEL_COUNT, shaped.begin(), shaped.end());
     return kernels;
 }
 

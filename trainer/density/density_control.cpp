@@ -10,6 +10,7 @@
 #include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
 #include "trainer/density/round_buffers.h"
+#include "trainer/density/shape_rows.h"
 
 namespace darb {
 
@@ -38,10 +39,12 @@ void limit_growth(const std::vector<glm::vec2>& gradient_sum, std::uint32_t room
 // [rows][kQuantiles]: a row for each of SHAPE_ROWS shapes, where the kernel has them.
 std::vector<float> radius_quantiles(int kernel, Footprint footprint) {
     std::vector<float> quantiles;
-    for (int row = 0; row < SHAPE_ROWS && kernel_has_shape(kernel); ++row)
-        for (const double radius : shaped_radius_quantiles(
-                 footprint, shape_exponent(footprint, shape_of_row(row)), kQuantiles))
+    for (int row = 0; row < SHAPE_ROWS && kernel_has_shape(kernel); ++row) {
+        const ShapedKernel& shaped = shaped_kernel(kernel);
+        const double exponent = shaped.exponent(footprint, shaped.shape_of_row(row));
+        for (const double radius : shaped.radius_quantiles(footprint, exponent, kQuantiles))
             quantiles.push_back(static_cast<float>(radius));
+    }
     for (int k = 0; k < kQuantiles && !kernel_has_shape(kernel); ++k)
         quantiles.push_back(
             static_cast<float>(kernel_radius_quantile(kernel, (k + 0.5) / kQuantiles)));
@@ -63,10 +66,10 @@ DensityControl::DensityControl(Device& device, int kernel, Footprint footprint)
     gather_ = Pipeline(device, "gather_attribute", threads);
     gather_columns_ =
         Pipeline(device, "gather_attribute", {{"THREADS", SPLAT_GROUP}, {"COLUMNS", 1}});
-    split_ = Pipeline(device, "densify_split",
-                      {{"THREADS", SPLAT_GROUP},
-                       {"QUANTILES", kQuantiles},
-                       {"SHAPES", kernel_has_shape(kernel) ? SHAPE_ROWS : 1}});
+    SpecConstants split = shape_row_constants(kernel);
+    split["THREADS"] = SPLAT_GROUP;
+    split["QUANTILES"] = kQuantiles;
+    split_ = Pipeline(device, "densify_split", split);
     reset_ = Pipeline(device, "reset_opacity", threads);
     decay_ = Pipeline(device, "decay_opacity", threads);
     quantile_ = Buffer(device, "radius quantiles", fixed_bytes(kernel));

@@ -7,6 +7,7 @@
 #include "engine/primitives/groups.h"
 #include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
+#include "trainer/density/shape_rows.h"
 
 namespace darb {
 
@@ -26,9 +27,9 @@ Relocation::Relocation(Device& device, int kernel, Footprint footprint)
     weight_ = Pipeline(device, "relocation_weight", threads);
     draw_ = Pipeline(device, "relocation_draw", threads);
     sources_ = Pipeline(device, "relocation_sources", threads);
-    relocate_ =
-        Pipeline(device, "relocate",
-                 {{"THREADS", SPLAT_GROUP}, {"SHAPES", kernel_has_shape(kernel) ? SHAPE_ROWS : 1}});
+    SpecConstants relocate = shape_row_constants(kernel);
+    relocate["THREADS"] = SPLAT_GROUP;
+    relocate_ = Pipeline(device, "relocate", relocate);
     noise_ = Pipeline(device, "position_noise", threads);
     const std::vector<float> table =
         relocation_table(kernel, footprint, RELOCATION_OPACITIES, RELOCATION_COUNTS);

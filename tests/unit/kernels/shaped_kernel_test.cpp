@@ -15,6 +15,7 @@ namespace darb {
 namespace {
 
 constexpr double kR2 = BETA_SUPPORT;
+const ShapedKernel& kBeta = beta_kernel();
 constexpr Footprint kFootprints[] = {Footprint::psi, Footprint::exact};
 
 /// Midpoint sums of f over [0, to].
@@ -27,23 +28,23 @@ double integral(double to, const F& f, int steps = 200'000) {
 
 TEST(ShapedKernel, Start_isTheRowOfTheFamily) {
     for (const Footprint f : kFootprints) {
-        const double e = shape_exponent(f, 0);
+        const double e = kBeta.exponent(f, 0);
         EXPECT_EQ(e, f == Footprint::psi ? 4 : 4.5);
         for (double q = 0; q < 14; q += 0.37) {
-            EXPECT_NEAR(shaped_value(e, q).w, kernel_value(KERNEL_BETA, f, q), 1e-13) << q;
-            EXPECT_NEAR(shaped_value(e, q).slope, kernel_slope(KERNEL_BETA, f, q), 1e-12) << q;
+            EXPECT_NEAR(kBeta.value(f, e, q).w, kernel_value(KERNEL_BETA, f, q), 1e-13) << q;
+            EXPECT_NEAR(kBeta.value(f, e, q).slope, kernel_slope(KERNEL_BETA, f, q), 1e-12) << q;
         }
-        EXPECT_NEAR(shaped_reach(e, 0.6, 1 / 255.0), kernel_reach(KERNEL_BETA, f, 0.6, 1 / 255.0),
+        EXPECT_NEAR(kBeta.reach(f, e, 0.6, 1 / 255.0), kernel_reach(KERNEL_BETA, f, 0.6, 1 / 255.0),
                     1e-12);
-        EXPECT_NEAR(shaped_covariance_scale(f, e), covariance_scale(KERNEL_BETA, f), 1e-13);
-        EXPECT_NEAR(shaped_second_moment(f, e), rendered_second_moment(KERNEL_BETA, f), 1e-12);
-        EXPECT_NEAR(shaped_relocation_scale(e, 0.7, 4), relocation_scale(KERNEL_BETA, f, 0.7, 4),
+        EXPECT_NEAR(kBeta.covariance_scale(f, e), covariance_scale(KERNEL_BETA, f), 1e-13);
+        EXPECT_NEAR(kBeta.second_moment(f, e), rendered_second_moment(KERNEL_BETA, f), 1e-12);
+        EXPECT_NEAR(kBeta.relocation_scale(f, e, 0.7, 4), relocation_scale(KERNEL_BETA, f, 0.7, 4),
                     1e-12);
-        const auto quantiles = shaped_radius_quantiles(f, e, 50);
+        const auto quantiles = kBeta.radius_quantiles(f, e, 50);
         for (int k = 0; k < 50; ++k)
             EXPECT_NEAR(quantiles[static_cast<std::size_t>(k)],
                         kernel_radius_quantile(KERNEL_BETA, (k + 0.5) / 50), 1e-5);
-        const auto own = shaped_gaussian(f, e, false),
+        const auto own = kBeta.gaussian(f, e, false),
                    row = gaussian_equivalent(KERNEL_BETA, f, false);
         EXPECT_NEAR(own.covariance, row.covariance, 1e-12);
         EXPECT_NEAR(own.error, row.error, 1e-9);
@@ -54,13 +55,13 @@ TEST(ShapedKernel, Start_isTheRowOfTheFamily) {
 TEST(ShapedKernel, Derivatives_matchDifferencesFromCentreToEdge) {
     for (const double e : {1.0, 1.5, 4.0, 20.0, 64.0})
         for (const double q : {0.0, 1e-9, 0.3, 2.0, 7.0, 12.9, kR2 * (1 - 1e-7), kR2, 20.0}) {
-            const ShapedValue at = shaped_value(e, q);
+            const ShapedValue at = kBeta.value(f, e, q);
             const double h = 1e-4 * (kR2 - q), k = 1e-6;
             if (q < kR2 && q > 1e-6) {
-                const double d = (shaped_value(e, q + h).w - shaped_value(e, q - h).w) / (2 * h);
+                const double d = (kBeta.value(f, e, q + h).w - kBeta.value(f, e, q - h).w) / (2 * h);
                 EXPECT_NEAR(at.slope, d, 1e-9 + 5e-5 * std::abs(d)) << e << " at " << q;
             }
-            const double d = (shaped_value(e + k, q).w - shaped_value(e - k, q).w) / (2 * k);
+            const double d = (kBeta.value(f, e + k, q).w - kBeta.value(f, e - k, q).w) / (2 * k);
             EXPECT_NEAR(at.by_exponent, d, 1e-8) << e << " at " << q;
             if (q >= kR2) {
                 EXPECT_EQ(at.w, 0);
@@ -68,26 +69,26 @@ TEST(ShapedKernel, Derivatives_matchDifferencesFromCentreToEdge) {
                 EXPECT_EQ(at.by_exponent, 0);
             }
         }
-    EXPECT_EQ(shaped_value(4, 0).w, 1);
-    EXPECT_EQ(shaped_value(4, 0).by_exponent, 0);
+    EXPECT_EQ(kBeta.value(f, 4, 0).w, 1);
+    EXPECT_EQ(kBeta.value(f, 4, 0).by_exponent, 0);
     for (const Footprint f : kFootprints)
         for (const double t : {-1.3, 0.0, 1.0, 2.5}) {
-            const double d = (shape_exponent(f, t + 1e-6) - shape_exponent(f, t - 1e-6)) / 2e-6;
-            EXPECT_NEAR(shape_exponent_slope(f, t), d, 1e-7);
+            const double d = (kBeta.exponent(f, t + 1e-6) - kBeta.exponent(f, t - 1e-6)) / 2e-6;
+            EXPECT_NEAR(kBeta.exponent_slope(f, t), d, 1e-7);
         }
 }
 
 TEST(ShapedKernel, Exponent_isHeldBetweenItsBounds) {
     for (const Footprint f : kFootprints) {
-        EXPECT_EQ(shape_exponent(f, -100), EXPONENT_LEAST);
-        EXPECT_EQ(shape_exponent(f, 100), EXPONENT_MOST);
-        EXPECT_EQ(shape_exponent_slope(f, -100), 0);
-        EXPECT_EQ(shape_exponent_slope(f, 100), 0);
+        EXPECT_EQ(kBeta.exponent(f, -100), BETA_EXPONENT_LEAST);
+        EXPECT_EQ(kBeta.exponent(f, 100), BETA_EXPONENT_MOST);
+        EXPECT_EQ(kBeta.exponent_slope(f, -100), 0);
+        EXPECT_EQ(kBeta.exponent_slope(f, 100), 0);
         // The rows of the tables reach from one bound to the other.
-        EXPECT_EQ(shape_exponent(f, shape_of_row(0)), EXPONENT_LEAST);
-        EXPECT_EQ(shape_exponent(f, shape_of_row(SHAPE_ROWS - 1)), EXPONENT_MOST);
+        EXPECT_EQ(kBeta.exponent(f, kBeta.shape_of_row(0)), BETA_EXPONENT_LEAST);
+        EXPECT_EQ(kBeta.exponent(f, kBeta.shape_of_row(SHAPE_ROWS - 1)), BETA_EXPONENT_MOST);
     }
-    EXPECT_DOUBLE_EQ(shape_exponent(Footprint::psi, shape_of_exponent(7.25)), 7.25);
+    EXPECT_DOUBLE_EQ(kBeta.exponent(Footprint::psi, beta_shape_of(7.25)), 7.25);
 }
 
 // Of (1 - r^2/R^2)^b: the line integral at q, over that at 0; and the moments in space and plane.
@@ -98,27 +99,27 @@ TEST(ShapedKernel, FootprintsAndMoments_areTheIntegrals) {
             return integral(std::sqrt(kR2 - q), [&](double z) { return w(q + z * z); });
         };
         for (const double q : {0.5, 3.0, 9.0, 12.5})
-            EXPECT_NEAR(shaped_value(b + 0.5, q).w, line(q) / line(0), 1e-6) << b << " at " << q;
+            EXPECT_NEAR(kBeta.value(f, b + 0.5, q).w, line(q) / line(0), 1e-6) << b << " at " << q;
         const double r = std::sqrt(kR2);
         const double psi = integral(r, [&](double x) { return std::pow(x, 4) * w(x * x); }) /
                            integral(r, [&](double x) { return x * x * w(x * x); }) / 3;
-        EXPECT_NEAR(shaped_covariance_scale(Footprint::psi, b), psi, 1e-6);
+        EXPECT_NEAR(kBeta.covariance_scale(Footprint::psi, b), psi, 1e-6);
         const double plane = integral(kR2, [&](double q) { return q * w(q); }) /
                              integral(kR2, [&](double q) { return w(q); }) / 2;
-        EXPECT_NEAR(shaped_second_moment(Footprint::psi, b), psi * plane, 1e-6);
+        EXPECT_NEAR(kBeta.second_moment(Footprint::psi, b), psi * plane, 1e-6);
         // The exact footprint keeps the moment of space.
-        EXPECT_NEAR(shaped_second_moment(Footprint::exact, b + 0.5), psi, 1e-6);
+        EXPECT_NEAR(kBeta.second_moment(Footprint::exact, b + 0.5), psi, 1e-6);
     }
 }
 
 TEST(ShapedKernel, Reach_isWhereTheCutoffIs) {
     for (const double e : {1.0, 3.3, 64.0})
         for (const double opacity : {0.0039, 0.004, 0.05, 1.0}) {
-            const double q = shaped_reach(e, opacity, 1 / 255.0);
+            const double q = kBeta.reach(f, e, opacity, 1 / 255.0);
             if (opacity < 1 / 255.0)
                 EXPECT_EQ(q, 0);
             else
-                EXPECT_NEAR(opacity * shaped_value(e, q).w, 1 / 255.0, 1e-12);
+                EXPECT_NEAR(opacity * kBeta.value(f, e, q).w, 1 / 255.0, 1e-12);
         }
 }
 

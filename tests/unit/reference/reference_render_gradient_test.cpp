@@ -164,6 +164,10 @@ INSTANTIATE_TEST_SUITE_P(Shaped, EveryKernel,
                              return std::string(footprint_name(std::get<1>(i.param)));
                          });
 
+INSTANTIATE_TEST_SUITE_P(Exponential, EveryKernel,
+                         testing::Combine(testing::Values(KERNEL_GENERALIZED_EXPONENTIAL),
+                                          testing::Values(Footprint::psi)));
+
 class EveryRing : public EveryKernel {};
 
 TEST_P(EveryRing, Parameters_MatchDifferences) {

@@ -125,13 +125,13 @@ TEST(ShapedScene, scenes_of_deformable_beta_splatting_are_read) {
     for (std::size_t i = 0; i < 2; ++i) {
         const double b = 4 * std::exp(i == 0 ? 0 : 0.7), theirs_scale = std::exp(-2.0);
         const double ours_scale = std::exp(double{model.log_scale[3 * i + 1]});
-        const double exponent = shape_exponent(model.footprint, double{model.shape[i]});
+        const double exponent = beta_kernel().exponent(model.footprint, double{model.shape[i]});
         for (double x = 0; x < theirs_scale; x += 0.011) {  // along an axis, in the world
             const double d = x / theirs_scale, q = std::pow(x / ours_scale, 2);
-            EXPECT_NEAR(shaped_value(exponent, q).w, std::pow(1 - d * d, b), 2e-6) << x;
+            EXPECT_NEAR(beta_kernel().value(model.footprint, exponent, q).w, std::pow(1 - d * d, b), 2e-6) << x;
         }
     }
-    EXPECT_NEAR(shape_exponent(model.footprint, double{model.shape[2]}), EXPONENT_LEAST, 1e-5);
+    EXPECT_NEAR(beta_kernel().exponent(model.footprint, double{model.shape[2]}), BETA_EXPONENT_LEAST, 1e-5);
     std::string notes;
     for (const std::string& note : file.notes) notes += note + "\n";
     EXPECT_NE(notes.find("Deformable Beta Splatting"), std::string::npos) << notes;
@@ -154,8 +154,8 @@ TEST(ShapedScene, gaussians_follow_each_splats_shape) {
     EXPECT_GT(fit.error, 0.01);
     EXPECT_LT(fit.error, 0.3);
     for (std::size_t i = 0; i < model.size(); ++i) {
-        const double e = shape_exponent(model.footprint, double{model.shape[i]});
-        const GaussianEquivalent own = shaped_gaussian(model.footprint, e, false);
+        const double e = beta_kernel().exponent(model.footprint, double{model.shape[i]});
+        const GaussianEquivalent own = beta_kernel().gaussian(model.footprint, e, false);
         EXPECT_NEAR(2 * (gaussians.log_scale[3 * i] - model.log_scale[3 * i]),
                     std::log(own.covariance), 0.01)
             << model.shape[i];
@@ -174,7 +174,7 @@ TEST(ShapedScene, merging_keeps_the_width_and_what_is_merged_starts_anew) {
     ASSERT_EQ(one.size(), 1u);
     ASSERT_EQ(one.shape, std::vector<float>(1, 0.0f));
     const auto moment = [](double shape) {
-        return shaped_second_moment(Footprint::psi, shape_exponent(Footprint::psi, shape));
+        return beta_kernel().second_moment(Footprint::psi, beta_kernel().exponent(Footprint::psi, shape));
     };
     const double merged = std::exp(2.0 * one.log_scale[0]) * moment(0);
     EXPECT_NEAR(merged / (std::exp(-4.0) * moment(1.5)), 1, 1e-3);
