@@ -10,6 +10,7 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/shaped_kernel.h"
 #ifdef DARB_MUPARSER
 #include <muParser.h>
 #endif
@@ -247,7 +248,11 @@ std::vector<std::string> split_kernel_list(std::string_view list) {
     std::vector<std::string> kernels;
     for (const Part& item : items_of(list)) {
         const bool own = behind("support", item) || behind("name", item);
-        if (own && !kernels.empty() && is_kernel_expression(kernels.back()))
+        const bool halved = !kernels.empty() && kernels.back().starts_with(kBlendMark) &&
+                            kernels.back().find(',') == std::string::npos;
+        if (halved)
+            kernels.back() += "," + item.text;
+        else if (own && !kernels.empty() && is_kernel_expression(kernels.back()))
             kernels.back() += ", " + item.text;
         else if (!item.text.empty())
             kernels.push_back(item.text);

@@ -2,7 +2,25 @@
 
 #include <cmath>
 
+#include "engine/kernels/shaped_kernel.h"
+
 namespace darb {
+
+namespace {
+
+/// A blend as it is at shape 0.
+struct BlendStart {
+    const ShapedKernel& kernel;
+    double exponent;
+};
+
+std::optional<BlendStart> blend_start(int kernel, Footprint footprint) {
+    if (!blend_parts(kernel)) return std::nullopt;
+    const ShapedKernel& shaped = blend_kernel(kernel);
+    return BlendStart{shaped, shaped.exponent(footprint, 0)};
+}
+
+}  // namespace
 
 std::string_view kernel_name(int kernel) {
     return kernel_profile(kernel).name;
@@ -46,26 +64,46 @@ bool ends_with_a_jump(int kernel) {
 }
 
 double kernel_value(int kernel, Footprint footprint, double q) {
+    if (const auto start = blend_start(kernel, footprint))
+        return start->kernel.value(footprint, start->exponent, q).w;
     return derived_kernel(kernel).value(footprint, q);
 }
 
 double kernel_slope(int kernel, Footprint footprint, double q) {
+    if (const auto start = blend_start(kernel, footprint))
+        return start->kernel.value(footprint, start->exponent, q).slope;
     return derived_kernel(kernel).slope(footprint, q);
 }
 
 double kernel_reach(int kernel, Footprint footprint, double opacity, double cutoff) {
+    if (const auto start = blend_start(kernel, footprint))
+        return start->kernel.reach(footprint, start->exponent, opacity, cutoff);
     return derived_kernel(kernel).reach(footprint, opacity, cutoff);
 }
 
 double kernel_psi(int kernel) {
+    if (const auto start = blend_start(kernel, Footprint::psi))
+        return start->kernel.covariance_scale(Footprint::psi, start->exponent);
     return derived_kernel(kernel).psi();
 }
 
 double covariance_scale(int kernel, Footprint footprint) {
+    if (const auto start = blend_start(kernel, footprint))
+        return start->kernel.covariance_scale(footprint, start->exponent);
     return derived_kernel(kernel).covariance_scale(footprint);
 }
 
+// The area of a blend is that of its parts.
 double equal_area_scale(int kernel, Footprint footprint) {
+    if (const auto start = blend_start(kernel, footprint)) {
+        const auto integral = [&](int k) {  // a Gaussian's is 2
+            const double scale = equal_area_scale(k, footprint);
+            return 2 / (scale * scale * covariance_scale(k, footprint));
+        };
+        const auto [first, second] = *blend_parts(kernel);
+        const double m = start->exponent, both = (1 - m) * integral(first) + m * integral(second);
+        return std::sqrt(2 / (covariance_scale(kernel, footprint) * both));
+    }
     return derived_kernel(kernel).equal_area_scale(footprint);
 }
 

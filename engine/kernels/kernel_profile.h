@@ -40,6 +40,8 @@ struct KernelProfile {
 
 /// The rows, indexed by KERNEL_*, and behind them the registered kernels; kernel_registry.h.
 const KernelProfile& kernel_profile(int kernel);
+/// Of a blend: with the weight 1/2.
+const KernelProfile& blend_profile(int kernel);
 /// Those of the list and of more pulses alone, below KERNEL_ROWS.
 const KernelProfile& listed_profile(int kernel);
 /// KERNEL_* as shaders know it: of rings the kernel of one pulse, of a registered kernel one of the

@@ -9,6 +9,7 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_coefficients.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb {
 namespace {
@@ -52,6 +53,7 @@ const Registered* registered(int kernel) {
 
 const KernelProfile& kernel_profile(int kernel) {
     if (const Registered* entry = registered(kernel)) return entry->row;
+    if (blend_parts(kernel)) return blend_profile(kernel);
     return listed_profile(kernel);
 }
 
@@ -71,12 +73,13 @@ std::optional<int> kernel_from_name(std::string_view name) {
         if (listed_profile(kernel).name == name) return kernel;
     for (int kernel = KERNEL_ROWS; const Registered* entry = registered(kernel); ++kernel)
         if (entry->definition.name == name) return kernel;
-    return std::nullopt;
+    return blend_from_name(name);
 }
 
 bool has_exact_footprint(int kernel) {
     const Registered* entry = registered(kernel);
     if (entry != nullptr) return entry->exact;
+    if (blend_parts(kernel)) return true;
     const int form = listed_profile(kernel).form;
     return form != KERNEL_FORM_RINGS && form != KERNEL_FORM_EXPONENTIAL;
 }

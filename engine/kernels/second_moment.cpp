@@ -4,12 +4,17 @@
 
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/quadrature.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb {
 
 // With q = r^2 the area element is pi dq, and the moment per axis is half of that of q. As in
 // equal_area_scale, q = end (1 - s^2) makes half powers at the edge analytic.
 double rendered_second_moment(int kernel, Footprint footprint) {
+    if (blend_parts(kernel)) {
+        const ShapedKernel& blend = blend_kernel(kernel);
+        return blend.second_moment(footprint, blend.exponent(footprint, 0));
+    }
     const DerivedKernel& k = derived_kernel(kernel);
     if (!std::isfinite(k.row().support)) return 1;
     const double end = k.pulses().front().end;

@@ -19,7 +19,7 @@ constexpr Row kRows[] = {{KERNEL_BETA, beta_kernel},
 const ShapedKernel* find(int kernel) {
     for (const Row& row : kRows)
         if (row.kernel == kernel) return &row.shaped();
-    return nullptr;
+    return blend_parts(kernel) ? &blend_kernel(kernel) : nullptr;
 }
 
 }  // namespace

@@ -5,6 +5,9 @@
 // docs/math.md, A shape of each splat.
 #pragma once
 
+#include <array>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "engine/kernels/gaussian_equivalent.h"
@@ -61,6 +64,7 @@ class ShapedKernel {
 bool kernel_has_shape(int kernel);
 /// Of a kernel that has a shape.
 const ShapedKernel& shaped_kernel(int kernel);
+/// Those of the list, without blends.
 std::vector<int> shaped_kernels();
 /// The exponent of the scene's splat, of any kernel: 0 where it has no shape.
 double splat_exponent(int kernel, Footprint footprint, double shape);
@@ -76,5 +80,20 @@ double beta_shape_of(double b);
 /// for t < 2. Its line integral has no closed form: Footprint::psi only. Source: GES (Hamdi et al.
 /// 2024), whose renderer draws Gaussians of another size.
 const ShapedKernel& exponential_kernel();
+
+/// `blend:FIRST,SECOND` of two different kernels of the list: w = (1 - m) w1 + m w2. The weight in
+/// space is 1 / (1 + exp(-shape)); m, the exponent, is that of what is drawn, which the exact
+/// footprint's line integrals change.
+constexpr std::string_view kBlendMark = "blend:";
+std::optional<int> blend_from_name(std::string_view name);
+/// Nothing of a kernel that is no blend.
+std::optional<std::array<int, 2>> blend_parts(int kernel);
+const ShapedKernel& blend_kernel(int kernel);
+/// Of both kernels: the integral of w along a line through the centre (half of it), of r^2 w and of
+/// r^4 w / 3 over r.
+struct BlendFacts {
+    std::array<double, 2> centre{}, second{}, fourth{};
+};
+const BlendFacts& blend_facts(int kernel);
 
 }  // namespace darb

@@ -19,6 +19,31 @@ constexpr float kUnbounded = 3e38f;  // R^2 of the Gaussian
 // whose reach is the closed form's.
 constexpr double kRoundingMargin = 1e-6, kBuiltinMargin = 1e-4;
 
+/// Those of the first kernel, and what shaders/kernels/blend.glsl wants of the second.
+SpecConstants blend_constants(int kernel, Footprint footprint, int degree, float alpha_cutoff) {
+    const auto [first, second] = *blend_parts(kernel);
+    const auto of = [&](int k) {
+        return kernel_constants(k, footprint, EVALUATION_POLYNOMIAL, degree, alpha_cutoff);
+    };
+    SpecConstants constants = of(first);
+    const SpecConstants other = of(second);
+    for (const char* name : {"FORM", "DEGREE", "HALF_POWER", "SQUARED_VARIABLE", "SUPPORT",
+                             "INVERSE_SUPPORT", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "C7", "C8"})
+        constants.emplace(std::string("BLEND_") + name, other.at(std::string("KERNEL_") + name));
+    const BlendFacts& facts = blend_facts(kernel);
+    const auto put = [&](const char* name, double value) {
+        constants.emplace(name, static_cast<float>(value));
+    };
+    put("BLEND_CENTRE_RATIO", facts.centre[1] / facts.centre[0]);
+    put("BLEND_FOURTH_1", facts.fourth[0]);
+    put("BLEND_FOURTH_2", facts.fourth[1]);
+    put("BLEND_SECOND_1", facts.second[0]);
+    put("BLEND_SECOND_2", facts.second[1]);
+    constants.emplace("BLENDED", 1);
+    constants["KERNEL_REACH_MARGIN"] = static_cast<float>(kBuiltinMargin);
+    return constants;
+}
+
 }  // namespace
 
 SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, int degree,
@@ -31,7 +56,8 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
                     "Use one between 0 and 1.");
     if (footprint == Footprint::exact && !has_exact_footprint(kernel))
         throw Error(std::string(kernel_name(kernel)), "has no exact footprint",
-                    "Use the footprint psi, or one pulse.");
+                    "Use the footprint psi.");
+    if (blend_parts(kernel)) return blend_constants(kernel, footprint, degree, alpha_cutoff);
     const KernelCoefficients& k = kernel_coefficients(kernel, footprint, degree);
     if (k.form == KERNEL_FORM_RINGS) evaluation = EVALUATION_BUILTIN;
     double margin = evaluation == EVALUATION_BUILTIN ? kBuiltinMargin : kRoundingMargin;

@@ -36,10 +36,10 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 #include "kernels/polynomial.glsl"
 
 #include "kernels/builtin.glsl"
-#include "kernels/shaped.glsl"
 #include "kernels/compact.glsl"
 #include "kernels/gaussian.glsl"
 #include "kernels/quadric.glsl"
+#include "kernels/shaped.glsl"
 
 // w and its derivative by q, for q >= 0; both 0 at and after the support's edge, w never negative. The slope is
 // the derivative of the w computed here. exponent: the splat's, of a kernel with shapes; by_exponent: dw by it.
@@ -85,10 +85,10 @@ float kernel_reach(float opacity, float exponent) {
     if (!(opacity >= ALPHA_CUTOFF)) return 0.0;
     const float least = ALPHA_CUTOFF * (1.0 - KERNEL_REACH_MARGIN) / opacity;
     float q;
-    if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
-        q = -2.0 * log(least);
-    } else if (SHAPED) {
+    if (SHAPED) {
         q = shaped_reach(exponent, least);
+    } else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
+        q = -2.0 * log(least);
     } else if (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI) {
         q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
     } else {
@@ -102,7 +102,7 @@ float kernel_reach(float opacity, float exponent) {
         }
         q = high;
     }
-    return min(q * (1.0 + 1e-5), KERNEL_SUPPORT);
+    return min(q * (1.0 + 1e-5), SHAPED ? shaped_support() : KERNEL_SUPPORT);
 }
 
 // What multiplies the projected 2x2 covariance before the low-pass.

@@ -1,13 +1,19 @@
 // What each kernel whose shape each splat has of its own is to the passes; their twin is ShapedKernel
 // (engine/kernels/shaped_kernel.h). One of them is left after constant folding, or none.
-const bool SHAPED = KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FORM == KERNEL_FORM_EXPONENTIAL;
+layout(constant_id = 113) const int BLENDED = 0;  // 1: a blend of the kernel with that of BLEND_*
+
+const bool SHAPED =
+    BLENDED == 1 || KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FORM == KERNEL_FORM_EXPONENTIAL;
 
 #include "kernels/beta.glsl"
 #include "kernels/exponential.glsl"
+#include "kernels/blend.glsl"
 
 // Also dw by the exponent.
 void shaped_value_slope(float q, float exponent, out float w, out float slope, out float by_exponent) {
-    if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL)
+    if (BLENDED == 1)
+        blend_value_slope(q, exponent, w, slope, by_exponent);
+    else if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL)
         exponential_value_slope(q, exponent, w, slope, by_exponent);
     else
         beta_value_slope(q, exponent, w, slope, by_exponent);
@@ -15,23 +21,32 @@ void shaped_value_slope(float q, float exponent, out float w, out float slope, o
 
 // The exponent of a splat's shape, and its derivative, 0 where it is held.
 float shape_exponent(float shape, out float by_shape) {
-    return KERNEL_FORM == KERNEL_FORM_EXPONENTIAL ? exponential_exponent(shape, by_shape)
-                                                  : beta_exponent(shape, by_shape);
+    if (BLENDED == 1) return blend_exponent(shape, by_shape);
+    if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_exponent(shape, by_shape);
+    return beta_exponent(shape, by_shape);
 }
 
 // Where w is `least`, below 1.
 float shaped_reach(float exponent, float least) {
-    return KERNEL_FORM == KERNEL_FORM_EXPONENTIAL ? exponential_reach(exponent, least)
-                                                  : beta_reach(exponent, least);
+    if (BLENDED == 1) return blend_reach(exponent, least);
+    if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_reach(exponent, least);
+    return beta_reach(exponent, least);
 }
 
 float shaped_covariance_scale(float exponent) {
-    return KERNEL_FORM == KERNEL_FORM_EXPONENTIAL ? exponential_covariance_scale(exponent)
-                                                  : beta_covariance_scale(exponent);
+    if (BLENDED == 1) return blend_covariance_scale(exponent);
+    if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_covariance_scale(exponent);
+    return beta_covariance_scale(exponent);
 }
 
 // Half of d ln shaped_covariance_scale by the exponent: of the lengths.
 float shaped_length_slope(float exponent) {
-    return KERNEL_FORM == KERNEL_FORM_EXPONENTIAL ? exponential_length_slope(exponent)
-                                                  : beta_length_slope(exponent);
+    if (BLENDED == 1) return blend_length_slope(exponent);
+    if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_length_slope(exponent);
+    return beta_length_slope(exponent);
+}
+
+// The q beyond which w is 0; 3e38 where it never is.
+float shaped_support() {
+    return BLENDED == 1 ? max(KERNEL_SUPPORT, BLEND_SUPPORT) : KERNEL_SUPPORT;
 }

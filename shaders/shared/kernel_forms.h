@@ -35,6 +35,10 @@
 #define EXPONENTIAL_PSI \
     3.24274337, 5.40768433, -8.51232766, 12.3217168, -11.9811003, 6.62186212, -1.5554585
 
+// w = (1 - m) w1 + m w2, m of each splat, of two kernels of other forms. Of the row alone: to shaders it
+// is the form of the first and BLENDED.
+#define KERNEL_FORM_BLEND 6
+
 // Rows of density control's tables over the shape, evenly from the first to the last of the kernel.
 #define SHAPE_ROWS 16
 

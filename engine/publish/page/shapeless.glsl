@@ -7,6 +7,9 @@ void shaped_value_slope(float q, float exponent, out float w, out float slope, o
 float shaped_reach(float exponent, float least) {
     return 0.0;
 }
+float shaped_support() {
+    return KERNEL_SUPPORT;
+}
 float shaped_covariance_scale(float exponent) {
     return 1.0;
 }

@@ -1,0 +1,141 @@
+// w = (1 - m) w1 + m w2, m of each splat: a blend of two kernels (engine/kernels/shaped_blend.cpp). The first is that of
+// the constants KERNEL_*, the second that of these, whose code is the first's under other names.
+layout(constant_id = 130) const int BLEND_FORM = KERNEL_FORM_GAUSSIAN;
+layout(constant_id = 131) const int BLEND_DEGREE = 0;
+layout(constant_id = 132) const int BLEND_HALF_POWER = 0;
+layout(constant_id = 133) const int BLEND_SQUARED_VARIABLE = 0;
+layout(constant_id = 134) const float BLEND_SUPPORT = 3e38;
+layout(constant_id = 135) const float BLEND_INVERSE_SUPPORT = 0.0;
+layout(constant_id = 136) const float BLEND_CENTRE_RATIO = 1.0;  // of the line integrals through the centres, 2nd to 1st
+layout(constant_id = 137) const float BLEND_FOURTH_1 = 1.0;      // moments in space; fourth: a third of it
+layout(constant_id = 138) const float BLEND_FOURTH_2 = 1.0;
+layout(constant_id = 139) const float BLEND_SECOND_1 = 1.0;
+layout(constant_id = 140) const float BLEND_SECOND_2 = 1.0;
+layout(constant_id = 150) const float BLEND_C0 = 1.0;
+layout(constant_id = 151) const float BLEND_C1 = 0.0;
+layout(constant_id = 152) const float BLEND_C2 = 0.0;
+layout(constant_id = 153) const float BLEND_C3 = 0.0;
+layout(constant_id = 154) const float BLEND_C4 = 0.0;
+layout(constant_id = 155) const float BLEND_C5 = 0.0;
+layout(constant_id = 156) const float BLEND_C6 = 0.0;
+layout(constant_id = 157) const float BLEND_C7 = 0.0;
+layout(constant_id = 158) const float BLEND_C8 = 0.0;
+
+void first_value_slope(float q, out float w, out float slope) {
+    if (KERNEL_FORM == KERNEL_FORM_COMPACT)
+        compact_value_slope(q, w, slope);
+    else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN)
+        gaussian_value_slope(q, w, slope);
+    else
+        quadric_value_slope(q, w, slope);
+}
+
+#define KERNEL_DEGREE BLEND_DEGREE
+#define KERNEL_HALF_POWER BLEND_HALF_POWER
+#define KERNEL_SQUARED_VARIABLE BLEND_SQUARED_VARIABLE
+#define KERNEL_SUPPORT BLEND_SUPPORT
+#define KERNEL_INVERSE_SUPPORT BLEND_INVERSE_SUPPORT
+#define KERNEL_C0 BLEND_C0
+#define KERNEL_C1 BLEND_C1
+#define KERNEL_C2 BLEND_C2
+#define KERNEL_C3 BLEND_C3
+#define KERNEL_C4 BLEND_C4
+#define KERNEL_C5 BLEND_C5
+#define KERNEL_C6 BLEND_C6
+#define KERNEL_C7 BLEND_C7
+#define KERNEL_C8 BLEND_C8
+#define polynomial_step blend_polynomial_step
+#define kernel_polynomial blend_polynomial
+#define compact_power blend_compact_power
+#define compact_value_slope blend_compact_value_slope
+#define gaussian_value_slope blend_gaussian_value_slope
+#define quadric_integral blend_quadric_integral
+#define quadric_value_slope blend_quadric_value_slope
+#include "kernels/polynomial.glsl"
+#include "kernels/compact.glsl"
+#include "kernels/gaussian.glsl"
+#include "kernels/quadric.glsl"
+
+void second_value_slope(float q, out float w, out float slope) {
+    if (BLEND_FORM == KERNEL_FORM_COMPACT)
+        compact_value_slope(q, w, slope);
+    else if (BLEND_FORM == KERNEL_FORM_GAUSSIAN)
+        gaussian_value_slope(q, w, slope);
+    else
+        quadric_value_slope(q, w, slope);
+}
+
+#undef KERNEL_DEGREE
+#undef KERNEL_HALF_POWER
+#undef KERNEL_SQUARED_VARIABLE
+#undef KERNEL_SUPPORT
+#undef KERNEL_INVERSE_SUPPORT
+#undef KERNEL_C0
+#undef KERNEL_C1
+#undef KERNEL_C2
+#undef KERNEL_C3
+#undef KERNEL_C4
+#undef KERNEL_C5
+#undef KERNEL_C6
+#undef KERNEL_C7
+#undef KERNEL_C8
+#undef polynomial_step
+#undef kernel_polynomial
+#undef compact_power
+#undef compact_value_slope
+#undef gaussian_value_slope
+#undef quadric_integral
+#undef quadric_value_slope
+
+// Also dw/dm.
+void blend_value_slope(float q, float m, out float w, out float slope, out float by_exponent) {
+    float w1, slope1, w2, slope2;
+    first_value_slope(q, w1, slope1);
+    second_value_slope(q, w2, slope2);
+    by_exponent = w2 - w1;
+    w = w1 + m * by_exponent;
+    slope = slope1 + m * (slope2 - slope1);
+}
+
+// m of the shape's weight 1 / (1 + exp(-shape)): with exact that of the normalised line integrals.
+float blend_exponent(float shape, out float by_shape) {
+    const float held = clamp(shape, -30.0, 30.0);
+    const float m = 1.0 / (1.0 + exp(-held)), rest = 1.0 / (1.0 + exp(held));
+    by_shape = held == shape ? m * rest : 0.0;
+    if (FOOTPRINT == FOOTPRINT_PSI) return m;
+    const float whole = rest + m * BLEND_CENTRE_RATIO;
+    by_shape *= BLEND_CENTRE_RATIO / (whole * whole);
+    return m * BLEND_CENTRE_RATIO / whole;
+}
+
+// Where the larger of the supports ends, or where a Gaussian is `least`: no blend reaches further.
+float blend_farthest(float least) {
+    const float gaussian = -2.0 * log(least);
+    return max(KERNEL_FORM == KERNEL_FORM_GAUSSIAN ? gaussian : KERNEL_SUPPORT,
+               BLEND_FORM == KERNEL_FORM_GAUSSIAN ? gaussian : BLEND_SUPPORT);
+}
+
+float blend_reach(float m, float least) {
+    float low = 0.0, high = blend_farthest(least) * 1.0001;
+    for (int step = 0; step < 24; ++step) {
+        const float middle = 0.5 * (low + high);
+        float w, slope, by_exponent;
+        blend_value_slope(middle, m, w, slope, by_exponent);
+        const bool inside = w >= least;
+        low = inside ? middle : low;
+        high = inside ? high : middle;
+    }
+    return high;
+}
+
+float blend_covariance_scale(float m) {
+    return FOOTPRINT == FOOTPRINT_PSI
+               ? mix(BLEND_FOURTH_1, BLEND_FOURTH_2, m) / mix(BLEND_SECOND_1, BLEND_SECOND_2, m)
+               : 1.0;
+}
+float blend_length_slope(float m) {
+    return FOOTPRINT == FOOTPRINT_PSI
+               ? 0.5 * ((BLEND_FOURTH_2 - BLEND_FOURTH_1) / mix(BLEND_FOURTH_1, BLEND_FOURTH_2, m) -
+                        (BLEND_SECOND_2 - BLEND_SECOND_1) / mix(BLEND_SECOND_1, BLEND_SECOND_2, m))
+               : 0.0;
+}
