@@ -88,11 +88,12 @@ Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
     return row;
 }
 
-// Whether q is within rounding of an edge, or of a jump, of the kernel or of what it blends; there, and
-// a thousandth before the edge of a footprint that is a root there, slopes are not compared.
+// Whether q is within rounding of an edge, or of a jump, of the kernel or of what it blends; there,
+// and a thousandth before the edge of a footprint that is a root there, slopes are not compared.
 bool near_edge(int kernel, double q, bool jumps) {
     const auto parts = blend_parts(kernel);
-    for (const int k : parts ? std::vector<int>(parts->begin(), parts->end()) : std::vector{kernel}) {
+    for (const int k :
+         parts ? std::vector<int>(parts->begin(), parts->end()) : std::vector{kernel}) {
         const double off = q / kernel_support(k) - 1;
         if (jumps ? ends_with_a_jump(k) && std::abs(off) < 2e-6
                   : std::abs(off) < 2e-6 || (ends_with_a_jump(k) && off < 2e-6 && off > -1e-3))

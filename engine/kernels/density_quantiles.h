@@ -7,8 +7,8 @@
 
 namespace darb {
 
-/// At (k + 1/2) / count of a density over [0, radius], density(x) at the radius x * radius. x = sin^2
-/// a: even steps in a are fine at both ends.
+/// At (k + 1/2) / count of a density over [0, radius], density(x) at the radius x * radius. x =
+/// sin^2 a: even steps in a are fine at both ends.
 template <class Density>
 std::vector<double> density_quantiles(double radius, int count, const Density& density) {
     constexpr int kSteps = 4096;

@@ -150,8 +150,7 @@ void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) 
 
 double DerivedKernel::value(Footprint footprint, double q) const {
     if (q >= row_.support) return 0;
-    if (footprint == Footprint::psi || !std::isfinite(row_.support))
-        return profile_value(row_, q);
+    if (footprint == Footprint::psi || !std::isfinite(row_.support)) return profile_value(row_, q);
     double u, p, dp;
     footprint_parts(q, u, p, dp);
     return std::pow(u, row_.edge_order) * std::sqrt(u) * p;

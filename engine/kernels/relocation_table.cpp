@@ -48,8 +48,7 @@ std::vector<float> relocation_table(int kernel, Footprint footprint, int opaciti
     std::vector<float> table;
     const ShapedKernel* shaped = kernel_has_shape(kernel) ? &shaped_kernel(kernel) : nullptr;
     for (int row = 0; row < (shaped ? SHAPE_ROWS : 1); ++row) {
-        const double exponent =
-            shaped ? shaped->exponent(footprint, shaped->shape_of_row(row)) : 0;
+        const double exponent = shaped ? shaped->exponent(footprint, shaped->shape_of_row(row)) : 0;
         for (int count = 1; count <= max_count; ++count)
             for (int k = 0; k < opacities; ++k) {
                 const double opacity = (k + 0.5) / opacities;

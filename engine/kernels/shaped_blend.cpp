@@ -1,6 +1,6 @@
-// Blends of two kernels of the list, w = (1 - m) w1 + m w2, m of each splat. With the exact footprint
-// m is that of the line integrals divided by their values at the centre. Everything follows from what
-// the two kernels have.
+// Blends of two kernels of the list, w = (1 - m) w1 + m w2, m of each splat. With the exact
+// footprint m is that of the line integrals divided by their values at the centre. Everything
+// follows from what the two kernels have.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -110,9 +110,8 @@ class BlendKernel : public ShapedKernel {
 
     std::vector<double> radius_quantiles(Footprint footprint, double m, int count) const override {
         const auto& [first, second] = facts_.centre;
-        const double space = footprint == Footprint::exact
-                                 ? m * first / (m * first + (1 - m) * second)
-                                 : m;
+        const double space =
+            footprint == Footprint::exact ? m * first / (m * first + (1 - m) * second) : m;
         const double end = extent(m);
         return density_quantiles(std::sqrt(end), count, [&](double x) {
             return x * x * value(Footprint::psi, space, end * x * x).w;
@@ -166,8 +165,10 @@ Blend& blend_of(int kernel) {
         const KernelProfile &first = listed_profile(parts[0]), &second = listed_profile(parts[1]);
         blend.shaped = std::make_unique<const BlendKernel>(parts);
         blend.name = fmt::format("{}{},{}", kBlendMark, first.name, second.name);
-        blend.row = {blend.name, std::max(first.support, second.support),
-                     std::min(first.edge_order, second.edge_order), KERNEL_FORM_BLEND,
+        blend.row = {blend.name,
+                     std::max(first.support, second.support),
+                     std::min(first.edge_order, second.edge_order),
+                     KERNEL_FORM_BLEND,
                      [first, second](std::complex<double> q) {
                          const auto part = [&](const KernelProfile& k) {
                              return q.real() < k.support ? k.profile(q) : 0.0;

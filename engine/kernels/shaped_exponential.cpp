@@ -72,8 +72,8 @@ class ExponentialKernel : public ShapedKernel {
     }
 
     double second_moment(Footprint footprint, double t) const override {
-        const double plane = std::exp(2 / t * std::log(2.0) + std::lgamma(4 / t) -
-                                      std::lgamma(2 / t)) / 2;
+        const double plane =
+            std::exp(2 / t * std::log(2.0) + std::lgamma(4 / t) - std::lgamma(2 / t)) / 2;
         return covariance_scale(footprint, t) * plane;
     }
 

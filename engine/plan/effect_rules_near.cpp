@@ -43,17 +43,16 @@ Ball ball_of(const SplatModel& model, std::size_t i) {
         kernel_has_shape(model.kernel)
             ? splat_exponent(model.kernel, model.footprint, double{model.shape[i]})
             : 0;
-    const double unbounded = kernel_has_shape(model.kernel)
-                                 ? shaped_kernel(model.kernel)
-                                       .reach(model.footprint, exponent, opacity, kSmallestCutoff)
-                                 : 2 * std::log(opacity / kSmallestCutoff);
+    const double unbounded =
+        kernel_has_shape(model.kernel)
+            ? shaped_kernel(model.kernel).reach(model.footprint, exponent, opacity, kSmallestCutoff)
+            : 2 * std::log(opacity / kSmallestCutoff);
     ball.reach2 = opacity > kSmallestCutoff ? (std::isfinite(support) ? support : unbounded) : 0;
     const double largest =
         std::clamp(double{std::max({s[0], s[1], s[2]})}, -LOG_SCALE_LIMIT, LOG_SCALE_LIMIT);
-    const double psi =
-        kernel_has_shape(model.kernel)
-            ? shaped_kernel(model.kernel).covariance_scale(model.footprint, exponent)
-            : covariance_scale(model.kernel, model.footprint);
+    const double psi = kernel_has_shape(model.kernel)
+                           ? shaped_kernel(model.kernel).covariance_scale(model.footprint, exponent)
+                           : covariance_scale(model.kernel, model.footprint);
     ball.deviation = std::exp(largest) * std::sqrt(psi);
     return ball;
 }

@@ -88,8 +88,8 @@ struct Source {
             const std::string path = line.substr(10, line.rfind('"') - 10);
             const bool beside = path.find('/') == std::string::npos;
             add_file(path == "kernels/shaped.glsl" ? "engine/publish/page/shapeless.glsl"
-                     : beside ? name.substr(0, name.rfind('/') + 1) + path
-                              : "shaders/" + path);
+                     : beside                      ? name.substr(0, name.rfind('/') + 1) + path
+                                                   : "shaders/" + path);
         }
     }
 

@@ -27,8 +27,9 @@ SpecConstants blend_constants(int kernel, Footprint footprint, int degree, float
     };
     SpecConstants constants = of(first);
     const SpecConstants other = of(second);
-    for (const char* name : {"FORM", "DEGREE", "HALF_POWER", "SQUARED_VARIABLE", "SUPPORT",
-                             "INVERSE_SUPPORT", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "C7", "C8"})
+    for (const char* name :
+         {"FORM", "DEGREE", "HALF_POWER", "SQUARED_VARIABLE", "SUPPORT", "INVERSE_SUPPORT", "C0",
+          "C1", "C2", "C3", "C4", "C5", "C6", "C7", "C8"})
         constants.emplace(std::string("BLEND_") + name, other.at(std::string("KERNEL_") + name));
     const BlendFacts& facts = blend_facts(kernel);
     const auto put = [&](const char* name, double value) {

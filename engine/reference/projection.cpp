@@ -36,8 +36,9 @@ template <class T>
 T exponent_of(const Splats<T>& splats, size_t index) {
     if (!kernel_has_shape(splats.kernel)) return 0;
     const auto shape = static_cast<double>(splats.shape[index]);
-    return std::isnan(shape) ? splats.shape[index]
-                             : static_cast<T>(splat_exponent(splats.kernel, splats.footprint, shape));
+    return std::isnan(shape)
+               ? splats.shape[index]
+               : static_cast<T>(splat_exponent(splats.kernel, splats.footprint, shape));
 }
 
 template <class T>

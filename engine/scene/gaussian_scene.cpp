@@ -25,9 +25,8 @@ GaussianEquivalent convert_shapes(const SplatModel& model, bool keep_opacity, Sp
     const double first = kernel.first_shape(), step = (kernel.last_shape() - first) / (kFits - 1);
     std::vector<GaussianEquivalent> fits;
     for (int k = 0; k < kFits; ++k)
-        fits.push_back(kernel.gaussian(model.footprint,
-                                       kernel.exponent(model.footprint, first + k * step),
-                                       keep_opacity));
+        fits.push_back(kernel.gaussian(
+            model.footprint, kernel.exponent(model.footprint, first + k * step), keep_opacity));
     GaussianEquivalent mean{0, 0, 0};
     double weights = 0;
     for (std::size_t i = 0; i < model.size(); ++i) {

@@ -117,8 +117,8 @@ Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& 
     const ShapedKernel& kernel = shaped_kernel(model.kernel);
     // What is merged has the shape 0. A splat counts as the one of this shape that is as wide.
     for (std::size_t i = 0; i < first_; ++i) {
-        const double moment = kernel.second_moment(
-            model.footprint, kernel.exponent(model.footprint, model.shape[i]));
+        const double moment =
+            kernel.second_moment(model.footprint, kernel.exponent(model.footprint, model.shape[i]));
         for (double& c : moments_[i].covariance) c *= moment / second_moment_;
         moments_[i].mass *= moment / second_moment_;
     }

@@ -1,25 +1,25 @@
 // w = (1 - m) w1 + m w2, m of each splat: a blend of two kernels (engine/kernels/shaped_blend.cpp). The first is that of
 // the constants KERNEL_*, the second that of these, whose code is the first's under other names.
-layout(constant_id = 130) const int BLEND_FORM = KERNEL_FORM_GAUSSIAN;
-layout(constant_id = 131) const int BLEND_DEGREE = 0;
-layout(constant_id = 132) const int BLEND_HALF_POWER = 0;
-layout(constant_id = 133) const int BLEND_SQUARED_VARIABLE = 0;
-layout(constant_id = 134) const float BLEND_SUPPORT = 3e38;
-layout(constant_id = 135) const float BLEND_INVERSE_SUPPORT = 0.0;
-layout(constant_id = 136) const float BLEND_CENTRE_RATIO = 1.0;  // of the line integrals through the centres, 2nd to 1st
-layout(constant_id = 137) const float BLEND_FOURTH_1 = 1.0;      // moments in space; fourth: a third of it
-layout(constant_id = 138) const float BLEND_FOURTH_2 = 1.0;
-layout(constant_id = 139) const float BLEND_SECOND_1 = 1.0;
-layout(constant_id = 140) const float BLEND_SECOND_2 = 1.0;
-layout(constant_id = 150) const float BLEND_C0 = 1.0;
-layout(constant_id = 151) const float BLEND_C1 = 0.0;
-layout(constant_id = 152) const float BLEND_C2 = 0.0;
-layout(constant_id = 153) const float BLEND_C3 = 0.0;
-layout(constant_id = 154) const float BLEND_C4 = 0.0;
-layout(constant_id = 155) const float BLEND_C5 = 0.0;
-layout(constant_id = 156) const float BLEND_C6 = 0.0;
-layout(constant_id = 157) const float BLEND_C7 = 0.0;
-layout(constant_id = 158) const float BLEND_C8 = 0.0;
+layout(constant_id = 160) const int BLEND_FORM = KERNEL_FORM_GAUSSIAN;
+layout(constant_id = 161) const int BLEND_DEGREE = 0;
+layout(constant_id = 162) const int BLEND_HALF_POWER = 0;
+layout(constant_id = 163) const int BLEND_SQUARED_VARIABLE = 0;
+layout(constant_id = 164) const float BLEND_SUPPORT = 3e38;
+layout(constant_id = 165) const float BLEND_INVERSE_SUPPORT = 0.0;
+layout(constant_id = 166) const float BLEND_CENTRE_RATIO = 1.0;  // of the line integrals through the centres, 2nd to 1st
+layout(constant_id = 167) const float BLEND_FOURTH_1 = 1.0;      // moments in space; fourth: a third of it
+layout(constant_id = 168) const float BLEND_FOURTH_2 = 1.0;
+layout(constant_id = 169) const float BLEND_SECOND_1 = 1.0;
+layout(constant_id = 170) const float BLEND_SECOND_2 = 1.0;
+layout(constant_id = 180) const float BLEND_C0 = 1.0;
+layout(constant_id = 181) const float BLEND_C1 = 0.0;
+layout(constant_id = 182) const float BLEND_C2 = 0.0;
+layout(constant_id = 183) const float BLEND_C3 = 0.0;
+layout(constant_id = 184) const float BLEND_C4 = 0.0;
+layout(constant_id = 185) const float BLEND_C5 = 0.0;
+layout(constant_id = 186) const float BLEND_C6 = 0.0;
+layout(constant_id = 187) const float BLEND_C7 = 0.0;
+layout(constant_id = 188) const float BLEND_C8 = 0.0;
 
 void first_value_slope(float q, out float w, out float slope) {
     if (KERNEL_FORM == KERNEL_FORM_COMPACT)

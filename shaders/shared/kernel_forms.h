@@ -17,13 +17,13 @@
 // footprint psi e = b, with exact b + 1/2, b = BETA_START exp(shape), held within the bounds
 #define KERNEL_FORM_BETA 4
 
-#define BETA_SUPPORT 13.0   // R^2: with BETA_START the second moment is the Gaussian's
-#define BETA_START 4.0      // b of shape 0
+#define BETA_SUPPORT 13.0        // R^2: with BETA_START the second moment is the Gaussian's
+#define BETA_START 4.0           // b of shape 0
 #define BETA_EXPONENT_LEAST 1.0  // below it the slope at the edge grows without bound
 #define BETA_EXPONENT_MOST 64.0
 
-// w = exp(-((q + s)^(t/2) - s^(t/2)) / 2), t of each splat: EXPONENTIAL_START exp(shape), held within
-// the bounds; powers of two as BETA's
+// w = exp(-((q + s)^(t/2) - s^(t/2)) / 2), t of each splat: EXPONENTIAL_START exp(shape), held
+// within the bounds; powers of two as BETA's
 #define KERNEL_FORM_EXPONENTIAL 5
 
 #define EXPONENTIAL_START 2.0  // t of shape 0: the Gaussian, whatever s is
@@ -35,8 +35,8 @@
 #define EXPONENTIAL_PSI \
     3.24274337, 5.40768433, -8.51232766, 12.3217168, -11.9811003, 6.62186212, -1.5554585
 
-// w = (1 - m) w1 + m w2, m of each splat, of two kernels of other forms. Of the row alone: to shaders it
-// is the form of the first and BLENDED.
+// w = (1 - m) w1 + m w2, m of each splat, of two kernels of other forms. Of the row alone: to
+// shaders it is the form of the first and BLENDED.
 #define KERNEL_FORM_BLEND 6
 
 // Rows of density control's tables over the shape, evenly from the first to the last of the kernel.

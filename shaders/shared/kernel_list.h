@@ -24,7 +24,8 @@
 #define KERNEL_BETA 13
 #define KERNEL_GENERALIZED_EXPONENTIAL 14
 #define KERNEL_ROWS 15
-// Blends of two kernels of the list, whose weight each splat has: this + first * KERNEL_COUNT + second.
+// Blends of two kernels of the list, whose weight each splat has: this + first * KERNEL_COUNT +
+// second.
 #define KERNEL_BLENDS 100000
 #define KERNEL_MAX_PULSES 3
 

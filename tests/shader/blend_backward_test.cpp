@@ -2,6 +2,7 @@
 // against the reference: one gradient for each splat-tile intersection.
 #include "tests/support/blend_scene.h"
 #include "tests/support/compare_arrays.h"
+#include "tests/support/every_kernel.h"
 
 namespace darb::test {
 namespace {
@@ -117,7 +118,7 @@ TEST_P(BlendBackward, random_layers_match_double) {
 }
 
 TEST_P(EveryWay, exponents_of_splats_match_double) {
-    for (const int kernel : shaped_kernels()) {
+    for (const int kernel : every_shaped_kernel()) {
         SCOPED_TRACE(kernel_name(kernel));
         BlendScene scene = BlendVariant{kernel}.scene(53, 37);
         scene.back = GetParam();

@@ -9,6 +9,7 @@
 #include "engine/raster/backward.h"
 #include "engine/reference/reference_density_control.h"
 #include "engine/scene/splat_shapes.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
 #include "trainer/density/density_control.h"
@@ -261,7 +262,7 @@ std::vector<glm::dvec3> child_offsets(int kernel, size_t parents, std::uint32_t 
 }
 
 TEST(Densify, offsets_of_children_follow_the_density_of_their_own_shape) {
-    for (const int kernel : shaped_kernels())
+    for (const int kernel : every_shaped_kernel())
         for (const float shape : {-3.0f, -0.6f, 0.0f, 1.1f, 4.0f}) {  // the outer ones are held
             SCOPED_TRACE(fmt::format("{} {}", kernel_name(kernel), shape));
             const Footprint footprint =

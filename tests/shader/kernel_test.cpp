@@ -14,6 +14,7 @@
 #include "engine/raster/kernel_constants.h"
 #include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/kernel_probe_args.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/kernel_vectors.h"
 #include "tests/support/own_kernels.h"
 
@@ -195,8 +196,8 @@ TEST_F(KernelShader, Exponents_of_beta_areThoseOfDoubleFromCentreToEdgeAndBeyond
                     if (0.5 * got[i].value >= kCutoff) {
                         ASSERT_GE(got[i].reach, q);
                     }
-                    ASSERT_NEAR(got[i].covariance_scale, beta_kernel().covariance_scale(footprint, e),
-                                1e-6);
+                    ASSERT_NEAR(got[i].covariance_scale,
+                                beta_kernel().covariance_scale(footprint, e), 1e-6);
                 }
                 EXPECT_NEAR(got[0].reach, beta_kernel().reach(footprint, e, 0.5, kCutoff), 2e-3);
             }
@@ -233,6 +234,37 @@ TEST_F(KernelShader, Exponents_of_generalized_exponential_areThoseOfDoubleFromCe
             const double reach = kernel.reach(Footprint::psi, t, 0.5, kCutoff);
             EXPECT_NEAR(got[0].reach / reach, 1, 3e-4);
         }
+}
+
+TEST_F(KernelShader, Weights_of_blends_areThoseOfDouble) {
+    for (const int id : {test::kSmoothBlend, test::kSteepBlend})
+        for (const Footprint footprint : {Footprint::psi, Footprint::exact})
+            for (const double m : {0.0, 0.3, 1.0}) {
+                const ShapedKernel& kernel = shaped_kernel(id);
+                const Variant v{id, footprint, EVALUATION_POLYNOMIAL, kFullDegree};
+                SCOPED_TRACE(fmt::format("{}, weight {}", v.name(), m));
+                std::vector<Probe> probes = ramp(v, 500);
+                for (Probe& p : probes) p.opacity = 0.5f;
+                const std::vector<Answer> got = run(v, probes, static_cast<float>(m));
+                const double allowed = kernel.rounding(m);
+                for (std::size_t i = 0; i < probes.size(); ++i) {
+                    const double q = probes[i].q;
+                    bool at_edge = false;  // of either, where a rounding of q decides
+                    for (const int k : *blend_parts(id))
+                        at_edge |= std::abs(q / kernel_support(k) - 1) < 1e-2;
+                    const ShapedValue truth = kernel.value(footprint, m, q);
+                    if (!at_edge) {
+                        ASSERT_NEAR(got[i].value, truth.w, allowed) << q;
+                        ASSERT_NEAR(got[i].slope, truth.slope, 4e-6) << q;
+                    }
+                    if (0.5 * got[i].value >= kCutoff) {
+                        ASSERT_GE(got[i].reach, q);
+                    }
+                    ASSERT_NEAR(got[i].covariance_scale, kernel.covariance_scale(footprint, m),
+                                2e-6);
+                }
+                EXPECT_NEAR(got[0].reach / kernel.reach(footprint, m, 0.5, kCutoff), 1, 1e-3);
+            }
 }
 
 TEST_F(KernelShader, CovarianceScale_isPsiOrOne) {

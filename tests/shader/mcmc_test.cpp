@@ -11,8 +11,8 @@
 #include "engine/scene/splat_shapes.h"
 #include "shaders/shared/kernel_forms.h"
 #include "shaders/shared/strategy_args.h"
-#include "tests/support/every_kernel.h"
 #include "tests/support/compare_arrays.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
@@ -140,8 +140,7 @@ TEST(Relocate, opacity_and_scale_match_double_for_every_kernel) {
             scale(d, "log_scale", model.log_scale), opacity(d, "opacity", model.opacity_logit);
         const auto count = static_cast<std::uint32_t>(n);
         run_pass("relocate", gpu::RelocationArgs{count, count, 0, 0, kDead, 0, 0},
-                 {source, copy, table, scale, opacity, shapes}, count,
-                 shape_row_constants(kernel));
+                 {source, copy, table, scale, opacity, shapes}, count, shape_row_constants(kernel));
         const auto logit = opacity.read<float>(), log_scale = scale.read<float>();
         for (size_t i = 0; i < n; ++i) {
             if (copies[i] == 0) {

@@ -1,8 +1,8 @@
 // project_backward.comp alone, its gradients stored and not applied, against the reference for the
 // same sums of intersections.
-#include "tests/support/every_kernel.h"
 #include "tests/support/backward_pass.h"
 #include "tests/support/compare_arrays.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/test_scene.h"
 
 namespace darb::test {

@@ -4,8 +4,8 @@
 
 #include "engine/core/rng.h"
 #include "engine/reference/reference_render.h"
-#include "tests/support/every_kernel.h"
 #include "tests/support/compare_arrays.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/projected_frame.h"
 #include "tests/support/test_scene.h"
 

@@ -99,9 +99,8 @@ TestScene scene_for(int kernel, Footprint footprint, double spread = 1) {
 }
 
 TEST(ProjectionEffects, antialias_matches_double) {
-    for (const int kernel :
-         {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_INVERSE_QUADRATIC, KERNEL_BETA,
-          KERNEL_GENERALIZED_EXPONENTIAL})
+    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_INVERSE_QUADRATIC,
+                             KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
             if (footprint == Footprint::exact && !has_exact_footprint(kernel)) continue;
             SCOPED_TRACE(kernel_name(kernel));
@@ -112,8 +111,7 @@ TEST(ProjectionEffects, antialias_matches_double) {
 }
 
 TEST(ProjectionEffects, smoothing_filter_matches_double) {
-    for (const int kernel :
-         {KERNEL_RAISED_COSINE, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
+    for (const int kernel : {KERNEL_RAISED_COSINE, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
         for (const bool antialias : {false, true}) {
             TestScene s = scene_for(kernel, Footprint::psi);
             s.model.antialias = antialias;

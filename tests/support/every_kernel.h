@@ -7,10 +7,21 @@
 
 namespace darb::test {
 
+/// Two smooth kernels, one of them endless; and one that jumps with one that has a kink.
+constexpr int kSmoothBlend = KERNEL_BLENDS + KERNEL_GAUSSIAN * KERNEL_COUNT + KERNEL_RAISED_COSINE;
+constexpr int kSteepBlend = KERNEL_BLENDS + KERNEL_SINC * KERNEL_COUNT + KERNEL_INVERSE_QUADRATIC;
+
+/// With a blend.
+inline std::vector<int> every_shaped_kernel() {
+    std::vector<int> kernels = shaped_kernels();
+    kernels.push_back(kSmoothBlend);
+    return kernels;
+}
+
 inline std::vector<int> every_kernel() {
     std::vector<int> kernels;
     for (int k = 0; k < KERNEL_COUNT; ++k) kernels.push_back(k);
-    for (const int k : shaped_kernels()) kernels.push_back(k);
+    for (const int k : every_shaped_kernel()) kernels.push_back(k);
     return kernels;
 }
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/ply.h"
+#include "engine/scene/splat_shapes.h"
 #include "tests/support/resumed_run.h"
 
 namespace darb::test {
@@ -49,8 +51,8 @@ TEST_P(ShapedTraining, shapes_are_learned_and_a_resumed_run_equals_one_that_neve
     EXPECT_EQ(parse_ply(encode_ply(model), "memory").shape, model.shape);
 }
 
-INSTANTIATE_TEST_SUITE_P(strategies, ShapedTraining,
-                         testing::ValuesIn(every_kernel_and_strategy()), [](const auto& p) {
+INSTANTIATE_TEST_SUITE_P(strategies, ShapedTraining, testing::ValuesIn(every_kernel_and_strategy()),
+                         [](const auto& p) {
                              return std::string(kernel_name(p.param.first)) + "_" +
                                     std::string(strategy_name(p.param.second));
                          });
@@ -83,7 +85,9 @@ TEST(ShapedTrainingRecovery, a_picture_of_exponent_4_is_fitted_from_2) {
     std::vector<float> shapes = trainer.state().model.shape;
     std::ranges::sort(shapes);
     const auto exponent = [&](double share) {
-        return 2 * std::exp(shapes[static_cast<std::size_t>(share * shapes.size())]);
+        return 2 *
+               std::exp(
+                   shapes[static_cast<std::size_t>(share * static_cast<double>(shapes.size()))]);
     };
     EXPECT_NEAR(exponent(0.5), 4, 0.4) << "the median";
     EXPECT_GT(exponent(0.2), 2.8);

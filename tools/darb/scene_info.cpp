@@ -69,7 +69,8 @@ void add_splats(const SplatModel& model, json& info) {
         scales.push_back(s[2]);
         opacities.push_back(sigmoid(model.opacity_logit[i]));
         if (!model.shape.empty())
-            exponents.push_back(splat_exponent(model.kernel, model.footprint, double{model.shape[i]}));
+            exponents.push_back(
+                splat_exponent(model.kernel, model.footprint, double{model.shape[i]}));
         zero_rotations += !has_rotation(model, i);
         huge += s[2] > huge_scale;
         needles += s[2] > kNeedleRatio * s[1];

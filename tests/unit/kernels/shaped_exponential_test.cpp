@@ -60,8 +60,8 @@ TEST(ShapedExponential, Derivatives_matchDifferencesFromCentreToFarAway) {
         for (const double q : {0.0, 1e-9, 1e-5, 1e-3, 0.3, 1.0, 2.0, 7.0, 40.0}) {
             const ShapedValue at = kernel.value(kPsi, t, q);
             const double h = 1e-5 * (q + 1e-4), k = 1e-6;
-            const double d = (w_of(t, q + h) - w_of(t, std::max(q - h, 0.0))) /
-                             (q + h - std::max(q - h, 0.0));
+            const double d =
+                (w_of(t, q + h) - w_of(t, std::max(q - h, 0.0))) / (q + h - std::max(q - h, 0.0));
             EXPECT_NEAR(at.slope, d, 1e-9 + 1e-4 * std::abs(d)) << t << " at " << q;
             EXPECT_NEAR(at.by_exponent, (w_of(t + k, q) - w_of(t - k, q)) / (2 * k), 1e-8)
                 << t << " at " << q;

@@ -55,13 +55,17 @@ TEST(ShapedKernel, Start_isTheRowOfTheFamily) {
 TEST(ShapedKernel, Derivatives_matchDifferencesFromCentreToEdge) {
     for (const double e : {1.0, 1.5, 4.0, 20.0, 64.0})
         for (const double q : {0.0, 1e-9, 0.3, 2.0, 7.0, 12.9, kR2 * (1 - 1e-7), kR2, 20.0}) {
-            const ShapedValue at = kBeta.value(f, e, q);
+            const ShapedValue at = kBeta.value(Footprint::psi, e, q);
             const double h = 1e-4 * (kR2 - q), k = 1e-6;
             if (q < kR2 && q > 1e-6) {
-                const double d = (kBeta.value(f, e, q + h).w - kBeta.value(f, e, q - h).w) / (2 * h);
+                const double d = (kBeta.value(Footprint::psi, e, q + h).w -
+                                  kBeta.value(Footprint::psi, e, q - h).w) /
+                                 (2 * h);
                 EXPECT_NEAR(at.slope, d, 1e-9 + 5e-5 * std::abs(d)) << e << " at " << q;
             }
-            const double d = (kBeta.value(f, e + k, q).w - kBeta.value(f, e - k, q).w) / (2 * k);
+            const double d = (kBeta.value(Footprint::psi, e + k, q).w -
+                              kBeta.value(Footprint::psi, e - k, q).w) /
+                             (2 * k);
             EXPECT_NEAR(at.by_exponent, d, 1e-8) << e << " at " << q;
             if (q >= kR2) {
                 EXPECT_EQ(at.w, 0);
@@ -69,8 +73,8 @@ TEST(ShapedKernel, Derivatives_matchDifferencesFromCentreToEdge) {
                 EXPECT_EQ(at.by_exponent, 0);
             }
         }
-    EXPECT_EQ(kBeta.value(f, 4, 0).w, 1);
-    EXPECT_EQ(kBeta.value(f, 4, 0).by_exponent, 0);
+    EXPECT_EQ(kBeta.value(Footprint::psi, 4, 0).w, 1);
+    EXPECT_EQ(kBeta.value(Footprint::psi, 4, 0).by_exponent, 0);
     for (const Footprint f : kFootprints)
         for (const double t : {-1.3, 0.0, 1.0, 2.5}) {
             const double d = (kBeta.exponent(f, t + 1e-6) - kBeta.exponent(f, t - 1e-6)) / 2e-6;
@@ -99,7 +103,8 @@ TEST(ShapedKernel, FootprintsAndMoments_areTheIntegrals) {
             return integral(std::sqrt(kR2 - q), [&](double z) { return w(q + z * z); });
         };
         for (const double q : {0.5, 3.0, 9.0, 12.5})
-            EXPECT_NEAR(kBeta.value(f, b + 0.5, q).w, line(q) / line(0), 1e-6) << b << " at " << q;
+            EXPECT_NEAR(kBeta.value(Footprint::psi, b + 0.5, q).w, line(q) / line(0), 1e-6)
+                << b << " at " << q;
         const double r = std::sqrt(kR2);
         const double psi = integral(r, [&](double x) { return std::pow(x, 4) * w(x * x); }) /
                            integral(r, [&](double x) { return x * x * w(x * x); }) / 3;
@@ -115,11 +120,11 @@ TEST(ShapedKernel, FootprintsAndMoments_areTheIntegrals) {
 TEST(ShapedKernel, Reach_isWhereTheCutoffIs) {
     for (const double e : {1.0, 3.3, 64.0})
         for (const double opacity : {0.0039, 0.004, 0.05, 1.0}) {
-            const double q = kBeta.reach(f, e, opacity, 1 / 255.0);
+            const double q = kBeta.reach(Footprint::psi, e, opacity, 1 / 255.0);
             if (opacity < 1 / 255.0)
                 EXPECT_EQ(q, 0);
             else
-                EXPECT_NEAR(opacity * kBeta.value(f, e, q).w, 1 / 255.0, 1e-12);
+                EXPECT_NEAR(opacity * kBeta.value(Footprint::psi, e, q).w, 1 / 255.0, 1e-12);
         }
 }
 

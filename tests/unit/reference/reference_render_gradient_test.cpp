@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "tests/support/compare_arrays.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/test_scene.h"
 #include "tests/unit/reference/reference_scenes.h"
 
@@ -167,6 +168,13 @@ INSTANTIATE_TEST_SUITE_P(Shaped, EveryKernel,
 INSTANTIATE_TEST_SUITE_P(Exponential, EveryKernel,
                          testing::Combine(testing::Values(KERNEL_GENERALIZED_EXPONENTIAL),
                                           testing::Values(Footprint::psi)));
+
+INSTANTIATE_TEST_SUITE_P(Blend, EveryKernel,
+                         testing::Combine(testing::Values(kSmoothBlend),
+                                          testing::Values(Footprint::psi, Footprint::exact)),
+                         [](const auto& i) {
+                             return std::string(footprint_name(std::get<1>(i.param)));
+                         });
 
 class EveryRing : public EveryKernel {};
 

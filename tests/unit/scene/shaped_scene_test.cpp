@@ -128,10 +128,13 @@ TEST(ShapedScene, scenes_of_deformable_beta_splatting_are_read) {
         const double exponent = beta_kernel().exponent(model.footprint, double{model.shape[i]});
         for (double x = 0; x < theirs_scale; x += 0.011) {  // along an axis, in the world
             const double d = x / theirs_scale, q = std::pow(x / ours_scale, 2);
-            EXPECT_NEAR(beta_kernel().value(model.footprint, exponent, q).w, std::pow(1 - d * d, b), 2e-6) << x;
+            EXPECT_NEAR(beta_kernel().value(model.footprint, exponent, q).w, std::pow(1 - d * d, b),
+                        2e-6)
+                << x;
         }
     }
-    EXPECT_NEAR(beta_kernel().exponent(model.footprint, double{model.shape[2]}), BETA_EXPONENT_LEAST, 1e-5);
+    EXPECT_NEAR(beta_kernel().exponent(model.footprint, double{model.shape[2]}),
+                BETA_EXPONENT_LEAST, 1e-5);
     std::string notes;
     for (const std::string& note : file.notes) notes += note + "\n";
     EXPECT_NE(notes.find("Deformable Beta Splatting"), std::string::npos) << notes;
@@ -174,7 +177,8 @@ TEST(ShapedScene, merging_keeps_the_width_and_what_is_merged_starts_anew) {
     ASSERT_EQ(one.size(), 1u);
     ASSERT_EQ(one.shape, std::vector<float>(1, 0.0f));
     const auto moment = [](double shape) {
-        return beta_kernel().second_moment(Footprint::psi, beta_kernel().exponent(Footprint::psi, shape));
+        return beta_kernel().second_moment(Footprint::psi,
+                                           beta_kernel().exponent(Footprint::psi, shape));
     };
     const double merged = std::exp(2.0 * one.log_scale[0]) * moment(0);
     EXPECT_NEAR(merged / (std::exp(-4.0) * moment(1.5)), 1, 1e-3);
