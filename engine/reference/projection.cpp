@@ -360,12 +360,12 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     }
     if (kernel_has_shape(splats.kernel)) {
         // Through the profile, and through psi, which scales every row of M by its root.
-        const ShapedKernel& kernel = shaped_kernel(splats.kernel);
+        const ShapedKernel& shaped = shaped_kernel(splats.kernel);
         const auto shape = static_cast<double>(splats.shape[index]);
-        const T by_shape = static_cast<T>(kernel.exponent_slope(splats.footprint, shape));
+        const T by_shape = static_cast<T>(shaped.exponent_slope(splats.footprint, shape));
         const T d_length = glm::dot(d_scale, terms.scale);
         const T length_slope = static_cast<T>(
-            kernel.length_slope(splats.footprint, static_cast<double>(splat.exponent)));
+            shaped.length_slope(splats.footprint, static_cast<double>(splat.exponent)));
         out.shape[index] = by_shape * (gradient.d_exponent + length_slope * d_length);
     }
     const T sigmoid = sigmoid_of_clamped(splats.opacity_logit[index]);

@@ -43,9 +43,11 @@ int run_plan(PlanFlags flags) {
     refuse_to_overwrite_inputs({flags.json}, files_of(s.training ? s.dataset.views : s.views));
     EffectPlan plan = plan_of(s, flags, choice);
     std::optional<AntialiasProbe> probe;
+    std::optional<ShapeProbe> shape;
     if (flags.probe) {
         probe = probe_subject(s, flags, plan);
         take_probe(*probe, plan);
+        shape = probe_subject_shape(s, flags, plan);
     }
     const bool empty = !s.training && s.model.size() == 0;
     EffectPrices prices;
@@ -60,11 +62,13 @@ int run_plan(PlanFlags flags) {
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
     print_priced(out, plan, prices, s.training);
     if (probe) print_probe(out, *probe);
+    if (shape) print_probe(out, *shape);
     const char* kind = s.training ? "data set" : "scene";
     json result{{"path", name_in_json(flags.json, flags.what)},
                 {"kind", kind},
                 {"effects", priced_json(plan, prices)}};
     if (probe) result["probe"] = probe_json(*probe);
+    if (shape) result["shape_probe"] = probe_json(*shape);
     if (flags.compare && !empty) result["compared"] = compare_choices(s, flags);
     write_json(flags.json, result);
     tell_paths(flags.quiet, {flags.json});
@@ -98,8 +102,8 @@ void add_plan(CLI::App& app, Action& action) {
     auto* probe = command->add_flag(
         "--probe", flags->probe,
         "of a data set: decide on anti-aliasing by two short runs, measured at 1/2, 1, 2 and 4 "
-        "times the size of -r");
-    command->add_option("--probe-iterations", flags->probe_iterations, "of each of the two")
+        "times the size of -r; and by two more whether a --kernel that learns shapes pays");
+    command->add_option("--probe-iterations", flags->probe_iterations, "of each of the runs")
         ->capture_default_str()
         ->check(CLI::Range(20, 1'000'000))
         ->needs(probe);

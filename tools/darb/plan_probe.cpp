@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
-#include "engine/core/say.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/tune_flags.h"
@@ -38,21 +36,53 @@ Arm train_arm(Device& device, const Dataset& dataset, const std::vector<ImageU8>
     return arm;
 }
 
-std::string gain_text(double db) {
-    return fmt::format("{:+.2f} dB", db);
+/// The data set with photos set aside.
+Dataset probed_dataset(const Dataset& source, const EffectPlan& plan) {
+    Dataset dataset = source;
+    mark_held_out(dataset.views, {});
+    apply_plan(plan, dataset.views);
+    const std::size_t held_out = held_out_views(dataset.views).size();
+    if (held_out == 0 || held_out == dataset.views.size())
+        throw Error(source.root.string(), "has no photos both to train on and to hold out",
+                    "Leave out --probe.");
+    return dataset;
+}
+
+SceneEvaluation evaluation_of(const Dataset& dataset, const TrainOptions& run) {
+    SceneEvaluation evaluation;
+    evaluation.alpha_is_mask = dataset.alpha_is_mask;
+    evaluation.background = glm::vec3(run.white_background ? 1.0f : 0.0f);
+    return evaluation;
 }
 
 }  // namespace
 
+ShapeProbe probe_shape(const DeviceOptions& device_options, const Dataset& source,
+                       const TrainOptions& options, const EffectPlan& plan) {
+    const Dataset dataset = probed_dataset(source, plan);
+    Device device(device_options);
+    settle_tuning(device);
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    TrainOptions run = options;
+    apply_plan(plan, run);
+    const SceneEvaluation evaluation = evaluation_of(dataset, run);
+    const std::vector<View> views = held_out_views(dataset.views);
+    ShapeProbe probe{run.iterations, run.kernel, KERNEL_GAUSSIAN, {}, {}};
+    const auto trained = [&](int kernel, ProbedRun& arm) {
+        run.kernel = kernel;
+        const Arm one = train_arm(device, dataset, photos, run);
+        arm = one.run;
+        return evaluate_scene(device, one.model, views, evaluation).psnr_db;
+    };
+    probe.fixed_db = trained(probe.fixed_kernel, probe.fixed);
+    probe.learned_db = trained(probe.kernel, probe.learned);
+    return probe;
+}
+
 AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Dataset& source,
                                const TrainOptions& options, const EffectPlan& plan) {
-    Dataset dataset = source;
-    mark_held_out(dataset.views, {});
-    apply_plan(plan, dataset.views);
+    const Dataset dataset = probed_dataset(source, plan);
     const std::vector<View> held_out = held_out_views(dataset.views);
-    if (held_out.empty() || held_out.size() == dataset.views.size())
-        throw Error(source.root.string(), "has no photos both to train on and to hold out",
-                    "Leave out --probe.");
     Device device(device_options);
     settle_tuning(device);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
@@ -63,9 +93,7 @@ AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Datase
     run.antialias = true;
     const Arm with = train_arm(device, dataset, photos, run);
     AntialiasProbe probe{run.iterations, without.run, with.run, {}};
-    SceneEvaluation evaluation;
-    evaluation.alpha_is_mask = dataset.alpha_is_mask;
-    evaluation.background = glm::vec3(run.white_background ? 1.0f : 0.0f);
+    const SceneEvaluation evaluation = evaluation_of(dataset, run);
     for (const double scale : kScales) {
         if (!photos_reach(held_out, scale)) continue;
         const std::vector<View> views = scaled_views(held_out, scale);
@@ -77,35 +105,6 @@ AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Datase
             {scale, camera.width, camera.height, psnr_db(without.model), psnr_db(with.model)});
     }
     return probe;
-}
-
-void print_probe(std::FILE* out, const AntialiasProbe& probe) {
-    tell(out, "\nanti-aliasing, a probe of {} iterations: held-out PSNR without, with\n",
-         probe.iterations);
-    for (const ProbedSize& size : probe.sizes)
-        tell(out, "{:>4}x  {:<11}  {:>8.2f} {:>8.2f} dB  {}\n", scale_text(size.scale),
-             fmt::format("{} x {}", size.width, size.height), size.without_db, size.with_db,
-             gain_text(size.with_db - size.without_db));
-    tell(out, "price: {:.1f} s and {} splats without, {:.1f} s and {} splats with\n",
-         probe.without.seconds, probe.without.splats, probe.with.seconds, probe.with.splats);
-}
-
-nlohmann::json probe_json(const AntialiasProbe& probe) {
-    nlohmann::json sizes = nlohmann::json::array();
-    for (const ProbedSize& size : probe.sizes)
-        sizes.push_back({{"scale", size.scale},
-                         {"width", size.width},
-                         {"height", size.height},
-                         {"without_psnr_db", size.without_db},
-                         {"with_psnr_db", size.with_db}});
-    const auto arm = [](const ProbedRun& run) {
-        return nlohmann::json{{"seconds", run.seconds}, {"splats", run.splats}};
-    };
-    return {{"iterations", probe.iterations},
-            {"gain_db", probe.gain_db()},
-            {"sizes", sizes},
-            {"without", arm(probe.without)},
-            {"with", arm(probe.with)}};
 }
 
 }  // namespace darb

@@ -7,7 +7,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "engine/plan/antialias_probe.h"
+#include "engine/plan/shape_probe.h"
 #include "trainer/options.h"
 
 namespace darb {
@@ -18,7 +18,13 @@ namespace darb {
 AntialiasProbe probe_antialias(const DeviceOptions& device, const Dataset& dataset,
                                const TrainOptions& options, const EffectPlan& plan);
 
+/// Of options.kernel, whose shape each splat learns, beside the Gaussian; both as the plan has it.
+ShapeProbe probe_shape(const DeviceOptions& device, const Dataset& dataset,
+                       const TrainOptions& options, const EffectPlan& plan);
+
 void print_probe(std::FILE* out, const AntialiasProbe& probe);
+void print_probe(std::FILE* out, const ShapeProbe& probe);
+nlohmann::json probe_json(const ShapeProbe& probe);
 nlohmann::json probe_json(const AntialiasProbe& probe);
 
 }  // namespace darb

@@ -6,6 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "tools/cost/views.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
@@ -84,13 +85,31 @@ std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags
     return effects;
 }
 
-AntialiasProbe probe_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {
+namespace {
+
+TrainOptions probed_options(const PlanFlags& flags) {
     TrainOptions train;
     train.kernel = kernel_of(flags);
     train.iterations = flags.probe_iterations;
-    const bool lens = plan.on(EFFECT_LENS) && distorted(s.dataset);
-    return probe_antialias(command_device(flags.device), lens ? through_the_lens(flags) : s.dataset,
-                           train, plan);
+    return train;
+}
+
+Dataset probed_set(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {
+    return plan.on(EFFECT_LENS) && distorted(s.dataset) ? through_the_lens(flags) : s.dataset;
+}
+
+}  // namespace
+
+AntialiasProbe probe_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {
+    return probe_antialias(command_device(flags.device), probed_set(s, flags, plan),
+                           probed_options(flags), plan);
+}
+
+std::optional<ShapeProbe> probe_subject_shape(const PlanSubject& s, const PlanFlags& flags,
+                                              const EffectPlan& plan) {
+    const TrainOptions options = probed_options(flags);
+    if (!kernel_has_shape(options.kernel)) return std::nullopt;
+    return probe_shape(command_device(flags.device), probed_set(s, flags, plan), options, plan);
 }
 
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {
