@@ -64,6 +64,10 @@ const DerivedKernel& derived_kernel(int kernel) {
         return all;
     }();
     if (const Registered* entry = registered(kernel)) return entry->derived;
+    if (blend_parts(kernel))
+        throw Error(std::string(kernel_name(kernel)),
+                    "has no profile of its own: each splat blends its two kernels",
+                    "Name one of the two.");
     static_cast<void>(listed_profile(kernel));  // throws for what is none
     return kernels[static_cast<std::size_t>(kernel)];
 }
