@@ -134,10 +134,9 @@ int register_kernel_of_file(KernelDefinition definition, const std::string& wher
         const std::string name = definition.name;
         for (int suffix = 2;; ++suffix) {
             const std::optional<int> known = kernel_from_name(definition.name);
-            if (known && *known < KERNEL_ROWS)
-                throw Error("kernel " + name, "is a name of the family, and defined anew",
-                            "Rename it in the file.");
-            if (!known || kernel_definition(*known)->same_kernel(definition)) break;
+            // The family may have got the name after the file.
+            const KernelDefinition* other = known ? kernel_definition(*known) : nullptr;
+            if (!known || (other != nullptr && other->same_kernel(definition))) break;
             definition.name = fmt::format("{}_{}", name.substr(0, kMostNameLength - 4), suffix);
         }
         if (definition.name != name)

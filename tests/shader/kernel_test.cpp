@@ -251,8 +251,7 @@ TEST_F(KernelShader, Weights_of_blends_areThoseOfDouble) {
                 for (std::size_t i = 0; i < probes.size(); ++i) {
                     const double q = probes[i].q;
                     bool at_edge = false;  // of either, where a rounding of q decides
-                    for (const int k : parts)
-                        at_edge |= std::abs(q / kernel_support(k) - 1) < 1e-2;
+                    for (const int k : parts) at_edge |= std::abs(q / kernel_support(k) - 1) < 1e-2;
                     const ShapedValue truth = kernel.value(footprint, m, q);
                     if (!at_edge) {
                         ASSERT_NEAR(got[i].value, truth.w, allowed) << q;

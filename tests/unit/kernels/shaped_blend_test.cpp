@@ -72,7 +72,7 @@ TEST(ShapedBlend, Derivatives_matchDifferences) {
                     if (q < 1e-3) continue;
                     EXPECT_NEAR(at.slope, (w(m, q + 1e-6) - w(m, q - 1e-6)) / 2e-6, 1e-7) << q;
                 }
-            EXPECT_EQ(blend.value(f, 0.3, 0).w, 1);
+            EXPECT_NEAR(blend.value(f, 0.3, 0).w, 1, 1e-15);
             for (const double s : {-4.0, -0.5, 0.0, 2.0}) {
                 const double d = (blend.exponent(f, s + 1e-6) - blend.exponent(f, s - 1e-6)) / 2e-6;
                 EXPECT_NEAR(blend.exponent_slope(f, s), d, 1e-8);
