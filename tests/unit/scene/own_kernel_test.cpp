@@ -113,7 +113,7 @@ TEST(OwnKernelFile, Names_of_the_family_get_a_number) {
         EXPECT_EQ(kernel_name(model.kernel), name + "_2");
         ASSERT_EQ(notes.size(), 1u);
         EXPECT_NE(notes[0].find(name + "_2"), std::string::npos) << notes[0];
-        EXPECT_EQ(kernel_name(parse(encode_ply(model), nullptr).kernel), name + "_2");
+        EXPECT_EQ(kernel_name(parse(text_of(encode_ply(model))).kernel), name + "_2");
     }
 }
 
