@@ -3,6 +3,8 @@
 
     train_own_loss.py [DATASET] [-o FOLDER] [--iterations N] [--resolution N]
 
+DATASET: the scene that lies in the source tree where it is left out; to be given elsewhere.
+
 The loss gets the picture as an array and returns its gradient: here a robust one, Charbonnier's
 sqrt(d^2 + e^2), that forgives pixels which are far off. Beside it the built-in loss is trained.
 """
@@ -40,6 +42,8 @@ def main():
     parser.add_argument("--iterations", type=int, default=600)
     parser.add_argument("--resolution", type=int, default=100)
     given = parser.parse_args()
+    if given.dataset == SHIPPED and not SHIPPED.exists():
+        parser.error("give a DATASET: this is not the source tree, which has one in assets/scene")
     data = darb.Dataset.read(given.dataset, resolution=given.resolution, eval=True)
     test = next(i for i in range(len(data)) if data.view(i)["is_test"])
     view, photo = data.view(test), np.float32(data.photo(test)) / 255
