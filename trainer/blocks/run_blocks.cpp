@@ -34,6 +34,13 @@ constexpr std::size_t kFewestCameras = 3;
 constexpr double kCoarseScale = 0.5;        // of the photos' sides, at most
 constexpr std::uint64_t kCoarsePhotos = 4;  // 1 / share of the memory that its photos may take
 
+std::size_t points_in(const BlockRegion& region, const std::vector<double>& points) {
+    std::size_t count = 0;
+    for (std::size_t p = 0; p < points.size(); p += 3)
+        count += region.holds({points[p], points[p + 1], points[p + 2]}) ? 1 : 0;
+    return count;
+}
+
 class BlocksRun {
   public:
     explicit BlocksRun(const BlocksJob& job)
@@ -269,8 +276,10 @@ void BlocksRun::train_block(std::size_t cell, const std::atomic<bool>& stop) {
     const BlockRegion region{manifest_.cells, cell, done_before(cell)};
     BlockStart start =
         block_start(coarse(), region, splats_beside(region), dataset.views, job_.options.sh_degree);
+    CellCount count = counts_[cell];
+    count.with_margin = points_in(region, job_.dataset.points.position);
     const TrainOptions options =
-        block_options(job_.options, counts_[cell], job_.dataset.points.size(), start.frozen,
+        block_options(job_.options, count, job_.dataset.points.size(), start.frozen,
                       static_cast<std::uint32_t>(start.model.size()));
     add_points(job_.dataset, region, job_.options, options.max_splats.value_or(kAnyNumberOfSplats),
                start);
