@@ -6,7 +6,6 @@
 
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"
-#include "shaders/shared/lens.h"
 
 namespace darb {
 
@@ -123,10 +122,9 @@ void Backward::record_gradients(Commands& commands, const FrameView& view, const
                                 const GradientTarget& target) {
     const auto& [to, add, camera] = target;
     check_stored(options_);
-    if (options_.camera_gradient &&
-        (!camera || add || view.camera.lens_fold < static_cast<float>(LENS_FOLD_NONE)))
+    if (options_.camera_gradient && (!camera || add))
         throw Error("backward pass", "no gradient of this camera can be left",
-                    "Give a buffer for it, add views up on the host, and take a pinhole.");
+                    "Give a buffer for it, and add views up on the host.");
     if (to.count() != splats.count())
         throw Error("backward pass",
                     fmt::format("{} splats, gradients of {}", splats.count(), to.count()),

@@ -19,8 +19,8 @@ namespace darb {
 struct GradientTarget {
     GradientBuffers& to;
     bool add = false;  // to what it holds, else in its place
-    /// float [N][Backward::kCameraFloats], where options.camera_gradient asks for it, without add,
-    /// of a pinhole: what shaders/backward/camera_gradient.glsl leaves.
+    /// float [N][CAMERA_SHARES], where options.camera_gradient asks for it, without add: what
+    /// shaders/backward/camera_gradient.glsl leaves.
     const Buffer* camera = nullptr;
 };
 
@@ -42,7 +42,6 @@ class Backward {
     void record_gradients(Commands& commands, const FrameView& view, const Frame& frame,
                           const GpuSplats& splats, const Buffer& d_image,
                           const GradientTarget& target);
-    static constexpr std::uint32_t kCameraFloats = 13;
 
     /// The backward blend alone: the intersections' sums of alpha T times the planes of `image`,
     /// float [3][H][W], where record() leaves those of dL/dcolour. Recorded between Forward::record

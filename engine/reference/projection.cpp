@@ -213,7 +213,55 @@ Vec3<T> mean_backward(const Vec3<T>& mean, const CovarianceTerms<T>& terms, cons
     return {d_uv.x / z, d_uv.y / z, -(glm::dot(d_uv, free) + scaled) / z};
 }
 
+/// dL/d(camera). j: rows of the Jacobian through the world, J W: W is the rotation. d_j: of J
+/// alone; d_k: of J W. d_view: dL/d(position) through the view direction.
+template <class T>
+struct CameraInputs {
+    Vec3<T> mean{0};      // in the camera
+    Vec3<T> position{0};  // world
+    Vec3<T> d_mean{0}, d_j1{0}, d_j2{0}, d_k1{0}, d_k2{0}, d_view{0};
+    Vec2<T> d_px{0};
+};
+
+template <class T>
+CameraGradients<T> camera_backward(const CameraInputs<T>& in, const CovarianceTerms<T>& terms,
+                                   const Camera& camera) {
+    CameraGradients<T> d;
+    // p = W x + t; k = j W; the centre that the view direction begins at is -W^T t.
+    const Vec3<T> t(camera.translation), d_centre = -in.d_view;
+    d.d_translation = in.d_mean - view_rotation<T>(camera) * d_centre;
+    d.d_rotation = glm::outerProduct(in.d_mean, in.position) +
+                   glm::outerProduct(terms.j1, in.d_k1) + glm::outerProduct(terms.j2, in.d_k2) -
+                   glm::outerProduct(t, d_centre);
+    const Vec2<T> free(in.mean.x / in.mean.z, in.mean.y / in.mean.z);
+    const Vec2<T> value = camera.lens.active ? lens_point(camera.lens, free).value : free;
+    d.d_focal = {in.d_px.x * value.x + glm::dot(in.d_j1, terms.j1) / T(camera.fx),
+                 in.d_px.y * value.y + glm::dot(in.d_j2, terms.j2) / T(camera.fy)};
+    d.d_principal = in.d_px;
+    if (camera.lens.active) return d;
+    // A ratio that is held is a corner of the picture, (pixel - c) / f: its row's f ratio is free
+    // of f, and goes with -c.
+    if (!terms.ratio.x_inside) {
+        d.d_focal.x += in.d_j1.z * terms.ratio.x / in.mean.z;
+        d.d_principal.x += in.d_j1.z / in.mean.z;
+    }
+    if (!terms.ratio.y_inside) {
+        d.d_focal.y += in.d_j2.z * terms.ratio.y / in.mean.z;
+        d.d_principal.y += in.d_j2.z / in.mean.z;
+    }
+    return d;
+}
+
 }  // namespace
+
+template <class T>
+CameraGradients<T>& CameraGradients<T>::operator+=(const CameraGradients& other) {
+    d_rotation += other.d_rotation;
+    d_translation += other.d_translation;
+    d_focal += other.d_focal;
+    d_principal += other.d_principal;
+    return *this;
+}
 
 double round_to_half(double x) {
     int exponent = 0;
@@ -318,7 +366,8 @@ ProjectedSplat<T> project(const Splats<T>& splats, size_t index, const Camera& c
 template <class T>
 void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
                       const RenderSettings& settings, const KernelTable& kernel,
-                      const ProjectedPair<T>& projected, SplatGradients<T>& out) {
+                      const ProjectedPair<T>& projected, SplatGradients<T>& out,
+                      CameraGradients<T>* d_camera) {
     const auto& [splat, gradient] = projected;
     if (splat.cull != Cull::none) {
         return;
@@ -337,14 +386,22 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     const Mat3<T> d_matrix = glm::outerProduct(terms.k1, e1 * terms.scale) +
                              glm::outerProduct(terms.k2, e2 * terms.scale);
     const Vec4<T> d_rotation = rotation_backward(rotation, d_matrix);
-    const Vec3<T> d_j1 = view_matrix * (rotation.matrix * (e1 * terms.scale));
-    const Vec3<T> d_j2 = view_matrix * (rotation.matrix * (e2 * terms.scale));
+    const Vec3<T> d_k1 = rotation.matrix * (e1 * terms.scale);
+    const Vec3<T> d_k2 = rotation.matrix * (e2 * terms.scale);
+    const Vec3<T> d_j1 = view_matrix * d_k1, d_j2 = view_matrix * d_k2;
 
     const Vec3<T> d_mean = mean_backward(mean, terms, camera, d_j1, d_j2, gradient.d_mean_px);
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
-    const Vec3<T> d_position =
-        d_mean * view_matrix +
+    const Vec3<T> d_view =
         colour_backward(splats, index, active_degree(splats, settings), view, splat, gradient, out);
+    const Vec3<T> d_position = d_mean * view_matrix + d_view;
+    if (d_camera) {
+        const Vec3<T> position(splats.position[index * 3], splats.position[index * 3 + 1],
+                               splats.position[index * 3 + 2]);
+        *d_camera = camera_backward(
+            {mean, position, d_mean, d_j1, d_j2, d_k1, d_k2, d_view, gradient.d_mean_px}, terms,
+            camera);
+    }
 
     for (int c = 0; c < 3; ++c) {
         const bool free = inside(splats.log_scale[index * 3 + c], LOG_SCALE_LIMIT);
@@ -376,12 +433,13 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
 }
 
 #define DARB_INSTANTIATE(T)                                                                        \
+    template struct CameraGradients<T>;                                                            \
     template struct SplatGradients<T>;                                                             \
     template ProjectedSplat<T> project(const Splats<T>&, size_t, const Camera&,                    \
                                        const RenderSettings&, const KernelTable&);                 \
     template void project_backward(const Splats<T>&, size_t, const Camera&, const RenderSettings&, \
                                    const KernelTable&, const ProjectedPair<T>&,                    \
-                                   SplatGradients<T>&);
+                                   SplatGradients<T>&, CameraGradients<T>*);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 

@@ -53,6 +53,16 @@ struct SplatGradients : SplatArrays<T> {
     void resize_like(const Splats<T>& splats);
 };
 
+/// dL/d(camera): of p_camera = rotation * p_world + translation, whose twelve numbers are each
+/// taken freely, and of focal lengths and principal point. A lens keeps its own terms.
+template <class T>
+struct CameraGradients {
+    Mat3<T> d_rotation{T(0)};  // as Camera::rotation: column, then row
+    Vec3<T> d_translation{0};
+    Vec2<T> d_focal{0}, d_principal{0};  // 1/px
+    CameraGradients& operator+=(const CameraGradients& other);
+};
+
 /// Everything but `outside`, which takes the tiles. Index in [0, N). A culled splat has its cull
 /// set and the rest unspecified.
 template <class T>
@@ -66,11 +76,12 @@ struct ProjectedPair {
     const ProjectedGradient<T>& gradient;
 };
 
-/// Writes the gradients of splat `index` into `out` (sized like the splats). Does nothing for
-/// culled splats.
+/// Writes the gradients of splat `index` into `out` (sized like the splats), and those of the
+/// camera, where they are wanted, into `d_camera`. Does nothing for culled splats.
 template <class T>
 void project_backward(const Splats<T>& splats, size_t index, const Camera& camera,
                       const RenderSettings& settings, const KernelTable& kernel,
-                      const ProjectedPair<T>& projected, SplatGradients<T>& out);
+                      const ProjectedPair<T>& projected, SplatGradients<T>& out,
+                      CameraGradients<T>* d_camera = nullptr);
 
 }  // namespace darb::reference

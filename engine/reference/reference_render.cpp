@@ -114,12 +114,15 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
         gradients.background += d;
     }
     const T half_width = T(0.5) * T(camera.width), half_height = T(0.5) * T(camera.height);
+    std::vector<CameraGradients<T>> d_camera(splats.size());
     for_each_splat(splats.size(), settings.threads, [&](size_t i) {
         const Vec2<T> d = gradients.projected[i].d_mean_px;
         gradients.mean_gradient_ndc[i] = std::hypot(d.x * half_width, d.y * half_height);
         project_backward(splats, i, camera, settings, kernel,
-                         {result.projected[i], gradients.projected[i]}, gradients.splats);
+                         {result.projected[i], gradients.projected[i]}, gradients.splats,
+                         &d_camera[i]);
     });
+    for (const CameraGradients<T>& d : d_camera) gradients.camera += d;
     return gradients;
 }
 

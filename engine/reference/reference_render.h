@@ -26,6 +26,7 @@ struct BasicGradients {
     /// [N] |dL/d(mean)| in NDC units, sqrt((d_x W/2)^2 + (d_y H/2)^2); 0 for culled splats.
     std::vector<T> mean_gradient_ndc;
     Vec3<T> background{0};
+    CameraGradients<T> camera;
 };
 
 using RenderResult = BasicRenderResult<double>;

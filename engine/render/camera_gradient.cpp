@@ -1,18 +1,19 @@
 #include "engine/render/camera_gradient.h"
 
-#include <array>
-
-#include "engine/raster/backward.h"
-
 namespace darb {
 
 CameraGradient camera_gradient(const Camera& camera, std::span<const float> shares,
                                std::span<const float> d_position) {
-    std::array<double, Backward::kCameraFloats> sum{};
-    for (std::size_t i = 0; i < shares.size(); ++i) sum[i % sum.size()] += double(shares[i]);
-    glm::dvec3 d_centre(0.0);
+    CameraTotals sum{};
+    for (std::size_t i = 0; i < shares.size(); ++i) sum[i % CAMERA_SHARES] += double(shares[i]);
     for (std::size_t i = 0; i < d_position.size(); ++i)
-        d_centre[static_cast<int>(i % 3)] -= double(d_position[i]);
+        sum[CAMERA_SHARES + i % 3] += double(d_position[i]);
+    return camera_gradient(camera, sum);
+}
+
+CameraGradient camera_gradient(const Camera& camera, const CameraTotals& sum) {
+    const glm::dvec3 d_centre(-sum[CAMERA_SHARES], -sum[CAMERA_SHARES + 1],
+                              -sum[CAMERA_SHARES + 2]);
 
     // The centre is -R^-1 t: d(centre) = -R^-1 (dt + dR centre).
     CameraGradient g;

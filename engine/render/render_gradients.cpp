@@ -388,7 +388,7 @@ ViewGradients GradientRenderer::backward(const ImageF& d_image, const ImageF& d_
     s.d_image.upload(planes);
     const Frame& frame = s.buffers->frame();
     const std::uint64_t share_bytes =
-        std::uint64_t{s.splats.count()} * Backward::kCameraFloats * sizeof(float);
+        std::uint64_t{s.splats.count()} * CAMERA_SHARES * sizeof(float);
     if (s.options.camera && s.camera_shares.bytes() < std::max<std::uint64_t>(share_bytes, 4))
         s.camera_shares = Buffer(s.device, "camera shares", share_bytes);
     s.backward->reserve(s.splats.count(), frame.size.intersections, frame.checkpoint_records());
@@ -410,11 +410,10 @@ ViewGradients GradientRenderer::backward(const ImageF& d_image, const ImageF& d_
     }
     view.d_background = background_gradient(d_image, s.transmittance);
     if (s.options.camera)
-        view.d_camera =
-            camera_gradient(s.camera,
-                            n > 0 ? s.camera_shares.download<float>(n * Backward::kCameraFloats)
-                                  : std::vector<float>{},
-                            view.d.position);
+        view.d_camera = camera_gradient(
+            s.camera,
+            n > 0 ? s.camera_shares.download<float>(n * CAMERA_SHARES) : std::vector<float>{},
+            view.d.position);
     return view;
 }
 

@@ -45,7 +45,7 @@ struct GradientOptions {
     /// The model's sh_dc is the colour, which may be negative: nothing is added and nothing
     /// clamped.
     bool direct_colour = false;
-    bool camera = false;  // d_camera; of pinholes
+    bool camera = false;  // d_camera
 };
 
 /// The values of all splats, where a caller has them.

@@ -1,6 +1,6 @@
 // dL/d(camera) of one splat, of the numbers that project.comp computes with, each free: the rotation's nine entries
-// by rows, the centre held, then fx, fy, cx, cy. With CAMERA_GRADIENT; the host adds the splats up, and has what
-// the centre does from dL/d(position). Needs camera_model.glsl; lenses are refused by the host.
+// by rows, the centre held, then fx, fy, cx, cy. With CAMERA_GRADIENT; camera_sums.comp or the host adds the splats up,
+// and what the centre does is in dL/d(position). A lens keeps its own terms. Needs camera_model.glsl.
 
 layout(constant_id = 30) const int CAMERA_GRADIENT = 0;
 
@@ -14,14 +14,19 @@ vec2 focal_gradient(vec2 d, float ratio, float free_ratio, float z, float d_pixe
 
 void store_camera_gradient(CameraData camera, uint i, vec3 p, vec3 to_splat, vec3 d_p, mat2x3 j, mat2x3 d_t,
                            mat2x3 d_j, vec2 d_mean) {
-    const uint at = 13u * i;
+    const uint at = CAMERA_SHARES * i;
     for (uint k = 0u; k < 3u; ++k) {
         const vec3 row = d_p[k] * to_splat + j[0][k] * d_t[0] + j[1][k] * d_t[1];
         for (uint c = 0u; c < 3u; ++c) camera_gradient[at + 3u * k + c] = row[c];
     }
     const vec2 free = p.xy / p.z, ratio = clamped_ratio(camera, free);
-    const vec2 of_x = focal_gradient(d_j[0].xz, ratio.x, free.x, p.z, d_mean.x);
-    const vec2 of_y = focal_gradient(d_j[1].yz, ratio.y, free.y, p.z, d_mean.y);
+    vec2 of_x = focal_gradient(d_j[0].xz, ratio.x, free.x, p.z, d_mean.x);
+    vec2 of_y = focal_gradient(d_j[1].yz, ratio.y, free.y, p.z, d_mean.y);
+    if (distorts(camera)) {  // pixel and rows go with f; what holds the ratio is the lens's own
+        const vec2 value = lens_point(camera, free).value;
+        of_x = vec2(d_mean.x * value.x + dot(d_j[0], j[0]) / camera.focal.x, d_mean.x);
+        of_y = vec2(d_mean.y * value.y + dot(d_j[1], j[1]) / camera.focal.y, d_mean.y);
+    }
     camera_gradient[at + 9u] = of_x.x;
     camera_gradient[at + 10u] = of_y.x;
     camera_gradient[at + 11u] = of_x.y;
@@ -29,5 +34,5 @@ void store_camera_gradient(CameraData camera, uint i, vec3 p, vec3 to_splat, vec
 }
 
 void clear_camera_gradient(uint i) {
-    for (uint c = 0u; c < 13u; ++c) camera_gradient[13u * i + c] = 0.0;
+    for (uint c = 0u; c < CAMERA_SHARES; ++c) camera_gradient[CAMERA_SHARES * i + c] = 0.0;
 }

@@ -62,6 +62,16 @@ struct FadeNearArgs {
     float clearance;  // world
 };
 
+// dL/d(camera) of a splat: the rotation's nine entries by rows, the centre held, then fx, fy, cx,
+// cy. Beside them in a sum over splats: dL/d(position).
+#define CAMERA_SHARES 13u
+#define CAMERA_SUMS 16u
+#define CAMERA_SUM_THREADS 64u
+#define CAMERA_SUM_GROUPS 256u  // at most
+struct CameraSumArgs {
+    uint splat_count;
+};
+
 // When the harmonics above the first band make a step: in this iteration, of its own gradient; not
 // in this one, whose gradient is gathered; in this one, of the mean of what was gathered.
 #define REST_EACH 0

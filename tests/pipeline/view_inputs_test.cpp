@@ -1,5 +1,5 @@
 // What a caller may give beside a model: opacities and scales themselves, colours, a loss of the
-// pixels' opacity; and what it may ask for: gradients of background and camera. Against the double
+// pixels' opacity; and what it may ask for: gradients of the background. Against the double
 // reference and its central differences.
 #include <cmath>
 
@@ -36,18 +36,6 @@ reference::RenderSettings truth_settings() {
     settings.near_z = static_cast<float>(NEAR_DEFAULT);
     for (int c = 0; c < 3; ++c) settings.background[c] = kBackground[c];
     return settings;
-}
-
-/// sum of weights times picture and opacity, of the double reference.
-double loss(const SplatModel& model, const Camera& camera, const ImageF& weights,
-            const ImageF& alpha_weights) {
-    const reference::RenderResult r = reference::render(model, camera, truth_settings());
-    double sum = 0;
-    for (size_t i = 0; i < weights.data.size(); ++i)
-        sum += double(weights.data[i]) * r.images.colour.data[i];
-    for (size_t i = 0; i < alpha_weights.data.size(); ++i)
-        sum += double(alpha_weights.data[i]) * (1 - r.images.transmittance.data[i]);
-    return sum;
 }
 
 /// The same splats by opacities and scales.
@@ -165,67 +153,6 @@ TEST(ViewInputs, colours_of_their_own_may_be_negative) {
         << "harmonics beside colours";
 }
 
-/// A camera moved along one of its ten degrees of freedom: turned about an axis of its own, moved,
-/// or with another number of the pinhole.
-Camera moved(Camera camera, int which, double h) {
-    if (which < 3) {
-        glm::dvec3 axis(0.0);
-        axis[which] = std::sin(h / 2);
-        const glm::dmat3 turn = reference::rotation_of(std::cos(h / 2), axis.x, axis.y, axis.z);
-        camera.rotation = turn * camera.rotation;
-        camera.translation = turn * camera.translation;
-    } else if (which < 6) {
-        camera.translation[which - 3] += h;
-    } else {
-        double* const numbers[] = {&camera.fx, &camera.fy, &camera.cx, &camera.cy};
-        *numbers[which - 6] += h;
-    }
-    return camera;
-}
-
-/// dL of that, by the gradient of the camera's numbers.
-double along(const CameraGradient& d, const Camera& camera, int which) {
-    if (which >= 6) return std::array{d.d_fx, d.d_fy, d.d_cx, d.d_cy}[size_t(which) - 6];
-    if (which >= 3) return d.d_translation[which - 3];
-    glm::dmat3 generator(0.0);  // of the rotation about that axis
-    const int j = (which + 1) % 3, k = (which + 2) % 3;
-    generator[j][k] = 1;
-    generator[k][j] = -1;
-    const glm::dmat3 d_rotation = generator * camera.rotation;
-    double sum = glm::dot(d.d_translation, generator * camera.translation);
-    for (int c = 0; c < 3; ++c) sum += glm::dot(d.d_rotation[c], d_rotation[c]);
-    return sum;
-}
-
-TEST(ViewInputs, gradients_of_the_camera_are_central_differences_of_the_reference) {
-    for (const bool wide : {false, true}) {
-        SCOPED_TRACE(wide);
-        TestScene scene = small_scene(KERNEL_GAUSSIAN, 43);
-        if (wide) {  // splats beside the picture that reach into it, where the Jacobian is held
-            scene.camera.fx *= 2.5;
-            scene.camera.fy *= 2.5;
-        }
-        const ImageF weights = random_image(scene.camera, 3, 11);
-        const ImageF alpha_weights = random_image(scene.camera, 1, 12);
-        GradientRenderer renderer(shared_device(), scene.model, {.camera = true});
-        renderer.render(scene.camera, kBackground);
-        const ViewGradients view = renderer.backward(weights, alpha_weights);
-        ASSERT_TRUE(view.d_camera.has_value());
-        ASSERT_GT(view.status.visible, 10u);
-        std::vector<double> truth, got;
-        for (int which = 0; which < 10; ++which) {
-            const double h = 1e-7;  // seldom across a cut-off, where the picture jumps
-            const double up =
-                loss(scene.model, moved(scene.camera, which, h), weights, alpha_weights);
-            const double down =
-                loss(scene.model, moved(scene.camera, which, -h), weights, alpha_weights);
-            const double difference = (up - down) / (2 * h);
-            const double mine = along(*view.d_camera, scene.camera, which);
-            EXPECT_NEAR(mine, difference, 2e-3 * std::abs(difference) + 0.02) << which;
-        }
-    }
-}
-
 TEST(ViewInputs, other_splats_take_the_place_of_those_on_the_device) {
     const TestScene scene = small_scene();
     const TestScene fewer = random_scene({.count = 7, .width = 48, .height = 40, .seed = 44});
@@ -307,9 +234,6 @@ TEST(ViewInputs, mistakes_of_the_caller_are_errors) {
     EXPECT_THROW(renderer.backward(weights, alpha), Error);
     alpha.data[5] = 0;
     EXPECT_NO_THROW(renderer.backward(weights, alpha));
-    scene.camera.lens.active = true;
-    renderer.render(scene.camera);
-    EXPECT_THROW(renderer.backward(weights), Error) << "no gradients of a lens";
     GradientOptions halved;
     halved.accuracy.choice[kRenderScale] = 1;
     EXPECT_THROW(GradientRenderer(shared_device(), scene.model, halved), Error);
