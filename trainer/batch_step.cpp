@@ -13,6 +13,7 @@ struct ViewReport {
     double loss = 0, mse = 0;
     std::int32_t iteration = 0;
     std::uint32_t pixels = 0, redone = 0, overflows = 0;
+    CameraTotals camera{};
 };
 
 void add_times(const std::vector<PassTime>& passes, StepOutcome& outcome) {
@@ -53,7 +54,8 @@ std::vector<StepOutcome> run_part(TrainingStep& step, GradientTree& tree,
 std::vector<StepOutcome> outcomes_of_all(Ranks& ranks, std::vector<StepOutcome> own) {
     std::vector<ViewReport> reports;
     for (const StepOutcome& o : own)
-        reports.push_back({o.status, o.loss, o.mse, o.iteration, o.pixels, o.redone, o.overflows});
+        reports.push_back(
+            {o.status, o.loss, o.mse, o.iteration, o.pixels, o.redone, o.overflows, o.camera});
     const std::vector<Bytes> told = ranks.gather(std::as_bytes(std::span(reports)));
     std::vector<StepOutcome> all;
     for (int r = 0; r < ranks.count(); ++r) {
@@ -65,8 +67,15 @@ std::vector<StepOutcome> outcomes_of_all(Ranks& ranks, std::vector<StepOutcome> 
         std::vector<ViewReport> its(bytes.size() / sizeof(ViewReport));
         if (!its.empty()) std::memcpy(its.data(), bytes.data(), its.size() * sizeof(ViewReport));
         for (const ViewReport& v : its)
-            all.push_back(
-                {v.iteration, v.status, v.loss, v.mse, v.pixels, {}, v.redone, v.overflows});
+            all.push_back({v.iteration,
+                           v.status,
+                           v.loss,
+                           v.mse,
+                           v.pixels,
+                           {},
+                           v.redone,
+                           v.overflows,
+                           v.camera});
     }
     return all;
 }

@@ -45,8 +45,9 @@ Evaluation evaluate_held_out(Trainer& trainer, const Dataset& dataset,
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
         if (!view.is_test) continue;
-        evaluation.views.push_back(compare_view(view.name, trainer.render(view.camera), photos[i],
-                                                trainer.background(), dataset.alpha_is_mask));
+        evaluation.views.push_back(compare_view(view.name, trainer.render(trainer.camera(i)),
+                                                photos[i], trainer.background(),
+                                                dataset.alpha_is_mask));
         evaluation.views.back().in_arc = view.in_arc;
     }
     take_means(evaluation);
@@ -63,7 +64,7 @@ std::vector<std::filesystem::path> write_side_by_side(Trainer& trainer, const Da
         if (!view.is_test) continue;
         const auto path = folder / picture_name(view.name, used);
         write_png(path, side_by_side(composite(photos[i], trainer.background()),
-                                     trainer.render(view.camera)));
+                                     trainer.render(trainer.camera(i))));
         files.push_back(path);
     }
     return files;

@@ -4,6 +4,7 @@
 
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/backward.h"
+#include "engine/raster/camera_sums.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/frame_view.h"
 #include "engine/raster/loss.h"
@@ -96,7 +97,8 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     plan.moments = moment_bytes(demand.splats, floats_of(demand), false) +
                    rest_sum_bytes(demand.splats, floats_of(demand));
     plan.frame = bytes.splats;
-    if (demand.batch > 1)
+    if (demand.cameras) plan.frame += CameraSums::device_bytes(size.splats);
+    if (demand.by_views)
         plan.frame +=
             GradientTree::device_bytes(demand.splats, demand.sh_degree, demand.frame.kernel,
                                        demand.batch, strategy_row(demand.strategy).scores_views);
@@ -178,6 +180,8 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
     }
     demand.strategy = options.strategy;
     demand.batch = options.batch;
+    demand.by_views = steps_by_views(options);
+    demand.cameras = options.refine_cameras;
     const std::vector<RampStep> steps = schedule.ramp_steps(std::max(demand.width, demand.height));
     if (steps.empty()) return;
     for (const View& view : views) {

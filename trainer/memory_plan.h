@@ -34,6 +34,8 @@ struct MemoryDemand {
     std::uint32_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
     Strategy strategy{};
     int batch = 1;
+    bool by_views = false;  // steps_by_views()
+    bool cameras = false;   // are refined
     // Of the resolution ramp: its smaller photos, of all training photos together, and cameras.
     std::uint64_t small_pixels = 0;
     std::uint32_t small_cameras = 0;

@@ -22,6 +22,9 @@ bool has_noise(const Opt& o, const Sched&) {
 bool has_decay(const Opt& o, const Sched&) {
     return strategy_row(o.strategy).has_setting("opacity_decay");
 }
+bool refines_cameras(const Opt& o, const Sched&) {
+    return o.refine_cameras;
+}
 // What the first strategy does not have stands only where it is, so that files from before it
 // agree.
 bool not_of_the_first(const Opt& o, const Sched&) {
@@ -107,6 +110,35 @@ const OptionRow kRows[] = {
     {.setting = "/effects/antialias", .member = &Opt::antialias, .group = option_group::kEffects},
     {.setting = "/effects/exposure", .member = &Opt::exposure, .group = option_group::kEffects},
     {.setting = "/effects/alpha", .member = &Opt::alpha, .group = option_group::kEffects},
+    {.setting = "/effects/cameras",
+     .member = &Opt::refine_cameras,
+     .group = option_group::kEffects,
+     .stands = refines_cameras},
+    {.flags = "--camera-lr",
+     .setting = "/effects/camera_lr",
+     .member = &Opt::camera_lr,
+     .group = option_group::kEffects,
+     .help = "of refined cameras, by how much a visit shifts a photo; falls to a fiftieth",
+     .unit = "px",
+     .usual = "0.1 px where tracks anchor them, else 0.5",
+     .least = kAboveZero,
+     .resolved = [](const Opt& o, const Sched&) -> Json {
+         return o.camera_lr ? Json(*o.camera_lr) : Json("usual");
+     },
+     .stands = refines_cameras},
+    {.flags = "--camera-from",
+     .setting = "/effects/camera_from",
+     .member = &Opt::camera_from,
+     .group = option_group::kEffects,
+     .help = "share of the run before cameras move",
+     .most = 1,
+     .stands = refines_cameras},
+    {.flags = "--camera-anchor",
+     .setting = "/effects/camera_anchor",
+     .member = &Opt::camera_anchor,
+     .group = option_group::kEffects,
+     .help = "weight of the tracks' reprojection, px^2, that holds refined cameras; 0: none",
+     .stands = refines_cameras},
     {.flags = "--exposure-lr-init",
      .setting = "/effects/exposure_lr/0",
      .member = &Opt::exposure_lr_init,

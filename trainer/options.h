@@ -40,6 +40,13 @@ struct TrainOptions {
     bool antialias = false;  // opacity compensation and the 3D smoothing filter of Mip-Splatting
     bool exposure = false;   // an affine map of colours per photo, trained beside the splats
     float exposure_lr_init = 0.001f, exposure_lr_final = 0.0001f;
+    // Poses and intrinsics of the photos are trained beside the splats: see camera_refinement.h.
+    bool refine_cameras = false;
+    // px a visit, falling to a fiftieth over the run; absent: 0.1 where tracks anchor them, else
+    // 0.5.
+    std::optional<float> camera_lr;
+    float camera_from = 0.1f;      // share of the run before the first step
+    float camera_anchor = 0.01f;   // weight of half the squared reprojection of tracks, px^2
     ProjectionEffects projection;  // but for its antialias and smoothing, which are antialias
     bool alpha = true;             // false: every photo is opaque, its alpha is not read
     HugeSplatPath huge_splat_path = HugeSplatPath::by_counters;

@@ -130,6 +130,17 @@ void TrainingPhotos::make_smaller(ResolutionRamp& ramp, int divisor) {
     small_.cameras = upload_cameras(*device_, small_.data);
 }
 
+void TrainingPhotos::set_camera(int view, const Camera& camera) {
+    const auto place = [&](Size& size, const Camera& at_size) {
+        size.data[view] = camera_data(at_size, origin_);
+        size.cameras.upload(std::vector{size.data[view]},
+                            static_cast<std::uint64_t>(view) * sizeof(gpu::CameraData));
+    };
+    view_cameras_[view] = camera;
+    place(whole_, camera);
+    if (divisor_ > 1) place(small_, divided(camera, divisor_));
+}
+
 std::uint64_t TrainingPhotos::small_pixels() const {
     std::uint64_t pixels = 0;
     for (const Buffer& photo : small_.photos) pixels += photo.bytes() / 4;

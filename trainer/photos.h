@@ -37,6 +37,7 @@ class TrainingPhotos {
 
     /// The training views among all, ascending.
     const std::vector<int>& views() const { return views_; }
+    std::size_t view_count() const { return view_cameras_.size(); }
     std::uint32_t count() const { return static_cast<std::uint32_t>(views_.size()); }
     TrainingView view(int view, int sh_degree, const glm::vec3& background) const;
     /// The photo of a view, where what is recorded next reads it: copied there first where it
@@ -46,6 +47,10 @@ class TrainingPhotos {
     /// What was recorded last goes to the queue: else the next place() copies anew.
     void submitted() { pending_ = false; }
     bool stream() const { return memory_ == Memory::waiting; }
+    /// The camera of a view at its whole size, and another in its place: of the same size. The
+    /// queue must be idle.
+    const Camera& camera(int view) const { return view_cameras_[view]; }
+    void set_camera(int view, const Camera& camera);
     /// The name of a view.
     const std::string& name(int view) const { return names_[view]; }
     /// Distance of the nearest points from the camera of a view; infinity: there are none.

@@ -78,6 +78,7 @@ class Run {
                "point_cloud.ply";
     }
     void save_model(int iteration);
+    void write_cameras();
     void show_step();
     void save_checkpoint(const std::filesystem::path& path);
     void begin();
@@ -91,6 +92,7 @@ class Run {
     void report_resolution();
     void report_memory();
     void report_probes();
+    void report_cameras();
     double seconds() const {
         return seconds_ +
                (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
@@ -206,7 +208,15 @@ void Run::save_model(int iteration) {
     while_doing(summary_.model.string(), [&] { write_ply(summary_.model, model); });
     if (const auto maps = trainer_.exposures(); !maps.empty())
         write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
+    if (trainer_.camera_moves()) write_cameras();
     stopwatch(true);
+}
+
+// As they are trained now.
+void Run::write_cameras() {
+    std::vector<View> views = dataset_.views;
+    for (size_t v = 0; v < views.size(); ++v) views[v].camera = trainer_.camera(v);
+    write_camera_list(run_.output / "cameras.json", views);
 }
 
 void Run::save_checkpoint(const std::filesystem::path& path) {
@@ -252,7 +262,7 @@ void Run::begin() {
         log_.begin();
         if (run_.write_start) run_.write_start(run_.output / "dense_start");
     }
-    write_camera_list(run_.output / "cameras.json", dataset_.views);
+    write_cameras();
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
     if (!run_.command.empty()) write_file_atomic(run_.output / "command.json", run_.command);
 }
@@ -278,6 +288,7 @@ RunSummary Run::execute(const std::atomic<bool>* stop) {
     summary_.interrupted = trainer_.iteration() < options_.iterations;
     if (summary_.interrupted) save_what_is_there(false);
     report_troubles();
+    report_cameras();
     progress_.finish();
     summary_.iteration = trainer_.iteration();
     summary_.seconds = seconds_;
@@ -416,6 +427,16 @@ void Run::report_probes() {
         progress_.note(fmt::format("iteration {}: colour of degree {} {} ({})", p.iteration,
                                    p.degree, p.admitted ? "admitted" : "refused", reason));
     }
+}
+
+void Run::report_cameras() {
+    const std::optional<CameraMoves> m = trainer_.camera_moves();
+    if (!m) return;
+    progress_.note(fmt::format(
+        "{} cameras moved by {:.2f} px and {:.3f} degrees in the middle, at most {:.2f} px and "
+        "{:.3f} degrees; focal lengths by up to {:.2f} %, principal points by {:.2f} px",
+        m->cameras, m->median_px, m->median_degrees, m->largest_px, m->largest_degrees,
+        100 * m->largest_focal, m->largest_centre_px));
 }
 
 void Run::report_troubles() {

@@ -18,6 +18,8 @@ ForwardOptions forward_options(const TrainOptions& options) {
     f.effects.antialias = f.effects.smoothing = options.antialias;
     f.huge_splat_path = options.huge_splat_path;
     f.store_for_backward = true;
+    f.camera_gradient = options.refine_cameras;
+    if (options.refine_cameras) f.effects.off_centre = true;  // principal points move
     return f;
 }
 
@@ -28,6 +30,10 @@ ExposureStep exposure_step(const StepInput& input) {
 }
 
 }  // namespace
+
+bool steps_by_views(const TrainOptions& options) {
+    return options.batch > 1 || options.refine_cameras;
+}
 
 LossOptions loss_options(const TrainOptions& options, const Dataset& dataset) {
     return {.use_alpha = options.alpha, .use_mask = options.alpha && dataset.alpha_is_mask};
@@ -52,7 +58,8 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
       flights_{Flight(device), Flight(device)} {
     if (options.exposure)
         exposure_.emplace(device, photos.count(), photos.largest_photo(), options.batch);
-    if (options.batch > 1) adam_.emplace(device);
+    if (steps_by_views(options)) adam_.emplace(device);
+    if (options.refine_cameras) cameras_.emplace(device);
 }
 
 void TrainingStep::reserve(int width, int height) {
@@ -63,6 +70,7 @@ void TrainingStep::reserve(int width, int height) {
 void TrainingStep::reserve_backward() {
     backward_.reserve(splats_->count(), buffers_.size().intersections,
                       buffers_.frame().checkpoint_records());
+    if (cameras_) cameras_->reserve(buffers_.size().splats);
 }
 
 bool TrainingStep::make_room(const gpu::FrameStatus& status) {
@@ -154,9 +162,13 @@ void TrainingStep::record_back(Commands& commands, const StepInput& input) {
     if (exposure_)
         exposure_->record_backward(commands, frame.images.image, d_image_, exposure_step(input),
                                    input.place);
-    if (input.gradients)
-        return backward_.record_gradients(commands, view.frame, frame, *splats_, d_image_,
-                                          {*input.gradients});
+    if (input.gradients) {
+        backward_.record_gradients(
+            commands, view.frame, frame, *splats_, d_image_,
+            {*input.gradients, false, cameras_ ? &cameras_->shares() : nullptr});
+        if (cameras_) cameras_->record(commands, splats_->count(), input.gradients->of(kPosition));
+        return;
+    }
     if (exposure_) exposure_->record_step(commands, status, exposure_step(input));
     backward_.record(commands, view.frame, frame, *splats_, d_image_, input.adam);
     if (input.strategy) input.strategy->record_after_update(step_frame(commands, input));
@@ -232,6 +244,7 @@ gpu::FrameStatus TrainingStep::read(Flight& flight, StepOutcome& outcome) {
     outcome.mse = double(loss.mse) / std::max(double(loss.weight), 1e-12);
     outcome.pixels = flight.input.view.size();
     outcome.passes = flight.commands.pass_times();
+    if (cameras_ && flight.input.gradients) outcome.camera = cameras_->read();
     return outcome.status;
 }
 

@@ -15,9 +15,11 @@
 #include "engine/gpu/commands.h"
 #include "engine/raster/adam_update.h"
 #include "engine/raster/backward.h"
+#include "engine/raster/camera_sums.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/loss.h"
+#include "engine/render/camera_gradient.h"
 #include "trainer/density/density_strategy.h"
 #include "trainer/exposure.h"
 #include "trainer/photos.h"
@@ -26,6 +28,9 @@ namespace darb {
 
 /// The frames that training takes.
 ForwardOptions forward_options(const TrainOptions& options);
+/// Whether the gradients of views go to buffers, of which a step is made, and are not a step at
+/// once: in batches, and where they are of cameras, too.
+bool steps_by_views(const TrainOptions& options);
 /// How its loss reads photos.
 LossOptions loss_options(const TrainOptions& options, const Dataset& dataset);
 
@@ -53,6 +58,7 @@ struct StepOutcome {
     std::uint32_t pixels = 0;  // of the photo
     std::vector<PassTime> passes;
     std::uint32_t redone = 0, overflows = 0;  // how often this step was done again, and why
+    CameraTotals camera{};                    // dL/d(camera), where cameras are refined
     bool ends_step = true;                    // false: other views of its batch follow
 };
 
@@ -141,8 +147,9 @@ class TrainingStep {
     Backward backward_;
     Loss loss_;
     float lambda_dssim_;
-    std::optional<Exposure> exposure_;  // options.exposure
-    std::optional<AdamUpdate> adam_;    // of batches
+    std::optional<Exposure> exposure_;   // options.exposure
+    std::optional<AdamUpdate> adam_;     // of batches
+    std::optional<CameraSums> cameras_;  // options.refine_cameras, of batches
     Buffer d_image_;
     Buffer given_d_image_;  // [3][H][W] of picture_gradient
     std::array<Flight, 2> flights_;

@@ -90,7 +90,8 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
     if (options_.antialias)
         smoothing_.emplace(device, forward_options(options).effects, photos_.training_cameras());
     if (options_.morton_order) morton_.emplace(device);
-    if (options_.batch > 1)
+    if (options_.refine_cameras) cameras_.emplace(dataset, options_);
+    if (steps_by_views(options_))
         tree_.emplace(device, options_.batch, strategy_row(options.strategy).scores_views);
     set_resolution(1);
     update_smoothing();
@@ -153,7 +154,28 @@ void Trainer::run_batch() {
     const std::vector<StepOutcome> outcomes =
         run_batch_step(step_, *tree_, splats_, views, *ranks_.all, options_.batch);
     iteration_ = end;
+    if (cameras_) refine_cameras(views, outcomes);
     for (const StepOutcome& outcome : outcomes) finish(outcome);
+}
+
+void Trainer::refine_cameras(const std::vector<StepInput>& views,
+                             const std::vector<StepOutcome>& outcomes) {
+    std::vector<CameraVisit> visits;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const int view = static_cast<int>(views[i].view.frame.index);
+        visits.push_back({view, camera_gradient(photos_.camera(view), outcomes[i].camera),
+                          views[i].view.width(), views[i].view.height()});
+    }
+    if (cameras_->step(iteration_, visits)) place_cameras();
+}
+
+void Trainer::place_cameras() {
+    for (std::size_t v = 0; v < photos_.view_count(); ++v)
+        photos_.set_camera(static_cast<int>(v), cameras_->camera(static_cast<int>(v)));
+}
+
+std::optional<CameraMoves> Trainer::camera_moves() const {
+    return cameras_ ? std::optional(cameras_->moves()) : std::nullopt;
 }
 
 void Trainer::open_step() {
@@ -358,6 +380,7 @@ Trainer::State Trainer::state() {
     s.next_probe = probe_.next();
     if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
     if (step_.exposure()) s.exposure = step_.exposure()->state();
+    if (cameras_) s.cameras = cameras_->state();
     s.error_shares = strategy_->state(splats_.count());
     for (int a = 0; a < kAttributeCount; ++a) s.moments.push_back(splats_.download_moments(a));
     s.rest_sum = splats_.download_rest_sum();
@@ -374,6 +397,10 @@ void Trainer::restore(const State& s) {
     drain();
     if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
     const std::uint32_t frozen = splats_.frozen();
+    if (cameras_ && !s.cameras.empty()) {
+        cameras_->restore(s.cameras);
+        place_cameras();
+    }
     splats_ = GpuSplats();  // first, so that there are never two
     splats_ = GpuSplats(*device_, s.model, true, schedule_.rest_every > 1);
     splats_.freeze(frozen);

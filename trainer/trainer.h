@@ -14,6 +14,7 @@
 
 #include "engine/core/image.h"
 #include "engine/data/dataset.h"
+#include "trainer/camera_refinement.h"
 #include "trainer/density/density_control.h"
 #include "trainer/density/density_strategy.h"
 #include "trainer/density/morton_order.h"
@@ -103,6 +104,10 @@ class Trainer {
     ImageF render(const Camera& camera);
     /// The exposure of each training photo by the view's name; empty where it is off.
     std::map<std::string, ColourMap> exposures();
+    /// The camera of a view of the data set as training has it now.
+    const Camera& camera(std::size_t view) const { return photos_.camera(static_cast<int>(view)); }
+    /// How far cameras have come; nothing where they are not refined.
+    std::optional<CameraMoves> camera_moves() const;
     /// The state that a checkpoint holds, the model included.
     State state();
     void restore(const State& state);
@@ -125,6 +130,9 @@ class Trainer {
     StepInput input_for(int iteration, int view, int last) const;
     void run_step();
     void run_batch();
+    void refine_cameras(const std::vector<StepInput>& views,
+                        const std::vector<StepOutcome>& outcomes);
+    void place_cameras();
     void finish(const StepOutcome& outcome);
     std::optional<DensityResult> control_density();
     DensityResult run_round(int iteration);
@@ -160,7 +168,8 @@ class Trainer {
     RunTotals totals_;
     int iteration_ = 0;
     int opened_ = 0;  // the iteration after which density control and probes had their turn
-    std::optional<GradientTree> tree_;  // options.batch > 1
+    std::optional<GradientTree> tree_;         // steps_by_views()
+    std::optional<CameraRefinement> cameras_;  // options.refine_cameras
     TrainingStep step_;  // last: it waits for the device before anything that it uses goes
 };
 

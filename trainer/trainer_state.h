@@ -28,6 +28,7 @@ struct TrainerState {
     int next_probe = 0;
     std::vector<float> smoothing;     // [N], or empty where the effect is off
     std::vector<float> exposure;      // Exposure::state(), or empty
+    std::vector<float> cameras;       // CameraRefinement::state(), or empty
     std::vector<float> error_shares;  // DensityStrategy::state(); the name is of the first that had
     SplatModel model;
     std::vector<std::vector<float>> moments;

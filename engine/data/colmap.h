@@ -22,6 +22,7 @@ struct ColmapImage {
     std::string name;
     glm::dmat3 rotation{1.0};  // world to camera
     glm::dvec3 translation{0.0};
+    std::vector<float> observed;  // [][2] px
 };
 
 using ColmapCameras = std::map<std::uint32_t, LensModel>;
@@ -38,13 +39,16 @@ struct ColmapModel {
 ColmapCameras parse_colmap_cameras(std::span<const std::byte> file, const std::string& where);
 std::vector<ColmapImage> parse_colmap_images(std::span<const std::byte> file,
                                              const std::string& where);
+/// observations: for each of the points' seen_by its number among those of the image.
 PointCloud parse_colmap_points(std::span<const std::byte> file, const std::string& where,
-                               std::size_t& dropped);
+                               std::size_t& dropped,
+                               std::vector<std::uint32_t>* observations = nullptr);
 
 ColmapCameras parse_colmap_cameras_text(std::string_view file, const std::string& where);
 std::vector<ColmapImage> parse_colmap_images_text(std::string_view file, const std::string& where);
 PointCloud parse_colmap_points_text(std::string_view file, const std::string& where,
-                                    std::size_t& dropped);
+                                    std::size_t& dropped,
+                                    std::vector<std::uint32_t>* observations = nullptr);
 
 /// Whether the folder holds cameras and images, .bin or .txt.
 bool is_colmap_model(const std::filesystem::path& folder);

@@ -66,14 +66,19 @@ std::vector<ColmapImage> parse_colmap_images(std::span<const std::byte> file,
         image.rotation = rotation_from_quaternion(wxyz, reader.where());
         check_position(image.translation, reader.where());
         const std::size_t observations = reader.read_count(kObservationBytes, "observations");
-        reader.skip(observations * kObservationBytes);
+        image.observed.reserve(2 * observations);
+        for (std::size_t k = 0; k < observations; ++k) {
+            image.observed.push_back(static_cast<float>(reader.read<double>()));
+            image.observed.push_back(static_cast<float>(reader.read<double>()));
+            reader.skip(8);  // the point
+        }
         images.push_back(std::move(image));
     }
     return images;
 }
 
 PointCloud parse_colmap_points(std::span<const std::byte> file, const std::string& where,
-                               std::size_t& dropped) {
+                               std::size_t& dropped, std::vector<std::uint32_t>* observations) {
     ByteReader reader(file, where);
     const std::size_t count = reader.read_count(kPointBytes, "points");
     PointCloud points;
@@ -93,8 +98,10 @@ PointCloud parse_colmap_points(std::span<const std::byte> file, const std::strin
         const bool finite = std::isfinite(position[0] + position[1] + position[2]);
         for (std::size_t t = 0; t < track; ++t) {
             const auto image = reader.read<std::uint32_t>();
-            reader.skip(kTrackBytes - sizeof image);
-            if (finite) points.seen_by.push_back(image);
+            const auto observation = reader.read<std::uint32_t>();
+            if (!finite) continue;
+            points.seen_by.push_back(image);
+            if (observations) observations->push_back(observation);
         }
         if (!finite) {
             ++dropped;

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <map>
 #include <utility>
 
 #include "engine/core/error.h"
@@ -19,17 +21,40 @@ bool has_pair(const std::filesystem::path& folder, const char* extension) {
            std::filesystem::is_regular_file(folder / (std::string("images") + extension));
 }
 
+// Where each image saw the points of its tracks, as shares of its sides.
+void locate_tracks(const std::vector<std::uint32_t>& observations, ColmapModel& model) {
+    std::map<std::uint32_t, const ColmapImage*> images;
+    for (const ColmapImage& image : model.images) images[image.id] = &image;
+    PointCloud& points = model.points;
+    std::size_t located = 0;
+    std::vector<float> at(2 * points.seen_by.size(), std::numeric_limits<float>::quiet_NaN());
+    for (std::size_t k = 0; k < points.seen_by.size(); ++k) {
+        const auto image = images.find(points.seen_by[k]);
+        const std::size_t number = observations[k];
+        if (image == images.end() || number >= image->second->observed.size() / 2) continue;
+        const auto camera = model.cameras.find(image->second->camera_id);
+        if (camera == model.cameras.end()) continue;
+        const LensModel& lens = camera->second;
+        at[2 * k] = image->second->observed[2 * number] / static_cast<float>(lens.width);
+        at[2 * k + 1] = image->second->observed[2 * number + 1] / static_cast<float>(lens.height);
+        ++located;
+    }
+    if (located > 0) points.seen_at = std::move(at);
+}
+
 void read_points(const std::filesystem::path& folder, ColmapModel& model) {
     const auto binary = folder / "points3D.bin", text = folder / "points3D.txt",
                ply = folder / "points3D.ply";
     const bool has_binary = model.binary && std::filesystem::is_regular_file(binary);
     const bool has_own = has_binary || std::filesystem::is_regular_file(text);
+    std::vector<std::uint32_t> observations;
     if (has_binary)
-        model.points =
-            parse_colmap_points(read_file(binary), binary.string(), model.dropped_points);
+        model.points = parse_colmap_points(read_file(binary), binary.string(), model.dropped_points,
+                                           &observations);
     else if (has_own)
-        model.points =
-            parse_colmap_points_text(read_text_file(text), text.string(), model.dropped_points);
+        model.points = parse_colmap_points_text(read_text_file(text), text.string(),
+                                                model.dropped_points, &observations);
+    if (has_own) locate_tracks(observations, model);
     if (!std::filesystem::is_regular_file(ply)) return;
     std::size_t dropped = 0;
     PointCloud points = read_point_cloud_ply(ply, dropped);

@@ -85,9 +85,17 @@ bool is_number(std::string_view text) {
     return error == std::errc{} && end == text.data() + text.size();
 }
 
+void add_observations(Lines& lines, ColmapImage& image) {
+    while (!lines.rest().empty()) {
+        for (int k = 0; k < 2; ++k)
+            image.observed.push_back(static_cast<float>(lines.number<double>("coordinate")));
+        lines.word("the observation's point");
+    }
+}
+
 /// After a pose: its observations, 3 numbers each, or an empty line where it has none. Some writers
 /// leave empty lines out; the line is then the next pose, of 9 numbers and a name.
-void skip_observations(Lines& lines) {
+void read_observations(Lines& lines, ColmapImage& image) {
     constexpr std::size_t kPoseNumbers = 9, kProbed = 12;  // a name may be a number, not three
     if (!lines.next()) return;
     if (lines.rest().starts_with('#')) return lines.back();
@@ -98,7 +106,8 @@ void skip_observations(Lines& lines) {
         ++words;
         rest.remove_prefix(std::min(rest.find_first_not_of(kSpace, end), rest.size()));
     }
-    if (words % 3 == 0 && numbers == std::min(words, kProbed)) return;
+    if (words % 3 == 0 && numbers == std::min(words, kProbed))
+        return add_observations(lines, image);
     if (words > kPoseNumbers && numbers >= kPoseNumbers) return lines.back();
     throw Error(lines.where(),
                 fmt::format("is neither observations, 3 numbers each, nor an image: {} words, the "
@@ -138,14 +147,15 @@ std::vector<ColmapImage> parse_colmap_images_text(std::string_view file, const s
             throw Error(lines.where(), "the image has no name", "Export the model again.");
         image.rotation = rotation_from_quaternion(wxyz, lines.where());
         check_position(image.translation, lines.where());
+        read_observations(lines, image);
         images.push_back(std::move(image));
-        skip_observations(lines);
     }
     return images;
 }
 
 PointCloud parse_colmap_points_text(std::string_view file, const std::string& where,
-                                    std::size_t& dropped) {
+                                    std::size_t& dropped,
+                                    std::vector<std::uint32_t>* observations) {
     PointCloud points;
     points.seen_begin.push_back(0);
     dropped = 0;
@@ -162,7 +172,10 @@ PointCloud parse_colmap_points_text(std::string_view file, const std::string& wh
         if (!lines.rest().empty()) lines.word("the error");
         while (!lines.rest().empty()) {
             points.seen_by.push_back(lines.number<std::uint32_t>("image id of the track"));
-            lines.word("the point's index in the track");
+            const std::string_view word = lines.word("the point's index in the track");
+            std::uint32_t observation = 0xFFFFFFFFu;  // of no image, where it is no number
+            std::from_chars(word.data(), word.data() + word.size(), observation);
+            if (observations) observations->push_back(observation);
         }
         points.seen_begin.push_back(points.seen_by.size());
         points.position.insert(points.position.end(), position, position + 3);

@@ -171,17 +171,27 @@ void index_tracks(Dataset& dataset) {
     std::map<std::uint32_t, std::uint32_t> index;
     for (std::size_t i = 0; i < dataset.views.size(); ++i)
         index[dataset.views[i].source_id] = static_cast<std::uint32_t>(i);
-    std::vector<std::uint32_t> seen, views;
+    const bool located = points.has_tracks();
+    std::vector<std::uint32_t> seen;
+    std::vector<float> seen_at;
     std::vector<std::size_t> begin{0};
+    std::vector<std::pair<std::uint32_t, std::size_t>> views;  // with the place in the track
     for (std::size_t p = 0; p + 1 < points.seen_begin.size(); ++p) {
         views.clear();
         for (std::size_t k = points.seen_begin[p]; k < points.seen_begin[p + 1]; ++k)
             if (const auto at = index.find(points.seen_by[k]); at != index.end())
-                views.push_back(at->second);
+                views.emplace_back(at->second, k);
         std::sort(views.begin(), views.end());
-        seen.insert(seen.end(), views.begin(), std::unique(views.begin(), views.end()));
+        for (std::size_t v = 0; v < views.size(); ++v) {
+            if (v > 0 && views[v].first == views[v - 1].first) continue;
+            seen.push_back(views[v].first);
+            if (!located) continue;
+            seen_at.push_back(points.seen_at[2 * views[v].second]);
+            seen_at.push_back(points.seen_at[2 * views[v].second + 1]);
+        }
         begin.push_back(seen.size());
     }
+    points.seen_at = std::move(seen_at);
     points.seen_by = std::move(seen);
     points.seen_begin = std::move(begin);
 }

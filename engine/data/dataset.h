@@ -44,10 +44,14 @@ struct PointCloud {
     // the source does not say.
     std::vector<std::size_t> seen_begin;  // [P + 1]
     std::vector<std::uint32_t> seen_by;
+    // [seen_by][2] where in the photo, as shares of its width and height, of the photo as its lens
+    // declares it; empty where the source does not say. NaN: not known.
+    std::vector<float> seen_at;
     // Of points on surfaces, as engine/stereo finds them; else empty.
     std::vector<float> normal;   // [P][3] world, length 1, towards the cameras
     std::vector<float> spacing;  // [P] world units, to the next points on the surface
     std::size_t size() const { return colour.size() / 3; }
+    bool has_tracks() const { return !seen_by.empty() && seen_at.size() == 2 * seen_by.size(); }
 };
 
 struct DatasetOptions {

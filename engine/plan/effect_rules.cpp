@@ -286,9 +286,9 @@ void override_rows(const EffectChoice& choice, EffectPlan& plan, int most_degree
 std::vector<int> impossible_effects(EffectUse use) {
     switch (use) {
         case EffectUse::pictures:
-            return {EFFECT_EXPOSURE, EFFECT_ALPHA};
+            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_CAMERAS};
         case EffectUse::measuring:
-            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH};
+            return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS};
         default:
             return {EFFECT_DEPTH};
     }
@@ -302,6 +302,7 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
         model.antialias, false, 0, model.antialias ? 1.0 : 0.0,
         fmt::format("the file says SplatRenderMode {}", model.antialias ? "mip" : "default")};
     plan.row(EFFECT_EXPOSURE).reason = "of photos in training alone";
+    plan.row(EFFECT_CAMERAS).reason = "of photos in training alone";
     plan.row(EFFECT_OFF_CENTRE) = centre_rule(views);
     plan.row(EFFECT_LENS) = lens_rule(views);
     plan.row(EFFECT_ALPHA).reason = "of photos alone; pictures are over the background";
@@ -316,7 +317,7 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
         plan.row(EFFECT_NEAR) = near_rule(model, views, outputs.near_plane);
     }
     override_rows(choice, plan, model.sh_degree,
-                  {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH});
+                  {EFFECT_ANTIALIAS, EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS});
     return plan;
 }
 
@@ -333,10 +334,11 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
     plan.row(EFFECT_LENS) = lens_rule(dataset.views);
     plan.row(EFFECT_ALPHA) = alpha_rule(dataset, photos);
     plan.row(EFFECT_DEPTH).reason = "no regulariser asks for it";
+    plan.row(EFFECT_CAMERAS).reason = "off unless it is asked for: --refine-cameras on";
     plan.row(EFFECT_HUGE) = huge_rule();
     plan.row(EFFECT_NEAR) = {true, false, 0, 0,
                              "splats move while they train, beside the cameras too"};
-    override_rows(choice, plan, sh_degree, {EFFECT_DEPTH});
+    override_rows(choice, plan, sh_degree, {EFFECT_DEPTH, EFFECT_CAMERAS});
     return plan;
 }
 

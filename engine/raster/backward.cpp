@@ -36,7 +36,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     if (found != project_.end()) return found->second;
     SpecConstants constants = projection_constants(options_, sh_degree, sh_stored);
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(blend_.window_intersections());
-    constants["CAMERA_GRADIENT"] = options_.camera_gradient ? 1 : 0;
+    constants["CAMERA_GRADIENT"] = options_.camera_gradient && update == UPDATE_STORE ? 1 : 0;
     constants["UPDATE"] = update;
     constants["REST"] = rest;
     return project_.emplace(key, Pipeline(*device_, "project_backward", constants)).first->second;

@@ -13,12 +13,13 @@
 #define EFFECT_DEPTH 6        // a picture of depths
 #define EFFECT_HUGE 7  // splats over very many tiles, and tiles' lists of very many intersections
 #define EFFECT_NEAR 8  // splats beside the picture that reach into it: the Jacobian is clamped
-#define EFFECT_COUNT 9
+#define EFFECT_CAMERAS 9  // poses and intrinsics are trained beside the splats
+#define EFFECT_COUNT 10
 
 #ifdef __cplusplus
 // On the command line and in files, by number.
 #define EFFECT_NAMES \
-    "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near"
+    "sh", "antialias", "exposure", "off_centre", "lens", "alpha", "depth", "huge", "near", "cameras"
 #endif
 
 #endif

@@ -132,6 +132,12 @@ TEST(MemoryPlan, the_mean_of_the_last_iterations_is_met_to_the_byte) {
     EXPECT_EQ(later.total(), later.resident() + std::max(later.densify, later.average));
 }
 
+TEST(MemoryPlan, refined_cameras_are_met_to_the_byte) {
+    TrainOptions options = options_of(1);
+    options.refine_cameras = true;
+    compare_to_the_byte(options, 4'000);
+}
+
 TEST(MemoryPlan, no_splats_are_met_to_the_byte) {
     compare_to_the_byte(options_of(1), 0);
 }

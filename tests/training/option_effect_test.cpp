@@ -7,6 +7,7 @@
 #include <string>
 
 #include "engine/core/error.h"
+#include "engine/data/track_observations.h"
 #include "tests/support/tiny_training.h"
 #include "trainer/option_table.h"
 #include "trainer/strategy.h"
@@ -24,6 +25,9 @@ const std::map<std::string, std::string> kOtherValues{
     {"/sh_degree", "0"},
     {"/effects/exposure_lr/0", "0.3"},
     {"/effects/exposure_lr/1", "0.3"},
+    {"/effects/camera_lr", "0.7"},
+    {"/effects/camera_from", "0.5"},
+    {"/effects/camera_anchor", "3"},
     {"/lambda_dssim", "0.5"},
     {"/position_lr/0", "0.01"},
     {"/position_lr/1", "0.0001"},
@@ -62,6 +66,25 @@ std::string key_of(const OptionRow& row) {
                                                                       : "max_memory";
 }
 
+/// Tracks that lie a little beside where the points are drawn.
+void add_tracks(Dataset& dataset) {
+    PointCloud& points = dataset.points;
+    points.seen_begin.push_back(0);
+    for (std::size_t p = 0; p < points.size(); ++p) {
+        const double* x = &points.position[3 * p];
+        for (std::size_t v = 0; v < dataset.views.size(); ++v) {
+            View& view = dataset.views[v];
+            view.lens.width = view.camera.width;
+            view.lens.height = view.camera.height;
+            const glm::dvec2 at = pinhole_pixel(view.camera, {x[0], x[1], x[2]});
+            points.seen_by.push_back(static_cast<std::uint32_t>(v));
+            points.seen_at.push_back(static_cast<float>(at.x / view.camera.width + 0.02));
+            points.seen_at.push_back(static_cast<float>(at.y / view.camera.height));
+        }
+        points.seen_begin.push_back(points.seen_by.size());
+    }
+}
+
 /// A run in which all of training takes part: growth, resets, transparent pixels, a splat beside a
 /// camera.
 TinyTraining run_for(const OptionRow& row) {
@@ -80,6 +103,8 @@ TinyTraining run_for(const OptionRow& row) {
     o.opacity_reset_interval = 7;
     o.clearance = 0.9f;
     o.exposure = key.starts_with("/effects/exposure_lr");
+    o.refine_cameras = key.starts_with("/effects/camera_");
+    if (o.refine_cameras) add_tracks(t.dataset);
     const std::string strategies = row.strategies;
     if (strategies == "mcmc") o.strategy = Strategy::mcmc;
     if (strategies == "budget") o.strategy = Strategy::budget;
@@ -130,7 +155,8 @@ TEST(OptionEffect, another_value_of_each_option_trains_another_scene_long) {
         const std::string key = key_of(row);
         const bool special = key == "/resolution_ramp" || key == "/random_points";
         const std::string run = strategy_name(t.options.strategy).data() + std::string(" ") +
-                                (special ? key : "") + (t.options.exposure ? "exposure" : "");
+                                (special ? key : "") + (t.options.exposure ? "exposure" : "") +
+                                (t.options.refine_cameras ? "cameras" : "");
         if (!usual_of.contains(run)) usual_of[run] = trained(t);
         const std::optional<TrainerState>& usual = usual_of[run];
         ASSERT_TRUE(usual);

@@ -19,6 +19,7 @@
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/scene_file.h"
+#include "tools/darb/trained_cameras.h"
 #include "tools/darb/tune_flags.h"
 
 namespace darb {
@@ -28,7 +29,7 @@ namespace {
 struct EvalFlags {
     std::filesystem::path scene, dataset, json;
     std::string split = "test", device, effects = "auto";
-    bool eval_exposure = false, quiet = false, light = false;
+    bool eval_exposure = false, quiet = false, light = false, align = false;
     bool white_background = false;
     std::vector<double> scales;  // none: as the photos are
     DatasetOptions data;
@@ -57,8 +58,10 @@ int eval(Ranks& ranks, EvalFlags flags) {
     options.effects = choose_effects(flags.effects, EffectUse::measuring, flags.data);
     options.background = glm::vec3(flags.white_background ? 1.0f : 0.0f);
     options.fit_exposure = flags.eval_exposure;
+    options.align_cameras = flags.align;
     const SplatModel model = load_scene(flags.scene);
-    const Dataset dataset = load_dataset(flags.dataset, flags.data);
+    Dataset dataset = load_dataset(flags.dataset, flags.data);
+    take_trained_cameras(flags.scene, dataset.views);
     options.alpha_is_mask = dataset.alpha_is_mask;
     print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
@@ -133,6 +136,9 @@ void add_eval(CLI::App& app, Action& action) {
     add_lens_flag(*command, flags->data);
     command->add_flag("--eval-exposure", flags->eval_exposure,
                       "fit each picture's colours to its photo by an affine map before measuring");
+    command->add_flag(
+        "--align-cameras", flags->align,
+        "turn and move each camera until the picture fits its photo, before measuring");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);
     command->callback([flags, &action] {

@@ -21,6 +21,7 @@ struct SceneEvaluation {
     EffectChoice effects;
     glm::vec3 background{0.0f};
     bool fit_exposure = false;   // of each picture to its photo, before measuring
+    bool align_cameras = false;  // each to its photo first, by CameraAlignment
     bool alpha_is_mask = false;  // of the data set
     Ranks* ranks = nullptr;      // that measure the views by turns; null: this process does all
 };

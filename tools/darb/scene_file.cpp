@@ -47,6 +47,20 @@ long last_iteration(const fs::path& output) {
 
 // None where there is no such run or it held nothing out.
 std::optional<HoldOut> hold_out_of_run(const fs::path& scene) {
+    const fs::path log = log_of_run(scene);
+    if (log.empty()) return std::nullopt;
+    const nlohmann::json start = start_of_run(log);
+    if (!start.is_object()) return std::nullopt;
+    const auto at = start.find("hold_out");
+    const std::string text =
+        at != start.end() && at->is_string() ? at->get<std::string>() : std::string();
+    if (text.empty()) return std::nullopt;
+    return while_doing(log.string(), [&] { return parse_hold_out(text); });
+}
+
+}  // namespace
+
+fs::path log_of_run(const fs::path& scene) {
     std::error_code none;
     fs::path folder = fs::absolute(scene, none), log = folder / "run.jsonl";
     constexpr int kDeepest = 3;  // OUT/point_cloud/iteration_N/point_cloud.ply
@@ -54,20 +68,19 @@ std::optional<HoldOut> hold_out_of_run(const fs::path& scene) {
         folder = folder.parent_path();
         log = folder / "run.jsonl";
     }
-    if (!fs::is_regular_file(log, none)) return std::nullopt;
-    std::ifstream lines(log);
-    std::string text;
-    for (std::string line; std::getline(lines, line);) {
-        const auto event = nlohmann::json::parse(line, nullptr, false);
-        if (!event.is_object() || event.value("event", nlohmann::json()) != "start") continue;
-        const auto at = event.find("hold_out");  // of the last start: a run may go on
-        text = at != event.end() && at->is_string() ? at->get<std::string>() : "";
-    }
-    if (text.empty()) return std::nullopt;
-    return while_doing(log.string(), [&] { return parse_hold_out(text); });
+    return fs::is_regular_file(log, none) ? log : fs::path();
 }
 
-}  // namespace
+nlohmann::json start_of_run(const fs::path& log) {
+    nlohmann::json start;
+    std::ifstream lines(log);
+    for (std::string line; std::getline(lines, line);) {
+        nlohmann::json event = nlohmann::json::parse(line, nullptr, false);
+        if (event.is_object() && event.value("event", nlohmann::json()) == "start")
+            start = std::move(event);
+    }
+    return start;
+}
 
 void hold_out_as_trained(const fs::path& scene, DatasetOptions& data) {
     if (!data.hold_out) data.held_out = hold_out_of_run(scene).value_or(HoldOut{});

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 
 #include "engine/data/dataset.h"
 #include "engine/scene/splat_file.h"
@@ -25,5 +26,11 @@ SplatModel load_scene(const std::filesystem::path& path, SplatFile* facts = null
 /// Holds out what the command line says, else what the run did that wrote the scene, its output
 /// folder or a file in it, else every eighth view; an arc is noted.
 void hold_out_as_trained(const std::filesystem::path& scene, DatasetOptions& data);
+
+/// The run.jsonl of the run that a scene is of, its output folder or a file in it; empty where
+/// there is none.
+std::filesystem::path log_of_run(const std::filesystem::path& scene);
+/// Its last event of a start, as a run may go on; null where there is none.
+nlohmann::json start_of_run(const std::filesystem::path& log);
 
 }  // namespace darb

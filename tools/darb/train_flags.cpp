@@ -64,6 +64,13 @@ void add_scene_flags(CLI::App& command, TrainFlags& f) {
     command.add_flag("--antialiasing", f.antialiasing, "as --effects +antialias")
         ->group(option_group::kEffects);
     command
+        .add_option("--refine-cameras", f.refine_cameras,
+                    "train poses and intrinsics beside the splats, as --effects +cameras; auto: as "
+                    "the plan says, off")
+        ->check(CLI::IsMember({"auto", "on", "off"}))
+        ->capture_default_str()
+        ->group(option_group::kEffects);
+    command
         .add_option("--pulses", f.pulses,
                     "of raised_cosine and sinc: 2 or 3 keep rings that the paper's limit removes")
         ->capture_default_str()

@@ -18,6 +18,7 @@ struct TrainFlags {
     std::string dataset;
     std::string device;
     std::string effects = "auto", schedule_effects;
+    std::string refine_cameras = "auto";
     bool antialiasing = false;  // as 3DGS spells +antialias
     bool resume = false;
     bool verbose = false;      // the table of passes at the end
@@ -35,6 +36,7 @@ struct TrainFlags {
     std::string preset;             // of trainer/presets.h; empty: none was named
     bool length_given = false;      // --iterations
     bool width_given = false;       // -r
+    std::string cameras_note;       // what tracks made of the cameras, for people; may be empty
     std::string start_note;         // what plan_start found, for people; may be empty
     std::string strategy_note;      // what plan_strategy decided, for people
     GivenOfStrategies of_strategies;

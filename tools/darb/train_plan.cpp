@@ -129,6 +129,7 @@ void print_plan(Device& device, const Dataset& dataset, TrainFlags& flags) {
     print_notes(dataset.notes);
     say("device: {}\n", device.description());
     say("effects: {}\n", flags.run.effects);
+    if (!flags.cameras_note.empty()) say("{}\n", flags.cameras_note);
     if (!flags.start_note.empty()) say("{}\n", flags.start_note);
     if (!flags.strategy_note.empty()) say("{}\n", flags.strategy_note);
     print_growth(flags.train);

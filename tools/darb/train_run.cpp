@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
+#include "engine/data/source.h"
+#include "engine/data/track_adjustment.h"
 #include "tools/darb/effect_flags.h"
 #include "trainer/dense_start.h"
 #include "trainer/forecast.h"
@@ -17,7 +19,23 @@ namespace {
 EffectChoice training_choice(const TrainFlags& flags) {
     EffectChoice choice = parse_effects(flags.effects);
     if (flags.antialiasing) choice.changed[EFFECT_ANTIALIAS] = true;
+    if (flags.refine_cameras != "auto")
+        choice.changed[EFFECT_CAMERAS] = flags.refine_cameras == "on";
     return choice;
+}
+
+// Before anything begins at the cameras or the points.
+std::string adjusted_cameras(Dataset& dataset) {
+    const TrackAdjustment a = adjust_to_tracks(dataset);
+    if (a.adjusted)
+        return fmt::format(
+            "cameras: tracks moved {} by {:.2f} px in the middle; their error, {} times {} points, "
+            "went from {:.2f} to {:.2f} px",
+            counted(a.views, "camera"), a.median_move_px, a.observations, a.points, a.before_px,
+            a.after_px);
+    return a.views < 2
+               ? "cameras: no tracks say where photos saw points; pictures alone refine them"
+               : fmt::format("cameras: they fit the tracks, {:.2f} px in the middle", a.before_px);
 }
 
 }  // namespace
@@ -31,6 +49,7 @@ void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos) {
         plan_training(dataset, flags.run.photos, flags.train.sh_degree, training_choice(flags));
     apply_plan(plan, flags.train);
     apply_plan(plan, dataset.views);
+    if (flags.train.refine_cameras) flags.cameras_note = adjusted_cameras(dataset);
     flags.run.effects = plan_line(plan);
     flags.run.effects_json =
         plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);

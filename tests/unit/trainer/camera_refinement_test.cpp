@@ -1,0 +1,101 @@
+// Refined cameras without a picture: what the anchor of the tracks alone makes of them.
+#include "trainer/camera_refinement.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/core/error.h"
+#include "tests/support/tracked_dataset.h"
+
+namespace darb::test {
+namespace {
+
+TrainOptions refining(int iterations) {
+    TrainOptions o;
+    o.iterations = iterations;
+    o.refine_cameras = true;
+    o.camera_from = 0;
+    o.camera_lr = 0.3f;
+    return o;
+}
+
+void visit_all(CameraRefinement& cameras, const Dataset& dataset, int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+        const int view = i % static_cast<int>(dataset.views.size());
+        if (dataset.views[size_t(view)].is_test) continue;
+        const CameraVisit visit{view, {}, 200, 150};
+        cameras.step(i + 1, {&visit, 1});
+    }
+}
+
+// Points are where they are: poses come back, and a wrong focal length does.
+TEST(CameraRefinement, tracks_bring_disturbed_cameras_back) {
+    const Dataset truth = tracked_dataset();
+    const auto places = places_of(truth);
+    Dataset dataset = truth;
+    disturb(dataset.views, places, 2);
+    CameraRefinement cameras(dataset, refining(1'600));
+    const CameraMoves none = cameras.moves();
+    EXPECT_EQ(none.largest_px, 0);
+    visit_all(cameras, dataset, 0, 1'600);
+    std::vector<double> shifts;
+    for (size_t v = 0; v < truth.views.size(); ++v)
+        shifts.push_back(
+            shift_px(cameras.camera(static_cast<int>(v)), truth.views[v].camera, places));
+    for (const double shift : shifts) EXPECT_LT(shift, 0.1);
+    EXPECT_GT(cameras.moves().median_px, 0.5);
+    EXPECT_EQ(cameras.moves().cameras, truth.views.size());
+}
+
+TEST(CameraRefinement, cameras_that_are_right_stay) {
+    const Dataset truth = tracked_dataset();
+    CameraRefinement cameras(truth, refining(400));
+    visit_all(cameras, truth, 0, 400);
+    EXPECT_LT(cameras.moves().largest_px, 0.1);
+    EXPECT_LT(cameras.moves().largest_focal, 1e-3);
+}
+
+TEST(CameraRefinement, a_wrong_focal_length_comes_back_and_held_out_views_share_it) {
+    const Dataset truth = tracked_dataset();
+    Dataset dataset = truth;
+    for (View& view : dataset.views) view.camera.fx *= 1.02, view.camera.fy *= 1.02;
+    // What photos saw is where it was.
+    for (View& view : dataset.views) view.lens.parameters = {224.4, 224.4, 100, 75};
+    dataset.views[0].is_test = true;
+    CameraRefinement cameras(dataset, refining(4'000));
+    visit_all(cameras, dataset, 0, 4'000);
+    EXPECT_NEAR(cameras.camera(1).fx, 220, 2);
+    EXPECT_EQ(cameras.camera(0).fx, cameras.camera(1).fx);
+    EXPECT_EQ(cameras.camera(0).translation, dataset.views[0].camera.translation);
+}
+
+TEST(CameraRefinement, goes_on_from_its_state_with_the_same_bits) {
+    Dataset dataset = tracked_dataset();
+    disturb(dataset.views, places_of(dataset), 2);
+    CameraRefinement whole(dataset, refining(200)), first(dataset, refining(200)),
+        second(dataset, refining(200));
+    visit_all(whole, dataset, 0, 200);
+    visit_all(first, dataset, 0, 90);
+    second.restore(first.state());
+    EXPECT_EQ(second.state().size(), second.state_size());
+    visit_all(second, dataset, 90, 200);
+    EXPECT_EQ(second.state(), whole.state());
+    for (int v = 0; v < 8; ++v)
+        EXPECT_EQ(second.camera(v).translation, whole.camera(v).translation);
+    EXPECT_THROW(second.restore({1, 2, 3}), Error);
+}
+
+TEST(CameraRefinement, two_photos_are_too_few) {
+    EXPECT_THROW(CameraRefinement(tracked_dataset(2), refining(100)), Error);
+}
+
+TEST(CameraRefinement, a_gradient_that_is_no_number_moves_nothing) {
+    const Dataset dataset = tracked_dataset();
+    CameraRefinement cameras(dataset, refining(100));
+    CameraVisit visit{1, {}, 200, 150};
+    visit.gradient.d_translation.x = std::nan("");
+    cameras.step(50, {&visit, 1});
+    EXPECT_EQ(cameras.camera(1).translation, dataset.views[1].camera.translation);
+}
+
+}  // namespace
+}  // namespace darb::test
