@@ -104,6 +104,9 @@ void check_for_blocks(const TrainFlags& flags) {
         effects.base == EffectChoice::Base::all || effects.changed[EFFECT_EXPOSURE].value_or(false),
         "--effects with exposure",
         "Leave exposure out: each block would find other colours for the same photo.");
+    refuse(flags.refine_cameras == "on" || effects.changed[EFFECT_CAMERAS].value_or(false),
+           "--refine-cameras",
+           "Leave it out: each block would find another pose for the same photo.");
 }
 
 int train_blocks(Ranks& ranks, TrainFlags flags, const TuneFlags& tune, std::string command) {
