@@ -83,7 +83,16 @@ std::optional<int> kernel_from_name(std::string_view name) {
 bool has_exact_footprint(int kernel) {
     const Registered* entry = registered(kernel);
     if (entry != nullptr) return entry->exact;
-    if (blend_parts(kernel)) return true;
+    if (const auto parts = blend_parts(kernel)) {
+        // The slope of a quadric's line integral grows without bound at its edge, which matters
+        // where the other kernel goes on: w is no longer below any cut-off there.
+        const auto ends_inside = [](const KernelProfile& one, const KernelProfile& other) {
+            return one.form == KERNEL_FORM_QUADRIC && one.support < other.support;
+        };
+        const KernelProfile &first = listed_profile((*parts)[0]),
+                            &second = listed_profile((*parts)[1]);
+        return !ends_inside(first, second) && !ends_inside(second, first);
+    }
     const int form = listed_profile(kernel).form;
     return form != KERNEL_FORM_RINGS && form != KERNEL_FORM_EXPONENTIAL;
 }

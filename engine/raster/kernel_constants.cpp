@@ -64,7 +64,10 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     double margin = evaluation == EVALUATION_BUILTIN ? kBuiltinMargin : kRoundingMargin;
     const bool shaped = kernel_has_shape(kernel);
     if (shaped) margin = kBuiltinMargin;  // of log2 and exp2 in the reach
-    if (k.form == KERNEL_FORM_GAUSSIAN || shaped) margin += 1.5 * k.value_error;
+    // The exponential's power goes through the polynomial twice: its error is that of ln w, times
+    // it.
+    const double passes = k.form == KERNEL_FORM_EXPONENTIAL ? 2 - std::log(alpha_cutoff) : 1.5;
+    if (k.form == KERNEL_FORM_GAUSSIAN || shaped) margin += passes * k.value_error;
     DARB_CHECK(k.half_power <= 9, "half_power = {}", k.half_power);  // shaders/kernels/compact.glsl
     SpecConstants constants{
         {"KERNEL", shader_kernel(kernel)},

@@ -86,7 +86,7 @@ TEST_F(BlocksCommand, joins_cells_and_resumes_a_killed_block_to_the_same_bytes) 
     for (const nlohmann::json& block : done["blocks"]) {
         EXPECT_EQ(block["state"], "done");
         EXPECT_GT(block["frozen"], 0);
-        EXPECT_GE(block["cameras"].size(), 3u);
+        EXPECT_GE(block["views"].size(), 3u);
         EXPECT_GT(block["peak_device_bytes"], 100'000);
         EXPECT_LE(block["peak_device_bytes"], 200'000'000);
     }

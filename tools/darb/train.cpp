@@ -10,7 +10,6 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "engine/plan/tuning_names.h"
 #include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
@@ -60,17 +59,6 @@ void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
         throw Error("--view", fmt::format("has no place in a run of {} ranks", ranks.count()),
                     "Leave it out; darb view opens what the run saves.");
     refuse_without_cameras(flags, ranks.count());
-}
-
-// Each rank measures its own device, and of equal ones each might choose another way. All ranks
-// ask, whatever their options are: those are compared later.
-void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own) {
-    if (ranks.count() == 1) return;
-    const std::string own = names_text(tuning_names(device.tuning()));
-    const Bytes first = from_first(ranks, std::as_bytes(std::span(own)));
-    if (keeps_own) return;
-    const std::string_view names(reinterpret_cast<const char*>(first.data()), first.size());
-    device.set_tuning(resumed_tuning(device.info(), device.tuning(), names, "tuning of rank 0"));
 }
 
 int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {

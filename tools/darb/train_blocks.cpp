@@ -96,6 +96,7 @@ void check_for_blocks(const TrainFlags& flags) {
     refuse(!flags.run.save_iterations.empty(), "--save-iterations", kAfter);
     refuse(!flags.run.checkpoint_iterations.empty(), "--checkpoint-iterations",
            "Leave it out; --checkpoint-interval is for each block.");
+    refuse(flags.verbose, "--verbose", "Leave it out: each block's metrics.json has its passes.");
     refuse(flags.allow_mixed, "--allow-mixed", "Leave it out: each block is trained on one rank.");
     refuse(flags.train.start == StartPoints::dense || flags.train.start == StartPoints::random,
            "--start dense or random", "Use --start auto or points.");
@@ -121,11 +122,16 @@ int train_blocks(Ranks& ranks, TrainFlags flags, const TuneFlags& tune, std::str
     plan_strategy(dataset, flags);
     flags.run.command = std::move(command);
     const std::atomic<bool>& stop = stop_on_signals();
+    std::optional<Tuning> tuning;  // the same for every part, on every rank
     const auto device = [&] {
         auto made = std::make_unique<Device>(command_device(flags.device));
-        settle_tuning(*made, tune);
+        tuning ? made->set_tuning(*tuning) : settle_tuning(*made, tune);
         return made;
     };
+    if (auto first = device()) {
+        take_tuning_of_first(ranks, *first, !tune.choice.empty());
+        tuning = first->tuning();
+    }
     if (ranks.is_first()) print_blocks_plan(*device(), dataset, flags);
     const BlocksJob job{
         dataset,

@@ -29,8 +29,9 @@ void widen_sh(int degree, SplatModel& model) {
     model.sh_rest = std::move(rest);
 }
 
-// Whatever the lens: a pinhole's frame with room beside it.
+// A pinhole's frame with room beside it; with a lens, which may see more than such a frame, all.
 bool may_see(const Camera& camera, const glm::dvec3& centre, double radius) {
+    if (camera.lens.active) return true;
     const glm::dvec3 at = camera.rotation * centre + camera.translation;
     if (at.z < -radius) return false;
     const double x = kBesidePicture * camera.width / (2 * camera.fx);

@@ -22,6 +22,20 @@ std::array<double, kChannels> picture_means(const ImageF& picture) {
     return sum;
 }
 
+// Those that see most of it, kFewestViews at most; in order.
+std::vector<std::size_t> best_views(const std::vector<std::vector<double>>& shares,
+                                    std::size_t cell) {
+    std::vector<std::size_t> best;
+    for (std::size_t v = 0; v < shares.size(); ++v)
+        if (shares[v][cell] > 0) best.push_back(v);
+    std::stable_sort(best.begin(), best.end(), [&](std::size_t a, std::size_t b) {
+        return shares[a][cell] > shares[b][cell];
+    });
+    best.resize(std::min(best.size(), kFewestViews));
+    std::sort(best.begin(), best.end());
+    return best;
+}
+
 }  // namespace
 
 std::vector<std::vector<double>> cell_shares(Device& device, const SplatModel& coarse,
@@ -55,6 +69,8 @@ std::vector<std::vector<std::size_t>> choose_views(const std::vector<std::vector
         for (std::size_t c = 0; c < of.size(); ++c)
             if (of[c] >= least || (c == most && of[c] > 0)) chosen[c].push_back(v);
     }
+    for (std::size_t c = 0; c < chosen.size(); ++c)
+        if (chosen[c].size() < kFewestViews) chosen[c] = best_views(shares, c);
     return chosen;
 }
 

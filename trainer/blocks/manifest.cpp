@@ -73,6 +73,7 @@ void write_manifest(const std::filesystem::path& path, const BlocksManifest& m) 
         {"settings", ManifestJson::parse(m.settings)},
         {"dataset", m.dataset},
         {"max_memory_bytes", m.max_memory},
+        {"coarse_scale", m.coarse_scale},
         {"columns", cells.columns},
         {"rows", cells.rows},
         {"least_share", kLeastShare},
@@ -92,7 +93,7 @@ void write_manifest(const std::filesystem::path& path, const BlocksManifest& m) 
                          {"high", manifest_json(cell.high)},
                          {"margin", manifest_json(cell.margin)},
                          {"points", block.points},
-                         {"cameras", block.cameras}};
+                         {"views", block.views}};
         row.update(manifest_json(block.part));
         json["blocks"].push_back(std::move(row));
     }
@@ -111,16 +112,18 @@ BlocksManifest read_manifest(const std::filesystem::path& path) {
         m.settings = nlohmann::json::parse(json.at("settings").dump()).dump();
         m.dataset = json.at("dataset");
         m.max_memory = json.at("max_memory_bytes");
+        m.coarse_scale = json.at("coarse_scale");
         m.cells.columns = json.at("columns");
         m.cells.rows = json.at("rows");
         m.coarse = part_from(json.at("coarse"));
         m.joined = json.at("joined_splats");
         for (const ManifestJson& row : json.at("blocks"))
-            m.blocks.push_back(
-                {row.at("name"), row.at("points"), row.at("cameras"), part_from(row)});
+            m.blocks.push_back({row.at("name"), row.at("points"), row.at("views"), part_from(row)});
     } catch (const std::exception& e) {
         throw Error(path.string(), std::string("is no manifest of blocks: ") + e.what(), kRemedy);
     }
+    if (!(m.coarse_scale > 0 && m.coarse_scale <= 1))
+        throw Error(path.string(), fmt::format("'coarse_scale' is {}", m.coarse_scale), kRemedy);
     if (m.cells.columns < 1 || m.cells.rows < 1 || m.cells.columns > kMostCells ||
         m.cells.rows > kMostCells ||
         m.blocks.size() != std::size_t(m.cells.columns) * std::size_t(m.cells.rows))

@@ -27,7 +27,7 @@ struct PartRecord {
 struct BlockRecord {
     std::string name;  // COLUMNxROW, from 0; its folder
     std::size_t points = 0;
-    std::vector<std::string> cameras;  // by the views' names
+    std::vector<std::size_t> views;  // by their places among the training views
     PartRecord part;
 };
 
@@ -35,6 +35,7 @@ struct BlocksManifest {
     std::string settings;          // settings_text()
     std::string dataset;           // dataset_fingerprint() without photos
     std::uint64_t max_memory = 0;  // bytes of device memory; 0: no bound
+    double coarse_scale = 0;       // of the photos' sides, for the coarse model
     Partition cells;
     PartRecord coarse;
     std::vector<BlockRecord> blocks;

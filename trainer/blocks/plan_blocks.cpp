@@ -91,7 +91,7 @@ std::string blocks_table(const BlocksManifest& m) {
             name, cameras, part.splats, part.frozen, part.kept,
             format_bytes(double(part.peak_bytes)), bound, part.seconds);
     };
-    for (const BlockRecord& block : m.blocks) row(block.name, block.cameras.size(), block.part);
+    for (const BlockRecord& block : m.blocks) row(block.name, block.views.size(), block.part);
     return text;
 }
 

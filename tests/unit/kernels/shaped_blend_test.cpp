@@ -60,6 +60,13 @@ TEST(ShapedBlend, Ends_areTheTwoKernels) {
             }
 }
 
+TEST(ShapedBlend, Exact_is_not_there_where_a_quadric_ends_inside_the_other_kernel) {
+    EXPECT_TRUE(has_exact_footprint(*kernel_from_name("blend:gaussian,raised_cosine")));
+    EXPECT_TRUE(has_exact_footprint(*kernel_from_name("blend:sinc,inverse_quadratic")));
+    EXPECT_FALSE(has_exact_footprint(*kernel_from_name("blend:gaussian,inverse_quadratic")));
+    EXPECT_FALSE(has_exact_footprint(*kernel_from_name("blend:inverse_multiquadric,gaussian")));
+}
+
 TEST(ShapedBlend, Derivatives_matchDifferences) {
     for (const int id : kBlends)
         for (const Footprint f : kFootprints) {

@@ -124,9 +124,16 @@ TEST(Partition, grids_follow_the_ground) {
 }
 
 TEST(CameraChoice, takes_who_sees_enough_and_gives_each_view_to_a_cell) {
-    const auto chosen = choose_views({{0.5, 0.04}, {0.05, 0.3}, {0.01, 0.02}, {0, 0}}, 0.05);
-    EXPECT_EQ(chosen[0], (std::vector<std::size_t>{0, 1}));
-    EXPECT_EQ(chosen[1], (std::vector<std::size_t>{1, 2}));
+    const auto chosen = choose_views(
+        {{0.5, 0.3}, {0.05, 0.3}, {0.01, 0.02}, {0, 0}, {0.2, 0.06}, {0.06, 0.01}}, 0.05);
+    EXPECT_EQ(chosen[0], (std::vector<std::size_t>{0, 1, 4, 5}));
+    EXPECT_EQ(chosen[1], (std::vector<std::size_t>{0, 1, 2, 4}));
+}
+
+TEST(CameraChoice, gives_a_cell_that_few_see_those_that_see_most_of_it) {
+    const auto chosen =
+        choose_views({{0.5, 0.01}, {0.5, 0.04}, {0.5, 0}, {0.5, 0.02}, {0.5, 0.03}}, 0.05);
+    EXPECT_EQ(chosen[1], (std::vector<std::size_t>{1, 3, 4}));
 }
 
 // 20 x 20 splats of different opacities on the ground from 0 to 20.
@@ -261,11 +268,11 @@ class BlocksManifestFile : public testing::Test {
         manifest_.settings = R"({"iterations":100,"seed":0})";
         manifest_.dataset = "abc";
         manifest_.max_memory = 5'000;
+        manifest_.coarse_scale = 0.25;
         manifest_.cells = two_cells();
         manifest_.coarse = {PartState::done, "", 0, 100, 100, 4'000, 1.5};
-        manifest_.blocks = {
-            {"0x0", 7, {"a", "b"}, {PartState::failed, "disk full", 64, 0, 0, 9, 2}},
-            {"1x0", 8, {"c"}, {}}};
+        manifest_.blocks = {{"0x0", 7, {0, 2}, {PartState::failed, "disk full", 64, 0, 0, 9, 2}},
+                            {"1x0", 8, {1}, {}}};
         write_manifest(path_, manifest_);
     }
     void TearDown() override { std::filesystem::remove(path_); }
@@ -292,7 +299,8 @@ TEST_F(BlocksManifestFile, comes_back_as_it_was) {
     ASSERT_EQ(read.blocks.size(), 2u);
     EXPECT_EQ(read.blocks[0].part.state, PartState::failed);
     EXPECT_EQ(read.blocks[0].part.error, "disk full");
-    EXPECT_EQ(read.blocks[0].cameras, (std::vector<std::string>{"a", "b"}));
+    EXPECT_EQ(read.blocks[0].views, (std::vector<std::size_t>{0, 2}));
+    EXPECT_EQ(read.coarse_scale, 0.25);
     EXPECT_EQ(read.blocks[1].part.state, PartState::waiting);
     EXPECT_EQ(refusal(manifest_, {2, 1}), "");
 }
