@@ -19,7 +19,6 @@ ForwardOptions forward_options(const TrainOptions& options) {
     f.huge_splat_path = options.huge_splat_path;
     f.store_for_backward = true;
     f.camera_gradient = options.refine_cameras;
-    if (options.refine_cameras) f.effects.off_centre = true;  // principal points move
     return f;
 }
 

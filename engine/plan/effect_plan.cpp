@@ -68,7 +68,7 @@ ProjectionEffects EffectPlan::projection() const {
     ProjectionEffects effects;
     for (const ProjectionSwitch& s : kProjectionSwitches)
         effects.*s.on = s.effect != kNoEffect && on(s.effect);
-    effects.off_centre |= effects.lens;
+    effects.off_centre |= effects.lens || on(EFFECT_CAMERAS);  // principal points move
     return effects;
 }
 
