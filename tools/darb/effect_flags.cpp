@@ -72,4 +72,10 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
     options.huge_splat_path = plan.huge_splat_path();
 }
 
+bool asks_for_exposure(const std::string& text) {
+    const EffectChoice choice = parse_effects(text);
+    return choice.base == EffectChoice::Base::all ||
+           choice.changed[EFFECT_EXPOSURE].value_or(false);
+}
+
 }  // namespace darb

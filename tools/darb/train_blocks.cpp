@@ -9,6 +9,7 @@
 #include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/stop_signals.h"
@@ -100,11 +101,8 @@ void check_for_blocks(const TrainFlags& flags) {
     refuse(flags.allow_mixed, "--allow-mixed", "Leave it out: each block is trained on one rank.");
     refuse(flags.train.start == StartPoints::dense || flags.train.start == StartPoints::random,
            "--start dense or random", "Use --start auto or points.");
-    const EffectChoice effects = parse_effects(flags.effects);
-    refuse(
-        effects.base == EffectChoice::Base::all || effects.changed[EFFECT_EXPOSURE].value_or(false),
-        "--effects with exposure",
-        "Leave exposure out: each block would find other colours for the same photo.");
+    refuse(asks_for_exposure(flags.effects), "--effects with exposure",
+           "Leave exposure out: each block would find other colours for the same photo.");
     refuse(flags.refine_cameras == "on" || effects.changed[EFFECT_CAMERAS].value_or(false),
            "--refine-cameras",
            "Leave it out: each block would find another pose for the same photo.");
