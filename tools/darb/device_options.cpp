@@ -1,11 +1,8 @@
 #include "tools/darb/device_options.h"
 
 #include <cstdlib>
-#include <span>
-#include <string>
 #include <string_view>
 
-#include "engine/plan/tuning_names.h"
 #include "tools/darb/user_folders.h"
 
 namespace darb {
@@ -36,15 +33,6 @@ DeviceOptions command_device(const std::string& select) {
         validation != nullptr && *validation != '\0' && std::string_view(validation) != "0";
     if (const char* faults = std::getenv("DARB_FAULT")) options.faults = parse_faults(faults);
     return options;
-}
-
-void take_tuning_of_first(Ranks& ranks, Device& device, bool keeps_own) {
-    if (ranks.count() == 1) return;
-    const std::string own = names_text(tuning_names(device.tuning()));
-    const Bytes first = from_first(ranks, std::as_bytes(std::span(own)));
-    if (keeps_own) return;
-    const std::string_view names(reinterpret_cast<const char*>(first.data()), first.size());
-    device.set_tuning(resumed_tuning(device.info(), device.tuning(), names, "tuning of rank 0"));
 }
 
 }  // namespace darb

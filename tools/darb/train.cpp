@@ -15,6 +15,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
 #include "tools/darb/page_output.h"
+#include "tools/darb/rank_tuning.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/train_blocks.h"

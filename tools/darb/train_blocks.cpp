@@ -11,6 +11,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/rank_tuning.h"
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/train_data.h"
