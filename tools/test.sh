@@ -7,17 +7,18 @@ cd "$(dirname "$0")/.." || exit 1
 all_steps="setup style release unit sync gpu clang sanitize fuzz"
 usage() {
     cat <<TEXT
-usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all but includes, long and python)
+usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all before includes)
   setup      install missing packages (tools/setup.sh)
   style      include arrows, length caps, clang-format (tools/check_style.sh)
   release    build with gcc, warnings are errors
   unit       tests that need no device
   sync       the quick device tests, under Vulkan synchronization validation
   gpu        the other device tests: training, long frames, numerics, scripts
-  clang      build with clang, warnings are errors, with ASan and UBSan, and the fuzzers
-  sanitize   unit tests and the quick tests of pipelines of that build
+  clang      build command, unit tests and fuzzers with clang, ASan and UBSan; warnings are errors
+  sanitize   unit tests of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   includes   build all with clang without precompiled headers: a forgotten include is an error
+  pipelines  build the rest of the tests with clang, ASan and UBSan, and run the quick ones of pipelines
   long       device tests that take minutes
   python     the Python module: installs what it needs, builds it and the command, runs tests/python
   quick      = setup style release unit
@@ -31,7 +32,7 @@ case "${1:-full}" in
     *) steps=$* ;;
 esac
 for step in $steps; do
-    [[ " $all_steps includes long python " == *" $step "* ]] || { usage >&2; exit 2; }
+    [[ " $all_steps includes pipelines long python " == *" $step "* ]] || { usage >&2; exit 2; }
 done
 
 jobs=$(nproc)
@@ -40,7 +41,8 @@ logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 
 # Device tests start their own threads, one per core, so two at a time are plenty.
-# A device test runs once here, under validation (sync) or without (gpu); those of pipelines again under sanitizers.
+# A device test runs once here, under validation (sync) or without (gpu); those of pipelines also under sanitizers, in
+# the step of that name.
 # Without validation: cases whose name ends in _slow, those that look at SPIR-V or at other vector widths;
 # those in _long in the step of that name.
 long='_long(/|$)'
@@ -50,7 +52,7 @@ numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases|Eff
 # Of processes and of scripts, seconds each: they find nothing new under sanitizers or validation.
 once='^(scripts|pages|Outputs)\.'
 # Passes that other tests also record, with other numbers: without validation.
-same_passes='^(kernel_gradient|walk|accuracy_walk|hard_case|blend|blend_backward|project)_test$'
+same_passes='^(kernel_gradient|walk|accuracy_walk|hard_case|blend|blend_backward|project|effect_picture|viewer_picture)_test$'
 without_validation="$gpu_alone|$once|$same_passes"
 run_ctest() {
     local preset=$1 log
@@ -77,7 +79,7 @@ build() {
         cat "$logs/configure"
         return 1
     fi
-    cmake --build --preset "$1" -j "$jobs" -- -k 0 # every error, not only the first
+    cmake --build --preset "$1" -j "$jobs" ${2:+--target "${@:2}"} -- -k 0 # every error, not only the first
 }
 
 # With the drivers of drivers.gpu_compilers_slow, which skips where they cannot be had.
@@ -88,7 +90,7 @@ do_setup() {
 }
 do_style() { tools/check_style.sh; }
 do_release() { build release; }
-do_clang() { build asan; }
+do_clang() { build asan darb unit_tests fuzzers make_seeds; }
 do_unit() { run_ctest build -L '^unit$'; }
 do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E "$without_validation" --timeout 300; }
 do_gpu() {
@@ -100,10 +102,12 @@ do_gpu() {
 do_includes() { build clang; }
 do_long() { run_ctest build -R "$long"; }
 do_python() { tools/setup.sh --with-python --with-torch && build python && run_ctest build-python -R '^python\.'; }
-do_sanitize() {
+run_sanitized() { # LABEL
     ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
-        run_ctest build-asan -L '^(unit|pipeline)$' -E "$gpu_alone|$once|$numerics" --timeout 300
+        run_ctest build-asan -L "^$1\$" -E "$gpu_alone|$once|$numerics" --timeout 300
 }
+do_sanitize() { run_sanitized unit; }
+do_pipelines() { build asan && run_sanitized pipeline; }
 do_fuzz() { tools/fuzz.sh 0.02; }
 
 started=$SECONDS
@@ -115,7 +119,7 @@ for step in $steps; do
         continue
     fi
     case $step in
-        unit | gpu | sanitize | sync | long | python) # counted case by case
+        unit | gpu | sanitize | sync | pipelines | long | python) # counted case by case
             "do_$step"
             status=$?
             ;;
@@ -135,7 +139,7 @@ done
 for step in ${failures[@]+"${failures[@]}"}; do
     echo "=== $step, what failed:"
     case $step in
-        unit | gpu | sanitize | sync | long | python) grep -h -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step".* | head -120 ;;
+        unit | gpu | sanitize | sync | pipelines | long | python) grep -h -A 30 -E '\*\*\*(Failed|Timeout|Exception)' "$logs/$step".* | head -120 ;;
         *) tail -n 60 "$logs/$step.log" ;;
     esac
 done

@@ -24,6 +24,7 @@ constexpr double kAnchoredRate_px = 0.1, kFreeRate_px = 0.5;
 constexpr std::size_t kMostTracks = 1'000;  // of a photo, that anchor it
 constexpr double kHuberPx = 1;              // beyond, tracks pull no stronger
 constexpr std::size_t kFewestCameras = 3;
+constexpr std::size_t kPointsOfAll = 20'000;  // of a set without tracks, for the length of a step
 
 std::vector<glm::dvec3> positions(const PointCloud& points) {
     std::vector<glm::dvec3> all;
@@ -33,16 +34,20 @@ std::vector<glm::dvec3> positions(const PointCloud& points) {
     return all;
 }
 
-// Of one view those that its photo saw, else all.
+// Of one view those that its photo saw; of a set without tracks some of all, the same for each.
 std::vector<std::vector<glm::dvec3>> points_by_view(const Dataset& dataset,
                                                     const std::vector<glm::dvec3>& points) {
-    std::vector<std::vector<glm::dvec3>> by_view(dataset.views.size());
     const PointCloud& cloud = dataset.points;
+    if (cloud.seen_begin.empty()) {
+        std::vector<glm::dvec3> some;
+        for (std::size_t p = 0; p < points.size(); p += points.size() / kPointsOfAll + 1)
+            some.push_back(points[p]);
+        return {some};
+    }
+    std::vector<std::vector<glm::dvec3>> by_view(dataset.views.size());
     for (std::size_t p = 0; p + 1 < cloud.seen_begin.size(); ++p)
         for (std::size_t k = cloud.seen_begin[p]; k < cloud.seen_begin[p + 1]; ++k)
             by_view[cloud.seen_by[k]].push_back(points[p]);
-    if (cloud.seen_begin.empty())
-        for (auto& seen : by_view) seen = points;
     return by_view;
 }
 
@@ -104,7 +109,8 @@ CameraRefinement::CameraRefinement(const Dataset& dataset, const TrainOptions& o
         if (view.is_test) continue;
         groups_[at->second].trained_views += 1;
         pose_of_[v] = static_cast<int>(poses_.size());
-        poses_.push_back({static_cast<int>(v), PoseMetric(c, seen[v], depth), {}, {}});
+        poses_.push_back(
+            {static_cast<int>(v), PoseMetric(c, seen[seen.size() > 1 ? v : 0], depth), {}, {}});
     }
     cameras_ = start_;
     for (const TrackObservation& o : track_observations(dataset))
@@ -191,12 +197,12 @@ bool CameraRefinement::step(int iteration, std::span<const CameraVisit> visits) 
         const PoseVector gradient = pose_gradient(pose, d);
         const glm::dvec4& unit =
             groups_[static_cast<std::size_t>(group_of_[static_cast<std::size_t>(visit.view)])].unit;
-        auto& sum = by_group[group_of_[static_cast<std::size_t>(visit.view)]];
         const std::array own{d.d_fx, d.d_fy, d.d_cx, d.d_cy};
         bool finite = true;
         for (const double value : gradient) finite &= std::isfinite(value);
         for (const double value : own) finite &= std::isfinite(value);
         if (!finite) continue;
+        auto& sum = by_group[group_of_[static_cast<std::size_t>(visit.view)]];
         for (std::size_t i = 0; i < 4; ++i) sum[i] += own[i] * unit[static_cast<int>(i)];
         pose.trained.step(gradient, now);
     }

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "engine/core/check.h"
 #include "engine/core/error.h"
 
 namespace darb {
@@ -130,15 +131,17 @@ void TrainingPhotos::make_smaller(ResolutionRamp& ramp, int divisor) {
     small_.cameras = upload_cameras(*device_, small_.data);
 }
 
-void TrainingPhotos::set_camera(int view, const Camera& camera) {
-    const auto place = [&](Size& size, const Camera& at_size) {
-        size.data[view] = camera_data(at_size, origin_);
-        size.cameras.upload(std::vector{size.data[view]},
-                            static_cast<std::uint64_t>(view) * sizeof(gpu::CameraData));
+void TrainingPhotos::set_cameras(const std::vector<Camera>& cameras) {
+    DARB_CHECK(cameras.size() == view_cameras_.size());
+    view_cameras_ = cameras;
+    const auto place = [&](Size& size, int divisor) {
+        for (std::size_t v = 0; v < cameras.size(); ++v)
+            size.data[v] =
+                camera_data(divisor > 1 ? divided(cameras[v], divisor) : cameras[v], origin_);
+        size.cameras.upload(size.data);
     };
-    view_cameras_[view] = camera;
-    place(whole_, camera);
-    if (divisor_ > 1) place(small_, divided(camera, divisor_));
+    place(whole_, 1);
+    if (divisor_ > 1) place(small_, divisor_);
 }
 
 std::uint64_t TrainingPhotos::small_pixels() const {

@@ -47,10 +47,10 @@ class TrainingPhotos {
     /// What was recorded last goes to the queue: else the next place() copies anew.
     void submitted() { pending_ = false; }
     bool stream() const { return memory_ == Memory::waiting; }
-    /// The camera of a view at its whole size, and another in its place: of the same size. The
-    /// queue must be idle.
+    /// The camera of a view at its whole size.
     const Camera& camera(int view) const { return view_cameras_[view]; }
-    void set_camera(int view, const Camera& camera);
+    /// Others in place of those of all views, of the same sizes. The queue must be idle.
+    void set_cameras(const std::vector<Camera>& cameras);
     /// The name of a view.
     const std::string& name(int view) const { return names_[view]; }
     /// Distance of the nearest points from the camera of a view; infinity: there are none.

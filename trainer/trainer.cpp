@@ -170,8 +170,10 @@ void Trainer::refine_cameras(const std::vector<StepInput>& views,
 }
 
 void Trainer::place_cameras() {
+    std::vector<Camera> cameras;
     for (std::size_t v = 0; v < photos_.view_count(); ++v)
-        photos_.set_camera(static_cast<int>(v), cameras_->camera(static_cast<int>(v)));
+        cameras.push_back(cameras_->camera(static_cast<int>(v)));
+    photos_.set_cameras(cameras);
 }
 
 std::optional<CameraMoves> Trainer::camera_moves() const {

@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 #include "engine/core/error.h"
 #include "engine/data/colmap.h"
@@ -85,10 +86,19 @@ bool is_number(std::string_view text) {
     return error == std::errc{} && end == text.data() + text.size();
 }
 
+float number_or_nan(std::string_view text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size()
+               ? static_cast<float>(value)
+               : std::numeric_limits<float>::quiet_NaN();
+}
+
+// Only tracks need them: a place that is no number is one that no track has.
 void add_observations(Lines& lines, ColmapImage& image) {
     while (!lines.rest().empty()) {
         for (int k = 0; k < 2; ++k)
-            image.observed.push_back(static_cast<float>(lines.number<double>("coordinate")));
+            image.observed.push_back(number_or_nan(lines.word("the observation's place")));
         lines.word("the observation's point");
     }
 }

@@ -124,7 +124,7 @@ TEST(CompareCommand, CamerasThatKeepTheirLens_areBlendedWithIt_slow) {
     EXPECT_GT(run["blending"]["blended_per_pixel"].get<double>(), 0.1);
 }
 
-TEST(CompareCommand, MorePulses_areTrainedStoredAndSetAgainstOne_slow) {
+TEST(CompareCommand, MorePulses_areTrainedStoredAndSetAgainstOne_long) {
     const fs::path out = scratch() / "compare_pulses";
     const Outcome compared = darb("compare " + kScene +
                                   " --kernels gaussian,sinc --pulses 1,3 -r 8 "

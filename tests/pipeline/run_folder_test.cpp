@@ -216,7 +216,7 @@ TEST_F(RunFolder, an_arc_is_held_out_and_measured_apart) {
     EXPECT_EQ(train("--iterations 1 -q --hold-out ring").code, 2);
 }
 
-TEST_F(RunFolder, the_plan_decides_on_antialiasing_slow) {
+TEST_F(RunFolder, the_plan_decides_on_antialiasing_long) {
     const auto antialias = [&](const char* options) {
         EXPECT_EQ(train(std::string("--iterations 1 -q ") + options).code, 0);
         return settings()["effects"]["antialias"].get<bool>();

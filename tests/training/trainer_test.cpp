@@ -461,7 +461,7 @@ TEST(Training, more_bad_gradients_than_one_in_a_thousand_stop_the_run) {
 }
 
 // Each in one footprint: gradients of both are compared with double elsewhere.
-TEST(Training, every_kernel_brings_the_loss_down) {
+TEST(Training, every_kernel_brings_the_loss_down_long) {
     for (int kernel = 0; kernel < KERNEL_ROWS; ++kernel) {
         const bool exact = kernel % 2 == 1 && has_exact_footprint(kernel);
         SCOPED_TRACE(std::string(kernel_name(kernel)) + (exact ? " exact" : " psi"));

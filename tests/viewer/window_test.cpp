@@ -230,7 +230,7 @@ TEST_F(WindowTest, Panels_grow_with_the_dots_per_inch_slow) {
 }
 
 // Each format in turn dropped on one running viewer; between them a file that is none.
-TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_slow) {
+TEST_F(WindowTest, Dropped_files_of_every_format_are_shown_long) {
     std::vector<fs::path> files;
     for (const char* name : {"a.compressed.ply", "a.spz", "a.splat"}) {
         files.push_back(folder_ / name);

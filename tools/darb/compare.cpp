@@ -17,6 +17,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/stop_signals.h"
@@ -82,8 +83,13 @@ int compare(Ranks& ranks, CompareFlags flags) {
     const std::vector<int> kernels = kernels_of(flags);
     Comparison comparison;
     const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
-    for (const std::string& dataset : flags.datasets)  // bad options end it before it begins
-        refuse_without_cameras(train_flags_of(flags, dataset, kernels.front(), 0), ranks.count());
+    for (const std::string& dataset : flags.datasets) {  // bad options end it before it begins
+        const TrainFlags run = train_flags_of(flags, dataset, kernels.front(), 0);
+        refuse_without_cameras(run, ranks.count());
+        if (asks_for_cameras(run.effects))
+            throw Error("--effects with cameras", "has no place in compare, which has one for all",
+                        "Leave cameras out: darb eval measures runs that refine theirs.");
+    }
     for (const int kernel : kernels) comparison.kernels.emplace_back(kernel_name(kernel));
     comparison.iterations = flags.iterations;
     comparison.scales = flags.scales;

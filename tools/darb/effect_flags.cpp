@@ -74,8 +74,11 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
 
 bool asks_for_exposure(const std::string& text) {
     const EffectChoice choice = parse_effects(text);
-    return choice.base == EffectChoice::Base::all ||
-           choice.changed[EFFECT_EXPOSURE].value_or(false);
+    return choice.changed[EFFECT_EXPOSURE].value_or(choice.base == EffectChoice::Base::all);
+}
+
+bool asks_for_cameras(const std::string& text) {
+    return parse_effects(text).changed[EFFECT_CAMERAS].value_or(false);  // `all` leaves it off
 }
 
 }  // namespace darb

@@ -21,8 +21,9 @@ void add_lens_flag(CLI::App& command, DatasetOptions& data);
 /// where they cannot be read, ask for an effect that the use cannot have, or contradict --lens.
 EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptions& data);
 
-/// Whether --effects turns exposure on.
+/// Whether --effects turns exposure on, or refined cameras.
 bool asks_for_exposure(const std::string& text);
+bool asks_for_cameras(const std::string& text);
 
 /// A row an effect: name, on, overridden, measured, reason.
 nlohmann::json plan_json(const EffectPlan& plan);

@@ -104,9 +104,7 @@ void check_for_blocks(const TrainFlags& flags) {
            "--start dense or random", "Use --start auto or points.");
     refuse(asks_for_exposure(flags.effects), "--effects with exposure",
            "Leave exposure out: each block would find other colours for the same photo.");
-    refuse(flags.refine_cameras == "on" ||
-               parse_effects(flags.effects).changed[EFFECT_CAMERAS].value_or(false),
-           "--refine-cameras",
+    refuse(flags.refine_cameras == "on" || asks_for_cameras(flags.effects), "--refine-cameras",
            "Leave it out: each block would find another pose for the same photo.");
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace darb::make_scene {
@@ -71,7 +72,8 @@ void add_block(const dvec3& corner, Pcg32& rng, World& world) {
         for (int y = 0; y < kLots; ++y) {
             const dvec3 at =
                 corner + dvec3(kStreet / 2 + (x + 0.5) * lot, kStreet / 2 + (y + 0.5) * lot, 0.02);
-            add_house(at, rng.uniform(0.5, 0.75) * lot, rng.uniform(0.5, 0.75) * lot, rng, world);
+            const double depth = rng.uniform(0.5, 0.75) * lot, width = rng.uniform(0.5, 0.75) * lot;
+            add_house(at, width, depth, rng, world);
             add_tree(at + dvec3(0.44 * lot, rng.uniform(-0.4, 0.4) * lot, 0), rng, world);
         }
 }
