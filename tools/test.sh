@@ -45,7 +45,7 @@ trap 'rm -rf "$logs"' EXIT
 # the step of that name.
 # Without validation: cases whose name ends in _slow, those that look at SPIR-V or at other vector widths;
 # those in _long in the step of that name.
-long='_long(/|$)'
+long='_long(/|$| )' # a space: ctest adds the parameter
 gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others, or the same host code for long: not under sanitizers.
 numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)\.|for_every_kernel$|Accuracy_switch_changes|^trained_command_test$|splats_far_off_coarsen'
