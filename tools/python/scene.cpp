@@ -110,7 +110,7 @@ void bind_attribute(py::class_<PyScene>& scene, const char* name, const char* do
                 throw Error(
                     name,
                     fmt::format("has no place in the kernel {}", kernel_name(self.model().kernel)),
-                    "Assign kernel = \"beta\" first.");
+                    "Assign one that learns a shape, as kernel = \"beta\", first.");
             const Floats floats = wanted.size() == 1 ? take_floats(value, name, {wanted[0]})
                                   : wanted.size() == 2
                                       ? take_floats(value, name, {wanted[0], wanted[1]})
@@ -229,9 +229,10 @@ void bind_scene(py::module_& module) {
                                     "[N, 3] float32: colour = 0.5 + 0.2821 sh_dc + other bands.");
     bind_attribute<ATTRIBUTE_SH_REST>(scene, "sh_rest",
                                       "[N, K - 1, 3] float32, the bands above the first.");
-    bind_attribute<ATTRIBUTE_SHAPE>(scene, "shapes",
-                                    "[N] float32, ln(b / 4) of the kernel beta, (1 - q/13)^b; None "
-                                    "with another kernel, and 0 from where one takes beta.");
+    bind_attribute<ATTRIBUTE_SHAPE>(
+        scene, "shapes",
+        "[N] float32, of a kernel that learns one: ln(b / 4) of beta; None "
+        "with another kernel, and 0 from where one takes such a kernel.");
 }
 
 }  // namespace darb::python

@@ -92,7 +92,7 @@ def rasterize(means, quats=None, scales=None, opacities=None, *, colors=None, sh
         colors     [N, 3]  RGB of any sign, as they are: nothing is added and nothing clamped
         sh         [N, K, 3]  harmonics instead, K = 1, 4, 9 or 16, the first band first:
                            colour = max(0, 0.5 + sum over k of sh[k] Y_k(direction)), as 3DGS has it
-        shapes     [N]     of kernel="beta" alone: t of its profile (1 - q/13)^b, b = 4 exp(t); 0
+        shapes     [N]     of kernels that learn one (docs/kernels.md): of "beta" ln(b/4); 0
                            of all by default
     Cameras, float32 or float64:
         viewmats   [C, 4, 4]  world to camera, rigid; x right, y down, z forward
@@ -124,7 +124,7 @@ def rasterize_backward(d_image, d_alpha=None, *, means, quats=None, scales=None,
 
     d_image [C, H, W, 3] is dL/d(image), d_alpha [C, H, W] or None dL/d(alpha), float32. The other
     arguments are those of rasterize. "means", "quats", "scales", "opacities", "colors" or "sh", and
-    "shapes" of the kernel beta are as large as the inputs and added over the cameras, "backgrounds"
+    "shapes" of kernels that learn one are as large as the inputs and added over the cameras, "backgrounds"
     is [C, 3]. A Scene has "log_scales" and "opacity_logits" instead of scales and opacities.
 
     With camera "viewmats" [C, 4, 4] and "Ks" [C, 3, 3], too: their numbers are taken freely, as
@@ -170,7 +170,8 @@ Scene.__doc__ = """A splat scene in memory.
 
 Attributes are read-only looks at the scene's own float32; assign an array of the same shape to
 change one: means [N, 3], log_scales [N, 3], quats [N, 4] (w x y z), opacity_logits [N], sh_dc
-[N, 3], sh_rest [N, K - 1, 3], shapes [N] (of the kernel beta, else None). kernel, footprint and antialiased say how it is drawn. The splats
+[N, 3], sh_rest [N, K - 1, 3], shapes [N] (of a kernel that learns one, else None). kernel, footprint and antialiased say
+how it is drawn. The splats
 stay on the device between calls until one is assigned. A notebook shows a scene as a picture.
 """
 
