@@ -264,7 +264,7 @@ TEST_F(Outputs, names_of_files_do_not_steer_the_terminal) {
 }
 
 // Neither what was named by its whole path nor what a message says of it.
-TEST_F(Outputs, numbers_name_no_folder_of_the_machine) {
+TEST_F(Outputs, numbers_name_no_folder_of_the_machine_long) {
     const fs::path far = folder_ / "far", json = far / "n.json";
     fs::create_directories(far);
     const std::string data = data_.string(), s = ply().string(), of_far = scratch().string();
