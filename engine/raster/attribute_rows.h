@@ -35,7 +35,7 @@ BufferRange bound_rows(const Buffer& buffer, const AttributeRows& rows, const Sp
 /// Writes the rows [first, first + count) of [N][floats], whose rows are `pitch` floats apart, to
 /// where they lie in a buffer of N splats that begins at `to`; first: a multiple of ROW_BLOCK, as
 /// count is but where N ends there. What is padding becomes 0. Whether all of the values are
-/// finite.
+/// finite. A thread calls stream_fence() after the last of its calls.
 bool put_rows(const AttributeRows& rows, const float* values, std::size_t pitch, std::size_t first,
               std::size_t count, std::byte* to);
 

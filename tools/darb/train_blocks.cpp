@@ -126,11 +126,11 @@ int train_blocks(Ranks& ranks, TrainFlags flags, const TuneFlags& tune, std::str
         tuning ? made->set_tuning(*tuning) : settle_tuning(*made, tune);
         return made;
     };
-    if (auto first = device()) {
-        take_tuning_of_first(ranks, *first, !tune.choice.empty());
-        tuning = first->tuning();
-    }
-    if (ranks.is_first()) print_blocks_plan(*device(), dataset, flags);
+    auto first = device();
+    take_tuning_of_first(ranks, *first, !tune.choice.empty());
+    tuning = first->tuning();
+    if (ranks.is_first()) print_blocks_plan(*first, dataset, flags);
+    first.reset();  // each part has one of its own
     const BlocksJob job{
         dataset,
         flags.train,

@@ -105,8 +105,8 @@ void finish_train_flags(TrainFlags& f) {
                     "Leave --footprint out, or use another kernel or one pulse.");
     if (f.train.shape_lr && !kernel_has_shape(f.train.kernel))
         say_note(
-            "note: --shape-lr is not used: splats have shapes of their own with --kernel beta and "
-            "generalized_exponential");
+            "note: --shape-lr is not used: splats have shapes of their own with --kernel beta, "
+            "generalized_exponential and blend:FIRST,SECOND");
     if (f.page && kernel_has_shape(f.train.kernel))
         throw Error("--html", "web pages cannot draw shapes of splats yet",
                     "Leave it out; darb convert --kernel gaussian OUT page.html writes a page of "

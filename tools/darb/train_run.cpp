@@ -8,6 +8,7 @@
 #include "engine/data/source.h"
 #include "engine/data/track_adjustment.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/outputs.h"
 #include "trainer/dense_start.h"
 #include "trainer/forecast.h"
 #include "trainer/strategy.h"
@@ -49,7 +50,15 @@ void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos) {
         plan_training(dataset, flags.run.photos, flags.train.sh_degree, training_choice(flags));
     apply_plan(plan, flags.train);
     apply_plan(plan, dataset.views);
-    if (flags.train.refine_cameras) flags.cameras_note = adjusted_cameras(dataset);
+    const TrainOptions usual;
+    if (flags.train.refine_cameras)
+        flags.cameras_note = adjusted_cameras(dataset);
+    else if (flags.train.camera_lr || flags.train.camera_from != usual.camera_from ||
+             flags.train.camera_anchor != usual.camera_anchor)
+        say_note(
+            "note: --camera-lr, --camera-from and --camera-anchor are not used: cameras are "
+            "refined "
+            "with --refine-cameras on");
     flags.run.effects = plan_line(plan);
     flags.run.effects_json =
         plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
