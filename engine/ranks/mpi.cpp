@@ -5,13 +5,17 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <mpi.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "engine/core/check.h"
@@ -35,12 +39,29 @@ constexpr double kSilentSeconds = 12;  // DARB_RANK_TIMEOUT has another
 constexpr double kLaterSeconds = 3;
 // What fails on all ranks is said by the first, which ends the others while they wait for that.
 constexpr auto kFirstSpeaks = milliseconds(1500);
+constexpr unsigned kLauncherSeconds = 6;
 constexpr auto kLongestNap = std::chrono::microseconds(400);
 
 double silent_seconds() {
     const char* const given = std::getenv("DARB_RANK_TIMEOUT");
     const double seconds = given ? std::atof(given) : 0;
     return seconds > 0 ? seconds : kSilentSeconds;
+}
+
+// mpirun waits to hear of a machine that cannot be reached for a quarter of an hour. A process of
+// its own tells it to end after kLauncherSeconds. Open MPI 4.1 then ends by a segmentation fault of
+// mpirun, as a signal by hand makes it.
+void end_launcher_later() {
+    const pid_t launcher = ::getppid();
+    std::string name;
+    std::getline(std::ifstream(fmt::format("/proc/{}/comm", launcher)), name);
+    if (name != "mpirun" && name != "mpiexec" && name != "orterun" && name != "prterun") return;
+    const long handle = ::syscall(SYS_pidfd_open, launcher, 0);
+    if (handle < 0 || ::fork() != 0) return;
+    ::setsid();  // mpirun ends what is in this process's group
+    ::sleep(kLauncherSeconds);
+    ::syscall(SYS_pidfd_send_signal, handle, SIGTERM, nullptr, 0);
+    std::_Exit(0);
 }
 
 class MpiRanks : public Ranks {
@@ -233,12 +254,14 @@ void MpiRanks::check_heard(const std::vector<Clock::time_point>& heard, Clock::t
     const int last = rank_ == 0 ? count_ : 1;
     const double limit = silent_seconds() + (rank_ > 1 ? kLaterSeconds : 0);
     for (int r = 0; r < last; ++r)
-        if (r != rank_ && duration<double>(now - heard[std::size_t(r)]).count() > limit)
+        if (r != rank_ && duration<double>(now - heard[std::size_t(r)]).count() > limit) {
+            end_launcher_later();
             end_all(fmt::format("{} has said nothing for {:.0f} s: it was stopped, or cannot be "
                                 "reached\n  All ranks end; go on from the last checkpoint with "
                                 "--resume.",
                                 name_of(r), limit),
                     2);
+        }
 }
 
 void MpiRanks::end_all(const std::string& what, int exit_code) {
