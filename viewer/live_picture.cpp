@@ -96,8 +96,7 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish, bool wh
         compiled_ = panes ? panes_.compiled() : picture_.compiled();
         if (panes) {
             Panes layout = wish.panes;
-            fit_lines(panes_.count(), layout,
-                      static_cast<float>(wish.area.left) / static_cast<float>(wish.area.width));
+            fit_lines(panes_.count(), layout, compared_strip(photos_, wish.key.display, wish.area));
             panes_.compose(layout);
             if (whole) made.psnr_db = panes_.psnr_db();
         }

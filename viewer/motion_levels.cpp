@@ -14,7 +14,7 @@ namespace {
 
 struct Cancelled {};
 
-constexpr int kNice = 15;  // pictures come first
+constexpr int kQuickNice = 5, kNice = 15;  // pictures come first
 
 SplatModel without(const SplatModel& model, const std::vector<std::uint8_t>& removed) {
     SplatModel kept = model;
@@ -37,26 +37,33 @@ MotionLevels::~MotionLevels() {
 }
 
 void MotionLevels::run() {
-    setpriority(PRIO_PROCESS, 0, kNice);  // of this thread, on Linux
-    const MergeOptions options{.threads = 1, .progress = [this](double) {
-                                   if (cancelled_) throw Cancelled();
-                               }};
     try {
-        for (const std::size_t count : counts_) {
-            if (cancelled_) break;
-            model_ = merge_splats(model_, count, options);
-            {
-                const std::lock_guard lock(mutex_);
-                ready_.push_back(model_);
-            }
-            if (wake_) wake_();
-        }
+        make_levels(true);
+        make_levels(false);
     } catch (const Cancelled&) {
     } catch (const std::bad_alloc&) {  // the important splats do without them
     }
     model_ = SplatModel();
     done_ = true;
     if (wake_) wake_();
+}
+
+void MotionLevels::make_levels(bool quick) {
+    setpriority(PRIO_PROCESS, 0, quick ? kQuickNice : kNice);  // of this thread, on Linux
+    const MergeOptions options{.threads = 1, .quick = quick, .progress = [this](double) {
+                                   if (cancelled_) throw Cancelled();
+                               }};
+    SplatModel last;
+    for (std::size_t i = 0; i < counts_.size(); ++i) {
+        if (cancelled_) throw Cancelled();
+        last = merge_splats(i == 0 ? model_ : last, counts_[i], options);
+        if (!quick && i == 0) model_ = SplatModel();
+        {
+            const std::lock_guard lock(mutex_);
+            ready_.push_back(last);
+        }
+        if (wake_) wake_();
+    }
 }
 
 std::optional<SplatModel> MotionLevels::take() {

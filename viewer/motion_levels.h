@@ -1,5 +1,6 @@
 // MotionLevels: the levels of merged splats that are drawn in motion, made one after another by a
-// thread of low priority while the viewer goes on with the most important splats.
+// thread of low priority while the viewer goes on with the most important splats. First all of them
+// quickly, then again as near to the scene as they can be.
 #pragma once
 
 #include <atomic>
@@ -26,13 +27,15 @@ class MotionLevels {
     MotionLevels& operator=(const MotionLevels&) = delete;
 
     void cancel() { cancelled_ = true; }
-    /// The next level, in the order of the counts, where it is ready.
+    /// The next level where it is ready: in the order of the counts, twice; of one count the later
+    /// is the better one.
     std::optional<SplatModel> take();
     /// No more will come. Memory that does not suffice ends them early.
     bool done() const { return done_; }
 
   private:
     void run();
+    void make_levels(bool quick);
     SplatModel model_;
     std::vector<std::size_t> counts_;
     std::function<void()> wake_;

@@ -77,7 +77,7 @@ void PanePictures::draw_photo(const PhotoOverlay& photo, const DisplaySettings& 
     commands_.submit_and_wait();
 }
 
-// Where the photo has nothing, the picture beside it is seen.
+// Where the photo has nothing, the picture beside it is seen, darker.
 void PanePictures::compose(const Panes& panes) {
     const Layout layout{panes.lines, panes.difference, panes.difference_max};
     if (pictures_.size() < 2 || composed_ == layout) return;

@@ -20,12 +20,13 @@ std::vector<int> kernels_beside(const Panes& panes, int shown) {
     return kernels;
 }
 
-void fit_lines(std::size_t panes, Panes& state, float left) {
+void fit_lines(std::size_t panes, Panes& state, const Strip& within) {
     const std::size_t wanted = panes > 0 ? panes - 1 : 0;
     if (state.lines.size() == wanted) return;
     state.lines.resize(wanted);
     for (std::size_t i = 0; i < wanted; ++i)
-        state.lines[i] = left + (1 - left) * static_cast<float>(i + 1) / static_cast<float>(panes);
+        state.lines[i] = within.begin + (within.end - within.begin) * static_cast<float>(i + 1) /
+                                            static_cast<float>(panes);
 }
 
 void move_line(std::size_t line, float share, Panes& state) {

@@ -21,9 +21,12 @@ struct Panes {
 
 /// Those of panes.kernels but the one that is shown first.
 std::vector<int> kernels_beside(const Panes& panes, int shown);
-/// Lines where their number is not one less than that of the panes: evenly spaced right of `left`,
-/// a share of the width.
-void fit_lines(std::size_t panes, Panes& state, float left = 0);
+/// A part of a window, in shares of its width.
+struct Strip {
+    float begin = 0, end = 1;
+};
+/// Lines where their number is not one less than that of the panes: evenly spaced in `within`.
+void fit_lines(std::size_t panes, Panes& state, const Strip& within = {});
 /// A line stays between its neighbours.
 void move_line(std::size_t line, float share, Panes& state);
 /// Where the panes begin and end, px: [panes + 1], from 0 to width, ascending.

@@ -1,5 +1,6 @@
 #include "viewer/photo_compare.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "engine/core/error.h"
@@ -30,6 +31,20 @@ PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, const Window
 bool photo_beside(const Photos& photos, const DisplaySettings& display) {
     return photos.compare && photos.current >= 0 && photos.loaded == photos.current &&
            display.mode == VIEW_COLOUR;
+}
+
+Strip compared_strip(const Photos& photos, const DisplaySettings& display, const WindowArea& area) {
+    const double width = std::max(area.width, 1);
+    double begin = area.left, end = width;
+    if (photo_beside(photos, display)) {
+        const Camera& of = photos.view().camera;
+        const double free = width - area.left;
+        const double beyond =
+            std::max(0.0, free - fit_scale(of, static_cast<int>(free), area.height) * of.width);
+        begin += beyond / 2;
+        end -= beyond / 2;
+    }
+    return {static_cast<float>(begin / width), static_cast<float>(end / width)};
 }
 
 void load_photo_of_view(Device& device, Photos& photos) {

@@ -7,6 +7,7 @@
 #include "engine/gpu/buffer.h"
 #include "viewer/display.h"
 #include "viewer/navigation.h"
+#include "viewer/panes.h"
 
 namespace darb {
 
@@ -35,6 +36,9 @@ Camera camera_in_window(const Photos& photos, const Navigation& free, const Wind
 PhotoOverlay overlay_of(const Photos& photos, const Camera& camera, const WindowArea& area);
 /// Whether the photo is shown beside the picture: it is wanted, there, and no error map is.
 bool photo_beside(const Photos& photos, const DisplaySettings& display);
+/// Where the lines between panes are put at first: over the photo where it is one of them, as
+/// beside it there is nothing to compare with; else right of the panels.
+Strip compared_strip(const Photos& photos, const DisplaySettings& display, const WindowArea& area);
 /// The photo of the camera that is looked through. Throws Error where it has none.
 void load_photo_of_view(Device& device, Photos& photos);
 

@@ -136,7 +136,12 @@ void SplatPicture::update_scene() {
 }
 
 void SplatPicture::add_level(const SplatModel& level) {
-    levels_.emplace_back(*device_, level, false);
+    const auto same = std::find_if(levels_.begin(), levels_.end(),
+                                   [&](const GpuSplats& l) { return l.count() == level.size(); });
+    if (same != levels_.end())
+        *same = GpuSplats(*device_, level, false);
+    else
+        levels_.emplace_back(*device_, level, false);
 }
 
 void SplatPicture::drop_levels() {

@@ -37,7 +37,8 @@ class SplatPicture {
     /// important: what to draw in motion, most important first; may be none.
     void set_scene(const SplatModel& model, const Bounds& bounds,
                    std::vector<std::uint32_t> important = {});
-    /// A level of the scene's merged splats, fewer than those before it; in motion it is drawn
+    /// A level of the scene's merged splats, fewer than those before it, or as many as one of them,
+    /// in whose place it comes; in motion it is drawn
     /// instead of so many important ones. Not for display styles. Throws Error.
     void add_level(const SplatModel& level);
     /// All levels are there: the important splats are not needed any more.

@@ -118,9 +118,9 @@ void Viewer::render_shown(const Camera& camera, const WindowArea& area,
 }
 
 void Viewer::compose_panes() {
-    const double left = free_area(session_, canvas_.width(), canvas_.height()).left;
+    const WindowArea area = free_area(session_, canvas_.width(), canvas_.height());
     fit_lines(shows_panes_ ? panes_.count() : 0, session_.panes,
-              static_cast<float>(left / std::max(canvas_.width(), 1)));
+              compared_strip(session_.photos, session_.display, area));
     if (shows_panes_) attempt([&] { panes_.compose(session_.panes); });
 }
 

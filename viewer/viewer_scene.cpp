@@ -293,7 +293,7 @@ void Viewer::follow_live(int width, int height) {
     const WindowArea area = free_area(s, width, height);
     const std::vector<int> beside = kernels_beside(s.panes, s.display.kernel);
     const std::size_t panes = beside.size() + (photo_beside(s.photos, s.display) ? 2 : 1);
-    fit_lines(panes, s.panes, static_cast<float>(area.left) / static_cast<float>(width));
+    fit_lines(panes, s.panes, compared_strip(s.photos, s.display, area));
     live_->wish({{camera_in_window(s.photos, s.navigation, area), s.display, s.photos.current,
                   s.photos.compare, beside, 0},
                  area,

@@ -127,8 +127,7 @@ Dataset load_source(const fs::path& path, DatasetOptions& options) {
     if (!fs::exists(path)) throw Error(path.string(), "does not exist", "Check the path.");
     if (!fs::is_directory(path)) {
         if (has_extension(path, ".json")) return load_transforms(path, options);
-        throw Error(path.string(), "is neither a folder nor a .json file",
-                    "Name a COLMAP project, a folder with transforms.json, or that file.");
+        refuse_file(path);
     }
     const bool transforms = std::ranges::any_of(
         kTransformsFiles, [&](const char* name) { return fs::exists(path / name); });
@@ -154,11 +153,7 @@ Dataset load_source(const fs::path& path, DatasetOptions& options) {
                                             dataset.root.string(), path.string()));
         return dataset;
     }
-    throw Error(
-        path.string(),
-        "holds no cameras: neither a COLMAP model (sparse/0 with cameras and images, .bin or "
-        ".txt) nor transforms.json",
-        "Reconstruct the cameras first, for example with colmap.");
+    refuse_folder(path);
 }
 
 // Image ids of the tracks to indices of the sorted views, each once a point.

@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kKeptLines = 8;  // shown when a command fails
+constexpr std::size_t kMapper = 2;     // of colmap_commands
 
 std::string joined(const auto& lines) {
     std::string text;
@@ -27,8 +28,15 @@ std::string joined(const auto& lines) {
     return text;
 }
 
-void run_command(const std::string& command,
-                 const std::function<void(std::string_view)>& progress) {
+constexpr const char* kPhotosHint =
+    "Photos need 60 % overlap and texture; see what colmap says above.";
+// A camera that stands still, or turns alone, shows no depth.
+constexpr const char* kMotionHint =
+    "The camera must move between photos, around the scene; they need 60 % overlap, texture, and "
+    "no blur.";
+
+void run_command(const std::string& command, const std::function<void(std::string_view)>& progress,
+                 const char* hint = kPhotosHint) {
     const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
     std::unique_ptr<std::FILE, decltype(close)> pipe(::popen((command + " 2>&1").c_str(), "r"),
                                                      close);
@@ -49,7 +57,7 @@ void run_command(const std::string& command,
     if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
         throw Error("colmap",
                     fmt::format("failed:\n    {}\n  It printed last:{}", command, joined(last)),
-                    "Photos need 60 % overlap and texture; see what colmap says above.");
+                    hint);
 }
 
 /// What a command prints, whatever becomes of it.
@@ -148,12 +156,12 @@ fs::path run_colmap(const ColmapRun& asked, const std::function<void(std::string
     commands = colmap_commands(run);
     for (std::size_t i = 0; i < commands.size(); ++i) {
         if (progress) progress(fmt::format("[{}/{}] {}", i + 1, commands.size(), commands[i]));
-        run_command(commands[i], progress);
-        if (i != 2) continue;
+        run_command(commands[i], progress, i == kMapper ? kMotionHint : kPhotosHint);
+        if (i != kMapper) continue;
         run.model = largest_model(run.workspace / "sparse", progress);
         if (run.model.empty())
             throw Error(run.photos.string(), "colmap found no common view of the photos",
-                        "Take more photos with more overlap, in good light.");
+                        kMotionHint);
         commands = colmap_commands(run);
     }
     return run.workspace / "dense";

@@ -20,6 +20,10 @@ inline constexpr std::array kTransformsFiles{"transforms_train.json", "transform
 /// path: a .json file, or a folder with one of these.
 Dataset load_transforms(const std::filesystem::path& path, const DatasetOptions& options);
 
+/// Throw Error: what the file or folder is that holds no cameras, and the way to a data set.
+[[noreturn]] void refuse_file(const std::filesystem::path& file);
+[[noreturn]] void refuse_folder(const std::filesystem::path& folder);
+
 /// Reads the head of every photo, decides on EXIF, scales declared lenses to the photos' sizes
 /// (with a note), and sets each camera's intrinsics to what load_photo returns. Throws Error naming
 /// the photo where its aspect ratio is not the camera's. Photos that do not exist keep declared

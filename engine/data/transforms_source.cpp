@@ -144,14 +144,14 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
     Skipped skipped;
     Declared declared;
     dataset.root = fs::is_directory(path) ? path : path.parent_path();
-    fs::path json = path;
+    fs::path file = path;
     if (fs::is_directory(path))
         for (const char* name : kTransformsFiles)
-            if (json == path && fs::exists(path / name)) json = path / name;
-    dataset.source = json.filename().string();
+            if (file == path && fs::exists(path / name)) file = path / name;
+    dataset.source = file.filename().string();
     const bool test = dataset.source == "transforms_test.json";
-    add_frames(json, test, options, dataset, skipped, declared);
-    if (fs::is_directory(path) && json.filename() == "transforms_train.json") {
+    add_frames(file, test, options, dataset, skipped, declared);
+    if (fs::is_directory(path) && file.filename() == "transforms_train.json") {
         const bool has_test = fs::exists(path / "transforms_test.json");
         const bool has_val = fs::exists(path / "transforms_val.json");
         if (has_test || has_val)
@@ -164,7 +164,7 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
     }
     if (dataset.views.empty()) {
         const std::string scaled = scaled_images(dataset.root);
-        throw Error(json.string(),
+        throw Error(file.string(),
                     skipped.count == 0
                         ? "lists no frames"
                         : fmt::format("none of its {} photos is there, the first being {}",
@@ -183,7 +183,7 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
         dataset.notes.push_back(
             fmt::format("--images {} has no effect: no file_path in {} begins with images/. Use "
                         "-r to scale.",
-                        options.images_folder, json.filename().string()));
+                        options.images_folder, file.filename().string()));
     if (declared.scaled_poses > 0)
         dataset.notes.push_back(fmt::format("The scale of the rotation was removed: {}.",
                                             counted(declared.scaled_poses, "pose")));

@@ -1,13 +1,14 @@
 #include "engine/data/video.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
 #include <memory>
 #include <string>
 
@@ -22,8 +23,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::array<std::string_view, 8> kVideoExtensions{".mp4", ".mov",  ".m4v", ".mkv",
-                                                           ".avi", ".webm", ".mpg", ".mts"};
+constexpr std::string_view kVideoExtensions[] = {".mp4", ".mov",  ".m4v", ".mkv",  ".avi", ".webm",
+                                                 ".mpg", ".mpeg", ".mts", ".m2ts", ".3gp", ".wmv"};
 constexpr int kProbeWidth = 480, kProbeHeight = 270;  // px
 constexpr std::size_t kMostLogChars = 600;
 
@@ -81,18 +82,30 @@ std::string selection(const std::vector<std::size_t>& pictures) {
     return text + ")";
 }
 
+// What ffmpeg said, and what to do about the two commonest causes.
 [[noreturn]] void ffmpeg_failed(const fs::path& video, const LogFile& log) {
-    const std::string said = log.text();
-    throw Error(video.string(),
-                "ffmpeg cannot read it" + (said.empty() ? std::string() : ":\n    " + said),
-                "Check that it plays; ffmpeg -i shows what it holds.");
+    std::string said = "\n" + log.text();
+    const auto says = [&](const char* part) { return said.find(part) != std::string::npos; };
+    if (says("matches no streams"))
+        throw Error(video.string(), "holds no pictures, as sound alone does", "Name a video.");
+    const char* hint = says("moov atom not found") || fs::file_size(video) == 0
+                           ? "It is not whole: copy it from the camera again."
+                           : "Check that it plays; ffmpeg -i shows what it holds.";
+    for (std::size_t at = 0; (at = said.find('\n', at)) != std::string::npos; at += 5)
+        said.replace(at, 1, "\n    ");
+    throw Error(video.string(), "ffmpeg cannot read it" + (said.size() > 5 ? ":" + said : ""),
+                hint);
 }
 
 }  // namespace
 
 bool is_video_name(const fs::path& path) {
     const std::string extension = lower(path.extension().string());
-    return std::ranges::find(kVideoExtensions, extension) != kVideoExtensions.end();
+    return std::ranges::find(kVideoExtensions, extension) != std::end(kVideoExtensions);
+}
+
+std::string video_extensions() {
+    return fmt::format("{}", fmt::join(kVideoExtensions, ", "));
 }
 
 double laplacian_variance(const unsigned char* grey, int width, int height) {

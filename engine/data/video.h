@@ -5,13 +5,15 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <string_view>
+#include <string>
 #include <vector>
 
 namespace darb {
 
 /// By the extension: .mp4, .mov and the like.
 bool is_video_name(const std::filesystem::path& path);
+/// All of these, with commas.
+std::string video_extensions();
 
 /// Sharpness of every picture of a video, in their order: the variance of the Laplacian of its
 /// brightness at 480 x 270.

@@ -19,6 +19,7 @@
 #include "engine/core/on_threads.h"
 #include "engine/kernels/second_moment.h"
 #include "engine/kernels/shaped_kernel.h"
+#include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_moments.h"
 #include "engine/scene/splat_shapes.h"
@@ -29,6 +30,8 @@ namespace {
 
 constexpr std::size_t kNeighbours = 6;
 constexpr std::size_t kRoundDivisor = 4;  // a round merges at most a fourth of the splats
+constexpr std::size_t kAlongCurve = 2;    // of a quick merge: so many neighbours, of later splats
+constexpr std::size_t kChunk = 64;        // splats of one code of the curve
 constexpr double kApart = 1e-3;
 constexpr std::size_t kBlock = 1 << 15, kPart = 256;  // splats between reports, of a thread at once
 constexpr std::uint32_t kNone = 0xffffffff;
@@ -101,8 +104,19 @@ bool is_drawn(const SplatModel& model, std::size_t i) {
     return is_finite(model, i) && has_rotation(model, i);
 }
 
+/// Splats that are not drawn count as being at the origin.
+SplatModel along_curve(const SplatModel& model) {
+    SplatModel places;
+    places.origin = model.origin;
+    places.position = model.position;
+    places.opacity_logit = model.opacity_logit;  // their number
+    for (std::size_t i = 0; i < model.size(); ++i)
+        if (!is_drawn(model, i)) std::fill_n(&places.position[3 * i], 3, 0.0f);
+    return pick_splats(model, chunk_order(places, kChunk));
+}
+
 Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& options)
-    : model_(model),
+    : model_(options.quick ? along_curve(model) : model),
       second_moment_(rendered_second_moment(model.kernel, model.footprint)),
       threads_(options.threads > 0 ? options.threads
                                    : std::max(1u, std::thread::hardware_concurrency())),
@@ -117,8 +131,8 @@ Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& 
     const ShapedKernel& kernel = shaped_kernel(model.kernel);
     // What is merged has the shape 0. A splat counts as the one of this shape that is as wide.
     for (std::size_t i = 0; i < first_; ++i) {
-        const double moment =
-            kernel.second_moment(model.footprint, kernel.exponent(model.footprint, model.shape[i]));
+        const double moment = kernel.second_moment(
+            model.footprint, kernel.exponent(model.footprint, model_.shape[i]));
         for (double& c : moments_[i].covariance) c *= moment / second_moment_;
         moments_[i].mass *= moment / second_moment_;
     }
@@ -182,6 +196,13 @@ void Merging::drop_undrawn(std::size_t count) {
 }
 
 std::vector<std::uint32_t> Merging::find_neighbours() {
+    if (options_.quick) {
+        std::vector<std::uint32_t> next(kNeighbours * model_.size(), kNone);
+        for (std::size_t i = 0; i < model_.size(); ++i)
+            for (std::size_t k = 0; k < kAlongCurve && i + k + 1 < model_.size(); ++k)
+                next[kNeighbours * i + k] = static_cast<std::uint32_t>(i + k + 1);
+        return next;
+    }
     const std::vector<glm::dvec3> points = apart(moments_);
     const PointsView view{points};
     Tree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(16));

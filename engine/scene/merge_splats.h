@@ -13,6 +13,9 @@ namespace darb {
 
 struct MergeOptions {
     std::size_t threads = 0;  // 0: as many as the machine has; the result is the same bits
+    /// Neighbours are those along a curve through the scene alone, and what is left comes in its
+    /// order: a fraction of the time, and pictures farther off.
+    bool quick = false;
     /// Called by the caller's thread with a share of the work, 0 to 1, several times a second; may
     /// throw to stop.
     std::function<void(double share)> progress = {};

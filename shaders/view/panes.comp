@@ -18,6 +18,9 @@ layout(set = 0, binding = 2, scalar) writeonly buffer Pixels { uint pixels[]; };
 #include "lib/linear_id.glsl"
 #include "view/heat.glsl"
 
+// Of a picture's light, where a photo or an error is asked for and there is none: it ought not to be taken for one.
+const float BESIDE = 0.35;
+
 void main() {
     const uint i = linear_id();
     const uint columns = args.right - args.left;
@@ -26,8 +29,10 @@ void main() {
     const vec4 own = unpackUnorm4x8(picture[at]);
     const vec4 second = unpackUnorm4x8(other[at]);
     const bool both = own.a > 0.5 && second.a > 0.5;
-    vec3 bgr = own.a > 0.5 ? own.rgb : second.rgb;
-    if (args.difference == 1 && both)
-        bgr = heat(dot(abs(own.rgb - second.rgb), vec3(1.0 / 3.0)) / args.heat_max).bgr;
+    vec3 bgr = own.rgb;
+    if (own.a <= 0.5)
+        bgr = BESIDE * second.rgb;
+    else if (args.difference == 1)
+        bgr = both ? heat(dot(abs(own.rgb - second.rgb), vec3(1.0 / 3.0)) / args.heat_max).bgr : BESIDE * own.rgb;
     pixels[at] = packUnorm4x8(vec4(bgr, 1.0));
 }

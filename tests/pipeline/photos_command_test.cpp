@@ -83,6 +83,16 @@ TEST_F(PhotosCommand, pictures_that_are_not_read_are_counted) {
     expect_refused({{train(), "2 .heic, 1 .webp"}, {train(), "Convert them to PNG or JPEG"}});
 }
 
+TEST_F(PhotosCommand, pictures_among_photos_that_are_not_read_are_told) {
+    write_file_atomic(photos() / "a.HEIC", std::string("picture"));
+    const Outcome o = with_path((scratch() / "bin").string() + ":/usr/bin:/bin",
+                                fmt::format("train {} -o {} --iterations 1", photos().string(),
+                                            (scratch() / "mixed").string()));
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("1 .heic in"), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("heif-convert"), std::string::npos) << o.err;
+}
+
 TEST_F(PhotosCommand, masks_beside_the_photos_go_to_colmap_with_a_note) {
     write_file_atomic(scratch() / "masks/view_00.png.png", std::string("mask"));
     const std::string masks = (scratch() / "masks").string();

@@ -47,6 +47,27 @@ TEST(VideoCommand, what_is_missing_is_named_with_its_package) {
     fs::remove(scratch() / "bin" / "ffmpeg");
 }
 
+TEST(VideoCommand, sound_and_a_file_that_is_cut_off_are_told_apart) {
+    if (!is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
+    write_fake_program(program("colmap"), "exit 1\n");
+    const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
+    const auto says = [&](const std::string& source, const std::string& part) {
+        ASSERT_EQ(std::system(("ffmpeg -nostdin -v error -y -f lavfi -i " + source + " " +
+                               shell_quoted(video()))
+                                  .c_str()),
+                  0);
+        if (source.starts_with("testsrc")) {
+            const auto whole = read_file(video());
+            write_file_atomic(video(), std::span<const std::byte>(whole).first(whole.size() / 2));
+        }
+        const Outcome o = with_path(path, train());
+        EXPECT_EQ(o.code, 2);
+        EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
+    };
+    says("sine=duration=1 -c:a aac", "holds no pictures");
+    says("testsrc=size=32x24:duration=1 -c:v mpeg4", "It is not whole");
+}
+
 TEST(VideoCommand, its_sharpest_pictures_go_to_colmap_in_their_order) {
     if (!is_installed("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
     // Each picture three times: as it is between two blurred ones.

@@ -160,6 +160,38 @@ TEST_F(ViewerTest, The_photo_is_what_kernels_are_measured_against) {
     EXPECT_LT(s.panes.psnr_db[1], 45);
 }
 
+// The window is twice as wide as the photo, which lies in the middle of it.
+TEST_F(ViewerTest, Lines_begin_on_the_photo_and_beside_it_its_strip_is_darker) {
+    load(file_);
+    viewer_->choose_camera(0);
+    Session& s = viewer_->session();
+    const auto wide = [&] {
+        viewer_->frame({}, 2 * kWidth, kHeight, true);
+        viewer_->compose();
+        viewer_->canvas().submit_and_wait();
+        return viewer_->canvas().read_back();
+    };
+    const ImageU8 alone = wide();
+    s.photos.compare = true;
+    s.panes.kernels = {KERNEL_RAISED_COSINE};
+    wide();
+    ASSERT_EQ(s.panes.lines.size(), 2u);
+    EXPECT_NEAR(s.panes.lines[0], 0.25 + 0.5 / 3, 1e-6);
+    EXPECT_NEAR(s.panes.lines[1], 0.25 + 1.0 / 3, 1e-6);
+    s.panes.lines = {0.75f, 1};
+    s.panes.difference = true;
+    const ImageU8 shown = wide();
+    int brightest = 0;
+    for (const int x : {3, kWidth / 2 - 1, 2 * kWidth - 4})
+        for (int y = 0; y < kHeight; ++y)
+            for (int c = 0; c < 3; ++c) {
+                brightest = std::max<int>(brightest, alone.at(x, y, c));
+                ASSERT_NEAR(shown.at(x, y, c), 0.35 * alone.at(x, y, c), 1) << x << ", " << y;
+            }
+    EXPECT_GT(brightest, 60);
+    ASSERT_EQ(shown.at(kWidth / 2 + 1, 5, 0), photo_.at(1, 5, 0));
+}
+
 TEST_F(ViewerTest, Error_map_is_dark_where_the_photo_is_the_picture) {
     load(file_);
     viewer_->choose_camera(0);

@@ -59,6 +59,13 @@ Pictures pictures_below(const fs::path& folder) {
     return found;
 }
 
+std::string counts_of(const std::map<std::string, std::size_t>& foreign) {
+    std::string list;
+    for (const auto& [extension, count] : foreign)
+        list += fmt::format("{}{} {}", list.empty() ? "" : ", ", count, extension);
+    return list;
+}
+
 // The command that makes JPEG files of them, beside them.
 std::string way_round(const std::map<std::string, std::size_t>& foreign, const fs::path& folder) {
     const std::string in = "cd " + shell_quoted(folder) + " && ";
@@ -82,19 +89,19 @@ fs::path photos_without_cameras(const fs::path& path, const std::string& images_
         throw Error(path.string(), "has no cameras, but " + found.cameras.string() + " is below it",
                     "Name the folder of one data set.");
     if (!found.photos.empty()) return path;
-    std::string list;
-    for (const auto& [extension, count] : found.foreign)
-        list += fmt::format("{}{} {}", list.empty() ? "" : ", ", count, extension);
-    if (!list.empty())
-        throw Error(path.string(), "holds no PNG or JPEG files, but pictures not read: " + list,
-                    way_round(found.foreign, path));
+    if (!found.foreign.empty())
+        throw Error(
+            path.string(),
+            "holds no PNG or JPEG files, but pictures not read: " + counts_of(found.foreign),
+            way_round(found.foreign, path));
     return {};
 }
 
 PhotoList list_photos(const fs::path& folder) {
     std::vector<std::string> lines;
     std::set<std::pair<int, int>> sizes;
-    for (const fs::directory_entry& entry : pictures_below(folder).photos) {
+    const Pictures found = pictures_below(folder);
+    for (const fs::directory_entry& entry : found.photos) {
         const ImageInfo info = read_image_info(entry.path());
         sizes.insert({info.width, info.height});
         lines.push_back(fmt::format("{} bytes {}\n", entry.file_size(),
@@ -106,7 +113,10 @@ PhotoList list_photos(const fs::path& folder) {
             fmt::format("has no cameras, and {} photos are too few to find them", lines.size()),
             "Take 20 or more photos around the scene, each overlapping the next by 60 %.");
     std::sort(lines.begin(), lines.end());
-    PhotoList list{{}, lines.size(), sizes.size() == 1};
+    PhotoList list{{}, lines.size(), sizes.size() == 1, {}};
+    if (!found.foreign.empty())
+        list.left_out = counts_of(found.foreign) + " in " + folder.string() + " are not read. " +
+                        way_round(found.foreign, folder);
     for (const std::string& line : lines) list.text += line;
     return list;
 }

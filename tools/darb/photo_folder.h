@@ -17,6 +17,7 @@ struct PhotoList {
     std::string text;  // a line a photo: tells whether OUT/colmap was made from the same ones
     std::size_t count = 0;
     bool one_size = true;
+    std::string left_out;  // pictures of formats that are not read, and the way round; may be empty
 };
 
 /// Throws Error where they are too few for COLMAP, or one cannot be read.

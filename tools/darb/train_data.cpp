@@ -85,6 +85,7 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
                          fmt::format("COLMAP found the cameras of {} of {} photos; {} is the data "
                                      "set with them.",
                                      dataset.views.size(), list.count, dense.string()));
+    if (!list.left_out.empty()) dataset.notes.push_back(list.left_out);
     if (!run.masks.empty()) dataset.notes.push_back(masks_note(run, project));
     return dataset;
 }

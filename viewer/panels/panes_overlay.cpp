@@ -70,17 +70,25 @@ void draw_line(const Session& s, float share, const ImVec2& size) {
             ImVec2(x + side * 2 * unit, y + 4 * unit), IM_COL32(40, 40, 40, 255));
 }
 
-// At the top of its strip, right of the panel; none where the strip is hidden or too narrow.
-bool draw_label(const Session& s, const std::string& text, float left, float right) {
-    const float gap = kLabelGap * s.gui_scale;
+// From its strip's left edge, right of the panel, in the first row that is free there; none where
+// the strip is hidden. ends: px, where the labels of each row end.
+void draw_label(const Session& s, const std::string& text, float left, float right,
+                std::vector<float>& ends) {
+    const float gap = kLabelGap * s.gui_scale, window = ImGui::GetIO().DisplaySize.x;
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
-    const float x = std::max(left, panel_width(s)) + gap;
-    if (x + size.x + gap > right) return false;
+    const float begin = std::max(left, panel_width(s));
+    if (begin + gap > right) return;
+    const float x = std::min(begin, window - size.x - 2 * gap) + gap;
+    const auto free = std::find_if(ends.begin(), ends.end(), [&](float end) { return end <= x; });
+    const float y = gap + float(free - ends.begin()) * (size.y + 2 * gap);
+    if (free == ends.end())
+        ends.push_back(x + size.x + gap);
+    else
+        *free = x + size.x + gap;
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    list.AddRectFilled(ImVec2(x - gap / 2, gap), ImVec2(x + size.x + gap / 2, 2 * gap + size.y),
+    list.AddRectFilled(ImVec2(x - gap / 2, y), ImVec2(x + size.x + gap / 2, y + gap + size.y),
                        kLabelBack, 4 * s.gui_scale);
-    list.AddText(ImVec2(x, 1.5f * gap), kLabel, text.c_str());
-    return true;
+    list.AddText(ImVec2(x, y + gap / 2), kLabel, text.c_str());
 }
 
 }  // namespace
@@ -92,11 +100,11 @@ void draw_panes(Session& s) {
     for (size_t i = 0; i < s.panes.lines.size(); ++i) drag_line(s, i, size);
     if (!s.panels) return;
     for (const float line : s.panes.lines) draw_line(s, line, size);
+    std::vector<float> ends;
     for (size_t i = 0; i < names.size(); ++i) {
         const float left = i == 0 ? 0 : s.panes.lines[i - 1] * size.x;
         const float right = i + 1 == names.size() ? size.x : s.panes.lines[i] * size.x;
-        if (!draw_label(s, pane_label(s, names, i), left, right))
-            draw_label(s, names[i], left, right);
+        draw_label(s, pane_label(s, names, i), left, right, ends);
     }
 }
 

@@ -351,5 +351,27 @@ TEST(LoadPhotos, what_does_not_fit_into_memory_is_said_before_anything_is_read) 
               std::string::npos);
 }
 
+// What is named in place of a data set.
+TEST(Photos, what_holds_no_cameras_is_told_with_the_way_to_them) {
+    const auto folder = test_folder();
+    const auto says = [&](const std::filesystem::path& name) {
+        return error_of([&] { load_dataset(folder / name, {}); });
+    };
+    const auto has = [](const std::string& text, const char* part) {
+        EXPECT_NE(text.find(part), std::string::npos) << text;
+    };
+    for (const char* name : {"a.HEIC", "a.jpg", "a.mov", "a.txt", "photos/images/b.jpg",
+                             "film/clip.mp4", "hidden/.clip.mp4"})
+        write_file_atomic(folder / name, std::string("x"));
+    has(says("a.HEIC"), "is one picture");
+    has(says("a.jpg"), "Name the folder of the photos");
+    has(says("a.mov"), "is a video, without cameras");
+    has(says("a.mov"), "darb train '");
+    has(says("a.txt"), "nor a video");
+    has(says("photos"), "but pictures");
+    has(says("film"), "clip.mp4' -o OUT");
+    has(says("hidden"), "holds no cameras: neither");
+}
+
 }  // namespace
 }  // namespace darb

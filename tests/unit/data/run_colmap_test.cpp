@@ -107,5 +107,14 @@ TEST(RunColmap, failure_shows_the_last_lines) {
     EXPECT_NE(error.find("feature_extractor"), std::string::npos);
 }
 
+TEST(RunColmap, photos_without_motion_are_named_with_the_remedy) {
+    const auto folder = test_folder();
+    const auto bin = write_fake(folder, "[ $1 != mapper ]\n");
+    const PathVariable path(bin.string() + ":" + std::getenv("PATH"));
+    const std::string error =
+        error_of([&] { run_colmap({.photos = folder, .workspace = folder / "w"}, {}); });
+    EXPECT_NE(error.find("The camera must move between photos"), std::string::npos) << error;
+}
+
 }  // namespace
 }  // namespace darb

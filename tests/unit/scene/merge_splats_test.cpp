@@ -163,6 +163,20 @@ TEST(MergeSplats, levels_follow_from_each_other_on_any_number_of_threads) {
     EXPECT_THROW(merge_splats(scene, 10, {.progress = [](double) { throw 1; }}), int);
 }
 
+// Halves of the splats' mean area times opacity stay; pairs along the curve are near each other.
+TEST(MergeSplats, quick_ones_keep_moments_and_merge_neighbours) {
+    SplatModel scene = sample_model(0, 4096);
+    const SplatModel half = merge_splats(scene, 2048, {.quick = true});
+    ASSERT_EQ(half.size(), 2048u);
+    EXPECT_EQ(half.position, merge_splats(scene, 2048, {.threads = 3, .quick = true}).position);
+    const Whole before = whole_of(scene), after = whole_of(half);
+    EXPECT_LT(norm(after.mean - before.mean), 0.1);
+    EXPECT_LT(norm(after.dc - before.dc), 0.1 * norm(before.dc) + 0.05);
+    scene.position[0] = std::numeric_limits<float>::quiet_NaN();
+    for (const std::size_t count : {4096u, 4095u, 7u})
+        EXPECT_EQ(merge_splats(scene, count, {.quick = true}).size(), count);
+}
+
 TEST(MergeSplats, a_square_becomes_a_disc_in_its_middle) {
     SplatModel four = translucent(4, 0);
     for (std::size_t i = 0; i < 4; ++i) {

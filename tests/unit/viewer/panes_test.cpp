@@ -16,8 +16,8 @@ TEST(Panes, Lines_are_even_at_first_and_stay_where_they_were_put) {
     EXPECT_EQ(p.lines[1], 0.6f);
     fit_lines(1, p);
     EXPECT_TRUE(p.lines.empty());
-    fit_lines(2, p, 0.5f);
-    EXPECT_EQ(p.lines, std::vector<float>{0.75f});
+    fit_lines(2, p, {0.5f, 0.75f});
+    EXPECT_EQ(p.lines, std::vector<float>{0.625f});
     fit_lines(0, p);
     EXPECT_TRUE(p.lines.empty());
 }
