@@ -30,9 +30,14 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
                 {KERNEL_RAISED_COSINE, Footprint::exact},
                 {KERNEL_GAUSSIAN, Footprint::psi, EVALUATION_BUILTIN},
                 {KERNEL_BETA},
-                {KERNEL_GENERALIZED_EXPONENTIAL}};
+                {KERNEL_GENERALIZED_EXPONENTIAL},
+                {KERNEL_GES_PUBLISHED},
+                {KERNEL_BLENDS + KERNEL_GAUSSIAN * KERNEL_COUNT + KERNEL_RAISED_COSINE}};
     std::vector<Variant> all;
-    for (const int kernel : shaped_kernels())
+    std::vector<int> shaped = shaped_kernels();  // and blends: smooth, and with jump and kink
+    shaped.push_back(KERNEL_BLENDS + KERNEL_GAUSSIAN * KERNEL_COUNT + KERNEL_RAISED_COSINE);
+    shaped.push_back(KERNEL_BLENDS + KERNEL_SINC * KERNEL_COUNT + KERNEL_INVERSE_QUADRATIC);
+    for (const int kernel : shaped)
         for (const Footprint f : {Footprint::psi, Footprint::exact})
             if (f == Footprint::psi || has_exact_footprint(kernel)) all.push_back({kernel, f});
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)

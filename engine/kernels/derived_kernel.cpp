@@ -85,7 +85,8 @@ DerivedKernel::DerivedKernel(const KernelProfile& row) : row_(row) {
     DARB_CHECK(row.edge_order >= 0 && row.support > 0, "kernel {}", row.name);
     DARB_CHECK((row.form == KERNEL_FORM_RINGS) == (row.pulses.count > 1), "kernel {}", row.name);
     const bool compact = std::isfinite(row.support);
-    DARB_CHECK(compact || row.form == KERNEL_FORM_GAUSSIAN || row.form == KERNEL_FORM_EXPONENTIAL,
+    DARB_CHECK(compact || row.form == KERNEL_FORM_GAUSSIAN || row.form == KERNEL_FORM_EXPONENTIAL ||
+                   row.form == KERNEL_FORM_GES,
                "kernel {}", row.name);
     find_pulses();
     radius_ = compact ? std::sqrt(pulses_.front().end) : kGaussRadius;

@@ -137,9 +137,9 @@ KernelCoefficients fit_literal(const DerivedKernel& kernel, Footprint footprint,
         k.half_power = 2 * row.edge_order + (footprint == Footprint::exact ? 1 : 0);
         k.squared = squared;
         fit_compact(kernel, footprint, slope_share, k);
-    } else if (row.form == KERNEL_FORM_EXPONENTIAL) {
+    } else if (row.form == KERNEL_FORM_EXPONENTIAL || row.form == KERNEL_FORM_GES) {
         fit_gaussian(k);
-        k.exponent = EXPONENTIAL_START;
+        k.exponent = EXPONENTIAL_START;  // GES_START, too
     } else if (row.form == KERNEL_FORM_GAUSSIAN || row.form == KERNEL_FORM_BETA) {
         fit_gaussian(k);
         k.exponent = row.edge_order + (footprint == Footprint::exact ? 0.5 : 0.0);

@@ -206,7 +206,7 @@ template <class Real>
 void evaluate(const KernelCoefficients& k, Real q, Real& w, Real& slope) {
     if (k.form == KERNEL_FORM_COMPACT) {
         evaluate_compact(k, q, w, slope);
-    } else if (k.form == KERNEL_FORM_GAUSSIAN) {
+    } else if (k.form == KERNEL_FORM_GAUSSIAN || k.form == KERNEL_FORM_GES) {
         evaluate_gaussian(k, q, w, slope);
     } else if (k.form == KERNEL_FORM_BETA) {
         evaluate_beta(k, q, w, slope);

@@ -86,6 +86,8 @@ const std::array<KernelProfile, KERNEL_ROWS> kRows{{
      [](Complex q) { return square(square((BETA_SUPPORT - q) / BETA_SUPPORT)); }},
     {"generalized_exponential", kInfinity, 0, KERNEL_FORM_EXPONENTIAL,  // of shape 0: a Gaussian
      [](Complex q) { return std::exp(-q / 2.0); }},
+    {"ges_published", kInfinity, 0, KERNEL_FORM_GES,  // of every shape
+     [](Complex q) { return std::exp(-q / 2.0); }},
 }};
 
 }  // namespace

@@ -94,7 +94,7 @@ bool has_exact_footprint(int kernel) {
         return !ends_inside(first, second) && !ends_inside(second, first);
     }
     const int form = listed_profile(kernel).form;
-    return form != KERNEL_FORM_RINGS && form != KERNEL_FORM_EXPONENTIAL;
+    return form != KERNEL_FORM_RINGS && form != KERNEL_FORM_EXPONENTIAL && form != KERNEL_FORM_GES;
 }
 
 const KernelDefinition* kernel_definition(int kernel) {

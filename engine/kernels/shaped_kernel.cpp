@@ -14,7 +14,8 @@ struct Row {
     const ShapedKernel& (*shaped)();
 };
 constexpr Row kRows[] = {{KERNEL_BETA, beta_kernel},
-                         {KERNEL_GENERALIZED_EXPONENTIAL, exponential_kernel}};
+                         {KERNEL_GENERALIZED_EXPONENTIAL, exponential_kernel},
+                         {KERNEL_GES_PUBLISHED, ges_kernel}};
 
 const ShapedKernel* find(int kernel) {
     for (const Row& row : kRows)

@@ -80,6 +80,10 @@ double beta_shape_of(double b);
 /// for t < 2. Its line integral has no closed form: Footprint::psi only. Source: GES (Hamdi et al.
 /// 2024), whose renderer draws Gaussians of another size.
 const ShapedKernel& exponential_kernel();
+/// `ges_published`: what GES's program draws. w = exp(-q/2) whatever the exponent t = 2 + shape;
+/// lengths are multiplied by f = 2 / (1 + exp(-0.1 (t - 2))), so covariance_scale is f^2.
+/// Footprint::psi only: f is its psi. Source: GES (Hamdi et al. 2024), its program.
+const ShapedKernel& ges_kernel();
 
 /// `blend:FIRST,SECOND` of two different kernels of the list: w = (1 - m) w1 + m w2. The weight in
 /// space is 1 / (1 + exp(-shape)); m, the exponent, is that of what is drawn, which the exact

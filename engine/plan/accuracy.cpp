@@ -6,6 +6,8 @@
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_coefficients.h"
+#include "engine/kernels/kernel_profile.h"
+#include "engine/kernels/shaped_kernel.h"
 
 namespace darb {
 
@@ -137,6 +139,12 @@ std::string accuracy_text(const Accuracy& accuracy) {
         best = text;
     }
     return best.empty() ? std::string(kPresets[kBalanced]) : best;
+}
+
+bool has_builtin_evaluation(int kernel) {
+    if (blend_parts(kernel)) return false;
+    if (kernel_profile(kernel).form != KERNEL_FORM_COMPACT) return true;
+    return kernel < KERNEL_COUNT && kernel != KERNEL_PARABOLIC;
 }
 
 void set_options(const Accuracy& accuracy, ForwardOptions& options) {

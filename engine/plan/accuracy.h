@@ -76,5 +76,8 @@ FrameAccuracy frame_accuracy(const Accuracy& accuracy, const SplatModel& model);
 
 /// Into the options of a forward pass: all but footprint, SH degree and resolution.
 void set_options(const Accuracy& accuracy, ForwardOptions& options);
+/// Whether the choice `builtin` of evaluation changes anything: not of blends, of the parabolic
+/// kernel and of those of one's own but in the forms that need no polynomial.
+bool has_builtin_evaluation(int kernel);
 
 }  // namespace darb

@@ -7,9 +7,8 @@
 namespace darb {
 
 std::string ShapeProbe::advice() const {
-    const double price = fixed.seconds > 0 ? 100 * (learned.seconds / fixed.seconds - 1) : 0;
     const std::string measured =
-        fmt::format("{:+.2f} dB on held-out photos for {:+.0f} % of time", gain_db(), price);
+        fmt::format("{:+.2f} dB on held-out photos for {:+.0f} % of time", gain_db(), 100 * price);
     return pays() ? fmt::format("{}: train with --kernel {}", measured, kernel_name(kernel))
                   : fmt::format("{}: stay with --kernel {}; less than {} dB may be chance",
                                 measured, kernel_name(fixed_kernel), kLeastGain_db);

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <vector>
 
+#include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/splat_shapes.h"
+#include "shaders/shared/kernel_forms.h"
 
 namespace darb {
 
@@ -22,6 +24,8 @@ float scaled_logit(float logit, double factor) {
 GaussianEquivalent convert_shapes(const SplatModel& model, bool keep_opacity, SplatModel& result) {
     constexpr int kFits = 64;
     const ShapedKernel& kernel = shaped_kernel(model.kernel);
+    const bool is_gaussian =
+        kernel_profile(model.kernel).form == KERNEL_FORM_GES;  // at another size
     const double first = kernel.first_shape(), step = (kernel.last_shape() - first) / (kFits - 1);
     std::vector<GaussianEquivalent> fits;
     for (int k = 0; k < kFits; ++k)
@@ -36,7 +40,10 @@ GaussianEquivalent convert_shapes(const SplatModel& model, bool keep_opacity, Sp
         const auto between = [&](double GaussianEquivalent::*of) {
             return fits[k].*of + part * (fits[k + 1].*of - fits[k].*of);
         };
-        const double covariance = between(&GaussianEquivalent::covariance);
+        const double covariance =
+            is_gaussian ? kernel.covariance_scale(model.footprint,
+                                                  kernel.exponent(model.footprint, model.shape[i]))
+                        : between(&GaussianEquivalent::covariance);
         const double opacity = between(&GaussianEquivalent::opacity);
         for (std::size_t c = 3 * i; c < 3 * i + 3; ++c)
             result.log_scale[c] =

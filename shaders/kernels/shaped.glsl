@@ -2,19 +2,22 @@
 // (engine/kernels/shaped_kernel.h). One of them is left after constant folding, or none.
 layout(constant_id = 113) const int BLENDED = 0;  // 1: a blend of the kernel with that of BLEND_*
 
-const bool SHAPED =
-    BLENDED == 1 || KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FORM == KERNEL_FORM_EXPONENTIAL;
+const bool SHAPED = BLENDED == 1 || KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FORM == KERNEL_FORM_EXPONENTIAL ||
+                    KERNEL_FORM == KERNEL_FORM_GES;
 
 #include "kernels/beta.glsl"
 #include "kernels/exponential.glsl"
 #include "kernels/blend.glsl"
+#include "kernels/ges.glsl"
 
-// Also dw by the exponent.
-void shaped_value_slope(float q, float exponent, out float w, out float slope, out float by_exponent) {
+// Also dw by the exponent, 0 on entry.
+void shaped_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
     if (BLENDED == 1)
         blend_value_slope(q, exponent, w, slope, by_exponent);
     else if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL)
         exponential_value_slope(q, exponent, w, slope, by_exponent);
+    else if (KERNEL_FORM == KERNEL_FORM_GES)
+        ges_value_slope(q, w, slope);
     else
         beta_value_slope(q, exponent, w, slope, by_exponent);
 }
@@ -23,6 +26,7 @@ void shaped_value_slope(float q, float exponent, out float w, out float slope, o
 float shape_exponent(float shape, out float by_shape) {
     if (BLENDED == 1) return blend_exponent(shape, by_shape);
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_exponent(shape, by_shape);
+    if (KERNEL_FORM == KERNEL_FORM_GES) return ges_exponent(shape, by_shape);
     return beta_exponent(shape, by_shape);
 }
 
@@ -30,12 +34,14 @@ float shape_exponent(float shape, out float by_shape) {
 float shaped_reach(float exponent, float least) {
     if (BLENDED == 1) return blend_reach(exponent, least);
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_reach(exponent, least);
+    if (KERNEL_FORM == KERNEL_FORM_GES) return -2.0 * log(least);
     return beta_reach(exponent, least);
 }
 
 float shaped_covariance_scale(float exponent) {
     if (BLENDED == 1) return blend_covariance_scale(exponent);
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_covariance_scale(exponent);
+    if (KERNEL_FORM == KERNEL_FORM_GES) return ges_covariance_scale(exponent);
     return beta_covariance_scale(exponent);
 }
 
@@ -43,6 +49,7 @@ float shaped_covariance_scale(float exponent) {
 float shaped_length_slope(float exponent) {
     if (BLENDED == 1) return blend_length_slope(exponent);
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_length_slope(exponent);
+    if (KERNEL_FORM == KERNEL_FORM_GES) return ges_length_slope(exponent);
     return beta_length_slope(exponent);
 }
 

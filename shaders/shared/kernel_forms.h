@@ -39,6 +39,16 @@
 // shaders it is the form of the first and BLENDED.
 #define KERNEL_FORM_BLEND 6
 
+// w = exp(-q/2) and psi = f^2, f = 2 / (1 + exp(-GES_STRENGTH (t - GES_START))), t of each splat:
+// GES_START + shape, held within the bounds, where f is 0.005 (below it the published program
+// prunes) and 1.995
+#define KERNEL_FORM_GES 7
+
+#define GES_START 2.0
+#define GES_STRENGTH 0.1
+#define GES_LEAST -58.0
+#define GES_MOST 62.0
+
 // Rows of density control's tables over the shape, evenly from the first to the last of the kernel.
 #define SHAPE_ROWS 16
 

@@ -23,7 +23,8 @@
 // Rows beyond the list whose shape each splat has of its own; kernel_forms.h.
 #define KERNEL_BETA 13
 #define KERNEL_GENERALIZED_EXPONENTIAL 14
-#define KERNEL_ROWS 15
+#define KERNEL_GES_PUBLISHED 15
+#define KERNEL_ROWS 16
 // Blends of two kernels of the list, whose weight each splat has: this + first * KERNEL_COUNT +
 // second.
 #define KERNEL_BLENDS 100000

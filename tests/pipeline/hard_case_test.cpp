@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/check/hard_cases.h"
+#include "tests/support/every_kernel.h"
 #include "tests/support/shared_device.h"
 
 namespace darb::test {
@@ -30,13 +31,17 @@ std::vector<Param> every_case() {
                        i % 3 == 0 ? Footprint::exact : Footprint::psi});
         if (i % 4 == 1)
             all.push_back({i, names[i].name, KERNEL_GENERALIZED_EXPONENTIAL, Footprint::psi});
+        if (i % 4 == 2) all.push_back({i, names[i].name, kSteepBlend, Footprint::psi});
+        if (i % 4 == 3)
+            all.push_back({i, names[i].name, i % 8 == 3 ? kSmoothBlend : KERNEL_GES_PUBLISHED,
+                           i % 8 == 3 ? Footprint::exact : Footprint::psi});
         if (names[i].name == "discs")
             all.push_back({i, names[i].name, KERNEL_PARABOLIC, Footprint::exact});
     }
     for (Param& p : all) {
         p.name += " " + std::string(kernel_name(p.kernel)) + " " +
                   std::string(footprint_name(p.footprint));
-        for (char& c : p.name) c = c == ' ' ? '_' : c;
+        for (char& c : p.name) c = c == ' ' || c == ':' || c == ',' ? '_' : c;
     }
     return all;
 }
@@ -55,7 +60,8 @@ INSTANTIATE_TEST_SUITE_P(every, HardCase, testing::ValuesIn(every_case()),
                          [](const auto& p) { return p.param.name; });
 
 TEST(PoisonedSplats, harm_no_other) {
-    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
+    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL,
+                             KERNEL_GES_PUBLISHED, kSteepBlend})
         for (const check::Row& row : check::check_poison(shared_device(), kernel, "poison"))
             EXPECT_TRUE(row.pass) << row.name << row.detail;
 }

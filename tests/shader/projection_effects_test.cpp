@@ -100,7 +100,7 @@ TestScene scene_for(int kernel, Footprint footprint, double spread = 1) {
 
 TEST(ProjectionEffects, antialias_matches_double) {
     for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_INVERSE_QUADRATIC,
-                             KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
+                             KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL, KERNEL_GES_PUBLISHED})
         for (const Footprint footprint : {Footprint::psi, Footprint::exact}) {
             if (footprint == Footprint::exact && !has_exact_footprint(kernel)) continue;
             SCOPED_TRACE(kernel_name(kernel));

@@ -160,8 +160,12 @@ std::vector<CostRow> single_rows(const SplatModel& model) {
             if (s == kShDegree && row.accuracy.value(s) >= model.sh_degree) continue;
             if (s == kFootprint && row.accuracy.value(s) == static_cast<int>(model.footprint))
                 continue;
-            // Rings are always built in, and have no exact footprint.
-            if ((s == kEvaluation || s == kFootprint) && kernel_pulses(model.kernel) > 1) continue;
+            // Rings are always built in, some kernels never.
+            if (s == kEvaluation && kernel_pulses(model.kernel) > 1) continue;
+            if (s == kEvaluation && row.accuracy.of(s).name == std::string_view("builtin") &&
+                !has_builtin_evaluation(model.kernel))
+                continue;
+            if (s == kFootprint && !has_exact_footprint(model.kernel)) continue;
             rows.push_back(std::move(row));
         }
     for (const int preset : {int(kFast), int(kExact)}) {

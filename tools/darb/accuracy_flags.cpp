@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "engine/core/error.h"
+#include "engine/kernels/kernel_family.h"
+#include "tools/darb/outputs.h"
 
 namespace darb {
 
@@ -40,6 +42,12 @@ Accuracy chosen_accuracy(const AccuracyFlags& flags, bool training) {
         if (!name.empty()) accuracy.choice[s] = find_choice(s, name, training);
     }
     return accuracy;
+}
+
+void note_unused_choices(const AccuracyFlags& flags, int kernel) {
+    if (flags.choice[kEvaluation] == "builtin" && !has_builtin_evaluation(kernel))
+        say_note(fmt::format("note: --evaluation builtin is not used: {} has polynomials only",
+                             kernel_name(kernel)));
 }
 
 }  // namespace darb

@@ -21,4 +21,7 @@ void add_accuracy_flags(CLI::App& command, AccuracyFlags& flags, bool training =
 /// training, on choices for pictures only.
 Accuracy chosen_accuracy(const AccuracyFlags& flags, bool training = false);
 
+/// A note where a choice that was given changes nothing of this kernel.
+void note_unused_choices(const AccuracyFlags& flags, int kernel);
+
 }  // namespace darb

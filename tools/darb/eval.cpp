@@ -60,6 +60,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
     options.fit_exposure = flags.eval_exposure;
     options.align_cameras = flags.align;
     const SplatModel model = load_scene(flags.scene);
+    note_unused_choices(flags.accuracy, model.kernel);
     Dataset dataset = load_dataset(flags.dataset, flags.data);
     take_trained_cameras(flags.scene, dataset.views);
     options.alpha_is_mask = dataset.alpha_is_mask;

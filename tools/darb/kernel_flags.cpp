@@ -99,11 +99,16 @@ std::vector<int> kernels_from_list(const std::string& option, const std::string&
     return kernels;
 }
 
+std::string shaped_kernel_names() {
+    std::string names;
+    for (const int k : shaped_kernels()) names += std::string(kernel_name(k)) + ", ";
+    return names + "blend:FIRST,SECOND";
+}
+
 std::string kernel_names() {
     std::string names;
     for (const int k : known_kernels()) names += std::string(kernel_name(k)) + ", ";
-    for (const int k : shaped_kernels()) names += std::string(kernel_name(k)) + ", ";
-    return names.substr(0, names.size() - 2);
+    return names + shaped_kernel_names();
 }
 
 }  // namespace darb

@@ -41,5 +41,7 @@ std::vector<int> kernels_from_list(const std::string& option, const std::string&
 
 /// The names that --kernel takes, with commas: built in, read from files, with shapes.
 std::string kernel_names();
+/// Those whose shape each splat learns.
+std::string shaped_kernel_names();
 
 }  // namespace darb

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 
 #include "engine/core/error.h"
 #include "tools/darb/effect_flags.h"
@@ -19,21 +20,51 @@ namespace {
 
 constexpr double kScales[] = {0.5, 1, 2, 4};
 
+constexpr int kTurn = 10;  // iterations
+
 struct Arm {
     ProbedRun run;
     SplatModel model;
+    std::vector<double> turns_s;  // all but the first, in which shaders are compiled
 };
 
-Arm train_arm(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-              const TrainOptions& options) {
-    const auto start = std::chrono::steady_clock::now();
-    Trainer trainer(device, dataset, photos, initial_model(dataset, options), options);
-    while (trainer.iteration() < options.iterations) trainer.step();
-    trainer.drain();
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    Arm arm{{took.count(), 0}, trainer.model()};
-    arm.run.splats = arm.model.size();
-    return arm;
+/// Runs of these options side by side, a few iterations of each in turn, the order of turns
+/// changing: what the machine does meanwhile falls on all of them alike.
+std::vector<Arm> train_arms(Device& device, const Dataset& dataset,
+                            const std::vector<ImageU8>& photos,
+                            const std::vector<TrainOptions>& options) {
+    std::vector<std::unique_ptr<Trainer>> trainers;
+    for (const TrainOptions& one : options)
+        trainers.push_back(
+            std::make_unique<Trainer>(device, dataset, photos, initial_model(dataset, one), one));
+    std::vector<Arm> arms(options.size());
+    for (int turn = 0; turn * kTurn < options.front().iterations; ++turn)
+        for (std::size_t k = 0; k < arms.size(); ++k) {
+            const std::size_t i = turn % 2 == 0 ? k : arms.size() - 1 - k;
+            const int end = std::min((turn + 1) * kTurn, options[i].iterations);
+            const auto start = std::chrono::steady_clock::now();
+            while (trainers[i]->iteration() < end) trainers[i]->step();
+            trainers[i]->drain();
+            const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+            if (turn > 0 || end == options[i].iterations) arms[i].turns_s.push_back(took.count());
+        }
+    for (std::size_t i = 0; i < arms.size(); ++i) {
+        arms[i].model = trainers[i]->model();
+        for (const double s : arms[i].turns_s) arms[i].run.seconds += s;
+        arms[i].run.splats = arms[i].model.size();
+    }
+    return arms;
+}
+
+/// By how much a turn of `other` takes longer than one of `one`: the median, which a turn that
+/// compiles does not move.
+double price_of(const Arm& one, const Arm& other) {
+    std::vector<double> ratios;
+    for (std::size_t t = 0; t < one.turns_s.size(); ++t)
+        ratios.push_back(other.turns_s[t] / one.turns_s[t]);
+    std::ranges::sort(ratios);
+    const std::size_t n = ratios.size();
+    return (ratios[(n - 1) / 2] + ratios[n / 2]) / 2 - 1;
 }
 
 /// The data set with photos set aside.
@@ -67,15 +98,16 @@ ShapeProbe probe_shape(const DeviceOptions& device_options, const Dataset& sourc
     apply_plan(plan, run);
     const SceneEvaluation evaluation = evaluation_of(dataset, run);
     const std::vector<View> views = held_out_views(dataset.views);
-    ShapeProbe probe{run.iterations, run.kernel, KERNEL_GAUSSIAN, {}, {}};
-    const auto trained = [&](int kernel, ProbedRun& arm) {
-        run.kernel = kernel;
-        const Arm one = train_arm(device, dataset, photos, run);
-        arm = one.run;
-        return evaluate_scene(device, one.model, views, evaluation).psnr_db;
+    TrainOptions fixed = run;
+    fixed.kernel = KERNEL_GAUSSIAN;
+    const std::vector<Arm> arms = train_arms(device, dataset, photos, {fixed, run});
+    const auto psnr_db = [&](const Arm& arm) {
+        return evaluate_scene(device, arm.model, views, evaluation).psnr_db;
     };
-    probe.fixed_db = trained(probe.fixed_kernel, probe.fixed);
-    probe.learned_db = trained(probe.kernel, probe.learned);
+    ShapeProbe probe{run.iterations, run.kernel, fixed.kernel, arms[0].run, arms[1].run};
+    probe.price = price_of(arms[0], arms[1]);
+    probe.fixed_db = psnr_db(arms[0]);
+    probe.learned_db = psnr_db(arms[1]);
     return probe;
 }
 
@@ -88,10 +120,11 @@ AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Datase
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     TrainOptions run = options;
     apply_plan(plan, run);
-    run.antialias = false;
-    const Arm without = train_arm(device, dataset, photos, run);
+    TrainOptions plain = run;
+    plain.antialias = false;
     run.antialias = true;
-    const Arm with = train_arm(device, dataset, photos, run);
+    const std::vector<Arm> arms = train_arms(device, dataset, photos, {plain, run});
+    const Arm &without = arms[0], &with = arms[1];
     AntialiasProbe probe{run.iterations, without.run, with.run, {}};
     const SceneEvaluation evaluation = evaluation_of(dataset, run);
     for (const double scale : kScales) {

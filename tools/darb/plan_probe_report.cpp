@@ -60,6 +60,7 @@ nlohmann::json probe_json(const ShapeProbe& probe) {
             {"psnr_db", probe.learned_db},
             {"beside_psnr_db", probe.fixed_db},
             {"gain_db", probe.gain_db()},
+            {"price", probe.price},
             {"pays", probe.pays()},
             {"learned", arm_json(probe.learned)},
             {"fixed", arm_json(probe.fixed)}};

@@ -38,10 +38,12 @@ int psi(const PsiFlags& flags) {
     const std::vector<KernelFit> fits = fits_of(list);
     nlohmann::json numbers = psi_json(results, flags.grid);
     numbers["in_the_shaders"] = fits_json(fits);
+    numbers["shapes"] = shapes_json(list);
     write_json(flags.json, numbers);
     if (!flags.html.empty())
         write_file_atomic(flags.html, psi_html(results, kernels, fits, flags.grid));
-    tell(stream_beside_json(flags.json, flags.quiet), "{}{}", psi_table(results), fits_table(fits));
+    tell(stream_beside_json(flags.json, flags.quiet), "{}{}{}", psi_table(results),
+         fits_table(fits), shapes_table(list));
     tell_paths(flags.quiet, {flags.json, flags.html});
     return 0;
 }

@@ -50,6 +50,7 @@ int render(RenderFlags flags) {
     check_depth(flags.depth, accuracy, choice);
     if (flags.cameras.empty()) return render_film(flags, accuracy, choice);
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
+    note_unused_choices(flags.accuracy, model.kernel);
     std::vector<View> views = open_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
     if (is_list)

@@ -68,6 +68,7 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     const PixelSize size = parse_size(flags.film.size);
     SplatFile facts;
     SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts));
+    note_unused_choices(flags.accuracy, model.kernel);
     const CameraPath path = film_path(flags.film, size, model, facts.up);
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);

@@ -97,6 +97,7 @@ void finish_train_flags(TrainFlags& f) {
     finish_strategy(f);
     f.train.kernel = *row;
     f.train.accuracy = chosen_accuracy(f.accuracy, true);
+    note_unused_choices(f.accuracy, f.train.kernel);
     f.train.footprint =
         f.train.accuracy.value(kFootprint) == FOOTPRINT_EXACT ? Footprint::exact : Footprint::psi;
     if (f.train.footprint == Footprint::exact && !has_exact_footprint(f.train.kernel))
@@ -104,9 +105,8 @@ void finish_train_flags(TrainFlags& f) {
                     "goes with the footprint psi only",
                     "Leave --footprint out, or use another kernel or one pulse.");
     if (f.train.shape_lr && !kernel_has_shape(f.train.kernel))
-        say_note(
-            "note: --shape-lr is not used: splats have shapes of their own with --kernel beta, "
-            "generalized_exponential and blend:FIRST,SECOND");
+        say_note("note: --shape-lr is not used: splats have shapes of their own with --kernel " +
+                 shaped_kernel_names());
     if (f.page && kernel_has_shape(f.train.kernel))
         throw Error("--html", "web pages cannot draw shapes of splats yet",
                     "Leave it out; darb convert --kernel gaussian OUT page.html writes a page of "

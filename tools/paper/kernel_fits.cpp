@@ -8,6 +8,7 @@
 #include "engine/core/text.h"
 #include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/kernel_registry.h"
+#include "engine/kernels/shaped_kernel.h"
 #include "engine/report/html.h"
 
 namespace darb {
@@ -15,7 +16,10 @@ namespace darb {
 namespace {
 
 std::string form_of(const KernelCoefficients& k) {
-    if (k.form == KERNEL_FORM_GAUSSIAN) return fmt::format("2^n P{}(f)", k.degree);
+    if (k.form == KERNEL_FORM_GAUSSIAN || k.form == KERNEL_FORM_GES)
+        return fmt::format("2^n P{}(f)", k.degree);
+    if (k.form == KERNEL_FORM_BETA) return fmt::format("(1 - t)^e, 2^n P{}(f)", k.degree);
+    if (k.form == KERNEL_FORM_EXPONENTIAL) return fmt::format("of q^(e/2), 2^n P{}(f)", k.degree);
     if (k.form == KERNEL_FORM_QUADRIC) return k.half_power == 2 ? "1/(1 + q)" : "1/sqrt(1 + q)";
     const char* x = k.squared ? "t^2" : "t";
     if (k.half_power == 0) return fmt::format("P{}({})", k.degree, x);
@@ -44,6 +48,48 @@ std::vector<KernelFit> fits_of(const std::vector<int>& kernels) {
         fits.push_back(std::move(fit));
     }
     return fits;
+}
+
+namespace {
+
+struct ShapeRow {
+    int kernel;
+    double exponent, psi, width;  // standard deviation in the picture, in that of the splat
+};
+
+std::vector<ShapeRow> shape_rows(const std::vector<int>& kernels) {
+    std::vector<ShapeRow> rows;
+    for (const int kernel : kernels) {
+        if (!kernel_has_shape(kernel)) continue;
+        const ShapedKernel& shaped = shaped_kernel(kernel);
+        for (const double e : shaped.exponents_to_check())
+            rows.push_back({kernel, e, shaped.covariance_scale(Footprint::psi, e),
+                            std::sqrt(shaped.second_moment(Footprint::psi, e))});
+    }
+    return rows;
+}
+
+}  // namespace
+
+std::string shapes_table(const std::vector<int>& kernels) {
+    const std::vector<ShapeRow> rows = shape_rows(kernels);
+    if (rows.empty()) return "";
+    std::string text =
+        fmt::format("\n{:<24} {:>8} {:>10} {:>10}\n", "each splat's exponent", "", "psi", "width");
+    for (const ShapeRow& row : rows)
+        text += fmt::format("{:<24} {:>8.3g} {:>10.5f} {:>10.5f}\n", kernel_name(row.kernel),
+                            row.exponent, row.psi, row.width);
+    return text;
+}
+
+nlohmann::json shapes_json(const std::vector<int>& kernels) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (const ShapeRow& row : shape_rows(kernels))
+        rows.push_back({{"kernel", kernel_name(row.kernel)},
+                        {"exponent", row.exponent},
+                        {"psi", row.psi},
+                        {"width", row.width}});
+    return rows;
 }
 
 std::string fits_table(const std::vector<KernelFit>& fits) {

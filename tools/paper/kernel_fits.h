@@ -18,6 +18,10 @@ struct KernelFit {
 };
 
 std::vector<KernelFit> fits_of(const std::vector<int>& kernels);
+/// What the exponents of splats do to psi and to the width that is drawn; empty without any such
+/// kernel.
+std::string shapes_table(const std::vector<int>& kernels);
+nlohmann::json shapes_json(const std::vector<int>& kernels);
 std::string fits_table(const std::vector<KernelFit>& fits);
 nlohmann::json fits_json(const std::vector<KernelFit>& fits);
 std::string fits_html(const std::vector<KernelFit>& fits);

@@ -113,8 +113,8 @@ FootprintDistance distance(const DerivedKernel& kernel, double edge, const F& sh
 }  // namespace
 
 double projected_profile(const DerivedKernel& kernel, double q) {
-    if (kernel.row().form == KERNEL_FORM_GAUSSIAN) return std::exp(-q / 2);
     const double support = kernel.row().support;
+    if (!std::isfinite(support)) return std::exp(-q / 2);  // as shapes of splats start, too
     if (q >= support) return 0;
     const auto integral = [&](double at) {
         const double half = std::sqrt(support - at);
@@ -160,7 +160,7 @@ FootprintDistance footprint_distance(const DerivedKernel& kernel, const KernelCo
 }
 
 double least_squares_psi(const DerivedKernel& kernel) {
-    if (kernel.row().form == KERNEL_FORM_GAUSSIAN) return 1;
+    if (!std::isfinite(kernel.row().support)) return 1;
     // Golden section on the squared error, whose only minimum lies well within the bracket.
     constexpr double kGolden = 0.6180339887498949;
     double low = 0.2, high = 3;

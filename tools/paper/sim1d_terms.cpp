@@ -212,11 +212,11 @@ namespace {
 
 // Kernels with shapes at their start, in the form of the others: beta is u^4 alone.
 KernelCoefficients coefficients_1d(int kernel) {
-    KernelCoefficients k = kernel_coefficients(
-        kernel == kGeneralisedExponential || kernel == KERNEL_GENERALIZED_EXPONENTIAL
-            ? KERNEL_GAUSSIAN
-            : kernel,
-        Footprint::psi, kFullDegree);
+    const bool starts_as_gaussian = kernel == kGeneralisedExponential ||
+                                    kernel == KERNEL_GENERALIZED_EXPONENTIAL ||
+                                    kernel == KERNEL_GES_PUBLISHED;
+    KernelCoefficients k = kernel_coefficients(starts_as_gaussian ? KERNEL_GAUSSIAN : kernel,
+                                               Footprint::psi, kFullDegree);
     if (k.form != KERNEL_FORM_BETA) return k;
     k.form = KERNEL_FORM_COMPACT;
     k.half_power = static_cast<int>(std::lround(2 * k.exponent));

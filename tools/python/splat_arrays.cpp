@@ -107,7 +107,7 @@ Floats take_shapes(const py::object& value, int kernel, py::ssize_t count) {
     if (value.is_none()) return {};
     throw Error("shapes", fmt::format("are given to the kernel {}", kernel_name(kernel)),
                 "Leave them out: only kernels that learn a shape of each splat take them: beta, "
-                "generalized_exponential.");
+                "generalized_exponential, ges_published, blend:FIRST,SECOND.");
 }
 
 SplatArraysGiven take_splats(const py::dict& options) {

@@ -166,7 +166,8 @@ INSTANTIATE_TEST_SUITE_P(Shaped, EveryKernel,
                          });
 
 INSTANTIATE_TEST_SUITE_P(Exponential, EveryKernel,
-                         testing::Combine(testing::Values(KERNEL_GENERALIZED_EXPONENTIAL),
+                         testing::Combine(testing::Values(KERNEL_GENERALIZED_EXPONENTIAL,
+                                                          KERNEL_GES_PUBLISHED),
                                           testing::Values(Footprint::psi)));
 
 INSTANTIATE_TEST_SUITE_P(Blend, EveryKernel,

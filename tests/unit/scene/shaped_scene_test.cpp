@@ -148,6 +148,20 @@ TEST(ShapedScene, scenes_of_deformable_beta_splatting_are_read) {
         }
 }
 
+TEST(ShapedScene, gaussians_of_ges_published_are_what_it_draws) {
+    SplatModel model = shaped_scene(Footprint::psi);
+    set_kernel(model, KERNEL_GES_PUBLISHED);
+    GaussianEquivalent fit{};
+    const SplatModel gaussians = as_gaussians(model, false, &fit);
+    EXPECT_LT(fit.error, 1e-4);
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        const double f = 2 / (1 + std::exp(-0.1 * double{model.shape[i]}));
+        EXPECT_NEAR(gaussians.log_scale[3 * i] - model.log_scale[3 * i], std::log(f), 1e-5);
+        const float logit = std::min(model.opacity_logit[i], 4.0f);  // of opaque ones it is bounded
+        EXPECT_NEAR(std::min(gaussians.opacity_logit[i], 4.0f), logit, 1e-3);
+    }
+}
+
 TEST(ShapedScene, gaussians_follow_each_splats_shape) {
     SplatModel model = shaped_scene(Footprint::exact);
     GaussianEquivalent fit{};
