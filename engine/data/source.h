@@ -55,5 +55,7 @@ std::string scaled_images(const std::filesystem::path& folder);
 
 /// Pluralised count for notes: "1 photo", "3 photos".
 std::string counted(std::size_t count, const char* noun);
+/// A name without it.
+std::string without_images(const std::string& name);
 
 }  // namespace darb
