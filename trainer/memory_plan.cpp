@@ -63,7 +63,7 @@ std::uint64_t cameras_bytes(std::uint64_t cameras) {
 std::uint64_t image_bytes(const Device& device, const MemoryDemand& demand) {
     constexpr std::uint64_t flight = Buffer::charged_bytes(sizeof(gpu::LossResult)) +
                                      Buffer::charged_bytes(sizeof(gpu::FrameStatus));
-    return Buffer::charged_bytes(demand.image_pixels * 12) +
+    return Buffer::charged_bytes(demand.image_pixels * 4 * d_image_planes(demand.frame)) +
            Loss::device_bytes(device, demand.width, demand.height) + cameras_bytes(demand.views) +
            2 * flight + DensityControl::fixed_bytes(demand.frame.kernel);
 }

@@ -127,6 +127,7 @@ class TrainingStep {
     StepInput with_photo(Commands& commands, const StepInput& input);
     void record_picture(Commands& commands, const StepInput& input);
     void record_before_loss(Commands& commands, const StepInput& input);
+    ExposedPicture exposed(const TrainingView& view);
     void record_loss(Commands& commands, const StepInput& input, const Buffer& loss);
     void record_back(Commands& commands, const StepInput& input);
     void record_update(Commands& commands, std::span<const StepInput> views,

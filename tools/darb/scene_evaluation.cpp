@@ -76,7 +76,8 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
         ImageF image = renderer.render(camera, options.background);
         if (options.fit_exposure)
             image = apply_exposure(
-                fit_exposure(image, photo, options.background, options.alpha_is_mask), image);
+                fit_exposure(image, photo, options.background, options.alpha_is_mask), image, photo,
+                options.alpha_is_mask);
         const ViewMetrics metrics =
             compare_view(view.name, image, photo, options.background, options.alpha_is_mask);
         own.push_back({metrics.psnr_db, metrics.ssim});
