@@ -36,6 +36,10 @@ bool steps_by_views(const TrainOptions& options) {
     return options.batch > 1 || options.refine_cameras;
 }
 
+bool compares_depth(const TrainOptions& options, const View& view) {
+    return options.depth && !view.depth.empty();
+}
+
 LossOptions loss_options(const TrainOptions& options, const Dataset& dataset) {
     return {.use_alpha = options.alpha, .use_mask = options.alpha && dataset.alpha_is_mask};
 }
@@ -61,6 +65,7 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
       flights_{Flight(device), Flight(device)} {
     if (options.exposure)
         exposure_.emplace(device, photos.count(), photos.largest_photo(), options.batch);
+    if (options.depth) depth_.emplace(device, loss.use_alpha, options.exposure);
     if (steps_by_views(options)) adam_.emplace(device);
     if (options.refine_cameras) cameras_.emplace(device);
 }
@@ -138,16 +143,16 @@ StepFrame TrainingStep::step_frame(Commands& commands, const StepInput& input) {
             scores ? &input.gradients->scores() : nullptr};
 }
 
-void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
-    const TrainingView& view = input.view;
-    Frame& frame = buffers_.frame();
-    forward_.record(commands, *splats_, view.frame, frame);
-    if (exposure_) exposure_->record(commands, exposed(view), view.photo, view.size());
 ExposedPicture TrainingStep::exposed(const TrainingView& view) {
     const FrameImages& images = buffers_.frame().images;
     return {images.image, images.final_transmittance, view.frame.background};
 }
 
+void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
+    const TrainingView& view = input.view;
+    Frame& frame = buffers_.frame();
+    forward_.record(commands, *splats_, view.frame, frame);
+    if (exposure_) exposure_->record(commands, exposed(view), view.photo, view.size());
 }
 
 void TrainingStep::record_before_loss(Commands& commands, const StepInput& input) {
@@ -170,6 +175,11 @@ void TrainingStep::record_back(Commands& commands, const StepInput& input) {
     if (exposure_)
         exposure_->record_backward(commands, exposed(view), d_image_, exposure_step(input),
                                    input.place);
+    if (depth_)
+        depth_->record(commands,
+                       {frame.images.image, frame.images.final_transmittance, *view.pixels,
+                        d_image_, view.measured},
+                       view.size(), depth_weight_, photos_->usual_depth());
     if (input.gradients) {
         backward_.record_gradients(
             commands, view.frame, frame, *splats_, d_image_,

@@ -32,6 +32,7 @@ constexpr double kPixelsOfTile = TILE_SIZE * TILE_SIZE;
 constexpr double kProjectFma = 250, kProjectBackwardFma = 600, kShFma = 3;
 constexpr double kBlendFma = 20, kBlendBackwardFma = 50;
 constexpr double kExposureFma = 9 + 12 + 9;
+constexpr double kDepthLossFma = 6;
 constexpr double kLossFma = 3 * 2 * 2 * 11 * 5;  // channels, ways, axes, taps, moments
 
 double best_ms(Commands& commands, const auto& record) {
