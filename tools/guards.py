@@ -106,7 +106,7 @@ GUARDS = [
      "counts && raw < ALPHA_MAX ? before * ahead : 0.0", "counts ? before * ahead : 0.0",
      "blend_backward_test", "BlendBackwardCases/EveryWay.alpha_at_its_limit_moves_only_the_colour/subgroup"),
     ("10,000 thin layers in one pixel", "gradient_ends_where_the_pixel_ended", BLEND_BACK,
-     "px.d_colour[k], number <= px.last[k]);", "px.d_colour[k], true);",
+     "px.d_colour[k], d_z, number <= px.last[k]);", "px.d_colour[k], d_z, true);",
      "blend_backward_test", "BlendBackwardCases/EveryWay.intersections_behind_the_stop_get_zero/subgroup"),
     ("10,000 thin layers in one pixel", "what_is_behind", SPLAT_SUMS,
      "behind += alpha * ahead;", "",

@@ -23,7 +23,7 @@ CHANGES = [
     ("shaders/lib/partials.glsl", "partials0[at] PARTIALS_PUT value;", "atomicAdd(partials0[at], value);"),
     ("shaders/backward/blend_backward_team.comp", "#extension GL_KHR_shader_subgroup_arithmetic : require",
      "#extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_shader_atomic_float : require"),
-    ("shaders/backward/blend_backward.comp", "partial_rest[slot] += rest;", "atomicAdd(partial_rest[slot], rest);"),
+    ("shaders/backward/blend_backward.comp", "partial_rest[RESTS * slot] += rest;", "atomicAdd(partial_rest[RESTS * slot], rest);"),
     ("shaders/backward/blend_backward.comp", "#extension GL_KHR_shader_subgroup_arithmetic : require",
      "#extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_shader_atomic_float : require"),
     ("shaders/backward/blend_backward.comp", "return intersection_from_sorted[j];",

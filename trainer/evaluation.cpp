@@ -1,6 +1,7 @@
 #include "trainer/evaluation.h"
 
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "engine/data/image_io.h"
@@ -27,9 +28,23 @@ ArcMeans means_of(const std::vector<ViewMetrics>& views, bool in_arc) {
     return means;
 }
 
+std::optional<DepthError> depth_means(const std::vector<ViewMetrics>& views) {
+    DepthError sum;
+    double count = 0;
+    for (const ViewMetrics& v : views) {
+        if (!v.depth) continue;
+        sum.mean_m += v.depth->mean_m;
+        sum.median_m += v.depth->median_m;
+        ++count;
+    }
+    if (count == 0) return std::nullopt;
+    return DepthError{sum.mean_m / count, sum.median_m / count};
+}
+
 }  // namespace
 
 void take_means(Evaluation& evaluation) {
+    evaluation.depth = depth_means(evaluation.views);
     const ArcMeans arc = means_of(evaluation.views, true);
     const ArcMeans others = means_of(evaluation.views, false);
     evaluation.arc.reset();

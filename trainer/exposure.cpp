@@ -20,6 +20,12 @@ std::uint32_t groups_of(std::uint32_t pixels) {
                       static_cast<std::uint32_t>(EXPOSURE_MAX_GROUPS));
 }
 
+gpu::ExposureArgs args_of(const ExposedPicture& picture, std::uint32_t photo,
+                          std::uint32_t pixels) {
+    const glm::vec3& b = picture.background;
+    return {pixels, photo, groups_of(pixels), b.r, b.g, b.b};
+}
+
 constexpr std::uint64_t kGradientFloats = EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS;
 constexpr std::uint64_t kGradientBytes = kGradientFloats * sizeof(float);
 static_assert(kGradientBytes % 256 == 0);  // where a binding may begin
@@ -51,22 +57,22 @@ std::uint64_t Exposure::device_bytes(std::uint32_t photos, std::uint64_t pixels,
     return charged_bytes(buffers(photos, pixels, batch));
 }
 
-void Exposure::record(Commands& commands, const Buffer& image, std::uint32_t photo,
+void Exposure::record(Commands& commands, const ExposedPicture& picture, std::uint32_t photo,
                       std::uint32_t pixels) {
     commands.pass("exposure");
     const Groups g = groups_for(pixels);
-    commands.dispatch(map_, gpu::ExposureArgs{pixels, photo, groups_of(pixels)},
-                      {maps_, image, mapped_}, g.x, g.y);
+    commands.dispatch(map_, args_of(picture, photo, pixels),
+                      {maps_, picture.image, mapped_, picture.transmittance}, g.x, g.y);
 }
 
-void Exposure::record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
-                               const ExposureStep& step, int place) {
+void Exposure::record_backward(Commands& commands, const ExposedPicture& picture,
+                               const Buffer& d_image, const ExposureStep& step, int place) {
     commands.pass("exposure");
     const std::uint32_t groups = groups_of(step.pixels);
     const BufferRange partials(partials_, kGradientBytes * static_cast<std::uint64_t>(place),
                                kGradientBytes);
-    commands.dispatch(backward_, gpu::ExposureArgs{step.pixels, step.photo, groups},
-                      {maps_, image, d_image, partials}, groups);
+    commands.dispatch(backward_, args_of(picture, step.photo, step.pixels),
+                      {maps_, picture.image, d_image, partials, picture.transmittance}, groups);
 }
 
 void Exposure::record_step(Commands& commands, const Buffer& status, const ExposureStep& step,

@@ -1,8 +1,9 @@
 // Per-photo exposure in training: an affine map of colours a photo between picture and loss,
 // trained by Adam beside the splats. Off in pictures for evaluation. The mean of all maps stays the
-// identity.
+// identity. It maps what the splats show and leaves the background as it is.
 #pragma once
 
+#include <glm/vec3.hpp>
 #include <vector>
 
 #include "engine/gpu/buffer_list.h"
@@ -19,6 +20,13 @@ struct ExposureStep {
     int visits = 1;  // of this photo, this one counted
 };
 
+/// What a map applies to.
+struct ExposedPicture {
+    const Buffer& image;          // float [3][H W]
+    const Buffer& transmittance;  // float [H W], what of the background is seen
+    glm::vec3 background;
+};
+
 class Exposure {
   public:
     /// For `photos` photos of at most `pixels` pixels, all identities; steps of `batch` views.
@@ -27,13 +35,15 @@ class Exposure {
     /// Device memory of an Exposure made with these arguments.
     static std::uint64_t device_bytes(std::uint32_t photos, std::uint64_t pixels, int batch = 1);
 
-    /// image [3][H W] -> mapped(), the picture as this photo shows it.
-    void record(Commands& commands, const Buffer& image, std::uint32_t photo, std::uint32_t pixels);
+    /// image [3][H W] over picture.background -> mapped(), the picture as this photo shows it.
+    void record(Commands& commands, const ExposedPicture& picture, std::uint32_t photo,
+                std::uint32_t pixels);
     const Buffer& mapped() const { return mapped_; }
 
-    /// d_image, dL/d(mapped), becomes dL/d(image); the map's own gradient stays for the step of
-    /// this place in the batch.
-    void record_backward(Commands& commands, const Buffer& image, const Buffer& d_image,
+    /// d_image [4][H W], whose first three planes are dL/d(mapped), becomes dL/d(image) and
+    /// dL/d(1 - transmittance), as ForwardOptions::alpha_gradient takes them; the map's own
+    /// gradient stays for the step of this place in the batch.
+    void record_backward(Commands& commands, const ExposedPicture& picture, const Buffer& d_image,
                          const ExposureStep& step, int place = 0);
     /// The photo's Adam step of what record_backward left. status: gpu::FrameStatus of the frame.
     void record_step(Commands& commands, const Buffer& status, const ExposureStep& step,

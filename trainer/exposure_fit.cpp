@@ -7,6 +7,14 @@
 
 namespace darb {
 
+namespace {
+
+double mapped_share(const ImageU8& photo, size_t pixel, bool alpha_is_mask) {
+    return alpha_is_mask ? 1.0 : photo.data[pixel * 4 + 3] / 255.0;
+}
+
+}  // namespace
+
 ColourMap fit_exposure(const ImageF& render, const ImageU8& photo, const glm::vec3& background,
                        bool alpha_is_mask) {
     constexpr double kHold = 1e-6;
@@ -23,8 +31,10 @@ ColourMap fit_exposure(const ImageF& render, const ImageU8& photo, const glm::ve
         if (alpha_is_mask && photo.data[p * 4 + 3] < 128) continue;
         glm::dvec4 x(0, 0, 0, 1);
         for (int c = 0; c < 3; ++c) x[c] = std::clamp(render.data[p * 3 + c], 0.0f, 1.0f);
-        normal += glm::outerProduct(x, x);
-        for (int r = 0; r < 3; ++r) right[r] += x * double(truth.data[p * 3 + r]);
+        const double share = mapped_share(photo, p, alpha_is_mask);
+        normal += share * share * glm::outerProduct(x, x);
+        for (int r = 0; r < 3; ++r)
+            right[r] += share * x * (double(truth.data[p * 3 + r]) - (1 - share) * x[r]);
     }
     const glm::dmat4 inverse = glm::inverse(normal);
     ColourMap map{};
@@ -35,12 +45,17 @@ ColourMap fit_exposure(const ImageF& render, const ImageU8& photo, const glm::ve
     return map;
 }
 
-ImageF apply_exposure(const ColourMap& map, const ImageF& image) {
+ImageF apply_exposure(const ColourMap& map, const ImageF& image, const ImageU8& photo,
+                      bool alpha_is_mask) {
     ImageF out(image.width, image.height, 3);
-    for (size_t p = 0; p < out.data.size(); p += 3)
-        for (size_t r = 0; r < 3; ++r)
-            out.data[p + r] = map[r * 4] * image.data[p] + map[r * 4 + 1] * image.data[p + 1] +
-                              map[r * 4 + 2] * image.data[p + 2] + map[r * 4 + 3];
+    for (size_t p = 0; p < out.data.size(); p += 3) {
+        const auto share = static_cast<float>(mapped_share(photo, p / 3, alpha_is_mask));
+        for (size_t r = 0; r < 3; ++r) {
+            const float mapped = map[r * 4] * image.data[p] + map[r * 4 + 1] * image.data[p + 1] +
+                                 map[r * 4 + 2] * image.data[p + 2] + map[r * 4 + 3];
+            out.data[p + r] = share * mapped + (1 - share) * image.data[p + r];
+        }
+    }
     return out;
 }
 

@@ -37,6 +37,7 @@ FrameSize frame_size(const Device& device, const MemoryDemand& demand) {
     size.cooperates = demand.cooperates;
     size.bucket = FrameBuffers::bucket(device, demand.frame);
     size.shaped = kernel_has_shape(demand.frame.kernel);
+    size.depth_sum = demand.frame.depth_sum;
     return size;
 }
 
@@ -63,7 +64,7 @@ std::uint64_t cameras_bytes(std::uint64_t cameras) {
 std::uint64_t image_bytes(const Device& device, const MemoryDemand& demand) {
     constexpr std::uint64_t flight = Buffer::charged_bytes(sizeof(gpu::LossResult)) +
                                      Buffer::charged_bytes(sizeof(gpu::FrameStatus));
-    return Buffer::charged_bytes(demand.image_pixels * 12) +
+    return Buffer::charged_bytes(demand.image_pixels * 4 * d_image_planes(demand.frame)) +
            Loss::device_bytes(device, demand.width, demand.height) + cameras_bytes(demand.views) +
            2 * flight + DensityControl::fixed_bytes(demand.frame.kernel);
 }
@@ -103,10 +104,12 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
             GradientTree::device_bytes(demand.splats, demand.sh_degree, demand.frame.kernel,
                                        demand.batch, strategy_row(demand.strategy).scores_views);
     plan.intersections = bytes.intersections;
-    plan.photos = demand.photo_pixels * 4;
+    const std::uint64_t words = demand.photo_pixels + demand.depth_pixels;
+    plan.photos = words * 4;
     if (demand.streams) {
-        plan.photos = 2 * Buffer::charged_bytes(demand.image_pixels * 4);
-        plan.waiting_photos = (demand.photo_pixels + demand.small_pixels) * 4;
+        plan.photos =
+            2 * Buffer::charged_bytes(demand.image_pixels * (demand.depth_pixels > 0 ? 8 : 4));
+        plan.waiting_photos = (words + demand.small_pixels) * 4;
     }
     plan.images = bytes.images + image_bytes(device, demand);
     plan.effects = effect_bytes(demand) + strategy_bytes(demand);
@@ -169,6 +172,7 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
         const std::uint64_t pixels = std::uint64_t(view.camera.width) * view.camera.height;
         demand.image_pixels = std::max(demand.image_pixels, pixels);
         demand.photo_pixels += pixels;
+        if (compares_depth(options, view)) demand.depth_pixels += pixels;
         ++training;
     }
     demand.exposure_photos = options.exposure ? training : 0;
@@ -186,7 +190,9 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
     if (steps.empty()) return;
     for (const View& view : views) {
         const Camera small = divided(view.camera, steps.back().divisor);  // the largest
-        if (!view.is_test) demand.small_pixels += std::uint64_t(small.width) * small.height;
+        if (!view.is_test)
+            demand.small_pixels +=
+                std::uint64_t(small.width) * small.height * (compares_depth(options, view) ? 2 : 1);
     }
     demand.small_cameras = demand.views;
 }

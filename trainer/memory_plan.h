@@ -30,13 +30,15 @@ struct MemoryDemand {
     int width = 1, height = 1;           // px, the most of any view
     std::uint64_t image_pixels = 1;      // of the largest training photo
     std::uint64_t photo_pixels = 0;      // of all training photos together
+    std::uint64_t depth_pixels = 0;      // of those with measured depths that are compared
     std::uint32_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
     std::uint32_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
     Strategy strategy{};
     int batch = 1;
     bool by_views = false;  // steps_by_views()
     bool cameras = false;   // are refined
-    // Of the resolution ramp: its smaller photos, of all training photos together, and cameras.
+    // Of the resolution ramp: its smaller photos, of all training photos together, those with
+    // depths twice, and cameras.
     std::uint64_t small_pixels = 0;
     std::uint32_t small_cameras = 0;
     bool streams = false;  // photos wait on the host

@@ -25,6 +25,9 @@ bool has_decay(const Opt& o, const Sched&) {
 bool refines_cameras(const Opt& o, const Sched&) {
     return o.refine_cameras;
 }
+bool compares_depths(const Opt& o, const Sched&) {
+    return o.depth;
+}
 // What the first strategy does not have stands only where it is, so that files from before it
 // agree.
 bool not_of_the_first(const Opt& o, const Sched&) {
@@ -109,6 +112,17 @@ const OptionRow kRows[] = {
     {.setting = "/effects/probe_sh", .member = &Opt::probe_sh, .group = option_group::kEffects},
     {.setting = "/effects/antialias", .member = &Opt::antialias, .group = option_group::kEffects},
     {.setting = "/effects/exposure", .member = &Opt::exposure, .group = option_group::kEffects},
+    {.setting = "/effects/depth",
+     .member = &Opt::depth,
+     .group = option_group::kEffects,
+     .stands = compares_depths},
+    {.flags = "--depth-weight",
+     .setting = "/effects/depth_weight",
+     .member = &Opt::depth_weight,
+     .group = option_group::kEffects,
+     .help = "of measured depths in the loss, against the mean of the colours' differences; a "
+             "depth's difference counts as a share of the usual depth",
+     .stands = compares_depths},
     {.setting = "/effects/alpha", .member = &Opt::alpha, .group = option_group::kEffects},
     {.setting = "/effects/cameras",
      .member = &Opt::refine_cameras,

@@ -40,6 +40,9 @@ struct TrainOptions {
     bool antialias = false;  // opacity compensation and the 3D smoothing filter of Mip-Splatting
     bool exposure = false;   // an affine map of colours per photo, trained beside the splats
     float exposure_lr_init = 0.001f, exposure_lr_final = 0.0001f;
+    // Rendered depths are compared with those that were measured: see depth_loss.h.
+    bool depth = false;
+    float depth_weight = 0.1f;
     // Poses and intrinsics of the photos are trained beside the splats: see camera_refinement.h.
     bool refine_cameras = false;
     // px a visit, falling to a fiftieth over the run; absent: 0.1 where tracks anchor them, else

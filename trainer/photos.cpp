@@ -8,6 +8,8 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/core/quantile.h"
+#include "engine/data/depths.h"
 
 namespace darb {
 
@@ -15,12 +17,19 @@ namespace {
 
 constexpr const char* kFromLoadPhotos =
     "Give RGBA of each view's size, in the order of the views, as load_photos does.";
+constexpr size_t kDepthStep = 16;  // every so many pixels are looked at for the usual depth
+
+ImageF depth_in_world(const View& view, double scale) {
+    ImageF depth = load_depth(view);
+    for (float& d : depth.data) d = static_cast<float>(d * scale);
+    return depth;
+}
 
 }  // namespace
 
 TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
                                const std::vector<ImageU8>& photos, const glm::dvec3& origin,
-                               bool stream)
+                               bool stream, bool depths)
     : device_(&device),
       origin_(origin),
       nearest_(nearest_points(dataset)),
@@ -29,6 +38,7 @@ TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
         throw Error("training photos",
                     fmt::format("{} for {} views", photos.size(), dataset.views.size()),
                     kFromLoadPhotos);
+    std::vector<double> sample;
     for (size_t i = 0; i < dataset.views.size(); ++i) {
         const View& view = dataset.views[i];
         view_cameras_.push_back(view.camera);
@@ -37,6 +47,7 @@ TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
         height_ = std::max(height_, view.camera.height);
         whole_.data.push_back(camera_data(view.camera, origin_));
         whole_.photos.emplace_back();
+        measured_.push_back(depths && !view.is_test && !view.depth.empty());
         if (view.is_test) continue;
         views_.push_back(static_cast<int>(i));
         const std::uint64_t count = std::uint64_t(view.camera.width) * view.camera.height;
@@ -46,17 +57,31 @@ TrainingPhotos::TrainingPhotos(Device& device, const Dataset& dataset,
                 fmt::format("is {}x{}x{} for a camera of {}x{}", photos[i].width, photos[i].height,
                             photos[i].channels, view.camera.width, view.camera.height),
                 kFromLoadPhotos);
-        whole_.photos.back() = Buffer(device, "photo " + view.name, count * 4, memory_);
-        whole_.photos.back().upload(std::as_bytes(std::span(photos[i].data)));
+        const ImageF depth =
+            measured_.back() ? depth_in_world(view, dataset.depth_scale) : ImageF();
+        upload(view, photos[i], depth);
+        for (size_t p = i % kDepthStep; p < depth.data.size(); p += kDepthStep)
+            if (depth.data[p] > 0) sample.push_back(depth.data[p]);
         pixels_ = std::max(pixels_, count);
     }
     longest_side_ = std::max(width_, height_);
     if (views_.empty())
         throw Error(dataset.root.string(), "no photo is left to train on",
                     "Every view is held out: add photos, or leave out --eval of darb train.");
+    if (!sample.empty()) usual_depth_ = nearest_rank(sample, 0.5);
     whole_.cameras = upload_cameras(device, whole_.data);
     if (!stream) return;
-    for (Place& place : places_) place.pixels = Buffer(device, "photo of a step", pixels_ * 4);
+    const bool any = std::find(measured_.begin(), measured_.end(), true) != measured_.end();
+    for (Place& place : places_)
+        place.pixels = Buffer(device, "photo of a step", pixels_ * (any ? 8 : 4));
+}
+
+void TrainingPhotos::upload(const View& view, const ImageU8& photo, const ImageF& depth) {
+    const std::uint64_t colours = photo.data.size(), more = depth.data.size() * sizeof(float);
+    Buffer& buffer = whole_.photos.back();
+    buffer = Buffer(*device_, "photo " + view.name, colours + more, memory_);
+    buffer.upload(std::as_bytes(std::span(photo.data)));
+    if (more > 0) buffer.upload(std::as_bytes(std::span(depth.data)), colours);
 }
 
 TrainingView TrainingPhotos::view(int view, int sh_degree, const glm::vec3& background) const {
@@ -65,7 +90,8 @@ TrainingView TrainingPhotos::view(int view, int sh_degree, const glm::vec3& back
     return {
         {size.data[view], &size.cameras, static_cast<std::uint32_t>(view), sh_degree, background},
         static_cast<std::uint32_t>(photo),
-        &size.photos[view]};
+        &size.photos[view],
+        measured_[static_cast<size_t>(view)]};
 }
 
 void TrainingPhotos::fill(Commands& commands, Place& place, int view) {

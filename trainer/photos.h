@@ -20,8 +20,11 @@ namespace darb {
 /// TrainingPhotos until their size changes.
 struct TrainingView {
     FrameView frame;
-    std::uint32_t photo = 0;         // among the training photos
-    const Buffer* pixels = nullptr;  // uint [H][W], R in the low byte; on the host where they wait
+    std::uint32_t photo = 0;  // among the training photos
+    // uint [H][W], R in the low byte, and where depths were measured float [H][W], world units; on
+    // the host where they wait.
+    const Buffer* pixels = nullptr;
+    bool measured = false;
 
     int width() const { return static_cast<int>(frame.camera.width); }
     int height() const { return static_cast<int>(frame.camera.height); }
@@ -31,9 +34,10 @@ struct TrainingView {
 class TrainingPhotos {
   public:
     /// photos: as load_photos gives them, in the order of dataset.views. origin: of the splats.
-    /// stream: they wait on the host. Throws Error where no view is left to train on.
+    /// stream: they wait on the host. depths: those of the views that have any go with them.
+    /// Throws Error where no view is left to train on.
     TrainingPhotos(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
-                   const glm::dvec3& origin, bool stream);
+                   const glm::dvec3& origin, bool stream, bool depths = false);
 
     /// The training views among all, ascending.
     const std::vector<int>& views() const { return views_; }
@@ -55,6 +59,9 @@ class TrainingPhotos {
     const std::string& name(int view) const { return names_[view]; }
     /// Distance of the nearest points from the camera of a view; infinity: there are none.
     double nearest_distance(int view) const { return nearest_[view]; }
+
+    /// Median of the measured depths, world units; 1 where there are none.
+    double usual_depth() const { return usual_depth_; }
 
     int longest_side() const { return longest_side_; }       // px, of all views
     int largest_width() const { return width_; }             // px, of all views
@@ -89,6 +96,7 @@ class TrainingPhotos {
         Buffer pixels;
         int view = -1;  // whose photo is there, after all that was recorded
     };
+    void upload(const View& view, const ImageU8& photo, const ImageF& depth);
     void make_smaller(ResolutionRamp& ramp, int divisor);
     void fill(Commands& commands, Place& place, int view);
 
@@ -98,6 +106,8 @@ class TrainingPhotos {
     std::vector<std::string> names_;    // [view]
     std::vector<double> nearest_;       // [view]
     std::vector<int> views_;
+    std::vector<bool> measured_;  // [view]
+    double usual_depth_ = 1;
     int longest_side_ = 1, width_ = 1, height_ = 1;
     std::uint64_t pixels_ = 1;
     Memory memory_;  // of the photos

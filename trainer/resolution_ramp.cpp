@@ -32,11 +32,14 @@ Buffer ResolutionRamp::downsample(const Buffer& photo, const Camera& camera, con
         static_cast<std::uint32_t>(camera.width), static_cast<std::uint32_t>(camera.height),
         static_cast<std::uint32_t>(smaller.width), static_cast<std::uint32_t>(smaller.height)};
     const std::uint64_t pixels = std::uint64_t{args.out_width} * args.out_height;
-    Buffer result(*device_, "smaller " + photo.name(), pixels * 4, memory);
+    const bool depths = photo.bytes() >= std::uint64_t{args.width} * args.height * 8;
+    if (depths && !depths_)
+        depths_ = Pipeline(*device_, "downsample_photo", {{"THREADS", SPLAT_GROUP}, {"DEPTHS", 1}});
+    Buffer result(*device_, "smaller " + photo.name(), pixels * (depths ? 8 : 4), memory);
     const Groups g = groups_for(pixels);
     commands_.begin();
     commands_.pass("downsample");
-    commands_.dispatch(pipeline_, args, {photo, result}, g.x, g.y);
+    commands_.dispatch(depths ? depths_ : pipeline_, args, {photo, result}, g.x, g.y);
     commands_.submit_and_wait();
     return result;
 }

@@ -17,14 +17,16 @@ class ResolutionRamp {
   public:
     explicit ResolutionRamp(Device& device);
 
-    /// A smaller photo: area means, colours weighted by alpha. photo: [H][W] R G B A of `camera`.
+    /// A smaller photo: area means, colours weighted by alpha. photo: [H][W] R G B A of `camera`
+    /// and, where it is twice as large, float [H][W] measured depths, of which the nearest measured
+    /// one is taken.
     Buffer downsample(const Buffer& photo, const Camera& camera, const Camera& smaller,
                       Memory memory = Memory::device);
 
   private:
     Device* device_;
     Commands commands_;
-    Pipeline pipeline_;
+    Pipeline pipeline_, depths_;
 };
 
 }  // namespace darb

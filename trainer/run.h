@@ -73,6 +73,7 @@ struct Evaluation {
     std::vector<ViewMetrics> views;
     double psnr_db = 0, ssim = 0;  // means over the views; but for an arc, where others are there
     std::optional<ArcMeans> arc;   // where others are there
+    std::optional<DepthError> depth;  // means over the views that have one
 };
 
 struct RunSummary {

@@ -19,6 +19,8 @@ ForwardOptions forward_options(const TrainOptions& options) {
     f.huge_splat_path = options.huge_splat_path;
     f.store_for_backward = true;
     f.camera_gradient = options.refine_cameras;
+    f.alpha_gradient = options.exposure;
+    f.depth_sum = options.depth;
     return f;
 }
 
@@ -32,6 +34,10 @@ ExposureStep exposure_step(const StepInput& input) {
 
 bool steps_by_views(const TrainOptions& options) {
     return options.batch > 1 || options.refine_cameras;
+}
+
+bool compares_depth(const TrainOptions& options, const View& view) {
+    return options.depth && !view.depth.empty();
 }
 
 LossOptions loss_options(const TrainOptions& options, const Dataset& dataset) {
@@ -53,10 +59,13 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
       backward_(device, forward_options(options)),
       loss_(device, photos.largest_width(), photos.largest_height(), loss),
       lambda_dssim_(options.lambda_dssim),
-      d_image_(device, "d_image", photos.largest_photo() * 12),
+      depth_weight_(options.depth_weight),
+      d_image_(device, "d_image",
+               photos.largest_photo() * 4 * d_image_planes(forward_options(options))),
       flights_{Flight(device), Flight(device)} {
     if (options.exposure)
         exposure_.emplace(device, photos.count(), photos.largest_photo(), options.batch);
+    if (options.depth) depth_.emplace(device, loss.use_alpha, options.exposure);
     if (steps_by_views(options)) adam_.emplace(device);
     if (options.refine_cameras) cameras_.emplace(device);
 }
@@ -134,11 +143,16 @@ StepFrame TrainingStep::step_frame(Commands& commands, const StepInput& input) {
             scores ? &input.gradients->scores() : nullptr};
 }
 
+ExposedPicture TrainingStep::exposed(const TrainingView& view) {
+    const FrameImages& images = buffers_.frame().images;
+    return {images.image, images.final_transmittance, view.frame.background};
+}
+
 void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
     const TrainingView& view = input.view;
     Frame& frame = buffers_.frame();
     forward_.record(commands, *splats_, view.frame, frame);
-    if (exposure_) exposure_->record(commands, frame.images.image, view.photo, view.size());
+    if (exposure_) exposure_->record(commands, exposed(view), view.photo, view.size());
 }
 
 void TrainingStep::record_before_loss(Commands& commands, const StepInput& input) {
@@ -159,8 +173,13 @@ void TrainingStep::record_back(Commands& commands, const StepInput& input) {
     Frame& frame = buffers_.frame();
     const Buffer& status = frame.counters.status;
     if (exposure_)
-        exposure_->record_backward(commands, frame.images.image, d_image_, exposure_step(input),
+        exposure_->record_backward(commands, exposed(view), d_image_, exposure_step(input),
                                    input.place);
+    if (depth_)
+        depth_->record(commands,
+                       {frame.images.image, frame.images.final_transmittance, *view.pixels,
+                        d_image_, view.measured},
+                       view.size(), depth_weight_, photos_->usual_depth());
     if (input.gradients) {
         backward_.record_gradients(
             commands, view.frame, frame, *splats_, d_image_,
@@ -323,7 +342,7 @@ double TrainingStep::photo_mse(const TrainingView& view) {
         flight.commands.begin();
         const Buffer& photo = photos_->place(flight.commands, view);
         forward_.record(flight.commands, *splats_, view.frame, frame);
-        if (exposure_) exposure_->record(flight.commands, image, view.photo, view.size());
+        if (exposure_) exposure_->record(flight.commands, exposed(view), view.photo, view.size());
         loss_.record(flight.commands,
                      {exposure_ ? exposure_->mapped() : image, photo, d_image_, flight.loss},
                      view.width(), view.height(), view.frame.background, lambda_dssim_);

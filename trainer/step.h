@@ -21,6 +21,7 @@
 #include "engine/raster/loss.h"
 #include "engine/render/camera_gradient.h"
 #include "trainer/density/density_strategy.h"
+#include "trainer/depth_loss.h"
 #include "trainer/exposure.h"
 #include "trainer/photos.h"
 
@@ -31,6 +32,8 @@ ForwardOptions forward_options(const TrainOptions& options);
 /// Whether the gradients of views go to buffers, of which a step is made, and are not a step at
 /// once: in batches, and where they are of cameras, too.
 bool steps_by_views(const TrainOptions& options);
+/// Whether the measured depth of this view is compared.
+bool compares_depth(const TrainOptions& options, const View& view);
 /// How its loss reads photos.
 LossOptions loss_options(const TrainOptions& options, const Dataset& dataset);
 
@@ -124,6 +127,7 @@ class TrainingStep {
     };
     void reserve_backward();
     void launch(Flight& flight, const StepInput& input);
+    ExposedPicture exposed(const TrainingView& view);
     StepInput with_photo(Commands& commands, const StepInput& input);
     void record_picture(Commands& commands, const StepInput& input);
     void record_before_loss(Commands& commands, const StepInput& input);
@@ -147,7 +151,9 @@ class TrainingStep {
     Backward backward_;
     Loss loss_;
     float lambda_dssim_;
-    std::optional<Exposure> exposure_;   // options.exposure
+    std::optional<Exposure> exposure_;  // options.exposure
+    std::optional<DepthLoss> depth_;    // options.depth
+    float depth_weight_;
     std::optional<AdamUpdate> adam_;     // of batches
     std::optional<CameraSums> cameras_;  // options.refine_cameras, of batches
     Buffer d_image_;

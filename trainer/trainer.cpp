@@ -73,7 +73,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       extent_(scene_extent(dataset)),
       memory_(device, dataset, options, schedule_, static_cast<std::uint32_t>(start.size())),
       splats_(device, start_model(start, options), true, schedule_.rest_every > 1),
-      photos_(device, dataset, photos, splats_.origin(), memory_.streams_photos()),
+      photos_(device, dataset, photos, splats_.origin(), memory_.streams_photos(), options.depth),
       order_(photos_.views(), options.seed),
       optimizer_(options, schedule_, extent_, scene_reach(dataset), photos_.count()),
       density_(device, options.kernel, options.footprint),

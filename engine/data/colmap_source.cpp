@@ -6,6 +6,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/colmap.h"
+#include "engine/data/depths.h"
 #include "engine/data/masks.h"
 #include "engine/data/source.h"
 
@@ -94,6 +95,7 @@ Dataset load_colmap(const fs::path& root, const fs::path& model_folder,
     }
     if (options.require_photos) check_photos(dataset.views, model_folder);
     add_masks(images.parent_path(), options, dataset);
+    add_depths(images.parent_path(), images, options, dataset);
     dataset.points = std::move(model.points);
     if (!model.points_note.empty()) dataset.notes.push_back(model.points_note);
     if (model.dropped_points > 0)

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
+#include "engine/core/quantile.h"
 #include "engine/data/metrics.h"
 
 namespace darb {
@@ -10,7 +13,8 @@ namespace darb {
 namespace {
 
 constexpr float kErrorGain = 4.0f;
-constexpr double kEqual_db = 100;  // of a picture that equals its photo
+constexpr float kLeastCover = 0.5f;  // as in training: of less no surface follows
+constexpr double kEqual_db = 100;    // of a picture that equals its photo
 
 }  // namespace
 
@@ -71,6 +75,19 @@ ViewMetrics compare_view(const std::string& name, const ImageF& render, const Im
     if (counted == 0) return {name, std::nan(""), std::nan("")};
     const double share = static_cast<double>(counted) / static_cast<double>(pixels);
     return {name, finite_psnr(shown, 10.0 * std::log10(share)), ssim(shown, truth)};
+}
+
+std::optional<DepthError> compare_depth(const ImageF& rendered, const ImageF& measured,
+                                        double scale) {
+    std::vector<double> errors;
+    double sum = 0;
+    for (size_t p = 0; p < measured.data.size(); ++p) {
+        if (!(measured.data[p] > 0) || rendered.data[2 * p + 1] < kLeastCover) continue;
+        errors.push_back(std::abs(rendered.data[2 * p] / scale - measured.data[p]));
+        sum += errors.back();
+    }
+    if (errors.empty()) return std::nullopt;
+    return DepthError{sum / static_cast<double>(errors.size()), median(std::move(errors))};
 }
 
 }  // namespace darb

@@ -2,16 +2,24 @@
 #pragma once
 
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 
 #include "engine/core/image.h"
 
 namespace darb {
 
+/// Of the depth of a picture from the measured one, over the pixels that were measured and of which
+/// the splats cover at least half.
+struct DepthError {
+    double mean_m = 0, median_m = 0;  // of the absolute difference
+};
+
 struct ViewMetrics {
     std::string name;
     double psnr_db = 0, ssim = 0;
-    bool in_arc = false;  // View::in_arc, which the caller sets
+    bool in_arc = false;                   // View::in_arc, which the caller sets
+    std::optional<DepthError> depth = {};  // likewise
 };
 
 /// The photo as float RGB over a background, value / 255, straight alpha composited.
@@ -26,5 +34,10 @@ ImageU8 side_by_side(const ImageF& photo, const ImageF& render);
 /// others alone; both are NaN where all are masked. PSNR is 100 dB at most.
 ViewMetrics compare_view(const std::string& name, const ImageF& render, const ImageU8& photo,
                          const glm::vec3& background, bool alpha_is_mask = false);
+
+/// rendered: [H][W][2] depth and opacity, as Renderer::render_depth gives them, world units;
+/// measured: [H][W] of load_depth; scale: world units a metre. Nothing where no pixel counts.
+std::optional<DepthError> compare_depth(const ImageF& rendered, const ImageF& measured,
+                                        double scale);
 
 }  // namespace darb

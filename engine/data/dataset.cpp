@@ -13,6 +13,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/colmap.h"
+#include "engine/data/depths.h"
 #include "engine/data/image_io.h"
 #include "engine/data/source.h"
 
@@ -62,14 +63,19 @@ std::string what_it_adds(const Dataset& transforms, const Dataset& model) {
     const auto file = [](const fs::path& path) {
         return path.empty() ? path : fs::absolute(path).lexically_normal();
     };
-    std::map<fs::path, fs::path> masks;
-    for (const View& view : model.views) masks[file(view.photo)] = file(view.mask);
+    std::map<fs::path, fs::path> masks, depths;
+    for (const View& view : model.views) {
+        masks[file(view.photo)] = file(view.mask);
+        depths[file(view.photo)] = file(view.depth);
+    }
     std::size_t known = 0;
-    bool masked = false, split = false;
+    bool masked = false, measured = false, split = false;
     for (const View& view : transforms.views) {
         const auto at = masks.find(file(view.photo));
         known += at != masks.end() ? 1 : 0;
         masked |= at != masks.end() && !view.mask.empty() && at->second != file(view.mask);
+        measured |= at != masks.end() && !view.depth.empty() &&
+                    depths[file(view.photo)] != file(view.depth);
         split |= view.is_test;
     }
     if (known < transforms.views.size())
@@ -78,7 +84,10 @@ std::string what_it_adds(const Dataset& transforms, const Dataset& model) {
     if (known < model.views.size())
         return fmt::format("it leaves out {} of the model's {} photos", model.views.size() - known,
                            model.views.size());
-    return masked ? "that lacks its masks" : split ? "that lacks its split" : "";
+    return masked     ? "that lacks its masks"
+           : measured ? "that lacks its depths"
+           : split    ? "that lacks its split"
+                      : "";
 }
 
 // The model that nerfstudio leaves below its transforms.json, which names the photos as COLMAP saw
@@ -235,6 +244,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
     if (options.hold_out) mark_held_out(dataset.views, options.held_out);
     fit_views(dataset, options);
     note_odd_cameras(dataset);
+    if (options.require_photos) find_depth_scale(dataset);
     return dataset;
 } catch (const std::bad_alloc&) {
     throw Error(path.string(), "does not fit into the memory that is left",

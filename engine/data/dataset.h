@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,8 @@ struct View {
     std::filesystem::path photo;  // the file
     std::filesystem::path mask;   // empty where there is none; 8-bit, 0 = ignore; of the photo as
                                   // stored or as its EXIF turns it, at any size
+    std::filesystem::path depth;  // measured, empty where there is none; see engine/data/depths.h
+    double depth_unit = 0;        // metres a step of its values; 0: as the type of the file says
     Camera camera;                // of the photo as load_photo returns it
     LensModel lens;               // of the file on disk, turned by orientation; see load_photo
     bool is_test = false;         // held out
@@ -58,10 +61,11 @@ struct DatasetOptions {
     std::string images_folder = "images";  // COLMAP: images, images_2, ...
     int resolution =
         -1;  // 1, 2, 4, 8: divisor; > 8: width in px; -1: as is, but at most 1,600 wide
-    bool hold_out = false;       // --eval: what held_out says is test; sources with a test file of
-                                 // their own use that in either case
-    HoldOut held_out{};          // --hold-out
-    bool require_photos = true;  // false: cameras only (render)
+    bool hold_out = false;  // --eval: what held_out says is test; sources with a test file of
+                            // their own use that in either case
+    HoldOut held_out{};     // --hold-out
+    std::optional<double> depth_scale;  // world units a metre; absent: find_depth_scale
+    bool require_photos = true;         // false: cameras only (render)
     bool original_lens = false;  // true: distorted photos stay so, and their cameras have the lens
     bool original_where_wide = false;  // true: so do those of too_wide_to_undistort
 };
@@ -74,6 +78,7 @@ struct Dataset {
     PointCloud points;               // may be empty
     PointCloud start;                // what training starts from in place of points; may be empty
     bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
+    double depth_scale = 1;          // of the views' depths: world units a metre
     bool alpha_is_mask = false;      // some of it comes from masks or gaps: pixels to leave out
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
 };

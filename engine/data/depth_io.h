@@ -1,4 +1,4 @@
-// Depth images as files: 16-bit grey PNG.
+// Depth images as files: 16-bit grey PNG, and to read .npy as well.
 #pragma once
 
 #include <cstddef>
@@ -18,5 +18,13 @@ struct DepthRange {
 /// depth: first channel, world units, 0 where nothing is seen. One grey step is `unit` world units;
 /// rounded, and kDepthSteps from there on. A tEXt chunk "DepthUnit" states the unit.
 DepthRange write_depth_png(const std::filesystem::path& path, const ImageF& depth, double unit);
+
+constexpr double kMillimetre = 0.001;  // m
+
+/// Measured depths [H][W], metres along the optical axis; 0 where nothing was measured, as where
+/// the file has 0, NaN, infinity or less than 0. unit: metres a step; 0: what the type says, 0.001
+/// of 16-bit grey PNG and of .npy of uint16 and int32, 1 of .npy of float32 and float64. Throws
+/// Error naming the file where it is of another type, or has no measured depth.
+ImageF read_depth(const std::filesystem::path& path, double unit = 0);
 
 }  // namespace darb

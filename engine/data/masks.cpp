@@ -22,10 +22,6 @@ bool holds_pictures(const fs::path& folder) {
         });
 }
 
-std::string without_images(const std::string& name) {
-    return name.starts_with(kImages) ? name.substr(kImages.size()) : name;
-}
-
 fs::path find_mask(const fs::path& masks, const std::string& name) {
     for (const fs::path& photo : {fs::path(name), fs::path(without_images(name))})
         for (const fs::path& stem : {photo, without_picture_extension(photo)})
@@ -36,6 +32,10 @@ fs::path find_mask(const fs::path& masks, const std::string& name) {
 }
 
 }  // namespace
+
+std::string without_images(const std::string& name) {
+    return name.starts_with(kImages) ? name.substr(kImages.size()) : name;
+}
 
 fs::path masks_folder(const fs::path& folder) {
     for (const char* name : {"masks", "mask"})

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "engine/core/image.h"
 
@@ -43,5 +44,13 @@ PhotoHead png_head(std::span<const std::byte> head, std::uint64_t bytes, const s
 /// damaged or cut off are an Error that says where in the photo.
 ImageU8 decode_jpeg(std::span<const std::byte> file, const std::string& where);
 ImageU8 decode_png(std::span<const std::byte> file, const std::string& where);
+
+/// 16-bit grey, of a PNG that is nothing else; else Error with this hint.
+struct GreyU16 {
+    int width = 0, height = 0;        // px
+    std::vector<std::uint16_t> data;  // [height][width]
+};
+GreyU16 decode_png16(std::span<const std::byte> file, const std::string& where,
+                     const std::string& hint);
 
 }  // namespace darb

@@ -112,6 +112,20 @@ PhotoHead checked_head(const PngReader& reader, std::uint64_t bytes, const std::
     return head;
 }
 
+void decode_rows(PngReader& reader, png_bytep to, std::size_t stride, int height,
+                 const std::string& where) {
+    const int passes =
+        png_get_interlace_type(reader.png, reader.info) == PNG_INTERLACE_ADAM7 ? 7 : 1;
+    const auto decode = [&] {
+        for (int pass = 0; pass < passes; ++pass)
+            for (reader.row = 0; reader.row < static_cast<std::uint32_t>(height); ++reader.row)
+                png_read_row(reader.png, to + reader.row * stride, nullptr);
+        reader.row = 0;
+        png_read_end(reader.png, nullptr);
+    };
+    if (!run_png(reader, decode)) refuse_png(reader, where);
+}
+
 }  // namespace
 
 bool is_png(std::span<const std::byte> file) {
@@ -142,16 +156,28 @@ ImageU8 decode_png(std::span<const std::byte> file, const std::string& where) {
     ImageU8 image(head.width, head.height, channels);
     const std::size_t stride = static_cast<std::size_t>(head.width) * channels;
     DARB_CHECK(png_get_rowbytes(reader.png, reader.info) == stride, "{} channels", channels);
-    const int passes =
-        png_get_interlace_type(reader.png, reader.info) == PNG_INTERLACE_ADAM7 ? 7 : 1;
-    const auto decode = [&] {
-        for (int pass = 0; pass < passes; ++pass)
-            for (reader.row = 0; reader.row < static_cast<std::uint32_t>(head.height); ++reader.row)
-                png_read_row(reader.png, &image.data[reader.row * stride], nullptr);
-        reader.row = 0;
-        png_read_end(reader.png, nullptr);
+    decode_rows(reader, image.data.data(), stride, head.height, where);
+    return image;
+}
+
+GreyU16 decode_png16(std::span<const std::byte> file, const std::string& where,
+                     const std::string& hint) {
+    PngReader reader(file);
+    if (!read_head(reader)) refuse_png(reader, where);
+    const PhotoHead head = checked_head(reader, file.size(), where);
+    const int depth = png_get_bit_depth(reader.png, reader.info);
+    if (depth != 16 || head.channels != 1)
+        throw Error(where, fmt::format("has {} bits and {} channels", depth, head.channels), hint);
+    const auto prepare = [&] {
+        png_set_swap(reader.png);  // to little-endian
+        png_set_interlace_handling(reader.png);
+        png_read_update_info(reader.png, reader.info);
     };
-    if (!run_png(reader, decode)) refuse_png(reader, where);
+    if (!run_png(reader, prepare)) refuse_png(reader, where);
+    GreyU16 image{head.width, head.height, {}};
+    image.data.resize(static_cast<std::size_t>(head.width) * head.height);
+    decode_rows(reader, reinterpret_cast<png_bytep>(image.data.data()),
+                static_cast<std::size_t>(head.width) * 2, head.height, where);
     return image;
 }
 

@@ -17,6 +17,7 @@
 #include "engine/data/dataset.h"
 #include "engine/data/image_io.h"
 #include "engine/data/resample.h"
+#include "engine/data/source.h"
 
 namespace darb {
 
@@ -25,27 +26,6 @@ namespace {
 bool same_aspect(const ImageU8& image, int width, int height) {
     const double wanted = static_cast<double>(image.width) * height / width;
     return std::abs(image.height - wanted) <= 1.5 + 0.01 * wanted;
-}
-
-/// The mask, turned like the photo: masks are made of the stored pixels or of the photo as viewers
-/// show it, and its shape tells which.
-ImageU8 load_mask(const View& view, const ImageU8& photo) {
-    const bool turned = view.orientation >= 5;
-    const int width = turned ? photo.height : photo.width;  // as stored
-    const int height = turned ? photo.width : photo.height;
-    ImageU8 mask = read_image(view.mask, 1);
-    if (same_aspect(mask, width, height)) return orient_image(mask, view.orientation);
-    if (same_aspect(mask, height, width)) {
-        if (turned) return mask;  // as viewers show the photo, and so it is
-        const int shown = read_image_info(view.photo).orientation;
-        // 6 and 8 undo each other, 5 and 7 themselves.
-        if (shown >= 5) return orient_image(mask, shown == 6 ? 8 : shown == 8 ? 6 : shown);
-    }
-    throw Error(
-        view.mask.string(),
-        fmt::format("is {} x {} px, another aspect ratio than that of its photo {}, {} x {}",
-                    mask.width, mask.height, view.photo.string(), width, height),
-        "Make masks of the same photos, or remove this one.");
 }
 
 /// The most that load_photo holds at a time: what libjpeg keeps of a progressive photo, its pixels
@@ -113,7 +93,8 @@ ImageU8 decode_photo(const View& view) {
                     fmt::format("is {} x {} px now, but was {} x {} when the data set was opened",
                                 photo.width, photo.height, view.lens.width, view.lens.height),
                     "Leave the photos alone while they are in use.");
-    if (!view.mask.empty()) apply_mask(photo, load_mask(view, photo));
+    if (!view.mask.empty())
+        apply_mask(photo, turn_with_photo(read_image(view.mask, 1), view, view.mask, "masks"));
     if (view.lens.distorted() && !view.camera.lens.active) {
         const Camera full = undistorted_frame(view.lens, view.photo.string()).camera;
         photo = undistort(photo, view.lens, full);
@@ -122,6 +103,25 @@ ImageU8 decode_photo(const View& view) {
 }
 
 }  // namespace
+
+ImageU8 turn_with_photo(ImageU8 image, const View& view, const std::filesystem::path& file,
+                        const char* kind) {
+    const bool turned = view.orientation >= 5;
+    const int width = turned ? view.lens.height : view.lens.width;  // as stored
+    const int height = turned ? view.lens.width : view.lens.height;
+    if (same_aspect(image, width, height)) return orient_image(image, view.orientation);
+    if (same_aspect(image, height, width)) {
+        if (turned) return image;  // as viewers show the photo, and so it is
+        const int shown = read_image_info(view.photo).orientation;
+        // 6 and 8 undo each other, 5 and 7 themselves.
+        if (shown >= 5) return orient_image(image, shown == 6 ? 8 : shown == 8 ? 6 : shown);
+    }
+    throw Error(
+        file.string(),
+        fmt::format("is {} x {} px, another aspect ratio than that of its photo {}, {} x {}",
+                    image.width, image.height, view.photo.string(), width, height),
+        fmt::format("Make {} of the same photos, or remove this one.", kind));
+}
 
 ImageU8 load_photo(const View& view) try {
     return decode_photo(view);

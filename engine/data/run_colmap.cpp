@@ -71,26 +71,25 @@ std::string output_of(const std::string& command) {
     return text;
 }
 
-/// Folder name of the model with the most images, which the mapper need not number 0; the first of
-/// equals. Empty where there is none.
-std::string largest_model(const fs::path& sparse,
-                          const std::function<void(std::string_view)>& progress) {
+std::map<std::string, std::size_t> models_below(const fs::path& sparse) {
     std::map<std::string, std::size_t> models;
     std::error_code ignored;
     for (const fs::directory_entry& entry : fs::directory_iterator(sparse, ignored))
         if (is_colmap_model(entry.path()))
             models[entry.path().filename().string()] = count_colmap_images(entry.path());
-    if (models.empty()) return {};
-    const auto best =
-        std::max_element(models.begin(), models.end(),
-                         [](const auto& a, const auto& b) { return a.second < b.second; });
-    if (models.size() > 1 && progress)
-        progress(fmt::format("{} models: {}, of {} photos, is the largest and is used",
-                             models.size(), (sparse / best->first).string(), best->second));
-    return best->first;
+    return models;
 }
 
 }  // namespace
+
+// The mapper need not number it 0.
+std::string largest_colmap_model(const fs::path& sparse) {
+    const std::map<std::string, std::size_t> models = models_below(sparse);
+    if (models.empty()) return {};
+    return std::max_element(models.begin(), models.end(),
+                            [](const auto& a, const auto& b) { return a.second < b.second; })
+        ->first;
+}
 
 std::string shell_quoted(const fs::path& path) {
     std::string text = "'";
@@ -137,6 +136,22 @@ std::vector<std::string> colmap_commands(const ColmapRun& run) {
     };
 }
 
+namespace {
+
+std::string chosen_model(const ColmapRun& run,
+                         const std::function<void(std::string_view)>& progress) {
+    const fs::path sparse = run.workspace / "sparse";
+    const std::string model = largest_colmap_model(sparse);
+    if (model.empty())
+        throw Error(run.photos.string(), "colmap found no common view of the photos", kMotionHint);
+    if (const std::size_t count = models_below(sparse).size(); count > 1 && progress)
+        progress(fmt::format("{} models: {}, of {} photos, is the largest and is used", count,
+                             (sparse / model).string(), count_colmap_images(sparse / model)));
+    return model;
+}
+
+}  // namespace
+
 fs::path run_colmap(const ColmapRun& asked, const std::function<void(std::string_view)>& progress) {
     ColmapRun run = asked;
     if (!fs::is_directory(run.photos))
@@ -158,10 +173,7 @@ fs::path run_colmap(const ColmapRun& asked, const std::function<void(std::string
         if (progress) progress(fmt::format("[{}/{}] {}", i + 1, commands.size(), commands[i]));
         run_command(commands[i], progress, i == kMapper ? kMotionHint : kPhotosHint);
         if (i != kMapper) continue;
-        run.model = largest_model(run.workspace / "sparse", progress);
-        if (run.model.empty())
-            throw Error(run.photos.string(), "colmap found no common view of the photos",
-                        kMotionHint);
+        run.model = chosen_model(run, progress);
         commands = colmap_commands(run);
     }
     return run.workspace / "dense";

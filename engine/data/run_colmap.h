@@ -33,6 +33,10 @@ bool has_new_names(std::string_view help);
 std::filesystem::path run_colmap(const ColmapRun& run,
                                  const std::function<void(std::string_view line)>& progress);
 
+/// Name of the model below `sparse` with the most images, the first of equals; empty where there is
+/// none.
+std::string largest_colmap_model(const std::filesystem::path& sparse);
+
 /// In single quotes, for the shell.
 std::string shell_quoted(const std::filesystem::path& path);
 

@@ -33,6 +33,12 @@ void fit_views(Dataset& dataset, const DatasetOptions& options);
 /// Notes on cameras that see none of the points, and on intrinsics beyond reason.
 void note_odd_cameras(Dataset& dataset);
 
+/// An image made of the photo's pixels (a mask, depths; `kind`), turned as load_photo turns the
+/// photo: it may be of the stored pixels or of the photo as viewers show it, and its shape tells
+/// which. Throws Error where it has another shape than the photo, of view.lens.
+ImageU8 turn_with_photo(ImageU8 image, const View& view, const std::filesystem::path& file,
+                        const char* kind);
+
 /// Size at which a width x height photo is loaded: DatasetOptions::resolution.
 struct PhotoSize {
     int width = 0, height = 0;
@@ -53,6 +59,8 @@ std::filesystem::path find_photo(const std::filesystem::path& folder, const std:
 
 /// The usual folder of photos, as it begins their names in transforms.json.
 constexpr std::string_view kImages = "images/";
+/// A name without it.
+std::string without_images(const std::string& name);
 
 /// The first folder images_* in `folder`, images_2 or the like; empty where there is none.
 std::string scaled_images(const std::filesystem::path& folder);

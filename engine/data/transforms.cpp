@@ -167,6 +167,12 @@ TransformsFile parse_transforms(std::string_view text, const std::string& where)
     TransformsIntrinsics defaults;
     read_intrinsics(root, where, defaults);
     file.ply_file_path = read_string(root, "ply_file_path", where);
+    std::optional<double> unit;
+    read_number(root, "depth_unit_scale_factor", where, unit);
+    file.depth_unit = unit.value_or(0);
+    if (unit && !(*unit > 0 && *unit < 1e6))
+        throw Error(where, fmt::format("depth_unit_scale_factor is {}", *unit),
+                    "Give the metres of a step, as 0.001.");
     for (const char* key : {"test_filenames", "val_filenames"}) {
         const auto test = root.find(key);
         if (!file.test_filenames.empty() || test == root.end() || !test->is_array()) continue;
@@ -182,6 +188,7 @@ TransformsFile parse_transforms(std::string_view text, const std::string& where)
         if (frame.file_path.empty()) throw Error(record, "has no file_path", kCorrectEntry);
         record += fmt::format(" ({})", frame.file_path);
         frame.mask_path = read_string(frames[i], "mask_path", record);
+        frame.depth_path = read_string(frames[i], "depth_file_path", record);
         frame.intrinsics = defaults;
         read_intrinsics(frames[i], record, frame.intrinsics);
         file.scaled_poses += read_pose(frames[i], record, frame) ? 1 : 0;

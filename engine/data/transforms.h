@@ -24,8 +24,9 @@ struct TransformsIntrinsics {
 };
 
 struct TransformsFrame {
-    std::string file_path;  // as written
-    std::string mask_path;  // may be empty
+    std::string file_path;   // as written
+    std::string mask_path;   // may be empty
+    std::string depth_path;  // depth_file_path, may be empty
     TransformsIntrinsics intrinsics;
     glm::dmat3 rotation{1.0};  // world to camera, COLMAP's axes
     glm::dvec3 translation{0.0};
@@ -34,6 +35,7 @@ struct TransformsFrame {
 struct TransformsFile {
     std::vector<TransformsFrame> frames;
     std::string ply_file_path;  // may be empty
+    double depth_unit = 0;      // depth_unit_scale_factor, metres a step; 0: not declared
     // nerfstudio's split, may be empty; val_filenames where test_filenames is empty.
     std::vector<std::string> test_filenames;
     std::size_t scaled_poses = 0;  // whose rotation had a scale

@@ -5,6 +5,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/data/depths.h"
 #include "engine/data/image_io.h"
 #include "engine/data/masks.h"
 #include "engine/data/point_cloud_ply.h"
@@ -40,14 +41,14 @@ bool in_pixels(const TransformsIntrinsics& in) {
 }
 
 /// The lens; a file without a size takes that of its own photo, turned, whichever is loaded.
-void set_lens(const TransformsFrame& frame, const fs::path& json, const DatasetOptions& options,
+void set_lens(const TransformsFrame& frame, const fs::path& listing, const DatasetOptions& options,
               View& view) {
-    const std::string where = fmt::format("{} ({})", json.string(), frame.file_path);
+    const std::string where = fmt::format("{} ({})", listing.string(), frame.file_path);
     int width = kSyntheticSize, height = kSyntheticSize;
     if ((!frame.intrinsics.w || !frame.intrinsics.h) && fs::is_regular_file(view.photo)) {
         fs::path own = view.photo;
         if (asked_name(view.name, options) != view.name && in_pixels(frame.intrinsics))
-            own = find_photo(json.parent_path(), view.name);
+            own = find_photo(listing.parent_path(), view.name);
         if (own.empty())
             throw Error(where,
                         fmt::format("its camera is in pixels of {}, which is missing, and declares "
@@ -62,6 +63,19 @@ void set_lens(const TransformsFrame& frame, const fs::path& json, const DatasetO
     view.lens = lens_from_transforms(frame.intrinsics, width, height, where);
 }
 
+void set_depth(const TransformsFrame& frame, double unit, const fs::path& file,
+               const DatasetOptions& options, View& view) {
+    view.depth_unit = unit;
+    if (frame.depth_path.empty()) return;
+    view.depth = file.parent_path() / frame.depth_path;
+    if (!fs::is_regular_file(view.depth))
+        view.depth = file.parent_path() / with_slashes(frame.depth_path);
+    if (options.require_photos && !fs::is_regular_file(view.depth))
+        throw Error(fmt::format("{} ({})", file.string(), frame.file_path),
+                    fmt::format("its depth {} is missing", view.depth.string()),
+                    "Put the depth back or remove depth_file_path.");
+}
+
 struct Skipped {
     std::size_t count = 0;
     std::string first;
@@ -72,21 +86,23 @@ struct Skipped {
 struct Declared {
     std::string ply;
     bool masks = false;  // of some frame
+    bool depths = false;
     std::size_t scaled_poses = 0;
 };
 
-void add_frames(const fs::path& json, bool is_test, const DatasetOptions& options, Dataset& dataset,
-                Skipped& skipped, Declared& declared) {
-    const TransformsFile file = parse_transforms(read_text_file(json), json.string());
+void add_frames(const fs::path& listing, bool is_test, const DatasetOptions& options,
+                Dataset& dataset, Skipped& skipped, Declared& declared) {
+    const TransformsFile file = parse_transforms(read_text_file(listing), listing.string());
     if (declared.ply.empty()) declared.ply = file.ply_file_path;
     declared.scaled_poses += file.scaled_poses;
-    const fs::path root = json.parent_path();
+    const fs::path root = listing.parent_path();
     std::set<std::string> test_names;
     for (const std::string& name : file.test_filenames) test_names.insert(plain_name(name));
     for (const TransformsFrame& frame : file.frames) {
         View view;
         view.name = plain_name(frame.file_path);
         declared.masks |= !frame.mask_path.empty();
+        declared.depths |= !frame.depth_path.empty();
         skipped.in_images += view.name.starts_with(kImages) ? 1 : 0;
         const std::string name = asked_name(view.name, options);
         const fs::path wanted = root / name;
@@ -105,10 +121,11 @@ void add_frames(const fs::path& json, bool is_test, const DatasetOptions& option
         if (!view.mask.empty() && !fs::is_regular_file(view.mask))
             view.mask = root / with_slashes(frame.mask_path);
         if (options.require_photos && !view.mask.empty() && !fs::is_regular_file(view.mask))
-            throw Error(fmt::format("{} ({})", json.string(), frame.file_path),
+            throw Error(fmt::format("{} ({})", listing.string(), frame.file_path),
                         fmt::format("its mask {} is missing", view.mask.string()),
                         "Put the mask back or remove mask_path.");
-        set_lens(frame, json, options, view);
+        set_depth(frame, file.depth_unit, listing, options, view);
+        set_lens(frame, listing, options, view);
         view.camera.rotation = frame.rotation;
         view.camera.translation = frame.translation;
         view.is_test = is_test || test_names.contains(view.name);
@@ -144,14 +161,14 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
     Skipped skipped;
     Declared declared;
     dataset.root = fs::is_directory(path) ? path : path.parent_path();
-    fs::path file = path;
+    fs::path listing = path;
     if (fs::is_directory(path))
         for (const char* name : kTransformsFiles)
-            if (file == path && fs::exists(path / name)) file = path / name;
-    dataset.source = file.filename().string();
+            if (listing == path && fs::exists(path / name)) listing = path / name;
+    dataset.source = listing.filename().string();
     const bool test = dataset.source == "transforms_test.json";
-    add_frames(file, test, options, dataset, skipped, declared);
-    if (fs::is_directory(path) && file.filename() == "transforms_train.json") {
+    add_frames(listing, test, options, dataset, skipped, declared);
+    if (fs::is_directory(path) && listing.filename() == "transforms_train.json") {
         const bool has_test = fs::exists(path / "transforms_test.json");
         const bool has_val = fs::exists(path / "transforms_val.json");
         if (has_test || has_val)
@@ -164,7 +181,7 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
     }
     if (dataset.views.empty()) {
         const std::string scaled = scaled_images(dataset.root);
-        throw Error(file.string(),
+        throw Error(listing.string(),
                     skipped.count == 0
                         ? "lists no frames"
                         : fmt::format("none of its {} photos is there, the first being {}",
@@ -183,11 +200,15 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
         dataset.notes.push_back(
             fmt::format("--images {} has no effect: no file_path in {} begins with images/. Use "
                         "-r to scale.",
-                        options.images_folder, file.filename().string()));
+                        options.images_folder, listing.filename().string()));
     if (declared.scaled_poses > 0)
         dataset.notes.push_back(fmt::format("The scale of the rotation was removed: {}.",
                                             counted(declared.scaled_poses, "pose")));
     if (!declared.masks) add_masks(dataset.root, options, dataset);
+    if (!declared.depths) {
+        const fs::path& photo = dataset.views[0].photo;  // in images/ or in the like of it
+        add_depths(dataset.root, photo.parent_path(), options, dataset);
+    }
     add_points(dataset.root, declared.ply, options, dataset);
     return dataset;
 }

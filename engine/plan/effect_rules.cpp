@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/error.h"
 #include "engine/core/quantile.h"
 #include "engine/data/lens_model.h"
 #include "engine/plan/effect_rules.h"
@@ -253,6 +254,20 @@ EffectRow alpha_rule(const Dataset& dataset, const std::vector<ImageU8>& photos)
     return row;
 }
 
+/// What they cost in PSNR depends on the sensor, so they are compared where somebody asks for it.
+EffectRow depth_rule(const std::vector<View>& views) {
+    EffectRow row;
+    const auto count = std::ranges::count_if(
+        views, [](const View& view) { return !view.is_test && !view.depth.empty(); });
+    row.measured = static_cast<double>(count);
+    row.reason = count > 0 ? fmt::format(
+                                 "{} training photos have measured depths, which are "
+                                 "compared with --effects +depth",
+                                 count)
+                           : "no training photo has a measured depth";
+    return row;
+}
+
 /// Frames tell, see EffectPlan::note_frame.
 EffectRow huge_rule() {
     EffectRow row;
@@ -290,7 +305,7 @@ std::vector<int> impossible_effects(EffectUse use) {
         case EffectUse::measuring:
             return {EFFECT_EXPOSURE, EFFECT_ALPHA, EFFECT_DEPTH, EFFECT_CAMERAS};
         default:
-            return {EFFECT_DEPTH};
+            return {};
     }
 }
 
@@ -333,12 +348,15 @@ EffectPlan plan_training(const Dataset& dataset, const std::vector<ImageU8>& pho
     plan.row(EFFECT_OFF_CENTRE) = centre_rule(dataset.views);
     plan.row(EFFECT_LENS) = lens_rule(dataset.views);
     plan.row(EFFECT_ALPHA) = alpha_rule(dataset, photos);
-    plan.row(EFFECT_DEPTH).reason = "no regulariser asks for it";
+    plan.row(EFFECT_DEPTH) = depth_rule(dataset.views);
     plan.row(EFFECT_CAMERAS).reason = "off unless it is asked for: --refine-cameras on";
     plan.row(EFFECT_HUGE) = huge_rule();
     plan.row(EFFECT_NEAR) = {true, false, 0, 0,
                              "splats move while they train, beside the cameras too"};
     override_rows(choice, plan, sh_degree, {EFFECT_DEPTH, EFFECT_CAMERAS});
+    if (plan.on(EFFECT_DEPTH) && plan.row(EFFECT_DEPTH).measured == 0)
+        throw Error("--effects with depth", "no training photo has a measured depth",
+                    "Put depths/NAME.png or .npy beside the photos, or leave +depth out.");
     return plan;
 }
 

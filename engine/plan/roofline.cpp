@@ -32,6 +32,7 @@ constexpr double kPixelsOfTile = TILE_SIZE * TILE_SIZE;
 constexpr double kProjectFma = 250, kProjectBackwardFma = 600, kShFma = 3;
 constexpr double kBlendFma = 20, kBlendBackwardFma = 50;
 constexpr double kExposureFma = 9 + 12 + 9;
+constexpr double kDepthLossFma = 6;
 constexpr double kLossFma = 3 * 2 * 2 * 11 * 5;  // channels, ways, axes, taps, moments
 
 double best_ms(Commands& commands, const auto& record) {
@@ -90,7 +91,8 @@ std::optional<PassWork> pass_work(std::string_view pass, const FrameCounts& c) {
         return PassWork{c.intersections * kIntersectionBytes + c.pixels * 20, samples * kBlendFma};
     if (pass == "loss") return PassWork{c.pixels * (12 + 4 + 12), c.pixels * kLossFma};
     if (pass == "exposure")  // the map, and its gradient and that of the picture before it
-        return PassWork{c.pixels * (24 + 36), c.pixels * kExposureFma};
+        return PassWork{c.pixels * (28 + 44), c.pixels * kExposureFma};
+    if (pass == "depth loss") return PassWork{c.pixels * 24, c.pixels * kDepthLossFma};
     if (pass == "blend backward")
         return PassWork{c.intersections * (kIntersectionBytes + 2 * kSumsBytes) + c.pixels * 20,
                         samples * kBlendBackwardFma};

@@ -33,9 +33,10 @@ BlendBackward::BlendBackward(Device& device, const ForwardOptions& options)
     make_buffers(device, *this, segment_buffers({}), "blend backward");
 }
 
-BufferList<BlendBackward> BlendBackward::intersection_buffers(std::uint64_t k, bool shaped) {
+BufferList<BlendBackward> BlendBackward::intersection_buffers(std::uint64_t k, bool shaped,
+                                                              bool depth_sum) {
     return {{&BlendBackward::partials_, "intersection partials", k * kPartialBytes},
-            {&BlendBackward::rest_, "intersection partials, rest", k * 4},
+            {&BlendBackward::rest_, "intersection partials, rest", k * (depth_sum ? 8 : 4)},
             {&BlendBackward::exponent_, "intersection partials, exponent", shaped ? k * 4 : 4}};
 }
 
@@ -50,7 +51,8 @@ BufferList<BlendBackward> BlendBackward::bucket_buffers(std::uint64_t records) {
 
 FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
     FrameBytes bytes;
-    bytes.intersections = charged_bytes(intersection_buffers(size.intersections, size.shaped));
+    bytes.intersections =
+        charged_bytes(intersection_buffers(size.intersections, size.shaped, size.depth_sum));
     bytes.images = charged_bytes(segment_buffers(size));
     if (const std::uint64_t records = size.checkpoint_records(); records > 0)
         bytes.intersections += charged_bytes(bucket_buffers(records));
@@ -61,7 +63,7 @@ void BlendBackward::make_pipelines(bool segmented) {
     SpecConstants constants = kernel_constants(options_);
     const std::uint32_t subgroup = add_block_constants(*device_, constants);
     constants["THREADS"] = static_cast<std::int32_t>(subgroup);
-    constants["ALPHA_GRADIENT"] = options_.alpha_gradient ? 1 : 0;
+    constants["ALPHA_GRADIENT"] = options_.alpha_gradient || options_.depth_sum ? 1 : 0;
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);
@@ -88,9 +90,10 @@ void BlendBackward::reserve(std::uint32_t intersections, std::uint32_t records) 
     if (intersections <= capacity_ && capacity_ > 0) return;
     capacity_ = 0;
     intersections = std::max(intersections, 1024u);
-    make_buffers(*device_, *this,
-                 intersection_buffers(intersections, kernel_has_shape(options_.kernel)),
-                 "blend backward");
+    make_buffers(
+        *device_, *this,
+        intersection_buffers(intersections, kernel_has_shape(options_.kernel), options_.depth_sum),
+        "blend backward");
     capacity_ = intersections;
     const std::uint64_t most = of_a_binding(*device_);
     if (window_intersections_ > 0 || capacity_ <= most) return;

@@ -34,12 +34,13 @@ class BlendBackward {
     const Buffer& partials() const { return partials_; }
     BufferRange partials(std::uint32_t window) const;
     std::uint32_t window_intersections() const { return window_intersections_; }
-    const Buffer& rest() const { return rest_; }  // float [K]
+    const Buffer& rest() const { return rest_; }  // float [K], [K][2] with options.depth_sum
     /// float [K] of a kernel with shapes: sums of its derivative by the exponent; else a word.
     const Buffer& exponent() const { return exponent_; }
 
   private:
-    static BufferList<BlendBackward> intersection_buffers(std::uint64_t intersections, bool shaped);
+    static BufferList<BlendBackward> intersection_buffers(std::uint64_t intersections, bool shaped,
+                                                          bool depth_sum);
     static BufferList<BlendBackward> segment_buffers(const FrameSize& size);
     static BufferList<BlendBackward> bucket_buffers(std::uint64_t records);
     void make_pipelines(bool segmented);

@@ -30,6 +30,7 @@ SpecConstants kernel_constants(const ForwardOptions& options) {
     constants["DEPTH_ORDER"] = options.depth_order;
     constants["LINEAR_VALUES"] = options.linear_values ? 1 : 0;
     constants["DIRECT_COLOUR"] = options.direct_colour ? 1 : 0;
+    constants["DEPTH_SUM"] = options.depth_sum ? 1 : 0;
     return constants;
 }
 

@@ -28,9 +28,18 @@ struct ForwardOptions {
     bool linear_values = false;  // opacities and scales themselves, not logits and logarithms
     bool direct_colour = false;  // sh_dc is the colour, of any sign; at degree 0
     // What else the backward pass takes and leaves.
-    bool alpha_gradient = false;   // dL/d(image) has a fourth plane, dL/d(1 - transmittance)
+    bool alpha_gradient = false;  // dL/d(image) has a fourth plane, dL/d(1 - transmittance)
+    // The image has a fourth plane, sum w z, w the weight of each splat in a pixel and z its depth
+    // along the optical axis; dL/d(image) has a fifth for it, and the fourth as alpha_gradient has.
+    // Not with DEPTH_ORDER_PIXEL.
+    bool depth_sum = false;
     bool camera_gradient = false;  // Backward::record_gradients leaves dL/d(camera), too
 };
+
+/// Planes [H][W] of dL/d(image) that the backward pass takes.
+constexpr std::uint64_t d_image_planes(const ForwardOptions& options) {
+    return options.depth_sum ? 5 : options.alpha_gradient ? 4 : 3;
+}
 
 /// The constants of these options that several passes share: kernel, storage and depth order.
 SpecConstants kernel_constants(const ForwardOptions& options);

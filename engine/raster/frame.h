@@ -22,6 +22,11 @@ struct FrameSize {
     bool cooperates = false;          // some frame had huge splats
     std::uint32_t bucket = 0;         // intersections of a checkpoint; 0: there are none
     bool shaped = false;              // the kernel has shapes
+    bool depth_sum = false;           // as ForwardOptions
+    /// Of a checkpoint.
+    std::uint64_t record_bytes() const {
+        return CHECKPOINT_BYTES + (depth_sum ? TILE_SIZE * TILE_SIZE * sizeof(float) : 0);
+    }
     /// Of every tile one more than its full buckets.
     std::uint64_t checkpoint_records() const {
         return bucket > 0 ? intersections / bucket + std::uint64_t{tiles} : 0;
@@ -69,7 +74,8 @@ struct TileIntersections {
     Buffer no_huge_rank;              // a word, in its place until then
 };
 
-/// float [3][H][W] not clamped; what the backward pass walks back from.
+/// float [3][H][W] not clamped, a plane more where depths are summed; what the backward pass walks
+/// back from.
 struct FrameImages {
     Buffer image;
     Buffer final_transmittance, last_intersection;  // [H][W], where they are stored
@@ -92,7 +98,7 @@ struct Frame {
     FrameSorts sorts;
 
     std::uint32_t checkpoint_records() const {
-        return static_cast<std::uint32_t>(images.checkpoints.bytes() / CHECKPOINT_BYTES);
+        return static_cast<std::uint32_t>(images.checkpoints.bytes() / size.record_bytes());
     }
     gpu::FrameStatus read_status() const {
         return counters.status.download<gpu::FrameStatus>(1)[0];

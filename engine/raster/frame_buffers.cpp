@@ -28,8 +28,12 @@ bool walks_back(const ForwardOptions& options) {
 }
 
 std::uint32_t most_intersections(const Device& device, const ForwardOptions& options) {
-    return walks_back(options) ? FrameBuffers::max_intersections(device)
-                               : static_cast<std::uint32_t>(most_intersections(device));
+    if (!walks_back(options)) return static_cast<std::uint32_t>(most_intersections(device));
+    const std::uint32_t most = FrameBuffers::max_intersections(device);
+    if (!options.depth_sum) return most;
+    // Two floats beside the partials, and larger checkpoints.
+    return std::min(most / 5 * 4, static_cast<std::uint32_t>(std::min<std::uint64_t>(
+                                      device.info().max_storage_buffer_bytes / 8, 1u << 30)));
 }
 
 BufferList<FrameCounters> counter_buffers() {
@@ -82,15 +86,16 @@ BufferList<TileIntersections> tile_buffers(std::uint64_t tiles) {
     return {{&TileIntersections::tile_range, "tile range", tiles * 8}};
 }
 
-BufferList<FrameImages> checkpoint_buffers(std::uint64_t records) {
-    return {
-        {&FrameImages::checkpoints, "checkpoints", records > 0 ? records * CHECKPOINT_BYTES : 4}};
+BufferList<FrameImages> checkpoint_buffers(const FrameSize& size) {
+    const std::uint64_t records = size.checkpoint_records();
+    return {{&FrameImages::checkpoints, "checkpoints",
+             records > 0 ? records * size.record_bytes() : 4}};
 }
 
 BufferList<FrameImages> pixel_buffers(const ForwardOptions& options, std::uint64_t pixels,
                                       std::uint32_t list_segments) {
     const bool store = options.store_for_backward;
-    return {{&FrameImages::image, "image", pixels * 12},
+    return {{&FrameImages::image, "image", pixels * (options.depth_sum ? 16 : 12)},
             {&FrameImages::final_transmittance, "final transmittance",
              store || list_segments > 1 ? pixels * 4 : 4},
             {&FrameImages::last_intersection, "last intersection", store ? pixels * 4 : 4}};
@@ -115,9 +120,10 @@ FrameBuffers::FrameBuffers(Device& device, const ForwardOptions& options)
     : device_(&device), options_(options) {
     frame_.size.bucket = bucket(device, options);
     frame_.size.shaped = kernel_has_shape(options.kernel);
+    frame_.size.depth_sum = options.depth_sum;
     make_buffers(device, frame_.counters, counter_buffers(), "project");
     make_buffers(device, frame_.intersections, no_huge_buffers(), "project");
-    make_buffers(device, frame_.images, checkpoint_buffers(0), "blend");
+    make_buffers(device, frame_.images, checkpoint_buffers({}), "blend");
     if (options.huge_splat_path == HugeSplatPath::always) {
         frame_.cooperates = true;
         make_huge_buffers();
@@ -134,7 +140,7 @@ FrameBytes FrameBuffers::device_bytes(const Device& device, const ForwardOptions
     bytes.intersections = charged_bytes(intersection_buffers(size.intersections)) +
                           RadixSort::device_bytes(device, size.intersections);
     if (size.cooperates) bytes.intersections += charged_bytes(huge_buffers(size.intersections));
-    bytes.intersections += charged_bytes(checkpoint_buffers(size.checkpoint_records()));
+    bytes.intersections += charged_bytes(checkpoint_buffers(size));
     bytes.images = charged_bytes(counter_buffers()) + charged_bytes(no_huge_buffers()) +
                    charged_bytes(tile_buffers(size.tiles)) +
                    charged_bytes(pixel_buffers(options, size.pixels, size.list_segments));
@@ -171,8 +177,7 @@ void FrameBuffers::reserve(std::uint32_t splats, std::uint32_t intersections, in
         reserve_intersections(std::max(intersections, kMinCapacity));
     reserve_image(width, height);
     if (size.checkpoint_records() > frame_.checkpoint_records())
-        make_buffers(*device_, frame_.images, checkpoint_buffers(size.checkpoint_records()),
-                     "blend");
+        make_buffers(*device_, frame_.images, checkpoint_buffers(size), "blend");
 }
 
 void FrameBuffers::reserve_splats(std::uint32_t splats) {
@@ -202,7 +207,7 @@ void FrameBuffers::reserve_image(int width, int height) {
         size.tiles = tiles;
     }
     if (const std::uint64_t pixels = std::uint64_t(width) * height; pixels > size.pixels) {
-        check_frame(*device_, width, height);
+        check_frame(*device_, width, height, {}, options_.depth_sum ? 4 : 3);
         size.pixels = 0;
         make_buffers(*device_, frame_.images, pixel_buffers(options_, pixels, size.list_segments),
                      "blend");

@@ -8,12 +8,14 @@
 
 namespace darb {
 
-std::uint64_t max_frame_pixels(const Device& device) {
-    return device.info().max_storage_buffer_bytes / (3 * sizeof(float));
+std::uint64_t max_frame_pixels(const Device& device, std::uint64_t planes) {
+    return device.info().max_storage_buffer_bytes / (planes * sizeof(float));
 }
 
-void check_frame(const Device& device, int width, int height, const std::string& camera) {
-    const std::uint64_t pixels = std::uint64_t(width) * height, most = max_frame_pixels(device);
+void check_frame(const Device& device, int width, int height, const std::string& camera,
+                 std::uint64_t planes) {
+    const std::uint64_t pixels = std::uint64_t(width) * height,
+                        most = max_frame_pixels(device, planes);
     if (pixels <= most) return;
     // As a width, which means the same whatever -r was; less what the height is rounded up by.
     const int fitting = static_cast<int>(std::sqrt(double(most) * width / height)) - 2;

@@ -14,6 +14,7 @@ template <class T>
 struct BlendImages {
     Image<T> colour;                    // [H][W][3], not clamped
     Image<T> transmittance;             // [H][W][1], T after the last splat
+    Image<T> depth;                     // [H][W][1], sum of T alpha depth
     Image<std::int32_t> contributions;  // [H][W][1], splats that were blended
 };
 
@@ -21,11 +22,12 @@ template <class T>
 void blend_tile(const TileLists& lists, size_t tile, const std::vector<ProjectedSplat<T>>& splats,
                 const KernelTable& kernel, const RenderSettings& settings, BlendImages<T>& images);
 
-/// dL/d(image), [H][W][3], and dL/d(1 - T), [H][W][1] or empty.
+/// dL/d(image), [H][W][3], dL/d(1 - T) and dL/d(depth), [H][W][1] or empty.
 template <class T>
 struct ImageGradient {
     const Image<T>& colour;
     const Image<T>& alpha;
+    const Image<T>& depth;
 };
 
 /// Writes one gradient per entry of the tile's list into intersections[0 .. length), and returns

@@ -390,7 +390,8 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
     const Vec3<T> d_k2 = rotation.matrix * (e2 * terms.scale);
     const Vec3<T> d_j1 = view_matrix * d_k1, d_j2 = view_matrix * d_k2;
 
-    const Vec3<T> d_mean = mean_backward(mean, terms, camera, d_j1, d_j2, gradient.d_mean_px);
+    Vec3<T> d_mean = mean_backward(mean, terms, camera, d_j1, d_j2, gradient.d_mean_px);
+    d_mean.z += gradient.d_depth;
     const ViewTerms<T> view = view_terms(&splats.position[index * 3], camera);
     const Vec3<T> d_view =
         colour_backward(splats, index, active_degree(splats, settings), view, splat, gradient, out);

@@ -44,6 +44,7 @@ struct ProjectedGradient {
     T d_l11 = 0, d_l21 = 0, d_l22 = 0;
     T d_opacity = 0;
     T d_exponent = 0;
+    T d_depth = 0;
     Vec3<T> d_colour{0};
 };
 

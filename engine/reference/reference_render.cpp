@@ -46,6 +46,7 @@ void add(ProjectedGradient<T>& sum, const ProjectedGradient<T>& term) {
     sum.d_l22 += term.d_l22;
     sum.d_opacity += term.d_opacity;
     sum.d_exponent += term.d_exponent;
+    sum.d_depth += term.d_depth;
     sum.d_colour += term.d_colour;
 }
 
@@ -68,6 +69,7 @@ BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
     }
     result.images = {Image<T>(camera.width, camera.height, 3),
                      Image<T>(camera.width, camera.height, 1),
+                     Image<T>(camera.width, camera.height, 1),
                      Image<std::int32_t>(camera.width, camera.height, 1)};
     parallel_for(result.tiles.tile_count(), settings.threads, [&](size_t tile) {
         blend_tile(result.tiles, tile, result.projected, kernel, settings, result.images);
@@ -78,7 +80,8 @@ BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
 template <class T>
 BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
                            const RenderSettings& settings, const BasicRenderResult<T>& result,
-                           const Image<T>& d_image, const Image<T>& d_alpha) {
+                           const Image<T>& d_image, const Image<T>& d_alpha,
+                           const Image<T>& d_depth) {
     check_shapes(splats, camera);
     if (d_image.width != camera.width || d_image.height != camera.height || d_image.channels != 3 ||
         result.projected.size() != splats.size())
@@ -87,9 +90,10 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
                                 d_image.height, d_image.channels, camera.width, camera.height,
                                 result.projected.size(), splats.size()),
                     "Walk back what render() made of the same splats and camera.");
-    if (!d_alpha.data.empty() && (d_alpha.width != camera.width || d_alpha.height != camera.height))
-        throw Error("reference", fmt::format("a gradient of {}x{}", d_alpha.width, d_alpha.height),
-                    "It is of the camera's size, or empty.");
+    for (const Image<T>* d : {&d_alpha, &d_depth})
+        if (!d->data.empty() && (d->width != camera.width || d->height != camera.height))
+            throw Error("reference", fmt::format("a gradient of {}x{}", d->width, d->height),
+                        "It is of the camera's size, or empty.");
     const KernelTable& kernel =
         kernel_table(splats.kernel, splats.footprint, settings.polynomial_degree);
     const TileLists& tiles = result.tiles;
@@ -98,9 +102,9 @@ BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
     std::vector<ProjectedGradient<T>> intersections(tiles.intersection_count());
     std::vector<Vec3<T>> d_background(tiles.tile_count());
     parallel_for(tiles.tile_count(), settings.threads, [&](size_t tile) {
-        d_background[tile] =
-            blend_tile_backward(tiles, tile, result.projected, kernel, settings, {d_image, d_alpha},
-                                intersections.data() + tiles.begin[tile]);
+        d_background[tile] = blend_tile_backward(tiles, tile, result.projected, kernel, settings,
+                                                 {d_image, d_alpha, d_depth},
+                                                 intersections.data() + tiles.begin[tile]);
     });
 
     BasicGradients<T> gradients;
@@ -132,15 +136,16 @@ RenderResult render(const SplatModel& model, const Camera& camera, const RenderS
 
 Gradients backward(const SplatModel& model, const Camera& camera, const RenderSettings& settings,
                    const RenderResult& result, const Image<double>& d_image,
-                   const Image<double>& d_alpha) {
-    return backward(make_splats<double>(model), camera, settings, result, d_image, d_alpha);
+                   const Image<double>& d_alpha, const Image<double>& d_depth) {
+    return backward(make_splats<double>(model), camera, settings, result, d_image, d_alpha,
+                    d_depth);
 }
 
 #define DARB_INSTANTIATE(T)                                                                       \
     template BasicRenderResult<T> render(const Splats<T>&, const Camera&, const RenderSettings&); \
     template BasicGradients<T> backward(const Splats<T>&, const Camera&, const RenderSettings&,   \
                                         const BasicRenderResult<T>&, const Image<T>&,             \
-                                        const Image<T>&);
+                                        const Image<T>&, const Image<T>&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
 

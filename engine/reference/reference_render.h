@@ -38,16 +38,17 @@ BasicRenderResult<T> render(const Splats<T>& splats, const Camera& camera,
                             const RenderSettings& settings);
 
 /// `result` is render's for the same splats, camera and settings. d_image [H][W][3] is dL/d(image);
-/// d_alpha [H][W][1], or empty for none, is dL/d(1 - transmittance).
+/// d_alpha and d_depth [H][W][1], or empty for none, are dL/d(1 - transmittance) and dL/d(depth).
 template <class T>
 BasicGradients<T> backward(const Splats<T>& splats, const Camera& camera,
                            const RenderSettings& settings, const BasicRenderResult<T>& result,
-                           const Image<T>& d_image, const Image<T>& d_alpha = {});
+                           const Image<T>& d_image, const Image<T>& d_alpha = {},
+                           const Image<T>& d_depth = {});
 
 /// The same in double from the float parameters of a model.
 RenderResult render(const SplatModel& model, const Camera& camera, const RenderSettings& settings);
 Gradients backward(const SplatModel& model, const Camera& camera, const RenderSettings& settings,
                    const RenderResult& result, const Image<double>& d_image,
-                   const Image<double>& d_alpha = {});
+                   const Image<double>& d_alpha = {}, const Image<double>& d_depth = {});
 
 }  // namespace darb::reference

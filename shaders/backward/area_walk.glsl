@@ -1,7 +1,7 @@
 // A subgroup walks a part of a tile's list from its end over the pixels of an area: what blend_backward.comp and
 // blend_backward_team.comp have in common. Needs their bindings, lib/area.glsl, lib/hits.glsl,
 // backward/splat_sums.glsl, splat_exponent, and where the sums of intersection j of the sorted list go: place_of(j),
-// put_sums, and put_exponent of that of a kernel with shapes.
+// put_sums, put_exponent of that of a kernel with shapes, and put_depth with DEPTH_SUM.
 
 struct Pixels {
     float transmittance[PIXELS];
@@ -9,6 +9,10 @@ struct Pixels {
     vec3 d_colour[PIXELS];
     uint last[PIXELS];
 };
+
+// With DEPTH_SUM, of each pixel; apart, so that nothing of it is left without.
+const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u;
+float d_depth[DEPTHS];
 
 uint load_pixels(uvec2 first, out Pixels px) {
     const vec3 background = vec3(args.background_r, args.background_g, args.background_b);
@@ -20,12 +24,14 @@ uint load_pixels(uvec2 first, out Pixels px) {
         px.behind[k] = 0.0;
         px.transmittance[k] = 1.0;
         px.last[k] = 0u;
+        if (DEPTH_SUM == 1) d_depth[k] = 0.0;
         if (at.x < args.width && at.y < args.height) {
             const uint o = at.y * args.width + at.x;
             px.d_colour[k] = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
             px.transmittance[k] = final_transmittance[o];
             px.last[k] = last_intersection[o];
             if (ALPHA_GRADIENT == 1) px.behind[k] = -d_image[3u * plane + o];
+            if (DEPTH_SUM == 1) d_depth[k] = d_image[DEPTH_GRADIENT_PLANE * plane + o];
         }
         px.behind[k] += dot(px.d_colour[k], background);
         last = max(last, px.last[k]);
@@ -33,12 +39,15 @@ uint load_pixels(uvec2 first, out Pixels px) {
     return last;
 }
 
-Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, float exponent,
+Sums splat_sums(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, float exponent, float z,
                 uint number) {
     Sums s = NO_SUMS;
-    for (uint k = 0u; k < PIXELS; ++k)
+    for (uint k = 0u; k < PIXELS; ++k) {
+        float d_z = 0.0;
+        if (DEPTH_SUM == 1) d_z = d_depth[k];
         add_pixel(s, px.transmittance[k], px.behind[k], d - vec2(slot_offset(k)), shape, l22, light, exponent,
-                  px.d_colour[k], number <= px.last[k]);
+                  z, px.d_colour[k], d_z, number <= px.last[k]);
+    }
     return s;
 }
 
@@ -49,7 +58,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
         const uint size = min(rest, SUBGROUP_SIZE);
         rest -= size;
         vec4 shape = vec4(0.0), light = vec4(0.0);
-        float l22 = 0.0, exponent = 0.0;
+        float l22 = 0.0, exponent = 0.0, depth = 0.0;
         uint number = 0u, place = 0u;
         if (gl_SubgroupInvocationID < size) {
             const uint at = hits_base() + rest + gl_SubgroupInvocationID;
@@ -59,6 +68,7 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
             shape = load_shape(splat, l22);
             light = load_light(splat);
             if (SHAPED) exponent = splat_exponent[splat];
+            if (DEPTH_SUM == 1) depth = splat_bound[splat].z;
         }
         uint lane = size;
         do {
@@ -67,12 +77,14 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
             const vec4 c = subgroupBroadcast(light, lane);
             const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
                                          SHAPED ? subgroupBroadcast(exponent, lane) : 0.0,
+                                         DEPTH_SUM == 1 ? subgroupBroadcast(depth, lane) : 0.0,
                                          subgroupBroadcast(number, lane));
             float parts[PARTIALS] =
                 float[](sums.gx * c.w, sums.gxx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
                         sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
             put_sums(subgroupBroadcast(place, lane), parts, sums.gdydy * c.w);
             if (SHAPED) put_exponent(subgroupBroadcast(place, lane), sums.exponent * c.w);
+            if (DEPTH_SUM == 1) put_depth(subgroupBroadcast(place, lane), sums.depth);
         } while (lane > 0u);
     } while (rest > 0u);
 }

@@ -28,10 +28,10 @@ layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
+layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W] and more
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
-layout(set = 0, binding = 14, scalar) buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 14, scalar) buffer PartialRest { float partial_rest[]; };  // [K][RESTS]
 layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
 layout(set = 0, binding = 16, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
 layout(set = 0, binding = 17, scalar) buffer PartialExponent { float partial_exponent[]; };  // [K] where SHAPED
@@ -41,6 +41,7 @@ layout(set = 0, binding = 17, scalar) buffer PartialExponent { float partial_exp
 #define BOUND_BINDING 5
 #include "lib/projected.glsl"
 #include "lib/area.glsl"
+#include "lib/depth_sum.glsl"
 #include "lib/list_part.glsl"
 const uint CHUNK = 128u;
 #include "lib/hits.glsl"
@@ -63,11 +64,15 @@ void put_sums(uint slot, float v[PARTIALS], float rest) {
     } else if (SUBGROUP_SIZE == PARTIALS || lane < PARTIALS) {
         put_partial(slot, lane, mine.x);
     }
-    if (lane == 0u) partial_rest[slot] += rest;
+    if (lane == 0u) partial_rest[RESTS * slot] += rest;
 }
 void put_exponent(uint slot, float value) {
     value = subgroup_sum(value);
     if (gl_SubgroupInvocationID == 0u) partial_exponent[slot] += value;
+}
+void put_depth(uint slot, float value) {
+    value = subgroup_sum(value);
+    if (gl_SubgroupInvocationID == 0u) partial_rest[RESTS * slot + 1u] += value;
 }
 #include "backward/area_walk.glsl"
 

@@ -26,13 +26,13 @@ layout(push_constant, scalar) uniform Push { BucketArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
+layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W] and more
 layout(set = 0, binding = 7, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer BucketTile { uint bucket_tile[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer Checkpoints { float checkpoints[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer BucketBehind { float bucket_behind[]; };  // [records][TILE_PIXELS]
 layout(set = 0, binding = 11, scalar) writeonly buffer Partials { vec4 partials[]; };  // [K][2]
-layout(set = 0, binding = 12, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 12, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K][RESTS]
 layout(set = 0, binding = 13, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
 layout(set = 0, binding = 14, scalar) writeonly buffer PartialExponent { float partial_exponent[]; };  // [K] where SHAPED
 
@@ -48,6 +48,7 @@ const uint SLOT_BITS = 8u;  // of TILE_PIXELS
 shared uint pixel_word[TILE_PIXELS];  // slot, and above it how many of the bucket's intersections the pixel looks at
 shared float pixel_transmittance[TILE_PIXELS], pixel_behind[TILE_PIXELS];
 shared float pixel_d_red[TILE_PIXELS], pixel_d_green[TILE_PIXELS], pixel_d_blue[TILE_PIXELS];
+shared float pixel_d_depth[DEPTH_SUM == 1 ? TILE_PIXELS : 1u];
 
 // The blocks that intersections [begin, end) touch, as the bits of an intersection.
 uint touched_blocks(uint begin, uint end) {
@@ -81,6 +82,7 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
             pixel_d_red[i] = d_image[o];
             pixel_d_green[i] = d_image[plane + o];
             pixel_d_blue[i] = d_image[2u * plane + o];
+            if (DEPTH_SUM == 1) pixel_d_depth[i] = d_image[DEPTH_GRADIENT_PLANE * plane + o];
         }
         count += subgroupBallotBitCount(ballot);
     }
@@ -89,7 +91,7 @@ uint gather_pixels(uvec2 tile, uint record, uint begin, uint end) {
 
 // One intersection a thread, all pixels; `local` is the intersection's number within the bucket. A pixel is at thread t
 // in the step that is t after its own number. What leaves at the last thread enters the part before this one.
-Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, float exponent,
+Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, float exponent, float z,
           vec4 light) {
     const uint lane = gl_SubgroupInvocationID;
     Sums sums = NO_SUMS;
@@ -106,9 +108,11 @@ Sums walk(uint count, uint local, vec2 mean, vec4 shape, float l22, float expone
         }
         const uint word = pixel_word[i];
         const vec2 to_mean = mean - vec2(slot_to_pixel(word & (TILE_PIXELS - 1u)));
-        add_pixel(sums, transmittance, behind, to_mean, shape, l22, light, exponent,
+        float d_z = 0.0;
+        if (DEPTH_SUM == 1) d_z = pixel_d_depth[i];
+        add_pixel(sums, transmittance, behind, to_mean, shape, l22, light, exponent, z,
                   vec3(pixel_d_red[i], pixel_d_green[i], pixel_d_blue[i]),
-                  here && local < word >> SLOT_BITS);
+                  d_z, here && local < word >> SLOT_BITS);
         if (BUCKET > SUBGROUP_SIZE && here && lane == SUBGROUP_SIZE - 1u) {
             pixel_transmittance[i] = transmittance;
             pixel_behind[i] = behind;
@@ -121,7 +125,7 @@ void blend_part(uint part, uvec2 tile, uint begin, uint end, uint count) {
     const uint local = part * SUBGROUP_SIZE + (SUBGROUP_SIZE - 1u - gl_SubgroupInvocationID);
     const bool has_pair = begin + local < end;
     vec4 shape = vec4(0.0), light = vec4(0.0);
-    float l22 = 0.0, exponent = 0.0;
+    float l22 = 0.0, exponent = 0.0, depth = 0.0;
     uint slot = 0u;
     if (has_pair) {
         slot = intersection_from_sorted[begin + local];
@@ -129,12 +133,14 @@ void blend_part(uint part, uvec2 tile, uint begin, uint end, uint count) {
         shape = load_shape(splat, l22);
         light = load_light(splat);
         if (SHAPED) exponent = splat_exponent[splat];
+        if (DEPTH_SUM == 1) depth = splat_bound[splat].z;
     }
-    const Sums s = walk(count, local, shape.xy - (vec2(tile * TILE_SIZE) + 0.5), shape, l22, exponent, light);
+    const Sums s = walk(count, local, shape.xy - (vec2(tile * TILE_SIZE) + 0.5), shape, l22, exponent, depth, light);
     if (has_pair) {
         partials[2u * slot] = vec4(s.gx, s.gxx, s.gxdy, s.gdy) * light.w;
         partials[2u * slot + 1u] = vec4(s.opacity, s.colour);
-        partial_rest[slot] = s.gdydy * light.w;
+        partial_rest[RESTS * slot] = s.gdydy * light.w;
+        if (DEPTH_SUM == 1) partial_rest[RESTS * slot + 1u] = s.depth;
         if (SHAPED) partial_exponent[slot] = s.exponent * light.w;
     }
 }

@@ -27,10 +27,10 @@ layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W]
+layout(set = 0, binding = 6, scalar) readonly buffer DImage { float d_image[]; };  // [3][H][W] and more
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer LastIntersection { uint last_intersection[]; };
-layout(set = 0, binding = 14, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K]
+layout(set = 0, binding = 14, scalar) writeonly buffer PartialRest { float partial_rest[]; };  // [K][RESTS]
 layout(set = 0, binding = 15, scalar) buffer Behind { float behind[]; };  // [H][W] where SEGMENT > 0
 layout(set = 0, binding = 16, scalar) readonly buffer SplatExponent { float splat_exponent[]; };  // where SHAPED
 layout(set = 0, binding = 17, scalar) writeonly buffer PartialExponent { float partial_exponent[]; };  // [K] where SHAPED
@@ -40,6 +40,7 @@ layout(set = 0, binding = 17, scalar) writeonly buffer PartialExponent { float p
 #define BOUND_BINDING 5
 #include "lib/projected.glsl"
 #include "lib/area.glsl"
+#include "lib/depth_sum.glsl"
 #include "lib/list_part.glsl"
 const uint CHUNK = 32u;
 #include "lib/hits.glsl"
@@ -49,7 +50,7 @@ const uint CHUNK = 32u;
 #include "lib/reduce.glsl"
 #include "backward/splat_sums.glsl"
 
-const uint TEAM = AREAS, SUMS = PARTIALS + (SHAPED ? 2u : 1u);
+const uint TEAM = AREAS, SUMS = PARTIALS + RESTS + (SHAPED ? 1u : 0u);
 shared float chunk_sums[TEAM * CHUNK * SUMS];
 shared uint chunk_slot[CHUNK], chunk_word[CHUNK];  // of each intersection: its slot, its splat and blocks
 shared uint area_end[TEAM];  // the list's intersections before it reach a pixel of the area
@@ -74,6 +75,10 @@ void put_exponent(uint place, float value) {
     value = subgroup_sum(value);
     if (gl_SubgroupInvocationID == 0u) chunk_sums[place + PARTIALS + 1u] = value;
 }
+void put_depth(uint place, float value) {
+    value = subgroup_sum(value);
+    if (gl_SubgroupInvocationID == 0u) chunk_sums[place + SUMS - 1u] = value;
+}
 #include "backward/area_walk.glsl"
 
 void load_chunk(uint end) {
@@ -97,9 +102,11 @@ void store_chunk(uint end) {
     for (uint i = gl_LocalInvocationIndex; i < count * PARTIALS; i += THREADS)
         put_partial(chunk_slot[i / PARTIALS], i % PARTIALS, team_sum(i / PARTIALS, i % PARTIALS));
     for (uint i = gl_LocalInvocationIndex; i < count; i += THREADS)
-        partial_rest[chunk_slot[i]] = team_sum(i, PARTIALS);
+        partial_rest[RESTS * chunk_slot[i]] = team_sum(i, PARTIALS);
     for (uint i = gl_LocalInvocationIndex; SHAPED && i < count; i += THREADS)
         partial_exponent[chunk_slot[i]] = team_sum(i, PARTIALS + 1u);
+    for (uint i = gl_LocalInvocationIndex; DEPTH_SUM == 1 && i < count; i += THREADS)
+        partial_rest[RESTS * chunk_slot[i] + 1u] = team_sum(i, SUMS - 1u);
 }
 
 void main() {

@@ -44,6 +44,8 @@ void main() {
     const vec3 d_colour = vec3(d_image[o], d_image[plane + o], d_image[2u * plane + o]);
     float rest = dot(d_colour, vec3(args.background_r, args.background_g, args.background_b));
     if (ALPHA_GRADIENT == 1) rest -= d_image[3u * plane + o];
+    float d_depth = 0.0;
+    if (DEPTH_SUM == 1) d_depth = d_image[DEPTH_GRADIENT_PLANE * plane + o];
     if (SEGMENT > 0u && last > range.y) rest = behind[o];
     const uint first = (range.x - whole.x) / BUCKET;
     uint bucket = (min(last, range.y) - 1u - whole.x) / BUCKET;
@@ -55,7 +57,9 @@ void main() {
         bucket_behind[bucket_behind_at(record, slot)] = rest;
         float before = 1.0;
         if (bucket > 0u) before = checkpoints[checkpoint_at(record - 1u, TRANSMITTANCE_PLANE, slot)];
-        rest = before > LEAST_TRANSMITTANCE ? (dot(light, d_colour) + after * rest) / before : 0.0;
+        float ahead = dot(light, d_colour);
+        if (DEPTH_SUM == 1) ahead += checkpoints[checkpoint_at(record, BUCKET_DEPTH_PLANE, slot)] * d_depth;
+        rest = before > LEAST_TRANSMITTANCE ? (ahead + after * rest) / before : 0.0;
         if (bucket == first) break;
         after = before;
     }

@@ -53,7 +53,7 @@ layout(set = 0, binding = STATE_BINDING + ATTRIBUTE_SHAPE, scalar) buffer DShape
 
 layout(set = 0, binding = FRAME_BINDING, scalar) readonly buffer IntersectionCount { uint intersection_count[]; };
 layout(set = 0, binding = FRAME_BINDING + 1, scalar) readonly buffer FirstIntersection { uint first_intersection[]; };
-layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer PartialRest { float partial_rest[]; };
+layout(set = 0, binding = FRAME_BINDING + 7, scalar) readonly buffer PartialRest { float partial_rest[]; };  // [K][RESTS]
 layout(set = 0, binding = FRAME_BINDING + 8, scalar) buffer GradientSum { vec2 gradient_sum[]; };  // norms, views
 layout(set = 0, binding = FRAME_BINDING + 9, scalar) buffer Status { FrameStatus status; };
 layout(set = 0, binding = FRAME_BINDING + 10, scalar) readonly buffer Smoothing { float smoothing[]; };  // [N] world
@@ -66,6 +66,7 @@ layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExp
 #include "lib/splat_values.glsl"
 #include "kernels/kernel.glsl"
 #include "lib/covariance.glsl"
+#include "lib/depth_sum.glsl"
 #include "effects/antialias.glsl"
 #include "effects/camera_model.glsl"
 #include "lib/linear_id.glsl"
@@ -77,7 +78,7 @@ layout(set = 0, binding = FRAME_BINDING + 12, scalar) readonly buffer PartialExp
 #include "backward/project_gradient.glsl"
 
 Partial sum_partials(uint i) {
-    Partial sums = Partial(vec4(0.0), 0.0, 0.0, 0.0, vec3(0.0));
+    Partial sums = Partial(vec4(0.0), 0.0, 0.0, 0.0, 0.0, vec3(0.0));
     uint e = first_intersection[i];
     const uint end = e + intersection_count[i];
     for (uint stop = e; e < end;) {
@@ -85,7 +86,8 @@ Partial sum_partials(uint i) {
         for (; e < stop; ++e) {
             const vec4 light = load_partial(e, 1u);
             sums.a += load_partial(e, 0u);
-            sums.b += partial_rest[e];
+            sums.b += partial_rest[RESTS * e];
+            if (DEPTH_SUM == 1) sums.d_depth += partial_rest[RESTS * e + 1u];
             sums.d_opacity += light.x;
             sums.d_colour += light.yzw;
             if (SHAPED) sums.d_exponent += partial_exponent[e];

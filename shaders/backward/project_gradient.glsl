@@ -13,7 +13,7 @@ struct SplatGradient {
 struct Partial {
     vec4 a;               // sums over pixels of G x, G x x, G x dy, G dy; G = opacity dL/dalpha dw/dq
     float b;              // G dy dy
-    float d_opacity, d_exponent;
+    float d_opacity, d_exponent, d_depth;  // d_depth: 0 but with DEPTH_SUM
     vec3 d_colour;
 };
 
@@ -104,7 +104,8 @@ SplatGradient project_gradient(CameraData camera, uint i, Partial sums) {
     g.rotation = (d_unit - unit * dot(unit, d_unit)) / norm;
 
     const vec3 d_j0 = to_camera(camera, axes * e1), d_j1 = to_camera(camera, axes * e2);
-    const vec3 d_p = camera_point_gradient(camera, p, d_j0, d_j1, g.mean);
+    vec3 d_p = camera_point_gradient(camera, p, d_j0, d_j1, g.mean);
+    if (DEPTH_SUM == 1) d_p.z += sums.d_depth;
     if (CAMERA_GRADIENT == 1)
         store_camera_gradient(camera, i, p, to_splat, d_p, mat2x3(j0, j1), mat2x3(axes * e1, axes * e2),
                               mat2x3(d_j0, d_j1), g.mean);

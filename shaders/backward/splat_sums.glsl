@@ -4,16 +4,16 @@
 
 // Sums over pixels; G = opacity dL/dalpha dw/dq without the opacity, as that of the exponent, with SHAPED.
 struct Sums {
-    float gx, gxx, gxdy, gdy, gdydy, opacity, exponent;
+    float gx, gxx, gxdy, gdy, gdydy, opacity, exponent, depth;
     vec3 colour;
 };
 
-const Sums NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
+const Sums NO_SUMS = Sums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, vec3(0.0));
 
 // to_mean: mean - centre of the pixel. reached: the pixel had not ended before this splat. On entry transmittance
-// and behind are those behind the splat, afterwards those before it.
+// and behind are those behind the splat, afterwards those before it. z, d_z: with DEPTH_SUM, else 0.
 void add_pixel(inout Sums s, inout float transmittance, inout float behind, vec2 to_mean, vec4 shape,
-               float l22, vec4 light, float exponent, vec3 d_colour, bool reached) {
+               float l22, vec4 light, float exponent, float z, vec3 d_colour, float d_z, bool reached) {
     const float x = shape.z * to_mean.x + shape.w * to_mean.y, y = l22 * to_mean.y;
     float w, slope, by_exponent;
     kernel_value_slope(x * x + y * y, exponent, w, slope, by_exponent);
@@ -21,7 +21,8 @@ void add_pixel(inout Sums s, inout float transmittance, inout float behind, vec2
     const bool counts = raw >= ALPHA_CUTOFF && reached;
     const float alpha = counts ? min(raw, ALPHA_MAX) : 0.0;
     const float before = transmittance / (1.0 - alpha);
-    const float ahead = dot(light.rgb, d_colour) - behind;
+    float ahead = dot(light.rgb, d_colour) - behind;
+    if (DEPTH_SUM == 1) ahead += z * d_z;
     const float d_alpha = counts && raw < ALPHA_MAX ? before * ahead : 0.0;
     const float g = d_alpha * slope, gx = g * x, gdy = g * to_mean.y;
     s.gx += gx;
@@ -32,6 +33,7 @@ void add_pixel(inout Sums s, inout float transmittance, inout float behind, vec2
     s.opacity += d_alpha * w;
     if (SHAPED) s.exponent += d_alpha * by_exponent;
     s.colour += (alpha * before) * d_colour;
+    if (DEPTH_SUM == 1) s.depth += (alpha * before) * d_z;
     behind += alpha * ahead;
     transmittance = before;
 }

@@ -1,7 +1,8 @@
 // The gradient of exposure.comp: d_image becomes that of the picture before the map, and every group leaves its sum
-// of the map's own gradient, the same in every run. Place: between loss and blend_backward.
+// of the map's own gradient, the same in every run. What is covered counts for the map's offset, which the picture's
+// gradient does not tell: that goes to the plane dL/d(1 - transmittance). Place: between loss and blend_backward.
 // Work: groups of EXPOSURE_THREADS walk over the pixels in strides. Shared memory: 12 floats a thread, reduced as a
-// tree. Reads the picture before the map, d_image; writes d_image, partial sums [groups][12].
+// tree. Reads the picture before the map, transmittance, d_image; writes d_image, partial sums [groups][12].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -13,8 +14,11 @@ layout(local_size_x = EXPOSURE_THREADS) in;
 layout(push_constant, scalar) uniform Push { ExposureArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Maps { float maps[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer ImageIn { float image[]; };
-layout(set = 0, binding = 2, scalar) buffer Gradient { float d_image[]; };
+layout(set = 0, binding = 2, scalar) buffer Gradient { float d_image[]; };  // [4][H W], the last plane written
 layout(set = 0, binding = 3, scalar) writeonly buffer Partials { float partials[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer FinalT { float final_transmittance[]; };
+
+#include "effects/covered.glsl"
 
 shared float sums[EXPOSURE_THREADS][EXPOSURE_TERMS];
 
@@ -26,12 +30,20 @@ void main() {
         sum[k] = 0.0;
     }
     for (uint p = gl_WorkGroupID.x * EXPOSURE_THREADS + lane; p < args.pixels; p += args.groups * EXPOSURE_THREADS) {
-        const vec4 colour = vec4(image[p], image[args.pixels + p], image[2u * args.pixels + p], 1.0);
+        const vec4 colour = covered_colour(p);
         const vec3 d = vec3(d_image[p], d_image[args.pixels + p], d_image[2u * args.pixels + p]);
         for (uint c = 0u; c < 3u; ++c) {
             for (uint k = 0u; k < 4u; ++k) sum[4u * c + k] += d[c] * colour[k];
-            d_image[c * args.pixels + p] = map[c] * d.x + map[4u + c] * d.y + map[8u + c] * d.z;
         }
+        vec3 before;
+        for (uint c = 0u; c < 3u; ++c) {
+            before[c] = map[c] * d.x + map[4u + c] * d.y + map[8u + c] * d.z;
+            d_image[c * args.pixels + p] = before[c];
+        }
+        // More of the splats is more of the offset and less of the background as it is; the gradient before the map
+        // has the background as if it were mapped.
+        const vec3 offset = vec3(map[3], map[7], map[11]);
+        d_image[3u * args.pixels + p] = dot(before - d, background()) + dot(d, offset);
     }
     for (uint k = 0u; k < EXPOSURE_TERMS; ++k) sums[lane][k] = sum[k];
     for (uint half_count = EXPOSURE_THREADS / 2u; half_count > 0u; half_count /= 2u) {

@@ -30,7 +30,7 @@ layout(push_constant, scalar) uniform Push { BlendArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer TileRange { uvec2 tile_range[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer IntersectionFromSorted { uint intersection_from_sorted[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer SplatFromIntersection { uint splat_from_intersection[]; };
-layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W]
+layout(set = 0, binding = 6, scalar) buffer ImageOut { float image[]; };  // [3][H][W], a plane more with DEPTH_SUM
 layout(set = 0, binding = 7, scalar) buffer FinalT { float final_transmittance[]; };
 layout(set = 0, binding = 8, scalar) buffer LastIntersection { uint last_intersection[]; };
 layout(set = 0, binding = 9, scalar) writeonly buffer Checkpoints { float checkpoints[]; };  // where CHECKPOINTS
@@ -53,22 +53,26 @@ struct Pixels {
     uint last[PIXELS];  // 1 + the last intersection looked at while it was alive; 0: none
 };
 
-// Light of the current bucket; not in Pixels, so that nothing of it is left without checkpoints.
+// Light of the current bucket; not in Pixels, so that nothing of it is left without checkpoints. So are depths.
 const uint BUCKET_COLOURS = CHECKPOINTS == 1 ? PIXELS : 1u;
 vec3 bucket_colour[BUCKET_COLOURS];
+const uint DEPTHS = DEPTH_SUM == 1 ? PIXELS : 1u, BUCKET_DEPTHS = CHECKPOINTS == 1 ? DEPTHS : 1u;
+float depth_sum[DEPTHS], bucket_depth[BUCKET_DEPTHS];
 
 vec3 load_depth(uint splat) {  // z and its slope
     const vec4 bound = splat_bound[splat];
     return vec3(bound.z, unpackHalf2x16(floatBitsToUint(bound.w)));
 }
 
-void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, uint number) {
+void blend_sample(inout Pixels px, uint k, float alpha, vec3 colour, float depth, uint number) {
     const float before = px.transmittance[k];
     const float wanted = alpha * before;
     const float next = before - wanted;
     const bool goes_on = next >= MIN_TRANSMITTANCE;  // false for what has ended
     px.colour[k] += (goes_on ? wanted : 0.0) * colour;
     if (CHECKPOINTS == 1) bucket_colour[k] += (goes_on ? wanted : 0.0) * colour;
+    if (DEPTH_SUM == 1) depth_sum[k] += (goes_on ? wanted : 0.0) * depth;
+    if (DEPTH_SUM == 1 && CHECKPOINTS == 1) bucket_depth[k] += (goes_on ? wanted : 0.0) * depth;
     px.transmittance[k] = goes_on ? next : -abs(before);
     if (STORE_FOR_BACKWARD == 1) px.last[k] = goes_on ? number : px.last[k];
 }
@@ -84,9 +88,9 @@ void blend_splat(inout Pixels px, vec2 d, vec4 shape, vec4 light, float l22, flo
         if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) {
             const float z = alpha > 0.0 ? depth.x - depth.y * x - depth.z * y : NO_DEPTH;
             const vec4 nearest = exchange_nearest(k, z, vec4(light.rgb, alpha));
-            blend_sample(px, k, nearest.a, nearest.rgb, number);
+            blend_sample(px, k, nearest.a, nearest.rgb, 0.0, number);
         } else {
-            blend_sample(px, k, alpha, light.rgb, number);
+            blend_sample(px, k, alpha, light.rgb, depth.x, number);
         }
     }
 }
@@ -108,6 +112,7 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
             light = load_light(splat);
             if (SHAPED) exponent = splat_exponent[splat];
             if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) depth = load_depth(splat);
+            if (DEPTH_SUM == 1) depth.x = splat_bound[splat].z;
         }
         const uint end = min(SUBGROUP_SIZE, count - batch);
         uint lane = 0u;
@@ -115,6 +120,7 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
             const vec4 s = subgroupBroadcast(shape, lane);
             vec3 z = vec3(0.0);
             if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) z = subgroupBroadcast(depth, lane);
+            if (DEPTH_SUM == 1) z.x = subgroupBroadcast(depth.x, lane);
             blend_splat(px, s.xy - centre, s, subgroupBroadcast(light, lane),
                         subgroupBroadcast(l22, lane), SHAPED ? subgroupBroadcast(exponent, lane) : 0.0,
                         subgroupBroadcast(number, lane), z);
@@ -135,6 +141,7 @@ void load(inout Pixels px, uvec2 first) {
         const uint o = at.y * args.width + at.x;
         px.transmittance[k] = final_transmittance[o];
         px.colour[k] = vec3(image[o], image[plane + o], image[2u * plane + o]);
+        if (DEPTH_SUM == 1) depth_sum[k] = image[DEPTH_PLANE * plane + o];
         if (STORE_FOR_BACKWARD == 1) px.last[k] = last_intersection[o];
     }
 }
@@ -153,6 +160,7 @@ void store(Pixels px, uvec2 first) {
         image[o] = colour.r;
         image[plane + o] = colour.g;
         image[2u * plane + o] = colour.b;
+        if (DEPTH_SUM == 1) image[DEPTH_PLANE * plane + o] = depth_sum[k];
         if (STORE_FOR_BACKWARD == 1) last_intersection[o] = px.last[k];
         if (STORE_FOR_BACKWARD == 1 || SEGMENT > 0u)
             final_transmittance[o] = more ? px.transmittance[k] : transmittance;
@@ -166,6 +174,10 @@ void store_checkpoint(Pixels px, uint record) {
         for (int c = 0; c < 3; ++c)
             checkpoints[checkpoint_at(record, uint(c), slot)] = bucket_colour[k][c];
         checkpoints[checkpoint_at(record, TRANSMITTANCE_PLANE, slot)] = abs(px.transmittance[k]);
+        if (DEPTH_SUM == 1) {
+            checkpoints[checkpoint_at(record, BUCKET_DEPTH_PLANE, slot)] = bucket_depth[k];
+            bucket_depth[k] = 0.0;
+        }
         bucket_colour[k] = vec3(0.0);
     }
 }
@@ -186,6 +198,8 @@ void main() {
         px.last[k] = 0u;
         if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) clear_window(k);
         if (CHECKPOINTS == 1) bucket_colour[k] = vec3(0.0);
+        if (DEPTH_SUM == 1) depth_sum[k] = 0.0;
+        if (DEPTH_SUM == 1 && CHECKPOINTS == 1) bucket_depth[k] = 0.0;
     }
     if (SEGMENT > 0u && args.segment > 0u) load(px, first);
     if (range.x < range.y) {
@@ -203,7 +217,7 @@ void main() {
         for (uint k = 0u; k < PIXELS; ++k)
             for (uint i = 0u; i < WINDOW; ++i) {
                 const vec4 light = window_light[i * PIXELS + k];
-                blend_sample(px, k, light.a, light.rgb, 0u);
+                blend_sample(px, k, light.a, light.rgb, 0.0, 0u);
             }
     }
     store(px, first);

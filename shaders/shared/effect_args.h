@@ -16,6 +16,7 @@ struct ExposureArgs {
     uint pixels;  // H W
     uint view;    // whose map
     uint groups;  // of exposure_backward
+    float background_r, background_g, background_b;
 };
 
 struct ExposureUpdateArgs {
@@ -32,7 +33,7 @@ struct SmoothingArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ExposureArgs) == 12);
+static_assert(sizeof(ExposureArgs) == 24);
 static_assert(sizeof(ExposureUpdateArgs) == 20);
 }  // namespace darb::gpu
 #endif

@@ -24,6 +24,12 @@ struct LossArgs {
     float background_r, background_g, background_b;
 };
 
+struct DepthLossArgs {
+    uint pixels;    // H W
+    uint measured;  // 1: the photo has depths behind its colours
+    float scale;    // of the absolute difference: weight / (H W times the usual depth)
+};
+
 struct LossSumArgs {
     uint works;
     uint result_index;

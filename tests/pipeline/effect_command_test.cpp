@@ -36,12 +36,12 @@ TEST(EffectCommand, effects_begin_with_a_minus_or_a_base) {
 TEST(EffectCommand, effects_that_a_command_cannot_do_are_refused) {
     const std::string out = " -o " + (scratch() / "unused").string() + " --effects ";
     const std::string plan = "plan " + kScene + " --no-price --effects ";
-    expect_refused({{"train " + kScene + out + "+depth", "Leave +depth out."},
+    expect_refused({{"train " + kScene + out + "+depth", "no training photo has a measured depth"},
                     {"render a.ply --cameras b" + out + "+exposure", "'exposure' is nothing"},
                     {"render a.ply --cameras b" + out + "all,+alpha", "'alpha' is nothing"},
                     {"eval a.ply b --effects +depth", "'depth' is nothing"},
                     {"view a.ply --effects +alpha", "'alpha' is nothing"},
-                    {plan + "none,+depth", "'depth' is nothing"},
+                    {plan + "none,+depth", "leave +depth out"},
                     {plan + "none --lens original", "keep the effect with +lens"}});
     EXPECT_EQ(darb(plan + "none,+alpha,-depth").code, 0);
     EXPECT_EQ(darb(plan + "none,+lens --lens original").code, 0);

@@ -6,6 +6,8 @@
 #include <string>
 
 #include "engine/core/files.h"
+#include "engine/data/dataset.h"
+#include "engine/data/image_io.h"
 #include "tests/support/fake_programs.h"
 #include "tests/support/run_command.h"
 
@@ -93,8 +95,12 @@ TEST_F(PhotosCommand, pictures_among_photos_that_are_not_read_are_told) {
     EXPECT_NE(o.err.find("heif-convert"), std::string::npos) << o.err;
 }
 
-TEST_F(PhotosCommand, masks_beside_the_photos_go_to_colmap_with_a_note) {
-    write_file_atomic(scratch() / "masks/view_00.png.png", std::string("mask"));
+TEST_F(PhotosCommand, masks_beside_the_photos_go_to_colmap_and_are_straightened_with_the_photos) {
+    const ImageU8 photo = read_image(photos() / "view_00.png");
+    ImageU8 mask(photo.width, photo.height, 1);
+    for (int y = 0; y < mask.height; ++y)
+        for (int x = 0; x < mask.width; ++x) mask.at(x, y, 0) = x < 40 ? 0 : 255;
+    write_png(scratch() / "masks/view_00.png.png", mask);
     const std::string masks = (scratch() / "masks").string();
     EXPECT_NE(with_path("/nowhere", train()).err.find("--ImageReader.mask_path '" + masks + "'"),
               std::string::npos);
@@ -102,8 +108,11 @@ TEST_F(PhotosCommand, masks_beside_the_photos_go_to_colmap_with_a_note) {
                                 fmt::format("train {}/ -o {} --iterations 1", photos().string(),
                                             (scratch() / "with_masks").string()));
     EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_NE(o.err.find("The masks in " + masks), std::string::npos) << o.err;
-    EXPECT_NE(o.err.find("--images photos"), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("The masks of 1 photos were straightened"), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("which are left out"), std::string::npos) << o.err;
+    const fs::path dense = scratch() / "with_masks/colmap/dense";
+    EXPECT_EQ(read_image(dense / "masks/view_00.png.png").data, mask.data) << "a pinhole's";
+    EXPECT_EQ(load_photo(load_dataset(dense).views[0]).at(39, 3, 3), 0);
 }
 
 TEST_F(PhotosCommand, output_among_the_photos_is_refused) {

@@ -23,6 +23,7 @@ Intersections gradients_of(const BlendScene& scene, const reference::TileLists& 
                                  2 * s.l22 * p.g_dy_dy,
                                  p.d_opacity,
                                  p.d_exponent,
+                                 p.d_depth,
                                  glm::dvec3(p.d_colour)});
     }
     return intersections;
@@ -53,6 +54,7 @@ void expect_gradients_match(const Result& r, const Tolerance& allowed, bool shap
     check("d_l21", [](const auto& p) { return p.d_l21; });
     check("d_l22", [](const auto& p) { return p.d_l22; });
     check("d_opacity", [](const auto& p) { return p.d_opacity; });
+    check("d_depth", [](const auto& p) { return p.d_depth; });
     if (shaped) check("d_exponent", [](const auto& p) { return p.d_exponent; });
     for (int c = 0; c < 3; ++c)
         check(fmt::format("d_colour.{}", c).c_str(), [c](const auto& p) { return p.d_colour[c]; });
@@ -69,11 +71,21 @@ Result expect_backward_matches(const BlendScene& scene, const Tolerance& allowed
             planes[c * pixels + i] = static_cast<float>(rng.uniform(-1, 1));
             d_colour.data[i * 3 + c] = planes[c * pixels + i];
         }
+    Image<double> d_alpha, d_depth;
+    for (Image<double>* plane : {&d_alpha, &d_depth}) {
+        if (!scene.depth_sum) continue;
+        *plane = Image<double>(scene.width, scene.height, 1);
+        for (double& d : plane->data) {
+            planes.push_back(static_cast<float>(rng.uniform(-1, 1)));
+            d = planes.back();
+        }
+    }
     Result r{scene.lists(), {}, {}, {}};
     r.truth.resize(r.lists.intersection_count());
     for (size_t t = 0; t < r.lists.tile_count(); ++t)
         reference::blend_tile_backward(r.lists, t, scene.splats, scene.table(), scene.settings(),
-                                       {d_colour, {}}, r.truth.data() + r.lists.begin[t]);
+                                       {d_colour, d_alpha, d_depth},
+                                       r.truth.data() + r.lists.begin[t]);
     r.out = blend_on_device(scene, r.lists, true, planes);
     r.got = gradients_of(scene, r.lists, r.out);
     expect_gradients_match(r, allowed, kernel_has_shape(scene.kernel));
@@ -128,6 +140,27 @@ TEST_P(EveryWay, exponents_of_splats_match_double) {
                   shaped_kernel(kernel).exponent_least());
         const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
         EXPECT_GT(r.lists.intersection_count(), 200U);
+    }
+}
+
+TEST_P(EveryWay, gradients_of_summed_depths_match_double) {
+    for (const std::uint32_t segment : {0u, 128u}) {
+        SCOPED_TRACE(segment);
+        BlendScene scene = empty_scene(53, 37);
+        scene.depth_sum = true;
+        scene.segment = segment;
+        scene.add_random(900, 4, 0.01, 0.9);
+        for (auto& s : scene.splats) s.depth = 1 + s.depth / 256;
+        const Result r = expect_backward_matches(scene, tolerance("gradient_scaled_float32"));
+        EXPECT_NE(r.out.intersections[0].d_depth, 0);
+        // The picture has them, too, and the colours are those without.
+        const reference::BlendImages<double> images = blend_in_double(scene, r.lists);
+        const auto at = r.out.image.begin() + std::ptrdiff_t{3} * 53 * 37;
+        EXPECT_TRUE(compare("sum w z", images.depth.data, std::vector<float>(at, r.out.image.end()),
+                            tolerance("image_float32")));
+        scene.depth_sum = false;
+        const BlendOutput without = blend_on_device(scene, r.lists);
+        EXPECT_TRUE(std::equal(without.image.begin(), without.image.end(), r.out.image.begin()));
     }
 }
 

@@ -186,9 +186,10 @@ struct ExposedStep {
           gradients(shared_device(), splats),
           cameras(upload_cameras(shared_device(), {camera_data(camera, scene.model.origin)})),
           photo(shared_device(), "photo", pixels() * 4),
-          d_image(shared_device(), "d_image", pixels() * 12),
+          d_image(shared_device(), "d_image", pixels() * 16),
           result(shared_device(), "loss", sizeof(gpu::LossResult)),
-          view{camera_data(camera, scene.model.origin), &cameras, 0, 1, glm::vec3(0)} {
+          view{camera_data(camera, scene.model.origin), &cameras, 0, 1,
+               glm::vec3(0.1f, 0.5f, 0.9f)} {
         Pcg32 random(5, 6);
         std::vector<std::uint32_t> values(pixels());
         for (std::uint32_t& value : values) value = random.next() | 0xFF000000u;
@@ -208,11 +209,13 @@ struct ExposedStep {
         Commands commands(shared_device());
         commands.begin();
         forward.record(commands, splats, view, frame);
-        exposure.record(commands, frame.images.image, 0, pixels());
+        const ExposedPicture picture{frame.images.image, frame.images.final_transmittance,
+                                     view.background};
+        exposure.record(commands, picture, 0, pixels());
         loss.record(commands, {exposure.mapped(), photo, d_image, result}, camera.width,
                     camera.height, view.background);
         const ExposureStep exposed{0, pixels(), 0.01f, t};
-        exposure.record_backward(commands, frame.images.image, d_image, exposed);
+        exposure.record_backward(commands, picture, d_image, exposed);
         exposure.record_step(commands, status, exposed);
         if (apart) {
             backward.record_gradients(commands, view, frame, splats, d_image, {gradients});
@@ -265,7 +268,7 @@ TEST(GradientStep, both_ways_agree_with_exposure_and_a_lens) {
     TestScene scene = random_scene({.count = kSplats, .sh_degree = 1, .seed = 80});
     scene.camera.lens = test_lenses().front().second;
     ForwardOptions options;
-    options.store_for_backward = true;
+    options.store_for_backward = options.alpha_gradient = true;
     options.effects.lens = true;
     ExposedStep fused(scene, options, false), apart(scene, options, true);
     const std::vector<float> untouched = fused.exposure.state();

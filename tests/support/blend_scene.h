@@ -28,6 +28,7 @@ struct BlendScene {
     std::uint32_t segment = 0;  // intersections of a list a dispatch; 0: all
     std::uint32_t threads = 0;  // of a workgroup of blend.comp; 0: a subgroup a block
     BackwardBlend back = BackwardBlend::subgroup;
+    bool depth_sum = false;  // as ForwardOptions: d_image has five planes
     std::vector<reference::ProjectedSplat<double>> splats;  // nearest first
 
     bool buckets() const { return back == BackwardBlend::buckets; }
@@ -138,6 +139,7 @@ struct IntersectionSums {
     float gx, gxx, gx_dy, g_dy, d_opacity;
     glm::vec3 d_colour;
     float g_dy_dy, d_exponent;
+    float d_depth = 0;  // with depth_sum
 };
 
 /// What the passes leave. Intersections are in the order of the lists.
@@ -196,6 +198,7 @@ struct BlendPipelines {
         const std::uint32_t subgroup = add_block_constants(device, constants);
         bucket = bucket_length(device);
         constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
+        constants["DEPTH_SUM"] = constants["ALPHA_GRADIENT"] = scene.depth_sum ? 1 : 0;
         constants["BUCKET"] = static_cast<std::int32_t>(bucket);
         const bool team = scene.back == BackwardBlend::team;
         constants["THREADS"] = static_cast<std::int32_t>(team ? 4 * subgroup : subgroup);
@@ -234,22 +237,23 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
     }
     const size_t pixels = size_t(scene.width) * scene.height,
                  intersections = lists.intersection_count();
+    const size_t more = scene.depth_sum ? 1 : 0;  // planes, and sums of an intersection
     const size_t records = intersections / pipelines.bucket + lists.tile_count();
     const float start = scene.back == BackwardBlend::team ? NAN : 0.0f;
     // A record that no pixel reaches must not be read: NaN would show.
-    const std::vector<float> unwritten(scene.buckets() ? records * CHECKPOINT_BYTES / 4 : 1, NAN);
+    const std::vector<float> unwritten(scene.buckets() ? records * 256 * (4 + more) : 1, NAN);
     const GuardedBuffer ranges(device, "tile range", shuffled.ranges),
         order(device, "intersection from sorted", shuffled.order),
         splats(device, "splat from intersection", shuffled.splat_from_intersection),
         shapes(device, "shape", shape), lights(device, "light", light),
-        bounds(device, "bound", bound), image(device, "image", pixels * 12),
+        bounds(device, "bound", bound), image(device, "image", pixels * (12 + 4 * more)),
         final_t(device, "final T", store || scene.segment > 0 ? pixels * 4 : 4),
         behind(device, "behind", scene.segment > 0 ? pixels * 4 : 4),
         last(device, "last intersection", store ? pixels * 4 : 4),
         d_images(device, "d_image", d_image),
         // A team writes every slot.
         partials(device, "partials", std::vector<float>(intersections * 8, start)),
-        rest(device, "partial rest", std::vector<float>(intersections, start)),
+        rest(device, "partial rest", std::vector<float>(intersections * (1 + more), start)),
         exponents(device, "exponent", exponent),
         partial_exponent(device, "partial exponent", std::vector<float>(intersections, start)),
         checkpoints(device, "checkpoints", unwritten),
@@ -316,8 +320,9 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
                                      p[3],
                                      p[4],
                                      {p[5], p[6], p[7]},
-                                     rests[shuffled.order[j]],
-                                     of_exponent[shuffled.order[j]]});
+                                     rests[shuffled.order[j] * (1 + more)],
+                                     of_exponent[shuffled.order[j]],
+                                     more > 0 ? rests[shuffled.order[j] * 2 + 1] : 0.0f});
     }
     return out;
 }
@@ -325,6 +330,7 @@ inline BlendOutput blend_on_device(const BlendScene& scene, const reference::Til
 inline reference::BlendImages<double> blend_in_double(const BlendScene& scene,
                                                       const reference::TileLists& lists) {
     reference::BlendImages<double> images{Image<double>(scene.width, scene.height, 3),
+                                          Image<double>(scene.width, scene.height, 1),
                                           Image<double>(scene.width, scene.height, 1),
                                           Image<std::int32_t>(scene.width, scene.height, 1)};
     for (size_t t = 0; t < lists.tile_count(); ++t)

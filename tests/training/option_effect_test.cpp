@@ -8,7 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/track_observations.h"
-#include "tests/support/tiny_training.h"
+#include "tests/support/measured_depths.h"
 #include "trainer/option_table.h"
 #include "trainer/strategy.h"
 
@@ -25,6 +25,7 @@ const std::map<std::string, std::string> kOtherValues{
     {"/sh_degree", "0"},
     {"/effects/exposure_lr/0", "0.3"},
     {"/effects/exposure_lr/1", "0.3"},
+    {"/effects/depth_weight", "3"},
     {"/effects/camera_lr", "0.7"},
     {"/effects/camera_from", "0.5"},
     {"/effects/camera_anchor", "3"},
@@ -103,6 +104,8 @@ TinyTraining run_for(const OptionRow& row) {
     o.opacity_reset_interval = 7;
     o.clearance = 0.9f;
     o.exposure = key.starts_with("/effects/exposure_lr");
+    o.depth = key == "/effects/depth_weight";
+    if (o.depth) add_measured_depths(tiny_truth({.width = 32, .height = 24}), t);
     o.refine_cameras = key.starts_with("/effects/camera_");
     if (o.refine_cameras) add_tracks(t.dataset);
     const std::string strategies = row.strategies;
@@ -156,6 +159,7 @@ TEST(OptionEffect, another_value_of_each_option_trains_another_scene_long) {
         const bool special = key == "/resolution_ramp" || key == "/random_points";
         const std::string run = strategy_name(t.options.strategy).data() + std::string(" ") +
                                 (special ? key : "") + (t.options.exposure ? "exposure" : "") +
+                                (t.options.depth ? "depth" : "") +
                                 (t.options.refine_cameras ? "cameras" : "");
         if (!usual_of.contains(run)) usual_of[run] = trained(t);
         const std::optional<TrainerState>& usual = usual_of[run];

@@ -55,6 +55,7 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
         [](TrainOptions& o) { o.antialias = !o.antialias; });
     add(options.exposure ? "without exposure" : "with exposure",
         [](TrainOptions& o) { o.exposure = !o.exposure; });
+    if (options.depth) add("without measured depths", [](TrainOptions& o) { o.depth = false; });
     add(options.resolution_ramp ? "without resolution ramp" : "with resolution ramp",
         [](TrainOptions& o) { o.resolution_ramp = !o.resolution_ramp; });
     if (options.sh_degree > 0)

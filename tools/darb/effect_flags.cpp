@@ -66,6 +66,7 @@ void apply_plan(const EffectPlan& plan, TrainOptions& options) {
     options.probe_sh = colour.on && !colour.overridden;
     options.antialias = plan.on(EFFECT_ANTIALIAS);
     options.exposure = plan.on(EFFECT_EXPOSURE);
+    options.depth = plan.on(EFFECT_DEPTH);
     options.refine_cameras = plan.on(EFFECT_CAMERAS);
     options.projection = plan.projection();
     options.alpha = plan.on(EFFECT_ALPHA);

@@ -29,8 +29,7 @@ namespace {
 struct EvalFlags {
     std::filesystem::path scene, dataset, json;
     std::string split = "test", device, effects = "auto";
-    bool eval_exposure = false, quiet = false, light = false, align = false;
-    bool white_background = false;
+    bool eval_exposure = false, quiet = false, light = false, align = false, white = false;
     std::vector<double> scales;  // none: as the photos are
     DatasetOptions data;
     AccuracyFlags accuracy;
@@ -56,7 +55,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
     options.accuracy = chosen_accuracy(flags.accuracy);
     hold_out_as_trained(flags.scene, flags.data);
     options.effects = choose_effects(flags.effects, EffectUse::measuring, flags.data);
-    options.background = glm::vec3(flags.white_background ? 1.0f : 0.0f);
+    options.background = glm::vec3(flags.white ? 1.0f : 0.0f);
     options.fit_exposure = flags.eval_exposure;
     options.align_cameras = flags.align;
     const SplatModel model = load_scene(flags.scene);
@@ -64,6 +63,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
     Dataset dataset = load_dataset(flags.dataset, flags.data);
     take_trained_cameras(flags.scene, dataset.views);
     options.alpha_is_mask = dataset.alpha_is_mask;
+    options.depth_scale = dataset.depth_scale;
     print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(dataset.views));
     const std::vector<View> views = views_of(dataset, flags);
@@ -71,6 +71,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
         flags.split == "train" ? Dataset{} : off_path_of(flags.dataset, flags.data);
     print_notes(away.notes);
     refuse_to_overwrite_inputs({flags.json}, files_of(away.views));
+    const std::vector<View> beyond = held_out_views(away.views);
     std::vector<std::vector<View>> sizes;  // before the first picture: a photo may be too small
     for (const double scale : flags.scales) sizes.push_back(scaled_views(views, scale));
     DeviceOptions device_options = command_device(flags.device);
@@ -79,9 +80,9 @@ int eval(Ranks& ranks, EvalFlags flags) {
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
     nlohmann::json json;
     if (flags.scales.empty()) {
-        const Evaluation evaluation = evaluate_scene(device, model, views, options);
-        json = evaluation_json(evaluation);
-        print_evaluation(out, evaluation);
+        const Evaluation measured = evaluate_scene(device, model, views, options);
+        json = evaluation_json(measured);
+        print_evaluation(out, measured);
     } else {
         const auto scales = evaluate_scales(device, model, flags.scales, sizes, options);
         json = evaluation_json(scales);
@@ -89,17 +90,16 @@ int eval(Ranks& ranks, EvalFlags flags) {
     }
     if (!away.views.empty()) {
         options.alpha_is_mask = away.alpha_is_mask;
-        const Evaluation evaluation =
-            evaluate_scene(device, model, held_out_views(away.views), options);
+        const Evaluation evaluation = evaluate_scene(device, model, beyond, options);
         json["off_path"] = evaluation_json(evaluation);
         tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
              evaluation.psnr_db, evaluation.ssim);
+        print_depth(out, evaluation);
     }
     if (!ranks.is_first()) return 0;
     if (flags.light)
-        json["light_of_few_views"] =
-            told_light(out, measure_light(device, model, options.effects, dataset.views, views,
-                                          held_out_views(away.views)));
+        json["light_of_few_views"] = told_light(
+            out, measure_light(device, model, options.effects, dataset.views, views, beyond));
     write_json(flags.json, json);
     tell_paths(flags.quiet, {flags.json});
     return 0;
@@ -130,11 +130,11 @@ void add_eval(CLI::App& app, Action& action) {
     command->add_flag("--light-share", flags->light,
                       "also the share of the light that comes from splats which fewer than three "
                       "training views see");
-    command->add_flag("-w,--white-background", flags->white_background,
-                      "white behind alpha, not black");
+    command->add_flag("-w,--white-background", flags->white, "white behind alpha, not black");
     add_accuracy_flags(*command, flags->accuracy);
     add_effects_flag(*command, flags->effects);
     add_lens_flag(*command, flags->data);
+    add_depth_scale_flag(*command, flags->data);
     command->add_flag("--eval-exposure", flags->eval_exposure,
                       "fit each picture's colours to its photo by an affine map before measuring");
     command->add_flag(

@@ -25,6 +25,14 @@ CLI::Option* add_hold_out_flag(CLI::App& command, DatasetOptions& data) {
         ->default_str("every:8");
 }
 
+CLI::Option* add_depth_scale_flag(CLI::App& command, DatasetOptions& data) {
+    return command
+        .add_option("--depth-scale", data.depth_scale,
+                    "world units a metre of depths/ and depth/ beside the photos [by the points "
+                    "that photos saw, else 1]")
+        ->check(CLI::Range(1e-9, 1e9));
+}
+
 CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales) {
     return command
         .add_option("--scales", scales,

@@ -12,6 +12,9 @@ namespace darb {
 /// --hold-out, which implies --eval.
 CLI::Option* add_hold_out_flag(CLI::App& command, DatasetOptions& data);
 
+/// --depth-scale: world units a metre of measured depths.
+CLI::Option* add_depth_scale_flag(CLI::App& command, DatasetOptions& data);
+
 /// --scales: sizes to measure at, as multiples of that of -r, each above 0.
 CLI::Option* add_scales_flag(CLI::App& command, std::vector<double>& scales);
 

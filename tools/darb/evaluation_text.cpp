@@ -11,14 +11,32 @@
 
 namespace darb {
 
+namespace {
+
+nlohmann::json depth_json(const DepthError& error) {
+    return {{"mean_error_m", error.mean_m}, {"median_error_m", error.median_m}};
+}
+
+}  // namespace
+
+void print_depth(std::FILE* out, const Evaluation& evaluation) {
+    if (!evaluation.depth) return;
+    const auto count = std::ranges::count_if(
+        evaluation.views, [](const ViewMetrics& v) { return v.depth.has_value(); });
+    tell(out, "depth off by {:.4f} m in the mean, {:.4f} m in the median (means of {})\n",
+         evaluation.depth->mean_m, evaluation.depth->median_m, count);
+}
+
 nlohmann::json evaluation_json(const Evaluation& evaluation) {
     nlohmann::json views = nlohmann::json::array();
     for (const ViewMetrics& v : evaluation.views) {
         views.push_back({{"name", v.name}, {"psnr_db", v.psnr_db}, {"ssim", v.ssim}});
         if (v.in_arc) views.back()["in_arc"] = true;
+        if (v.depth) views.back()["depth"] = depth_json(*v.depth);
     }
     nlohmann::json json{{"mean", {{"psnr_db", evaluation.psnr_db}, {"ssim", evaluation.ssim}}},
                         {"views", views}};
+    if (evaluation.depth) json["mean"]["depth"] = depth_json(*evaluation.depth);
     if (const auto& arc = evaluation.arc)
         json["arc"] = {{"views", arc->views}, {"psnr_db", arc->psnr_db}, {"ssim", arc->ssim}};
     return json;
@@ -49,6 +67,7 @@ void print_evaluation(std::FILE* out, const Evaluation& evaluation) {
     for (const ViewMetrics& v : evaluation.views) row(printable(v.name), v.psnr_db, v.ssim);
     row(mean, evaluation.psnr_db, evaluation.ssim);
     if (in_arc > 0) row(arc, evaluation.arc->psnr_db, evaluation.arc->ssim);
+    print_depth(out, evaluation);
 }
 
 void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales) {

@@ -86,6 +86,7 @@ Paths files_of(const std::vector<View>& views) {
     for (const View& view : views) {
         files.push_back(view.photo);
         files.push_back(view.mask);
+        files.push_back(view.depth);
     }
     return files;
 }

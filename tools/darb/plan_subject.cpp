@@ -76,6 +76,9 @@ std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags
         impossible_effects(s.training ? EffectUse::training : EffectUse::pictures);
     const auto has = [&](int effect) {
         if (effect == EFFECT_VIEW_COLOUR) return degree_of(s, flags) > 0;
+        if (effect == EFFECT_DEPTH && s.training)
+            return std::ranges::any_of(s.dataset.views,
+                                       [](const View& view) { return !view.depth.empty(); });
         if (effect == EFFECT_LENS) return !s.training || distorted(s.dataset);
         return std::find(impossible.begin(), impossible.end(), effect) == impossible.end();
     };

@@ -11,6 +11,7 @@
 #include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/data/compare_view.h"
+#include "engine/data/depths.h"
 #include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/paper/compare_stats.h"
@@ -24,7 +25,14 @@ namespace darb {
 namespace {
 struct ViewNumbers {  // of a view, on its way from another rank
     double psnr_db, ssim;
+    bool has_depth;
+    DepthError depth;
 };
+
+// A depth is of whole pixels, and 16 bits do not hold it.
+bool renders_depth(const Accuracy& accuracy) {
+    return accuracy.value(kStorage) == STORAGE_FLOAT32 && accuracy.value(kRenderScale) == 1;
+}
 
 // What decides which views are measured, and the pictures.
 void check_agreement(Ranks& ranks, const Device& device, const SplatModel& model,
@@ -74,17 +82,23 @@ Evaluation evaluate_scene(Device& device, const SplatModel& model, std::vector<V
                                                            options.alpha_is_mask)
                                         : view.camera;
         ImageF image = renderer.render(camera, options.background);
+        std::optional<DepthError> depth;
+        if (!view.depth.empty() && renders_depth(options.accuracy))
+            depth = compare_depth(renderer.render_depth(), load_depth(view), options.depth_scale);
         if (options.fit_exposure)
             image = apply_exposure(
-                fit_exposure(image, photo, options.background, options.alpha_is_mask), image);
+                fit_exposure(image, photo, options.background, options.alpha_is_mask), image, photo,
+                options.alpha_is_mask);
         const ViewMetrics metrics =
             compare_view(view.name, image, photo, options.background, options.alpha_is_mask);
-        own.push_back({metrics.psnr_db, metrics.ssim});
+        own.push_back(
+            {metrics.psnr_db, metrics.ssim, depth.has_value(), depth.value_or(DepthError{})});
     }
     Evaluation evaluation;
     for (const ViewNumbers& m : by_turns(ranks, own)) {
         const View& view = views[evaluation.views.size()];
         evaluation.views.push_back({view.name, m.psnr_db, m.ssim, view.in_arc});
+        if (m.has_depth) evaluation.views.back().depth = m.depth;
     }
     take_means(evaluation);
     return evaluation;

@@ -23,6 +23,7 @@ struct SceneEvaluation {
     bool fit_exposure = false;   // of each picture to its photo, before measuring
     bool align_cameras = false;  // each to its photo first, by CameraAlignment
     bool alpha_is_mask = false;  // of the data set
+    double depth_scale = 1;      // likewise; measured depths are compared where views have them
     Ranks* ranks = nullptr;      // that measure the views by turns; null: this process does all
 };
 
@@ -49,6 +50,8 @@ nlohmann::json evaluation_json(const Evaluation& evaluation);
 nlohmann::json evaluation_json(const std::vector<AtScale>& scales);
 /// A line a view, and their mean.
 void print_evaluation(std::FILE* out, const Evaluation& evaluation);
+/// How far depths are off, a line; nothing where none was measured.
+void print_depth(std::FILE* out, const Evaluation& evaluation);
 /// A line a scale: the means over its views.
 void print_evaluation(std::FILE* out, const std::vector<AtScale>& scales);
 

@@ -15,6 +15,7 @@
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
 #include "engine/data/run_colmap.h"
+#include "engine/data/straight_masks.h"
 #include "engine/data/video.h"
 #include "tools/darb/photo_folder.h"
 #include "tools/darb/video_photos.h"
@@ -43,25 +44,13 @@ void show(std::string_view line) {
         say_text(fmt::format("\r{}\033[K", printable(line.substr(0, kShownColumns))));
 }
 
-// Undistorting leaves the masks behind; darb straightens them with the photos where it loads both.
-std::string masks_note(const ColmapRun& run, const fs::path& project) {
-    const std::string images = run.photos.filename().string();
-    return fmt::format(
-        "The masks in {} served COLMAP alone, those of names like {}: to train with them, copy "
-        "{} (the largest, where there are several) to {} and name {} as the data set{}.",
-        run.masks.string(), "photo.jpg.png", (run.workspace / "sparse" / "0").string(),
-        (project / "sparse" / "0").string(), project.string(),
-        images == "images" ? "" : ", with --images " + images);
-}
-
 Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
                             std::optional<RunLock>& lock) {
     check_output(photos, flags.run.output);
     if (!lock) lock.emplace(flags.run.output);
     ColmapRun run;
     run.photos = fs::absolute(photos / "").lexically_normal().parent_path();
-    const fs::path project = run.photos.parent_path();
-    run.masks = masks_folder(project);
+    run.masks = masks_folder(run.photos.parent_path());
     run.workspace = flags.run.output / "colmap";
     run.sequential = flags.sequential;
     if (flags.data.resolution != -1) run.max_image_size = kAnySize;
@@ -78,6 +67,7 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
         run_colmap(run, flags.run.quiet ? nullptr : show);
         if (!flags.run.quiet && ::isatty(STDERR_FILENO) == 1) say_text("\r\033[K");
     }
+    const std::size_t masks = run.masks.empty() ? 0 : straighten_masks(run);
     DatasetOptions options = flags.data;
     options.images_folder = "images";
     Dataset dataset = load_dataset(dense, options);
@@ -86,7 +76,10 @@ Dataset load_through_colmap(const fs::path& photos, const TrainFlags& flags,
                                      "set with them.",
                                      dataset.views.size(), list.count, dense.string()));
     if (!list.left_out.empty()) dataset.notes.push_back(list.left_out);
-    if (!run.masks.empty()) dataset.notes.push_back(masks_note(run, project));
+    if (masks > 0)
+        dataset.notes.push_back(
+            fmt::format("The masks of {} photos were straightened with them and are in {}.", masks,
+                        (dense / "masks").string()));
     return dataset;
 }
 

@@ -71,6 +71,7 @@ void add_data_flags(CLI::App& command, TrainFlags& f) {
         ->group(option_group::kPhotos);
     add_lens_flag(command, f.data);
     command.get_option("--lens")->group(option_group::kPhotos);
+    add_depth_scale_flag(command, f.data)->group(option_group::kPhotos);
 }
 
 }  // namespace darb

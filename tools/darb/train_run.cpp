@@ -59,6 +59,9 @@ void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos) {
             "note: --camera-lr, --camera-from and --camera-anchor are not used: cameras are "
             "refined "
             "with --refine-cameras on");
+    if (!flags.train.depth && flags.train.depth_weight != usual.depth_weight)
+        say_note(
+            "note: --depth-weight is not used: measured depths are compared with --effects +depth");
     flags.run.effects = plan_line(plan);
     flags.run.effects_json =
         plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);

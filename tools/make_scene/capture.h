@@ -45,6 +45,10 @@ std::vector<View> off_path_views(int scale = 1);
 std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& views,
                                  std::uint64_t seed, int samples = 0);
 
+/// Their true depths along the optical axis at the middles of the pixels, world units, 0 where the
+/// ray meets nothing within the reach of points, as of a depth camera.
+std::vector<ImageF> take_depths(const World& world, const std::vector<View>& views);
+
 /// Photos (gamma 2.2, 8 bits) and so many surface points, evenly spread over the pixels of the
 /// training views, with 1 mm of noise. Uses all cores; the result does not depend on their number.
 Capture capture_views(const World& world, const std::vector<View>& views,

@@ -1,6 +1,7 @@
 // make_scene FOLDER [SCALE]: renders the data set that the project ships: a still life seen from 40
 // training and 8 held-out cameras, with a COLMAP model, and 16 views off that path. The same bytes
 // on every run. SCALE 1 to 8 multiplies the photos' sides of 200 x 150 px.
+// make_scene depths FOLDER [SCALE]: the same with the true depths of all views beside the photos.
 // make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
 #include <cstdio>
 #include <cstdlib>
@@ -36,11 +37,17 @@ int main(int argc, char** argv) {
         }
         return 0;
     }
+    const bool depths = argc >= 3 && std::strcmp(argv[1], "depths") == 0;
+    if (depths) {
+        --argc;
+        ++argv;
+    }
     const int scale = argc == 3 ? std::atoi(argv[2]) : 1;
     if (argc < 2 || argc > 3 || scale < 1 || scale > 8) {
         std::fprintf(
             stderr,
             "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
+            "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
             "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n");
         return 2;
     }
@@ -52,6 +59,11 @@ int main(int argc, char** argv) {
         const std::vector<darb::View> away = off_path_views(scale);
         write_test_views(std::filesystem::path(argv[1]) / "off_path", away,
                          take_photos(world, away, views.size()));
+        if (depths) {
+            write_depths(argv[1], views, take_depths(world, views));
+            write_depths(std::filesystem::path(argv[1]) / "off_path", away,
+                         take_depths(world, away));
+        }
     } catch (const std::exception& error) {
         std::fprintf(stderr, "error: %s\n", error.what());
         return 2;

@@ -6,6 +6,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/colmap_write.h"
+#include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
 
 namespace darb::make_scene {
@@ -65,6 +66,12 @@ void write_scene(const std::filesystem::path& folder, const std::vector<View>& v
     write_file_atomic(folder / "test.txt", held_out);
     write_file_atomic(folder / "transforms_train.json", transforms_json(views, false));
     write_file_atomic(folder / "transforms_test.json", transforms_json(views, true));
+}
+
+void write_depths(const std::filesystem::path& folder, const std::vector<View>& views,
+                  const std::vector<ImageF>& depths) {
+    for (std::size_t i = 0; i < views.size(); ++i)
+        write_depth_png(folder / "depths" / views[i].name, depths[i], kMillimetre);
 }
 
 void write_test_views(const std::filesystem::path& folder, const std::vector<View>& views,

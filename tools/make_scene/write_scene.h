@@ -17,4 +17,8 @@ void write_scene(const std::filesystem::path& folder, const std::vector<View>& v
 void write_test_views(const std::filesystem::path& folder, const std::vector<View>& views,
                       const std::vector<ImageU8>& photos);
 
+/// FOLDER/depths: a 16-bit PNG a view, in millimetres.
+void write_depths(const std::filesystem::path& folder, const std::vector<View>& views,
+                  const std::vector<ImageF>& depths);
+
 }  // namespace darb::make_scene

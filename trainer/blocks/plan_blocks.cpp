@@ -69,6 +69,7 @@ Grid blocks_for_memory(Device& device, const Dataset& dataset, const TrainOption
             static_cast<std::uint64_t>(double(whole.intersections) * splats /
                                        double(std::max<std::uint64_t>(whole.splats, 1)));
         part.photo_pixels = static_cast<std::uint64_t>(photos * double(whole.photo_pixels));
+        part.depth_pixels = static_cast<std::uint64_t>(photos * double(whole.depth_pixels));
         part.small_pixels = static_cast<std::uint64_t>(photos * double(whole.small_pixels));
         part.streams = !device.info().unified_memory;
         if (plan_memory(device, part).total() <= bytes)

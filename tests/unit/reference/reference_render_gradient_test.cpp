@@ -1,6 +1,6 @@
 // Every gradient of the reference against central differences of its own forward walk, for every
-// kernel and footprint, under random weights on colour and alpha. A parameter whose two renders
-// blend a different set of samples sits on a cut-off: it is counted, and not compared.
+// kernel and footprint, under random weights on colour, alpha and depth. A parameter whose two
+// renders blend a different set of samples sits on a cut-off: it is counted, and not compared.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -30,9 +30,10 @@ class Differences {
           settings_(settings),
           colour_weights_(random_weights(camera, 3, 11)),
           alpha_weights_(random_weights(camera, 1, 12)),
+          depth_weights_(random_weights(camera, 1, 13)),
           result_(reference::render(splats, camera, settings)),
           gradients_(reference::backward(splats, camera, settings, result_, colour_weights_,
-                                         alpha_weights_)) {}
+                                         alpha_weights_, depth_weights_)) {}
 
     const RenderResult& result() const { return result_; }
     const reference::Gradients& gradients() const { return gradients_; }
@@ -83,7 +84,8 @@ class Differences {
     double loss(const RenderResult& result) const {
         double sum = weighted_sum(result.images.colour, colour_weights_);
         for (size_t i = 0; i < alpha_weights_.data.size(); ++i) {
-            sum += (1 - result.images.transmittance.data[i]) * alpha_weights_.data[i];
+            sum += (1 - result.images.transmittance.data[i]) * alpha_weights_.data[i] +
+                   result.images.depth.data[i] * depth_weights_.data[i];
         }
         return sum;
     }
@@ -91,7 +93,7 @@ class Differences {
     Splats<double> splats_;
     Camera camera_;
     RenderSettings settings_;
-    Image<double> colour_weights_, alpha_weights_;
+    Image<double> colour_weights_, alpha_weights_, depth_weights_;
     RenderResult result_;
     reference::Gradients gradients_;
     size_t compared_ = 0;

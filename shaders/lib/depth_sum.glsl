@@ -1,0 +1,13 @@
+// Whether pixels have the sum of weight times depth beside their colour: a fourth plane of the picture, a fifth of its
+// gradient, after that of dL/d(1 - transmittance), and a sum more for each intersection.
+#ifndef DARB_DEPTH_SUM_GLSL
+#define DARB_DEPTH_SUM_GLSL
+
+layout(constant_id = 32) const int DEPTH_SUM = 0;
+
+const uint DEPTH_PLANE = 3u;           // of the picture
+const uint DEPTH_GRADIENT_PLANE = 4u;  // of its gradient
+// Of an intersection's sums beside the partials: G dy dy, and dL/d(depth).
+const uint RESTS = DEPTH_SUM == 1 ? 2u : 1u;
+
+#endif
