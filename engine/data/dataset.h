@@ -64,8 +64,8 @@ struct DatasetOptions {
     bool hold_out = false;  // --eval: what held_out says is test; sources with a test file of
                             // their own use that in either case
     HoldOut held_out{};     // --hold-out
-    std::optional<double> depth_scale;  // world units a metre; absent: find_depth_scale
-    bool require_photos = true;         // false: cameras only (render)
+    std::optional<double> depth_scale{};  // world units a metre; absent: find_depth_scale
+    bool require_photos = true;           // false: cameras only (render)
     bool original_lens = false;  // true: distorted photos stay so, and their cameras have the lens
     bool original_where_wide = false;  // true: so do those of too_wide_to_undistort
 };

@@ -183,6 +183,7 @@ inline DoubleGradients gradients_in_double(const SplatModel& model, const Camera
             2 * s.l22 * sum[8],
             sum[4],
             sum[9],
+            0,  // of the depth
             {sum[5], sum[6], sum[7]}};
         reference::project_backward(splats, i, camera, settings, kernel, {s, g}, out);
         result.mean_ndc.push_back(

@@ -13,14 +13,14 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kWidth = 60, kHeight = 40;
-constexpr double kFocal = 50, kRadial = -0.3;
+constexpr double kFocal = 50, kRadial = -0.6;
 
 /// What colmap leaves of a photo a.png under a lens: its models, and a pinhole of another size.
 ColmapRun straightened_set(const fs::path& folder) {
     const ColmapRun run{.photos = folder / "photos", .workspace = folder / "out"};
     write_png(run.photos / "a.png", ImageU8(kWidth, kHeight, 3));
     write_file_atomic(run.workspace / "sparse/0/cameras.txt",
-                      std::string("1 SIMPLE_RADIAL 60 40 50 30 20 -0.3\n"));
+                      std::string("1 SIMPLE_RADIAL 60 40 50 30 20 -0.6\n"));
     write_file_atomic(run.workspace / "dense/sparse/cameras.txt",
                       std::string("1 PINHOLE 50 32 50 50 25 16\n"));
     for (const char* model : {"sparse/0", "dense/sparse"})
