@@ -17,8 +17,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The photos as colmap was given them, with their lenses and masks, at their own size.
-Dataset photos_with_lenses(const ColmapRun& run) {
+/// The photos that have masks as colmap was given them, with their lenses, at their own size.
+Dataset masked_photos(const ColmapRun& run) {
     const fs::path sparse = run.workspace / "sparse";
     const ColmapModel model = read_colmap(sparse / largest_colmap_model(sparse));
     Dataset dataset;
@@ -33,6 +33,7 @@ Dataset photos_with_lenses(const ColmapRun& run) {
     whole.resolution = 1;
     whole.original_lens = true;
     add_masks(run.photos.parent_path(), whole, dataset);
+    std::erase_if(dataset.views, [](const View& view) { return view.mask.empty(); });
     fit_views(dataset, whole);
     return dataset;
 }
@@ -55,9 +56,9 @@ std::size_t straighten_masks(const ColmapRun& run) {
         pinholes[image.name] = pinhole_camera(straight.cameras.at(image.camera_id));
     const bool there = fs::exists(made);
     std::size_t count = 0;
-    for (const View& view : photos_with_lenses(run).views) {
+    for (const View& view : masked_photos(run).views) {
         const auto pinhole = pinholes.find(view.name);
-        if (view.mask.empty() || pinhole == pinholes.end()) continue;
+        if (pinhole == pinholes.end()) continue;
         ++count;
         if (!there)
             write_png(unfinished / (view.name + ".png"), straight_mask(view, pinhole->second));
