@@ -30,7 +30,7 @@ check off_centre 'EFFECT_OFF_CENTRE|off_centre|OFF_CENTRE' \
     'shaders/effects/camera_model.glsl engine/plan/effect_plan.cpp'
 
 # The numbers of all others: where a command or a panel treats one apart.
-for row in VIEW_COLOUR:10 ANTIALIAS:8 EXPOSURE:3 LENS:6 ALPHA:3 DEPTH:6 HUGE:6; do
+for row in VIEW_COLOUR:10 ANTIALIAS:8 EXPOSURE:3 LENS:6 ALPHA:3 DEPTH:8 HUGE:6; do
     name=${row%:*}
     most=${row#*:}
     count=$(grep -rlw "EFFECT_$name" engine trainer viewer tools/darb shaders | wc -l)

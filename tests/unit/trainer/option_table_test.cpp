@@ -49,6 +49,7 @@ TEST(OptionTable, each_flag_that_changes_a_result_changes_its_setting_alone) {
         if (std::string(row.strategies) == "budget") options.strategy = Strategy::budget;
         if (name == "--shape-lr") options.kernel = KERNEL_BETA;
         if (name.starts_with("--camera-")) options.refine_cameras = true;
+        if (name == "--depth-weight") options.depth = true;
         const Json before = settings_json(options);
         set_option(row, is_whole(row) ? "8" : other_value(row), options);
         const Json after = settings_json(options);
