@@ -76,7 +76,7 @@ TEST(DepthTraining, waits_on_the_host_to_the_same_bits_and_takes_the_memory_that
     EXPECT_FALSE(same_state(without, *trainers[0]));
 }
 
-TEST(DepthTraining, the_memory_is_what_the_plan_says) {
+TEST(DepthTraining, the_memory_is_what_the_plan_says_long) {
     const TinyTraining t = measured_training();
     Device device{device_options()};
     Trainer trainer(device, t.dataset, t.photos, t.start(), t.options);
@@ -85,7 +85,7 @@ TEST(DepthTraining, the_memory_is_what_the_plan_says) {
     EXPECT_EQ(device.peak_bytes(), trainer.planned_bytes());
 }
 
-TEST(DepthTraining, in_batches_repeats_bit_by_bit) {
+TEST(DepthTraining, in_batches_repeats_bit_by_bit_long) {
     TinyTraining t = measured_training();
     t.options.batch = 4;
     Trainer a = t.trainer(), b = t.trainer();
