@@ -32,11 +32,11 @@ std::vector<Variant> variants(bool every, std::optional<int> one = std::nullopt)
                 {KERNEL_BETA},
                 {KERNEL_GENERALIZED_EXPONENTIAL},
                 {KERNEL_GES_PUBLISHED},
-                {KERNEL_BLENDS + KERNEL_GAUSSIAN * KERNEL_COUNT + KERNEL_RAISED_COSINE}};
+                {blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE)}};
     std::vector<Variant> all;
     std::vector<int> shaped = shaped_kernels();  // and blends: smooth, and with jump and kink
-    shaped.push_back(KERNEL_BLENDS + KERNEL_GAUSSIAN * KERNEL_COUNT + KERNEL_RAISED_COSINE);
-    shaped.push_back(KERNEL_BLENDS + KERNEL_SINC * KERNEL_COUNT + KERNEL_INVERSE_QUADRATIC);
+    shaped.push_back(blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE));
+    shaped.push_back(blend_of(KERNEL_SINC, KERNEL_INVERSE_QUADRATIC));
     for (const int kernel : shaped)
         for (const Footprint f : {Footprint::psi, Footprint::exact})
             if (f == Footprint::psi || has_exact_footprint(kernel)) all.push_back({kernel, f});

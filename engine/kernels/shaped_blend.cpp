@@ -214,7 +214,7 @@ std::optional<int> blend_from_name(std::string_view name) {
     const int first = listed(name.substr(kBlendMark.size(), comma - kBlendMark.size()));
     const int second = listed(name.substr(comma + 1));
     if (first < 0 || second < 0 || first == second) return std::nullopt;
-    return KERNEL_BLENDS + first * KERNEL_COUNT + second;
+    return blend_of(first, second);
 }
 
 }  // namespace darb

@@ -85,6 +85,10 @@ const ShapedKernel& exponential_kernel();
 /// Footprint::psi only: f is its psi. Source: GES (Hamdi et al. 2024), its program.
 const ShapedKernel& ges_kernel();
 
+/// The number of `blend:FIRST,SECOND`, of two different kernels of the list.
+constexpr int blend_of(int first, int second) {
+    return KERNEL_BLENDS + first * KERNEL_COUNT + second;
+}
 /// `blend:FIRST,SECOND` of two different kernels of the list: w = (1 - m) w1 + m w2. The weight in
 /// space is 1 / (1 + exp(-shape)); m, the exponent, is that of what is drawn, which the exact
 /// footprint's line integrals change.

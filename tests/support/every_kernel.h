@@ -8,8 +8,8 @@
 namespace darb::test {
 
 /// Two smooth kernels, one of them endless; and one that jumps with one that has a kink.
-constexpr int kSmoothBlend = KERNEL_BLENDS + KERNEL_GAUSSIAN * KERNEL_COUNT + KERNEL_RAISED_COSINE;
-constexpr int kSteepBlend = KERNEL_BLENDS + KERNEL_SINC * KERNEL_COUNT + KERNEL_INVERSE_QUADRATIC;
+constexpr int kSmoothBlend = blend_of(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE);
+constexpr int kSteepBlend = blend_of(KERNEL_SINC, KERNEL_INVERSE_QUADRATIC);
 
 /// With a blend.
 inline std::vector<int> every_shaped_kernel() {

@@ -21,7 +21,7 @@ TEST(ShapedBlend, Names_areOfTwoKernelsOfTheList) {
     EXPECT_EQ(kernel_from_name("blend: gaussian, raised_cosine "), kSmoothBlend);
     for (int k = 0; k < KERNEL_COUNT; ++k)
         for (int j = 0; j < KERNEL_COUNT; ++j) {
-            const int blend = KERNEL_BLENDS + k * KERNEL_COUNT + j;
+            const int blend = blend_of(k, j);
             EXPECT_EQ(kernel_has_shape(blend), k != j);
             if (k == j) continue;
             EXPECT_EQ(kernel_from_name(kernel_name(blend)), blend);
