@@ -16,9 +16,9 @@ namespace {
 void add_preset_flag(CLI::App& command, TrainFlags& f) {
     std::string help;
     for (const RunPreset& preset : kRunPresets)
-        help += fmt::format("{}{}: {}, {} iterations on photos of at most {} px",
-                            help.empty() ? "" : "; ", preset.name, preset.summary,
-                            preset.iterations, preset.width);
+        help +=
+            fmt::format("{}{}: {}, {} iterations, photos of up to {} px", help.empty() ? "" : "; ",
+                        preset.name, preset.summary, preset.iterations, preset.width);
     command
         .add_option_function<std::string>(
             "--preset",
