@@ -8,6 +8,7 @@
     gpu_compilers.py tables DIR              prints the tables of docs/gpu.md, of every GPU that is there
 
     --darb PATH   the command (build/darb)
+    --again       check: what the last call measured, without compiling
 
 Mesa's drivers run over its no-op kernel driver (Debian: mesa-drm-shim): nothing is executed, so a result of theirs
 means nothing, but each pass is compiled as for the real thing. GPUs: navi31 navi21 vega10 of AMD; with --all turing
@@ -126,8 +127,11 @@ def passes(root, gpu, darb, out):
     return subprocess.run(command, env=env, capture_output=True, text=True, check=False)
 
 
-def measured(root, gpu, darb):
+def measured(root, gpu, darb, again=False):
+    """again: what the last call measured, where that is there."""
     out = root / f"passes-{gpu}.json"
+    if again and out.exists():
+        return json.loads(out.read_text())
     out.unlink(missing_ok=True)
     done = passes(root, gpu, darb, out)
     if done.returncode != 0 or not out.exists():
@@ -136,8 +140,10 @@ def measured(root, gpu, darb):
 
 
 def key(row):
-    """A pass among those of one GPU: shader, constants but for a kernel's coefficients, lanes of a subgroup."""
-    constants = [one for one in row["constants"].split() if not re.match(r"KERNEL_|[A-Z_]+=-?\d*\.\d|\w+=\S*e-", one)]
+    """A pass among those of one GPU: shader, lanes of a subgroup, and its constants but for a kernel's coefficients
+    and for those that are 0, so that what is new and off changes no name."""
+    constants = [one for one in row["constants"].split()
+                 if not re.match(r"KERNEL_|[A-Z_]+=-?\d*\.\d|\w+=\S*e-|\w+=0$", one)]
     return f"{row['shader']} [{' '.join(constants)}] {row['subgroup_size']}"
 
 
@@ -171,11 +177,11 @@ def worse(gpu, report, table):
     return found
 
 
-def check(root, darb, gpus):
+def check(root, darb, gpus, again):
     table = json.loads(TABLE.read_text())
     found = []
     for gpu in gpus:
-        report = measured(root, gpu, darb)
+        report = measured(root, gpu, darb, again)
         if not report["has_statistics"] or not report["passes"]:
             fail(f"{gpu}: the driver tells nothing of its passes")
         found += worse(gpu, report, table)
@@ -229,6 +235,7 @@ def main():
     parser.add_argument("dir", type=pathlib.Path)
     parser.add_argument("gpu", nargs="?", choices=sorted(GPUS))
     parser.add_argument("--all", action="store_true")
+    parser.add_argument("--again", action="store_true")
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--darb", type=pathlib.Path, default=ROOT / "build/darb")
     flags = parser.parse_args()
@@ -249,7 +256,7 @@ def main():
         return done.returncode
     darb = flags.darb.resolve()
     if flags.verb == "check":
-        return check(root, darb, [flags.gpu] if flags.gpu else CHECKED)
+        return check(root, darb, [flags.gpu] if flags.gpu else CHECKED, flags.again)
     return {"record": record, "tables": tables}[flags.verb](root, darb)
 
 
