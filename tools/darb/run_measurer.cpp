@@ -6,6 +6,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/evaluation_flags.h"
 #include "tools/darb/tune_flags.h"
+#include "tools/paper/compare_shapes.h"
 
 namespace darb {
 
@@ -37,6 +38,7 @@ void RunMeasurer::measure_models(ComparedRun& run, Device& device) const {
 
 void RunMeasurer::measure(ComparedRun& run, const std::vector<View>& held_out) {
     attempt(run, "LPIPS", [&] { lpips_.measure(run); });
+    attempt(run, "learned shapes", [&] { read_shapes_of(run); });
     const auto on_device = [&](const char* what, const std::function<void(Device&)>& measurement) {
         attempt(run, what, [&] {
             DeviceOptions options = command_device(flags_.device);

@@ -13,6 +13,7 @@
 #include "tools/paper/compare_means.h"
 #include "tools/paper/compare_pulses.h"
 #include "tools/paper/compare_runs.h"
+#include "tools/paper/compare_shapes.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 #include "tools/paper/pictures.h"
@@ -276,6 +277,7 @@ std::string dataset_part(const Comparison& c, const ComparedDataset& dataset) {
 std::string comparison_html(const Comparison& c) {
     std::string body;
     for (const int iteration : c.iterations) body += means_part(c, iteration);
+    body += shapes_html(c);
     for (const ComparedDataset& dataset : c.datasets) body += dataset_part(c, dataset);
     body += splat_figure(c);
     body += fmt::format(

@@ -5,6 +5,7 @@
 #include "tools/paper/compare_means.h"
 #include "tools/paper/compare_pulses.h"
 #include "tools/paper/compare_runs.h"
+#include "tools/paper/compare_shapes.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 
@@ -58,6 +59,7 @@ Json run_json(const ComparedRun& run) {
                             {"ns_per_splat_pixel", b->ns_per_splat_pixel},
                             {"blend_ms", b->blend_ms},
                             {"frame_ms", b->frame_ms}};
+    if (run.shapes) json["shapes"] = shapes_json(*run.shapes);
     return json;
 }
 

@@ -2,6 +2,7 @@
 // output folders, what is measured on their scenes, and the page with all of it.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -45,6 +46,14 @@ struct CurvePoint {
     double seconds = 0, loss = 0, splats = 0;
 };
 
+/// Exponents that splats are drawn with, of a kernel whose shape each splat learns.
+struct LearnedShapes {
+    static constexpr std::array kPercentiles = {1, 10, 50, 90, 99};
+    std::vector<double> edges;        // of the bins, rising, one more than shares
+    std::vector<double> shares;       // of the splats; they add up to 1
+    std::vector<double> percentiles;  // kPercentiles of the exponents
+};
+
 struct ComparedRun {
     std::string kernel;  // its name
     std::uint64_t seed = 0;
@@ -56,6 +65,7 @@ struct ComparedRun {
     std::vector<CurvePoint> curve;
     std::optional<double> peak_mb;  // of device memory, over the whole run, 10^6 bytes
     std::optional<BlendStatistics> blending;
+    std::optional<LearnedShapes> shapes;
 };
 
 struct ComparedDataset {

@@ -17,6 +17,7 @@
 #include "tools/paper/compare_crops.h"
 #include "tools/paper/compare_means.h"
 #include "tools/paper/compare_pulses.h"
+#include "tools/paper/compare_shapes.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 
@@ -369,6 +370,52 @@ TEST(PaperNumbers, Means_areThoseThatTheErrataOfThePageGive) {
     EXPECT_EQ(paper_numbers_of("DrJohnson").size(), 10u);
     EXPECT_TRUE(paper_numbers_of("fox").empty());
     EXPECT_EQ(paper_benchmark_of("fox"), "");
+}
+
+TEST(LearnedShapes, Histogram_holdsTheExponentsOfWhatIsDrawn) {
+    SplatModel model;
+    model.kernel = KERNEL_BETA;
+    model.footprint = Footprint::psi;
+    const float twice = std::log(2.0f);  // b = 8; the others start at 4
+    model.shape = {0, twice, 0, 3, 0};
+    model.opacity_logit = {2, 2, 2, -9, 2};  // the fourth is below the cut-off
+    model.position.resize(15);
+    const auto shapes = learned_shapes(model);
+    ASSERT_TRUE(shapes);
+    double sum = 0;
+    for (std::size_t i = 0; i < shapes->shares.size(); ++i) {
+        const double low = shapes->edges[i], high = shapes->edges[i + 1];
+        EXPECT_LT(low, high);
+        EXPECT_NEAR(shapes->shares[i],
+                    (4 >= low && 4 < high ? 0.75 : 0) + (8 >= low && 8 < high ? 0.25 : 0), 1e-12)
+            << low << " to " << high;
+        sum += shapes->shares[i];
+    }
+    EXPECT_NEAR(sum, 1, 1e-12);
+    EXPECT_NEAR(shapes->percentiles[2], 4, 1e-6);
+    EXPECT_NEAR(shapes->percentiles[4], 8, 1e-6);
+    model.kernel = KERNEL_GAUSSIAN;
+    EXPECT_FALSE(learned_shapes(model)) << "it has no shape";
+}
+
+TEST(LearnedShapes, Page_hasACurveForEachDataSet) {
+    Comparison c;
+    c.kernels = {"gaussian", "beta"};
+    c.datasets.resize(2);
+    for (ComparedDataset& dataset : c.datasets) {
+        dataset.name = &dataset == &c.datasets[0] ? "<one>" : "two";
+        ComparedRun run;
+        run.kernel = "beta";
+        run.shapes = LearnedShapes{{1, 4, 16}, {0.25, 0.75}, {1.5, 2.5, 5.5, 6.5, 7.5}};
+        dataset.runs.push_back(run);
+    }
+    const std::string html = shapes_html(c);
+    EXPECT_NE(html.find("Learned by beta"), std::string::npos);
+    EXPECT_EQ(html.find("Learned by gaussian"), std::string::npos);
+    EXPECT_NE(html.find("class='line s1'"), std::string::npos) << "the second data set";
+    EXPECT_NE(html.find("<td>&lt;one&gt;</td><td>1.5</td>"), std::string::npos) << html;
+    c.datasets.clear();
+    EXPECT_EQ(shapes_html(c), "");
 }
 
 }  // namespace
