@@ -121,15 +121,20 @@ inline void PrintTo(const BlendVariant& v, std::ostream* out) {
     *out << v.name();
 }
 
+/// Every one that the shaders tell apart: those of shaders/kernels/builtin.glsl by functions of the
+/// driver as well, and of kernels with shapes one footprint, as the other is another exponent
+/// alone.
 inline std::vector<BlendVariant> every_blend_variant() {
     std::vector<BlendVariant> all;
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
         for (const Footprint footprint : {Footprint::psi, Footprint::exact})
-            for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
-                all.push_back({kernel, footprint, evaluation});
-    for (const int evaluation : {EVALUATION_POLYNOMIAL, EVALUATION_BUILTIN})
-        for (const int kernel : shaped_kernels())  // exact: another exponent alone
-            all.push_back({kernel, Footprint::psi, evaluation});
+            all.push_back({kernel, footprint, EVALUATION_POLYNOMIAL});
+    for (const int kernel :
+         {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_HALF_COSINE_SQUARED, KERNEL_SINC,
+          KERNEL_COSINE, KERNEL_SQUARED_RAISED_COSINE, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
+        all.push_back({kernel, Footprint::psi, EVALUATION_BUILTIN});
+    for (const int kernel : shaped_kernels())
+        all.push_back({kernel, Footprint::psi, EVALUATION_POLYNOMIAL});
     return all;
 }
 
