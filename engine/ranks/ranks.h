@@ -76,14 +76,19 @@ template <class T>
 std::span<const std::byte> bytes_of(const T& value) {
     return std::as_bytes(std::span(&value, 1));
 }
-/// Where ranks do items of work by turns, rank r those of r, r + ranks, ...: what all left, in the
-/// order of the items, `each` values an item. own: of this rank's items.
+/// Whose an item of work is where ranks do items by turns: to and fro (0, 1, 1, 0, 0, 1, ...), so
+/// that of items which alternate, as two kernels for each seed do, no rank has all of one kind.
+inline std::size_t turn_of(std::size_t item, std::size_t ranks) {
+    const std::size_t place = item % ranks;
+    return item / ranks % 2 == 0 ? place : ranks - 1 - place;
+}
+/// What all left, in the order of the items, `each` values an item. own: of this rank's items.
 template <class T>
 std::vector<T> by_turns(Ranks& ranks, const std::vector<T>& own, std::size_t each = 1) {
     const std::vector<Bytes> all = ranks.gather(std::as_bytes(std::span(own)));
     std::vector<T> items;
     for (std::size_t i = 0;; ++i) {
-        const Bytes& its = all[i % all.size()];
+        const Bytes& its = all[turn_of(i, all.size())];
         const std::size_t at = i / all.size() * each * sizeof(T);
         if (at + each * sizeof(T) > its.size()) return items;
         items.resize(items.size() + each);
@@ -92,7 +97,8 @@ std::vector<T> by_turns(Ranks& ranks, const std::vector<T>& own, std::size_t eac
 }
 /// Whether an item is this rank's.
 inline bool has_turn(const Ranks& ranks, std::size_t item) {
-    return item % static_cast<std::size_t>(ranks.count()) == static_cast<std::size_t>(ranks.rank());
+    return turn_of(item, static_cast<std::size_t>(ranks.count())) ==
+           static_cast<std::size_t>(ranks.rank());
 }
 
 /// The first rank's, on all. Text and the like.

@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "engine/ranks/ranks.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/scene/edit_splats.h"
 #include "trainer/blocks/block_scene.h"
@@ -332,6 +333,40 @@ TEST_F(BlocksManifestFile, damaged_is_an_error_that_names_it) {
     other.replace(other.find("\"columns\": 2"), 12, "\"columns\": 3");
     write_file_atomic(path_, other);
     EXPECT_THROW(read_manifest(path_), Error);
+}
+
+// Every rank, each with what a call of gather gives to all.
+class Turns : public OneRank {
+  public:
+    Turns(int rank, int count) : rank_(rank), count_(count) {}
+    int rank() const override { return rank_; }
+    int count() const override { return count_; }
+    std::vector<Bytes> gather(std::span<const std::byte>) override { return all; }
+    std::vector<Bytes> all;
+
+  private:
+    int rank_, count_;
+};
+
+TEST(Turns, items_go_to_and_fro_and_come_back_in_their_order) {
+    for (const int count : {1, 2, 3, 4})
+        for (const std::size_t items : {0, 1, 5, 8, 11}) {
+            Turns first(0, count);
+            std::vector<std::size_t> expected, of_rank(static_cast<std::size_t>(count));
+            for (int r = 0; r < count; ++r) {
+                std::vector<std::size_t> own;
+                for (std::size_t i = 0; i < items; ++i)
+                    if (has_turn(Turns(r, count), i)) own.push_back(100 + i);
+                of_rank[static_cast<std::size_t>(r)] = own.size();
+                const auto bytes = std::as_bytes(std::span(own));
+                first.all.emplace_back(bytes.begin(), bytes.end());
+            }
+            for (std::size_t i = 0; i < items; ++i) expected.push_back(100 + i);
+            EXPECT_EQ(by_turns(first, std::vector<std::size_t>()), expected) << count;
+            EXPECT_LE(*std::max_element(of_rank.begin(), of_rank.end()),
+                      *std::min_element(of_rank.begin(), of_rank.end()) + 1);
+        }
+    EXPECT_NE(turn_of(0, 2), turn_of(2, 2)) << "of two kernels by turns, no rank has one alone";
 }
 
 }  // namespace
