@@ -6,6 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/metrics.h"
+#include "viewer/controls.h"
 
 namespace darb {
 
@@ -41,6 +42,7 @@ Rest rest(const Measured& m) {
 }
 
 void turn(ViewerWindow& window, double seconds) {
+    leave_photo(window.viewer().session());  // as a drag does: a photo's camera stands still
     window.viewer().session().navigation.orbit(2 * glm::pi<double>() * seconds / kTurn_s, 0);
     window.redraw();
 }
