@@ -50,7 +50,7 @@ void MotionLevels::run() {
 
 void MotionLevels::make_levels(bool quick) {
     setpriority(PRIO_PROCESS, 0, quick ? kQuickNice : kNice);  // of this thread, on Linux
-    const MergeOptions options{.quick = quick, .progress = [this](double) {
+    const MergeOptions options{.threads = 1, .quick = quick, .progress = [this](double) {
                                    if (cancelled_) throw Cancelled();
                                }};
     SplatModel last;

@@ -157,7 +157,7 @@ void Viewer::draw_picture(const PictureKey& key, PictureStep step) {
     t.passes = shows_panes_ ? panes_.pass_times() : picture_.pass_times();
     t.picture_ms = milliseconds_since(start);
     if (whole && shows_panes_) session_.panes.psnr_db = panes_.psnr_db();
-    if (quality == MotionQuality()) t.full_ms = t.picture_ms;  // in motion as well
+    if (whole) t.full_ms = t.picture_ms;
     t.quality = quality;
     t.visible = picture_.status().visible;
     t.intersections = picture_.status().intersections;
