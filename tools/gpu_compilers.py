@@ -240,6 +240,8 @@ def main():
     parser.add_argument("--darb", type=pathlib.Path, default=ROOT / "build/darb")
     flags = parser.parse_args()
     root = flags.dir.resolve()
+    if flags.again and flags.verb != "check":
+        fail(f"--again belongs to check, not to {flags.verb}")
     if flags.verb == "fetch":
         for suite in (STABLE, NEW) if flags.all else (STABLE,):
             fetch(root, suite)

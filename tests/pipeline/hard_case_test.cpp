@@ -62,7 +62,8 @@ INSTANTIATE_TEST_SUITE_P(every, HardCase, testing::ValuesIn(every_case()),
                          [](const auto& p) { return p.param.name; });
 
 TEST(PoisonedSplats, harm_no_other) {
-    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_BETA, kSteepBlend})
+    for (const int kernel :
+         {KERNEL_GAUSSIAN, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL, kSteepBlend})
         for (const check::Row& row : check::check_poison(shared_device(), kernel, "poison"))
             EXPECT_TRUE(row.pass) << row.name << row.detail;
 }

@@ -129,9 +129,9 @@ inline std::vector<BlendVariant> every_blend_variant() {
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
         for (const Footprint footprint : {Footprint::psi, Footprint::exact})
             all.push_back({kernel, footprint, EVALUATION_POLYNOMIAL});
-    for (const int kernel :
-         {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_HALF_COSINE_SQUARED, KERNEL_SINC,
-          KERNEL_COSINE, KERNEL_SQUARED_RAISED_COSINE, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
+    for (const int kernel : {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_HALF_COSINE_SQUARED,
+                             KERNEL_SINC, KERNEL_COSINE, KERNEL_SQUARED_RAISED_COSINE, KERNEL_BETA,
+                             KERNEL_GENERALIZED_EXPONENTIAL, KERNEL_GES_PUBLISHED})
         all.push_back({kernel, Footprint::psi, EVALUATION_BUILTIN});
     for (const int kernel : shaped_kernels())
         all.push_back({kernel, Footprint::psi, EVALUATION_POLYNOMIAL});

@@ -117,7 +117,8 @@ std::string shapes_html(const Comparison& c) {
         }
     if (plots.empty()) return {};
     return "<h2>One kernel, or many?</h2><p class='soft'>The shapes that splats learned, of those "
-           "that are drawn, first seed. Where a curve is narrow, one kernel would do. The tables "
+           "that are drawn, first seed that is there. Where a curve is narrow, one kernel would "
+           "do. The tables "
            "have percentiles.</p><div class='plots'>" +
            plots + "</div>\n" + tables;
 }

@@ -18,7 +18,7 @@ std::optional<LearnedShapes> learned_shapes(const SplatModel& model);
 void read_shapes_of(ComparedRun& run);
 
 /// A plot for each kernel that learns shapes, with a curve for each data set, and a table of
-/// percentiles, all of the first seed; empty where there is no such kernel.
+/// percentiles, all of the first seed that is there; empty where there is no such kernel.
 std::string shapes_html(const Comparison& comparison);
 nlohmann::json shapes_json(const LearnedShapes& shapes);
 
