@@ -86,6 +86,13 @@ compare=(compare "$data" -r 50 --iterations 20 --seeds 1 -q)
 text=$(mpirun -n 1 "$darb" "${compare[@]}" -o "$folder/compare" --kernels gaussian : \
     -n 1 "$darb" "${compare[@]}" -o "$folder/compare" --kernels sinc 2>&1)
 check 'other runs of a comparison are told' 'rank 1 has the runs with seeds 1, kernels sinc' "$text"
+compare=(compare "$data" -r 50 --iterations 20 --kernels gaussian,sinc --seeds 2 --blending-views 2 -q)
+for ranks in 1 2; do
+    mpirun -n "$ranks" "$darb" "${compare[@]}" -o "$folder/compare.$ranks" >"$folder/compare.log" 2>&1
+    grep -hE '"(psnr_db|ssim|kernel|blended_per_pixel|pairs_per_splat)"' "$folder/compare.$ranks/compare.json" >"$folder/figures.$ranks"
+done
+[[ -s $folder/figures.1 ]] || { echo "FAILED  compare: no figures"; cat "$folder/compare.log"; failed=1; }
+check 'two ranks compare what one compares' "^$(sha256sum <"$folder/figures.1")\$" "$(sha256sum <"$folder/figures.2")"
 mpirun -n 2 "$darb" train "$data" -o "$folder/ended" -r 50 --iterations 100000 --densify-until-iter 0 --batch 4 \
     --checkpoint-interval 1000000 -q >"$folder/ended.log" 2>&1 &
 pid=$!

@@ -1,10 +1,10 @@
 // The training runs of a comparison, through the code of `darb train`.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "engine/core/error.h"
-#include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "tools/darb/compare_flags.h"
 #include "tools/darb/device_options.h"
@@ -15,6 +15,7 @@
 #include "tools/darb/train_run.h"
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_measure.h"
+#include "tools/paper/compare_share.h"
 #include "trainer/checkpoint.h"
 #include "trainer/run_folder.h"
 
@@ -40,12 +41,12 @@ class Comparer {
 
     const std::vector<View>& views() const { return dataset_.views; }
     std::string fingerprint() const { return dataset_fingerprint(dataset_, photos_); }
-    /// Of these runs each rank's, by turns: what fails is tried again, and told, by run().
-    void train_share(const std::vector<int>& kernels, const Ranks& ranks,
-                     const std::atomic<bool>& stop);
-    ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
+    /// Of all runs, by seed and then kernel, those of this rank; up to the stop.
+    std::vector<ComparedRun> runs(const std::vector<int>& kernels, const Ranks& ranks,
+                                  const std::atomic<bool>& stop);
 
   private:
+    ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
     std::vector<View> held_out() const { return held_out_views(dataset_.views); }
     void train(TrainFlags& f, const std::atomic<bool>& stop);
 
@@ -79,18 +80,14 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
     run_training(device, dataset_, f.train, f.run, &stop);
 }
 
-void Comparer::train_share(const std::vector<int>& kernels, const Ranks& ranks,
-                           const std::atomic<bool>& stop) {
+std::vector<ComparedRun> Comparer::runs(const std::vector<int>& kernels, const Ranks& ranks,
+                                        const std::atomic<bool>& stop) {
+    std::vector<ComparedRun> done;
     for (int seed = 0, item = 0; seed < flags_.seeds; ++seed)
-        for (const int kernel : kernels) {
-            if (stop || !has_turn(ranks, std::size_t(item++))) continue;
-            TrainFlags f = train_flags_of(flags_, name_, kernel, static_cast<std::uint64_t>(seed));
-            try {
-                train(f, stop);
-            } catch (const std::exception& e) {
-                say("failed: {}\n", e.what());
-            }
-        }
+        for (const int kernel : kernels)
+            if (has_turn(ranks, std::size_t(item++)) && !stop)
+                done.push_back(run(kernel, static_cast<std::uint64_t>(seed), stop));
+    return done;
 }
 
 ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
@@ -106,14 +103,13 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
     } catch (const std::exception& e) {
         run.failure = e.what();
         count_exception(e, run);
-        say("failed: {}\n", e.what());  // -q hides progress alone
     }
     if (run.failure.empty())
         measurer_->measure(run, held_out());  // as the effects of the run have them
     else
         read_unfinished_run(run, flags_.iterations, settings_text(f.train),
                             format_camera_list(dataset_.views));
-    if (!run.notes.empty()) say_note("note: " + run.notes);
+    say_what_went_wrong(run);
     return run;
 }
 
@@ -131,19 +127,23 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
         failed.kernel = "every kernel";
         failed.failure = e.what();
         failed.exit_code = 2;
-        say("failed: {}\n", e.what());
+        say_what_went_wrong(failed);
         result.runs.push_back(std::move(failed));
     }
     check_same_runs(ranks, flags, dataset, kernels, comparer ? comparer->fingerprint() : "");
-    if (comparer && ranks.count() > 1) comparer->train_share(kernels, ranks, stop);
-    ranks.gather({});  // all runs are there
-    if (!comparer || !ranks.is_first()) return result;
-    refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
-    for (int seed = 0; seed < flags.seeds; ++seed)
-        for (const int kernel : kernels) {
-            if (stop) return result;
-            result.runs.push_back(comparer->run(kernel, static_cast<std::uint64_t>(seed), stop));
-        }
+    std::vector<ComparedRun> own;
+    if (comparer) {
+        refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
+        own = comparer->runs(kernels, ranks, stop);
+    }
+    const std::size_t items = kernels.size() * static_cast<std::size_t>(flags.seeds);
+    std::vector<ComparedRun> all = runs_of_all(ranks, own, items);
+    if (!comparer) return result;
+    for (const ComparedRun& run : all)
+        if (std::none_of(own.begin(), own.end(),
+                         [&](const ComparedRun& its) { return its.folder == run.folder; }))
+            say_what_went_wrong(run);
+    result.runs = std::move(all);
     return result;
 }
 

@@ -2,13 +2,20 @@
 
 #include <functional>
 
+#include "engine/core/say.h"
 #include "engine/scene/splat_file.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/evaluation_flags.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_shapes.h"
 
 namespace darb {
+
+void say_what_went_wrong(const ComparedRun& run) {
+    if (run.exit_code != 0 && !run.failure.empty()) say("failed: {}\n", run.failure);
+    if (!run.notes.empty()) say_note("note: " + run.notes);
+}
 
 RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
                          const Dataset& dataset, const TrainFlags& first, const Lpips* lpips)

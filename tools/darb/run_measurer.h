@@ -13,6 +13,9 @@
 
 namespace darb {
 
+/// A run's failure and its notes, for people; -q hides the notes.
+void say_what_went_wrong(const ComparedRun& run);
+
 /// Of one data set.
 class RunMeasurer {
   public:
