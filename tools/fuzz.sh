@@ -36,10 +36,10 @@ for reader in $readers; do
         failed=1
     fi
 done
-scenes=build/tests/scene_fuzz_test
+scenes=build/tests/pipeline_tests
 if [[ -x $scenes ]]; then
     if DARB_VALIDATION=1 DARB_FUZZ_SEED=$((RANDOM * 32768 + RANDOM)) DARB_FUZZ_SECONDS=$seconds \
-        $scenes >$build/scenes.log 2>&1 && ! grep -q 'vulkan validation:' $build/scenes.log; then
+        $scenes --gtest_filter=SceneFuzz.* >$build/scenes.log 2>&1 && ! grep -q 'vulkan validation:' $build/scenes.log; then
         echo "scenes: $seconds s, $(sed -nE 's/^([0-9]+) scenes, .*/\1/p' $build/scenes.log) executions, no finding"
     else
         tail -30 $build/scenes.log

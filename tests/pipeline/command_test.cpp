@@ -22,7 +22,7 @@ namespace {
 using nlohmann::json;
 using namespace test;
 
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+using test::kScene;
 
 TEST(Command, bad_usage_is_exit_code_2) {
     const std::string out = " -o " + (scratch() / "unused").string() + " ";

@@ -17,7 +17,7 @@ namespace {
 using nlohmann::json;
 using namespace test;
 
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+using test::kScene;
 
 TEST(EffectCommand, effects_begin_with_a_minus_or_a_base) {
     for (const char* effects : {"--effects -near", "--effects=-near", "--effects auto,-near"}) {

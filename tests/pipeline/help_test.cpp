@@ -14,7 +14,7 @@ namespace {
 
 using namespace test;
 
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+using test::kScene;
 
 TEST(Help, help_of_train_shows_what_a_user_needs_and_all_of_it_the_table) {
     const std::string brief = darb("train --help").out, all = darb("train --help-all").out;

@@ -11,14 +11,7 @@
 namespace darb::test {
 namespace {
 
-using nlohmann::json;
-
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
 const std::string kCubic = "'expr: (1 - q/9)^3, support 9, name cubic'";
-
-json read_json(const fs::path& path) {
-    return json::parse(read_text_file(path));
-}
 
 class OwnKernelCommand : public testing::Test {
   protected:
@@ -33,11 +26,11 @@ TEST_F(OwnKernelCommand, psi_and_sim1d_show_it_beside_the_family) {
                              file.string() + " --html " + page.string());
     ASSERT_EQ(psi.code, 0) << psi.err;
     EXPECT_NE(psi.out.find("expr: (1 - q/9)^3, support 9, name cubic"), std::string::npos);
-    const json kernels = read_json(file)["kernels"];
+    const nlohmann::json kernels = read_json(file)["kernels"];
     ASSERT_EQ(kernels.size(), 2u);
     EXPECT_EQ(kernels[1]["kernel"], "cubic");
     EXPECT_NEAR(kernels[1]["exact"].get<double>(), 9.0 / 11, 1e-12);  // R^2 / (2 * 3 + 5)
-    const json fit = read_json(file)["in_the_shaders"][1];
+    const nlohmann::json fit = read_json(file)["in_the_shaders"][1];
     EXPECT_EQ(fit["form"], "(1 - t)^3 P2(t)");
     EXPECT_LT(fit["error"].get<double>(), 1e-7);
     EXPECT_NE(read_text_file(page).find("cubic"), std::string::npos);
@@ -58,7 +51,7 @@ TEST_F(OwnKernelCommand, A_run_keeps_it_in_every_file_and_resumes_with_it_alone)
     std::ifstream lines(out / "run.jsonl");
     std::string first;
     std::getline(lines, first);
-    const json settings = json::parse(first)["settings"];
+    const nlohmann::json settings = nlohmann::json::parse(first)["settings"];
     EXPECT_EQ(settings["kernel"], "cubic");
     EXPECT_EQ(settings["kernel_definition"]["function"]["support"], 9);
     const Outcome drawn =
@@ -87,12 +80,12 @@ TEST_F(OwnKernelCommand, A_run_keeps_it_in_every_file_and_resumes_with_it_alone)
 
 TEST(OwnKernelFileCommand, A_table_trains_and_draws_another_scene) {
     const fs::path file = scratch() / "ramp.json", out = scratch() / "table";
-    json table = json::array();
+    nlohmann::json table = nlohmann::json::array();
     for (int i = 0; i <= 24; ++i) {
         const double t = i / 24.0;
         table.push_back({6 * t, (1 - t) * (1 - t) * (1 + t)});
     }
-    write_file_atomic(file, json{{"table", table}}.dump());
+    write_file_atomic(file, nlohmann::json{{"table", table}}.dump());
     const std::string with = " --kernel-file " + file.string();
     const Outcome run =
         darb("train " + kScene + " -r 8 -q --iterations 2 -o " + out.string() + with);
@@ -112,8 +105,8 @@ TEST_F(OwnKernelCommand, check_runs_its_values_walks_and_hard_cases_long) {
     const Outcome check = darb("check --kernel " + kCubic + " --json " + file.string());
     EXPECT_EQ(check.code, 0) << check.out << check.err;
     std::set<std::string> groups;
-    const json rows = read_json(file)["checks"];
-    for (const json& row : rows) groups.insert(row["group"]);
+    const nlohmann::json rows = read_json(file)["checks"];
+    for (const nlohmann::json& row : rows) groups.insert(row["group"]);
     for (const char* group : {"kernels", "walk, cubic psi", "walk, cubic exact",
                               "hard cases, cubic psi", "hard cases, cubic exact"})
         EXPECT_TRUE(groups.contains(group)) << group;

@@ -8,12 +8,6 @@
 namespace darb::test {
 namespace {
 
-nlohmann::json read_json(const fs::path& path) {
-    return nlohmann::json::parse(read_text_file(path));
-}
-
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
-
 TEST(CompareCommand, Runs_areTrainedReportedAndNotRepeated_slow) {
     const fs::path out = scratch() / "compare";
     const std::string command =

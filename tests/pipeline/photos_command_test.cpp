@@ -16,7 +16,7 @@ namespace {
 
 using namespace test;
 
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+using test::kScene;
 
 // Photos without cameras, and a program named colmap that notes its calls and takes the scene's own
 // model as its result.

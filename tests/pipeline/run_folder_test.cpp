@@ -17,7 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
 const std::string kTrain = "train " + kScene + " -r 8 ";
 
 class RunFolder : public testing::Test {

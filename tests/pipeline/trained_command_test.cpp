@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 using namespace test;
 
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+using test::kScene;
 
 // A scene of 20 iterations. 3DGS's names of the options, with underscores.
 class TrainedCommand : public testing::Test {

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace test;
 
-const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+using test::kScene;
 
 fs::path video() {
     return scratch() / "a video.mp4";

@@ -10,6 +10,7 @@
 #include "engine/raster/adam_update.h"
 #include "engine/reference/adam.h"
 #include "engine/render/render_gradients.h"
+#include "tests/support/compare_images.h"
 #include "tests/support/test_walk.h"
 #include "trainer/batch_step.h"
 #include "trainer/gradient_tree.h"
@@ -24,12 +25,6 @@ ImageF weights_of(const Camera& camera, std::uint64_t seed) {
     ImageF weights(camera.width, camera.height, 3);
     for (float& w : weights.data) w = static_cast<float>(rng.uniform(-1, 1));
     return weights;
-}
-
-Image<double> widened(const ImageF& image) {
-    Image<double> wide(image.width, image.height, image.channels);
-    wide.data.assign(image.data.begin(), image.data.end());
-    return wide;
 }
 
 /// The same place, turned a little about the vertical.

@@ -7,6 +7,7 @@
 #include "engine/core/rng.h"
 #include "engine/reference/reference_render.h"
 #include "engine/render/render_gradients.h"
+#include "tests/support/compare_images.h"
 #include "tests/support/test_walk.h"
 
 namespace darb::test {
@@ -17,12 +18,6 @@ ImageF random_image(const Camera& camera, int channels, std::uint64_t seed) {
     ImageF image(camera.width, camera.height, channels);
     for (float& w : image.data) w = static_cast<float>(rng.uniform(-1, 1));
     return image;
-}
-
-Image<double> widened(const ImageF& image) {
-    Image<double> wide(image.width, image.height, image.channels);
-    wide.data.assign(image.data.begin(), image.data.end());
-    return wide;
 }
 
 TestScene small_scene(int kernel = KERNEL_GAUSSIAN, std::uint64_t seed = 41) {

@@ -12,6 +12,11 @@ inline void run_to(Trainer& trainer, int iteration) {
     while (trainer.iteration() < iteration) trainer.step();
 }
 
+inline void run_and_drain(Trainer& trainer, int iteration) {
+    run_to(trainer, iteration);
+    trainer.drain();
+}
+
 /// `whole`, where it is, and runs that stop before and go on from the file.
 inline void expect_resumes(const TinyTraining& t, Trainer& whole, const std::vector<int>& stops) {
     for (const int stop : stops) {

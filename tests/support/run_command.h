@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -19,11 +20,22 @@ namespace darb::test {
 
 namespace fs = std::filesystem;
 
+/// The shipped scene.
+inline const std::string kScene = std::string(DARB_SOURCE_DIR) + "/assets/scene";
+
+inline nlohmann::json read_json(const fs::path& path) {
+    return nlohmann::json::parse(read_text_file(path));
+}
+
 // One a process: ctest may run the cases at once.
 inline fs::path scratch() {
     const fs::path folder = fs::path(testing::TempDir()) / fmt::format("darb_{}", ::getpid());
     fs::create_directories(folder);
     return folder;
+}
+
+inline std::string scratch_file(const std::string& name) {
+    return scratch() / name;
 }
 
 class RemoveScratch : public testing::Environment {

@@ -12,6 +12,7 @@
 #include "engine/data/image_io.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/ply.h"
+#include "tests/support/compare_images.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
 #include "viewer/viewer.h"
@@ -92,13 +93,5 @@ class ViewerTest : public ::testing::Test {
     ViewerOptions options_;
     std::optional<Viewer> viewer_;
 };
-
-inline int largest_difference(const ImageU8& a, const ImageU8& b) {
-    if (a.data.size() != b.data.size()) return 256;
-    int largest = 0;
-    for (size_t i = 0; i < a.data.size(); ++i)
-        largest = std::max(largest, std::abs(int(a.data[i]) - int(b.data[i])));
-    return largest;
-}
 
 }  // namespace darb::test

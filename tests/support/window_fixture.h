@@ -20,6 +20,7 @@
 
 #include "engine/core/files.h"
 #include "engine/core/image.h"
+#include "tests/support/compare_images.h"
 
 namespace darb::test {
 
@@ -102,14 +103,6 @@ inline std::uint32_t big_endian(const std::vector<std::byte>& bytes, size_t word
     for (size_t i = 0; i < 4; ++i)
         value = value << 8 | std::to_integer<std::uint32_t>(bytes[word * 4 + i]);
     return value;
-}
-
-inline int largest_difference(const ImageU8& a, const ImageU8& b) {
-    if (a.width != b.width || a.height != b.height) return 256;
-    int largest = 0;
-    for (size_t i = 0; i < a.data.size(); ++i)
-        largest = std::max(largest, std::abs(int(a.data[i]) - int(b.data[i])));
-    return largest;
 }
 
 class DisplayTest : public ::testing::Test {

@@ -5,6 +5,7 @@
 #include "engine/data/depths.h"
 #include "engine/gpu/device_state.h"
 #include "tests/support/measured_depths.h"
+#include "tests/support/resumed_run.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
 #include "trainer/memory_plan.h"
@@ -17,10 +18,6 @@ TinyTraining measured_training(const TinyOptions& tiny = {}) {
     add_measured_depths(tiny_truth(tiny), t, 1);
     t.options.depth = true;
     return t;
-}
-
-void run_to(Trainer& trainer, int iteration) {
-    while (trainer.iteration() < iteration) trainer.step();
 }
 
 /// Mean over the held-out view of how far depths are off, world units.

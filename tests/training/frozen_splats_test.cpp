@@ -2,6 +2,7 @@
 // checkpoint goes on with the same bits.
 #include <algorithm>
 
+#include "tests/support/resumed_run.h"
 #include "tests/support/tiny_training.h"
 
 namespace darb::test {
@@ -17,11 +18,6 @@ TinyTraining many_splats() {
 
 Trainer frozen_trainer(const TinyTraining& t, std::uint32_t frozen) {
     return Trainer(shared_device(), t.dataset, t.photos, t.start(), t.options, {}, frozen);
-}
-
-void run_to(Trainer& trainer, int iteration) {
-    while (trainer.iteration() < iteration) trainer.step();
-    trainer.drain();
 }
 
 // Of the values of the first splats; harmonics as wide as those of the start.
@@ -40,7 +36,7 @@ bool begins_alike(const SplatModel& a, const SplatModel& b, std::uint32_t splats
 void expect_frozen(const TinyTraining& t) {
     Trainer whole = frozen_trainer(t, kFrozen), first = frozen_trainer(t, kFrozen),
             rest = frozen_trainer(t, kFrozen);
-    for (Trainer* trainer : {&whole, &first}) run_to(*trainer, trainer == &whole ? 35 : 25);
+    for (Trainer* trainer : {&whole, &first}) run_and_drain(*trainer, trainer == &whole ? 35 : 25);
     const SplatModel start = t.start();
     const Trainer::State end = whole.state();
     EXPECT_TRUE(begins_alike(start, end.model, kFrozen));
@@ -53,7 +49,7 @@ void expect_frozen(const TinyTraining& t) {
                                 [](float value) { return value == 0; }));
     }
     rest.restore(first.state());
-    run_to(rest, 35);
+    run_and_drain(rest, 35);
     EXPECT_TRUE(same_state(whole, rest));
 }
 
@@ -81,7 +77,7 @@ TEST(FrozenSplats, of_all_splats_leave_the_picture_as_it_was) {
     t.options.densify_until = 0;
     Trainer trainer = frozen_trainer(t, 2 * kFrozen);
     const ImageF before = trainer.render(t.dataset.views[0].camera);
-    run_to(trainer, 4);
+    run_and_drain(trainer, 4);
     EXPECT_EQ(trainer.splat_count(), 2 * kFrozen);
     EXPECT_TRUE(begins_alike(t.start(), trainer.state().model, 2 * kFrozen));
     EXPECT_EQ(before.data, trainer.render(t.dataset.views[0].camera).data);

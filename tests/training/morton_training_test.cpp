@@ -2,15 +2,11 @@
 // bits.
 #include <gtest/gtest.h>
 
+#include "tests/support/resumed_run.h"
 #include "tests/support/tiny_training.h"
 
 namespace darb::test {
 namespace {
-
-void run_to(Trainer& trainer, int iteration) {
-    while (trainer.iteration() < iteration) trainer.step();
-    trainer.drain();
-}
 
 bool same_bits(const SplatModel& a, const SplatModel& b) {
     for (int at = 0; at < kAttributeCount; ++at)
@@ -23,10 +19,10 @@ TEST(MortonTraining, repeats_resumes_and_is_another_order) {
     Trainer plain = t.trainer();
     t.options.morton_order = true;
     Trainer whole = t.trainer(), first = t.trainer(), rest = t.trainer();
-    for (Trainer* trainer : {&plain, &whole}) run_to(*trainer, 45);
-    run_to(first, 33);
+    for (Trainer* trainer : {&plain, &whole}) run_and_drain(*trainer, 45);
+    run_and_drain(first, 33);
     rest.restore(first.state());
-    run_to(rest, 45);
+    run_and_drain(rest, 45);
     EXPECT_GT(whole.counters().cloned_or_split, 10U);
     EXPECT_TRUE(same_bits(whole.model(), rest.model()));
     EXPECT_FALSE(same_bits(whole.model(), plain.model()));

@@ -14,11 +14,11 @@ namespace {
 
 const std::filesystem::path kSources = DARB_SOURCE_DIR;
 
-struct Outcome {
+struct Gain {
     double psnr_before = 0, psnr_after = 0;  // dB, mean over the held-out views
 };
 
-Outcome train(const Dataset& dataset, const TrainOptions& options) {
+Gain train(const Dataset& dataset, const TrainOptions& options) {
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     Trainer trainer(shared_device(), dataset, photos, initial_model(dataset, options), options);
     const auto psnr = [&] {
@@ -26,7 +26,7 @@ Outcome train(const Dataset& dataset, const TrainOptions& options) {
         take_means(e);
         return e.psnr_db;
     };
-    Outcome outcome{psnr(), 0};
+    Gain outcome{psnr(), 0};
     while (trainer.iteration() < options.iterations) trainer.step();
     outcome.psnr_after = psnr();
     EXPECT_EQ(trainer.counters().bad_gradients, 0U);
@@ -38,7 +38,7 @@ TEST(ShippedScene, a_short_run_gains_3_db) {
         load_dataset(kSources / "assets/scene", {.resolution = 8, .hold_out = true});
     TrainOptions options;
     options.iterations = 400;
-    const Outcome outcome = train(dataset, options);
+    const Gain outcome = train(dataset, options);
     EXPECT_GT(outcome.psnr_before, 5) << "the start already shows something";
     EXPECT_GT(outcome.psnr_after, outcome.psnr_before + 3);
 }
@@ -53,7 +53,7 @@ TEST(ShippedScene, a_short_run_of_mcmc_gains_3_db) {
     options.densify_from = 50;
     options.densify_interval = 50;
     options.max_splats = default_budget(dataset, options);
-    const Outcome outcome = train(dataset, options);
+    const Gain outcome = train(dataset, options);
     EXPECT_GT(outcome.psnr_before, 5) << "the start already shows something";
     EXPECT_GT(outcome.psnr_after, outcome.psnr_before + 3);
 }
@@ -66,7 +66,7 @@ TEST(ShippedScene, a_full_run_is_as_good_as_the_published_one_long) {
     const double median = published.at("held_out_psnr_db").at("median").get<double>();
     TrainOptions options;
     options.iterations = published.at("iterations").get<int>();
-    const Outcome outcome =
+    const Gain outcome =
         train(load_dataset(kSources / "assets/scene", {.hold_out = true}), options);
     EXPECT_GT(outcome.psnr_after, median - 0.5) << "published: " << median << " dB";
 }

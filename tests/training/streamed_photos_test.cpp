@@ -5,6 +5,7 @@
 
 #include "engine/core/error.h"
 #include "engine/gpu/device_state.h"
+#include "tests/support/resumed_run.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
 #include "tests/support/tiny_training.h"
@@ -18,10 +19,6 @@ namespace {
 Trainer made(const TinyTraining& t, const char* place) {
     const ScopedVariants variants(shared_device(), fmt::format("photos={}", place));
     return t.trainer();
-}
-
-void run_to(Trainer& trainer, int iteration) {
-    while (trainer.iteration() < iteration) trainer.step();
 }
 
 testing::AssertionResult same_training(const TinyTraining& t, int iterations, Trainer& resident,

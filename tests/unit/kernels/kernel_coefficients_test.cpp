@@ -1,5 +1,6 @@
 // The shader polynomials, evaluated in float32 on the CPU, against double.
 #include "engine/kernels/kernel_coefficients.h"
+#include "tests/support/footprints.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,6 @@
 namespace darb {
 namespace {
 
-constexpr Footprint kBoth[] = {Footprint::psi, Footprint::exact};
 constexpr double kRounding = 3e-7;  // of float32 arithmetic, on w
 constexpr double kCutoff = 1 / 255.0;
 
@@ -20,7 +20,7 @@ double extent(const KernelCoefficients& k) {
 template <class Check>
 void for_every_fit(Check check) {
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
-        for (const Footprint footprint : kBoth)
+        for (const Footprint footprint : test::kFootprints)
             for (int degree = kLeastDegree; degree <= kFullDegree; ++degree) {
                 SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
                              std::string(footprint_name(footprint)) + " degree " +
@@ -66,7 +66,7 @@ TEST(KernelCoefficients, Slope_inFloat_isWithinFitAndRounding) {
 
 TEST(KernelCoefficients, FullDegree_isAtFloatRounding) {
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
-        for (const Footprint f : kBoth) {
+        for (const Footprint f : test::kFootprints) {
             const KernelCoefficients& k = kernel_coefficients(kernel, f, kFullDegree);
             EXPECT_LT(k.value_error, 1.2e-7) << kernel_name(kernel) << " " << footprint_name(f);
         }
@@ -74,7 +74,7 @@ TEST(KernelCoefficients, FullDegree_isAtFloatRounding) {
 
 TEST(KernelCoefficients, HigherDegree_isNeverWorse) {
     for (int kernel = 0; kernel < KERNEL_COUNT; ++kernel)
-        for (const Footprint f : kBoth)
+        for (const Footprint f : test::kFootprints)
             for (int degree = kLeastDegree; degree < kFullDegree; ++degree)
                 EXPECT_LE(kernel_coefficients(kernel, f, degree + 1).value_error,
                           kernel_coefficients(kernel, f, degree).value_error + 1.2e-7)

@@ -12,32 +12,33 @@
 #include "engine/kernels/kernel_coefficients.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/relocation_table.h"
+#include "tests/support/footprints.h"
 #include "tests/support/kernel_vectors.h"
 
 namespace darb {
 namespace {
 
-constexpr double kPi = std::numbers::pi, kInfinity = std::numeric_limits<double>::infinity();
-constexpr Footprint kFootprints[] = {Footprint::psi, Footprint::exact};
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// KERNEL_* by the formulas of the paper, which know nothing of the family's careful forms.
-double formula(int kernel, double q) {
+double paper_formula(int kernel, double q) {
     const double d = std::sqrt(q);
     switch (kernel) {
         case KERNEL_GAUSSIAN:
             return std::exp(-q / 2);
         case KERNEL_RAISED_COSINE:
-            return 0.5 + 0.5 * std::cos(kPi * d / 2.5);
+            return 0.5 + 0.5 * std::cos(std::numbers::pi * d / 2.5);
         case KERNEL_HALF_COSINE_SQUARED:
-            return std::cos(kPi * q / 18);
+            return std::cos(std::numbers::pi * q / 18);
         case KERNEL_SINC:
-            return std::sin(kPi * d / 3) / (kPi * d / 3);  // 0/0 at the centre
+            return std::sin(std::numbers::pi * d / 3) /
+                   (std::numbers::pi * d / 3);  // 0/0 at the centre
         case KERNEL_INVERSE_QUADRATIC:
             return 1 / (1 + q);
         case KERNEL_COSINE:
-            return std::cos(kPi * d / 6);
+            return std::cos(std::numbers::pi * d / 6);
         case KERNEL_SQUARED_RAISED_COSINE:
-            return std::pow(0.5 + 0.5 * std::cos(kPi * d / 3), 2);
+            return std::pow(0.5 + 0.5 * std::cos(std::numbers::pi * d / 3), 2);
         case KERNEL_INVERSE_MULTIQUADRIC:
             return std::pow(1 + q, -0.5);
         default:
@@ -47,7 +48,7 @@ double formula(int kernel, double q) {
 
 int written_anew(int kernel) {
     return register_kernel(std::string(kernel_name(kernel)) + "_anew", kernel_support(kernel),
-                           [kernel](double q) { return formula(kernel, q); });
+                           [kernel](double q) { return paper_formula(kernel, q); });
 }
 
 TEST(KernelDefinition, The_family_written_anew_has_its_coefficients) {
@@ -55,7 +56,7 @@ TEST(KernelDefinition, The_family_written_anew_has_its_coefficients) {
         const int anew = written_anew(kernel);
         EXPECT_GE(anew, KERNEL_ROWS);
         EXPECT_TRUE(has_exact_footprint(anew));
-        for (const Footprint footprint : kFootprints)
+        for (const Footprint footprint : test::kFootprints)
             for (int degree = kLeastDegree; degree <= kFullDegree; ++degree) {
                 SCOPED_TRACE(std::string(kernel_name(kernel)) + " " +
                              std::string(footprint_name(footprint)) + " " + std::to_string(degree));
@@ -79,7 +80,7 @@ TEST(KernelDefinition, The_family_written_anew_has_its_psi_and_values) {
         const int anew = written_anew(kernel);
         SCOPED_TRACE(std::string(kernel_name(kernel)));
         EXPECT_NEAR(kernel_psi(anew), kernel_psi(kernel), 1e-12);
-        for (const Footprint f : kFootprints) {
+        for (const Footprint f : test::kFootprints) {
             EXPECT_NEAR(equal_area_scale(anew, f), equal_area_scale(kernel, f), 1e-12);
             EXPECT_NEAR(relocation_scale(anew, f, 0.8, 5), relocation_scale(kernel, f, 0.8, 5),
                         1e-12);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tests/support/footprints.h"
 #include "tests/support/kernel_formulas.h"
 #include "tests/support/tanh_sinh.h"
 
@@ -14,7 +15,6 @@ namespace {
 
 using std::numbers::pi;
 using test::integrate;
-constexpr Footprint kBoth[] = {Footprint::psi, Footprint::exact};
 
 /// Where to look: the support, or as far as the Gaussian is above 1e-9.
 double extent(int kernel) {
@@ -24,7 +24,8 @@ double extent(int kernel) {
 TEST(KernelFamily, Names_roundTrip) {
     for (int k = 0; k < KERNEL_COUNT; ++k) EXPECT_EQ(kernel_from_name(kernel_name(k)), k);
     EXPECT_EQ(kernel_from_name("Gaussian"), std::nullopt);
-    for (const Footprint f : kBoth) EXPECT_EQ(footprint_from_name(footprint_name(f)), f);
+    for (const Footprint f : test::kFootprints)
+        EXPECT_EQ(footprint_from_name(footprint_name(f)), f);
     EXPECT_EQ(footprint_from_name(""), std::nullopt);
 }
 
@@ -41,7 +42,7 @@ TEST(KernelFamily, Value_isThePrintedFormula) {
 
 TEST(KernelFamily, CentreAndEdge_areExact) {
     for (int k = 0; k < KERNEL_COUNT; ++k)
-        for (const Footprint f : kBoth) {
+        for (const Footprint f : test::kFootprints) {
             EXPECT_NEAR(kernel_value(k, f, 0), 1, 1e-14) << kernel_name(k);
             if (!std::isfinite(kernel_support(k))) continue;
             EXPECT_EQ(kernel_value(k, f, kernel_support(k)), 0) << kernel_name(k);
@@ -69,7 +70,7 @@ TEST(KernelFamily, Slope_atCentreAndEdge_isAsPrinted) {
 
 TEST(KernelFamily, Slope_isTheDifferenceQuotient) {
     for (int k = 0; k < KERNEL_COUNT; ++k)
-        for (const Footprint f : kBoth)
+        for (const Footprint f : test::kFootprints)
             for (int i = 1; i < 95; ++i) {
                 const double q = extent(k) * i / 100, h = 1e-5 * extent(k);
                 // Five points: error h^4, and 1e-16 / h of rounding.
@@ -83,7 +84,7 @@ TEST(KernelFamily, Slope_isTheDifferenceQuotient) {
 TEST(KernelFamily, FiveKernels_differPairwise) {
     for (int j = 0; j < KERNEL_COUNT; ++j)
         for (int k = 0; k < j; ++k)
-            for (const Footprint f : kBoth) {
+            for (const Footprint f : test::kFootprints) {
                 double difference = 0;
                 for (double q = 0; q < 9; q += 0.1)
                     difference = std::max(difference,

@@ -10,8 +10,6 @@
 namespace darb {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 struct Rings {
     int row, kernel, pulses;
     double radius;
@@ -21,11 +19,11 @@ constexpr Rings kRings[] = {{KERNEL_RAISED_COSINE_2_PULSES, KERNEL_RAISED_COSINE
                             {KERNEL_SINC_2_PULSES, KERNEL_SINC, 2, 6},
                             {KERNEL_SINC_3_PULSES, KERNEL_SINC, 3, 9}};
 
-double formula(const Rings& r, double q) {
+double ring_formula(const Rings& r, double q) {
     if (q >= r.radius * r.radius) return 0;
     const double d = std::sqrt(q);
-    if (r.kernel == KERNEL_RAISED_COSINE) return 0.5 + 0.5 * std::cos(kPi * d / 2.5);
-    return d > 0 ? std::abs(std::sin(kPi * d / 3) / (kPi * d / 3)) : 1;
+    if (r.kernel == KERNEL_RAISED_COSINE) return 0.5 + 0.5 * std::cos(std::numbers::pi * d / 2.5);
+    return d > 0 ? std::abs(std::sin(std::numbers::pi * d / 3) / (std::numbers::pi * d / 3)) : 1;
 }
 
 double value(int row, double q) {
@@ -50,7 +48,8 @@ TEST(KernelPulses, Rows_areFoundByKernelAndCountAndByName) {
 TEST(KernelPulses, Value_isTheFormulaAndNeverNegative) {
     for (const Rings& r : kRings)
         for (double q = 0; q < 1.2 * r.radius * r.radius; q += 0.013) {
-            EXPECT_NEAR(value(r.row, q), formula(r, q), 1e-14) << kernel_name(r.row) << " " << q;
+            EXPECT_NEAR(value(r.row, q), ring_formula(r, q), 1e-14)
+                << kernel_name(r.row) << " " << q;
             EXPECT_GE(value(r.row, q), 0);
         }
 }
@@ -115,7 +114,8 @@ TEST(KernelPulses, CovarianceAndSplits_areThoseOfOnePulse) {
     // Integrals of r |sin| and r^3 |sin| over whole half waves: psi = 3/2 (n^2 + 1) - 18/pi^2.
     for (const int row : {KERNEL_SINC, KERNEL_SINC_2_PULSES, KERNEL_SINC_3_PULSES}) {
         const int n = kernel_pulses(row);
-        EXPECT_NEAR(kernel_psi(row), 1.5 * (n * n + 1) - 18 / (kPi * kPi), 1e-10);
+        EXPECT_NEAR(kernel_psi(row), 1.5 * (n * n + 1) - 18 / (std::numbers::pi * std::numbers::pi),
+                    1e-10);
     }
 }
 

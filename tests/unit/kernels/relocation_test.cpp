@@ -6,13 +6,12 @@
 #include <cmath>
 
 #include "engine/kernels/gaussian_equivalent.h"
+#include "tests/support/footprints.h"
 #include "tests/support/kernel_formulas.h"
 #include "tests/support/tanh_sinh.h"
 
 namespace darb {
 namespace {
-
-constexpr Footprint kBoth[] = {Footprint::psi, Footprint::exact};
 
 TEST(Relocation, Scale_isThePrintedFigure) {
     const auto scale = [](int k) { return relocation_scale(k, Footprint::psi, 0.9, 5); };
@@ -40,7 +39,7 @@ TEST(Relocation, Gaussian_isTheBinomialSum) {
 
 TEST(Relocation, Scale_keepsTheIntegralOverALine) {
     for (int k = 0; k < KERNEL_COUNT; ++k)
-        for (const Footprint f : kBoth) {
+        for (const Footprint f : test::kFootprints) {
             const double radius =
                 std::isfinite(kernel_support(k)) ? std::sqrt(kernel_support(k)) : 9;
             const double part = relocation_opacity(0.8, 7);

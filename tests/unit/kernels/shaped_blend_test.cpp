@@ -8,11 +8,11 @@
 #include "engine/kernels/relocation_table.h"
 #include "engine/kernels/second_moment.h"
 #include "tests/support/every_kernel.h"
+#include "tests/support/footprints.h"
 
 namespace darb::test {
 namespace {
 
-constexpr Footprint kFootprints[] = {Footprint::psi, Footprint::exact};
 constexpr int kBlends[] = {kSmoothBlend, kSteepBlend};
 
 TEST(ShapedBlend, Names_areOfTwoKernelsOfTheList) {

@@ -10,13 +10,13 @@
 #include "engine/kernels/relocation_table.h"
 #include "engine/kernels/second_moment.h"
 #include "shaders/shared/kernel_forms.h"
+#include "tests/support/footprints.h"
 
 namespace darb {
 namespace {
 
 constexpr double kR2 = BETA_SUPPORT;
 const ShapedKernel& kBeta = beta_kernel();
-constexpr Footprint kFootprints[] = {Footprint::psi, Footprint::exact};
 
 /// Midpoint sums of f over [0, to].
 template <class F>
@@ -27,7 +27,7 @@ double integral(double to, const F& f, int steps = 200'000) {
 }
 
 TEST(ShapedKernel, Start_isTheRowOfTheFamily) {
-    for (const Footprint f : kFootprints) {
+    for (const Footprint f : test::kFootprints) {
         const double e = kBeta.exponent(f, 0);
         EXPECT_EQ(e, f == Footprint::psi ? 4 : 4.5);
         for (double q = 0; q < 14; q += 0.37) {
@@ -75,7 +75,7 @@ TEST(ShapedKernel, Derivatives_matchDifferencesFromCentreToEdge) {
         }
     EXPECT_EQ(kBeta.value(Footprint::psi, 4, 0).w, 1);
     EXPECT_EQ(kBeta.value(Footprint::psi, 4, 0).by_exponent, 0);
-    for (const Footprint f : kFootprints)
+    for (const Footprint f : test::kFootprints)
         for (const double t : {-1.3, 0.0, 1.0, 2.5}) {
             const double d = (kBeta.exponent(f, t + 1e-6) - kBeta.exponent(f, t - 1e-6)) / 2e-6;
             EXPECT_NEAR(kBeta.exponent_slope(f, t), d, 1e-7);
@@ -83,7 +83,7 @@ TEST(ShapedKernel, Derivatives_matchDifferencesFromCentreToEdge) {
 }
 
 TEST(ShapedKernel, Exponent_isHeldBetweenItsBounds) {
-    for (const Footprint f : kFootprints) {
+    for (const Footprint f : test::kFootprints) {
         EXPECT_EQ(kBeta.exponent(f, -100), BETA_EXPONENT_LEAST);
         EXPECT_EQ(kBeta.exponent(f, 100), BETA_EXPONENT_MOST);
         EXPECT_EQ(kBeta.exponent_slope(f, -100), 0);

@@ -14,7 +14,7 @@ namespace {
 
 using test::tolerance;
 
-constexpr double kStep = 1e-6;
+constexpr double kEffectStep = 1e-6;
 
 struct Weights {
     ProjectedGradient<double> d;
@@ -51,12 +51,12 @@ size_t expect_gradients(const std::string& name, Splats<double> splats, const Ca
                                size_t stride) {
             for (size_t k = i * stride; k < (i + 1) * stride; ++k) {
                 const double kept = values[k];
-                values[k] = kept + kStep;
+                values[k] = kept + kEffectStep;
                 const double above = w.of(project(splats, i, camera, {}, kernel));
-                values[k] = kept - kStep;
+                values[k] = kept - kEffectStep;
                 const double below = w.of(project(splats, i, camera, {}, kernel));
                 values[k] = kept;
-                expected.push_back((above - below) / (2 * kStep));
+                expected.push_back((above - below) / (2 * kEffectStep));
                 got.push_back(d[k]);
             }
         };

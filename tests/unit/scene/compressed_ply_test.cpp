@@ -11,7 +11,9 @@
 namespace darb::test {
 namespace {
 
-const Reader kRead = [](std::span<const std::byte> file) { return parse_ply(file, "test"); };
+const Reader kReadCompressedPly = [](std::span<const std::byte> file) {
+    return parse_ply(file, "test");
+};
 
 /// One chunk with bounds 0 to 1 for x, 0 to 2 for y, 0 to 4 for z; scales -8 to 0; and one splat.
 FileBytes one_splat(bool colours, bool sh) {
@@ -50,7 +52,7 @@ FileBytes one_splat(bool colours, bool sh) {
 }
 
 TEST(CompressedPly, one_splat_decoded_by_hand) {
-    const SplatModel model = kRead(one_splat(true, true));
+    const SplatModel model = kReadCompressedPly(one_splat(true, true));
     ASSERT_EQ(model.size(), 1u);
     EXPECT_EQ(model.sh_degree, 1);
     EXPECT_EQ(model.position[0], 1.f);
@@ -76,7 +78,7 @@ TEST(CompressedPly, one_splat_decoded_by_hand) {
 }
 
 TEST(CompressedPly, without_bounds_of_colour_they_are_0_to_1) {
-    const SplatModel model = kRead(one_splat(false, false));
+    const SplatModel model = kReadCompressedPly(one_splat(false, false));
     EXPECT_EQ(model.sh_degree, 0);
     EXPECT_NEAR(model.sh_dc[0], 0.5 / 0.28209479, 1e-5);
 }
@@ -92,7 +94,7 @@ TEST(CompressedPly, harmonics_without_properties_are_degree_0) {
             FileBytes bytes;
             append_text(changed, bytes);
             EXPECT_EQ(error_of([&] {
-                          const SplatModel model = kRead(bytes);
+                          const SplatModel model = kReadCompressedPly(bytes);
                           EXPECT_EQ(model.sh_degree, 0);
                           EXPECT_EQ(model.position[0], 1.f);
                       }),
@@ -117,7 +119,7 @@ TEST(CompressedPly, every_degree_round_trips_within_the_stated_errors) {
         model.kernel = KERNEL_RAISED_COSINE;
         model.footprint = Footprint::exact;
         model.antialias = true;
-        const SplatModel read = kRead(encode_compressed_ply(model));
+        const SplatModel read = kReadCompressedPly(encode_compressed_ply(model));
         ASSERT_EQ(read.size(), model.size());
         EXPECT_EQ(read.sh_degree, degree);
         EXPECT_EQ(read.kernel, KERNEL_RAISED_COSINE);
@@ -144,8 +146,8 @@ TEST(CompressedPly, every_degree_round_trips_within_the_stated_errors) {
 
 TEST(CompressedPly, written_again_the_bytes_stay) {
     // The order is by position, which moves by less than a step of the order.
-    const SplatModel once = kRead(encode_compressed_ply(sample_model(2, 300)));
-    const SplatModel twice = kRead(encode_compressed_ply(once));
+    const SplatModel once = kReadCompressedPly(encode_compressed_ply(sample_model(2, 300)));
+    const SplatModel twice = kReadCompressedPly(encode_compressed_ply(once));
     const auto sorted = [](std::vector<float> values) {
         std::sort(values.begin(), values.end());
         return values;
@@ -155,18 +157,18 @@ TEST(CompressedPly, written_again_the_bytes_stay) {
 }
 
 TEST(CompressedPly, no_splats_and_equal_splats_round_trip) {
-    EXPECT_EQ(kRead(encode_compressed_ply(SplatModel{})).size(), 0u);
+    EXPECT_EQ(kReadCompressedPly(encode_compressed_ply(SplatModel{})).size(), 0u);
     SplatModel model = sample_model(0, 1);
     for (auto* values :
          {&model.position, &model.log_scale, &model.rotation, &model.opacity_logit, &model.sh_dc})
         values->insert(values->end(), values->begin(), values->end());
-    const SplatModel read = kRead(encode_compressed_ply(model));
+    const SplatModel read = kReadCompressedPly(encode_compressed_ply(model));
     EXPECT_EQ(read.position, model.position);  // the bounds are exact
 }
 
 /// Median distance of the first `count` splats to those that are read back.
 double median_shift(const SplatModel& model, size_t count) {
-    const SplatModel read = kRead(encode_compressed_ply(model));
+    const SplatModel read = kReadCompressedPly(encode_compressed_ply(model));
     std::vector<double> shifts;
     for (size_t i = 0; i < count; ++i)
         shifts.push_back(
@@ -205,8 +207,8 @@ TEST(CompressedPly, splats_that_move_by_more_than_their_size_are_counted) {
 
 TEST(CompressedPly, truncated_or_damaged_is_an_error) {
     const FileBytes file = encode_compressed_ply(sample_model(1, 3));
-    expect_truncation_is_refused(file, kRead);
-    expect_damage_is_survived(file, kRead, 2000);
+    expect_truncation_is_refused(file, kReadCompressedPly);
+    expect_damage_is_survived(file, kReadCompressedPly, 2000);
 }
 
 TEST(CompressedPly, counts_that_do_not_fit_are_refused) {
@@ -219,13 +221,14 @@ TEST(CompressedPly, counts_that_do_not_fit_are_refused) {
             changed.replace(changed.find(line) + line.size(), 1, count);
             FileBytes bytes;
             append_text(changed, bytes);
-            EXPECT_NE(error_of([&] { kRead(bytes); }), "no error") << element << " " << count;
+            EXPECT_NE(error_of([&] { kReadCompressedPly(bytes); }), "no error")
+                << element << " " << count;
         }
     std::string changed = text;
     changed.replace(changed.find("uint packed_scale"), 4, "int ");
     FileBytes bytes;
     append_text(changed, bytes);
-    EXPECT_NE(error_of([&] { kRead(bytes); }).find("packed_scale"), std::string::npos);
+    EXPECT_NE(error_of([&] { kReadCompressedPly(bytes); }).find("packed_scale"), std::string::npos);
 }
 
 }  // namespace

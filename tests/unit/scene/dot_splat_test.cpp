@@ -7,7 +7,9 @@
 namespace darb::test {
 namespace {
 
-const Reader kRead = [](std::span<const std::byte> file) { return parse_dot_splat(file, "test"); };
+const Reader kReadDotSplat = [](std::span<const std::byte> file) {
+    return parse_dot_splat(file, "test");
+};
 
 FileBytes one_splat(float x = 1, float scale = 0.5f) {
     FileBytes file;
@@ -17,7 +19,7 @@ FileBytes one_splat(float x = 1, float scale = 0.5f) {
 }
 
 TEST(DotSplat, one_splat_decoded_by_hand) {
-    const SplatModel model = kRead(one_splat());
+    const SplatModel model = kReadDotSplat(one_splat());
     ASSERT_EQ(model.size(), 1u);
     EXPECT_EQ(model.position, (std::vector<float>{1, -2, 3}));
     EXPECT_NEAR(model.log_scale[0], std::log(0.5), 1e-6);
@@ -35,7 +37,7 @@ TEST(DotSplat, round_trips_within_the_stated_errors) {
     const FileBytes file = encode_dot_splat(model);
     EXPECT_EQ(file.size(), 32 * model.size());
     EXPECT_TRUE(looks_like_dot_splat(file));
-    const SplatModel read = kRead(file);
+    const SplatModel read = kReadDotSplat(file);
     EXPECT_EQ(read.sh_degree, 0);
     EXPECT_EQ(read.position, model.position);
     for (size_t i = 0; i < model.size(); ++i) {
@@ -66,7 +68,7 @@ TEST(DotSplat, splats_without_sense_are_dropped_and_counted) {
 TEST(DotSplat, scales_beyond_what_is_drawn_are_written_as_drawn) {
     SplatModel model = sample_model(0, 2);
     model.log_scale[0] = 100;
-    const SplatModel read = kRead(encode_dot_splat(model));
+    const SplatModel read = kReadDotSplat(encode_dot_splat(model));
     ASSERT_EQ(read.size(), 2u);
     EXPECT_NEAR(read.log_scale[0], 20, 1e-5);
 }
@@ -75,10 +77,10 @@ TEST(DotSplat, lengths_that_32_does_not_divide_are_refused) {
     const FileBytes file = encode_dot_splat(sample_model(0, 3));
     for (size_t length = 0; length <= file.size(); ++length) {
         const std::span<const std::byte> part(file.data(), length);
-        const std::string error = error_of([&] { kRead(part); });
+        const std::string error = error_of([&] { kReadDotSplat(part); });
         EXPECT_EQ(error == "no error", length % 32 == 0) << length << ": " << error;
     }
-    expect_damage_is_survived(file, kRead, 500);
+    expect_damage_is_survived(file, kReadDotSplat, 500);
 }
 
 TEST(DotSplat, other_content_does_not_look_like_it) {

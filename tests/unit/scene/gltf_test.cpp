@@ -22,7 +22,7 @@ using nlohmann::json;
 SplatModel read(const FileBytes& file, SplatFile* facts = nullptr) {
     return parse_splats(file, "test", facts);
 }
-const Reader kRead = [](std::span<const std::byte> file) {
+const Reader kReadGltf = [](std::span<const std::byte> file) {
     return parse_splats(file, "test.gltf");
 };
 
@@ -310,7 +310,7 @@ TEST(Gltf, hostile_documents_are_refused_by_name) {
         Handmade made = handmade();
         hostile.change(made);
         const FileBytes file = made.file();
-        const std::string error = error_of([&] { kRead(file); });
+        const std::string error = error_of([&] { kReadGltf(file); });
         EXPECT_EQ(error.find("test.gltf"), 0u) << hostile.what << ": " << error;
         EXPECT_NE(error.find(hostile.said), std::string::npos) << hostile.what << ": " << error;
     }
@@ -330,14 +330,14 @@ TEST(Gltf, a_mesh_that_is_named_often_is_no_way_to_fill_the_memory) {
     }
     made.document["nodes"] = nodes;
     made.document["scenes"][0]["nodes"] = roots;
-    const std::string error = error_of([&] { kRead(made.file()); });
+    const std::string error = error_of([&] { kReadGltf(made.file()); });
     EXPECT_NE(error.find("declares"), std::string::npos) << error;
 }
 
 TEST(Gltf, json_that_is_nested_without_end_is_refused) {
     FileBytes file;
     append_text("{\"asset\":" + std::string(1'000'000, '['), file);
-    EXPECT_NE(error_of([&] { kRead(file); }).find("nested"), std::string::npos);
+    EXPECT_NE(error_of([&] { kReadGltf(file); }).find("nested"), std::string::npos);
 }
 
 TEST(Gltf, only_files_beside_it_are_read) {
@@ -373,14 +373,14 @@ TEST(Gltf, files_cut_off_at_every_byte_are_refused) {
     expect_truncation_is_refused(glb(sample_model(1, 2)), [](std::span<const std::byte> file) {
         return parse_splats(file, "test");
     });
-    expect_truncation_is_refused(handmade().file(), kRead);
+    expect_truncation_is_refused(handmade().file(), kReadGltf);
 }
 
 TEST(Gltf, damaged_files_are_survived) {
     SplatModel model = sample_model(1, 3);
     model.kernel = KERNEL_SINC;
-    expect_damage_is_survived(glb(model), kRead, 1500);
-    expect_damage_is_survived(handmade().file(), kRead, 1500);
+    expect_damage_is_survived(glb(model), kReadGltf, 1500);
+    expect_damage_is_survived(handmade().file(), kReadGltf, 1500);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace darb::test {
 namespace {
 
-const Reader kRead = [](std::span<const std::byte> file) {
+const Reader kReadKsplat = [](std::span<const std::byte> file) {
     return parse_splats(file, "test.ksplat");
 };
 
@@ -72,7 +72,7 @@ TEST(Ksplat, hostile_headers_are_refused_by_name) {
                                            {4096 + 20, 8, "buckets of 8 bytes"}}) {
         FileBytes file = ksplat_file(1, 1);
         set_value(c.word, c.at, file);
-        const std::string error = error_of([&] { kRead(file); });
+        const std::string error = error_of([&] { kReadKsplat(file); });
         EXPECT_EQ(error.find("test.ksplat"), 0u) << error;
         EXPECT_NE(error.find(c.said), std::string::npos) << c.said << " in: " << error;
     }
@@ -87,11 +87,12 @@ TEST(Ksplat, it_is_not_written) {
 }
 
 TEST(Ksplat, files_cut_off_at_every_byte_are_refused) {
-    for (const int level : {0, 2}) expect_truncation_is_refused(ksplat_file(level, 1), kRead);
+    for (const int level : {0, 2}) expect_truncation_is_refused(ksplat_file(level, 1), kReadKsplat);
 }
 
 TEST(Ksplat, damaged_files_are_survived) {
-    for (const int level : {0, 1, 2}) expect_damage_is_survived(ksplat_file(level, 2), kRead, 300);
+    for (const int level : {0, 1, 2})
+        expect_damage_is_survived(ksplat_file(level, 2), kReadKsplat, 300);
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ std::string text_of(const std::vector<std::byte>& bytes) {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-SplatModel parse(const std::string& text, std::vector<std::string>* notes = nullptr) {
+SplatModel parse_scene(const std::string& text, std::vector<std::string>* notes = nullptr) {
     PlyFacts facts;
     SplatModel model = parse_ply(std::as_bytes(std::span(text)), "own.ply", &facts);
     if (notes != nullptr) *notes = facts.notes;
@@ -43,7 +43,7 @@ SplatModel parse(const std::string& text, std::vector<std::string>* notes = null
 
 std::string error_of(const std::string& text) {
     try {
-        parse(text);
+        parse_scene(text);
     } catch (const Error& e) {
         EXPECT_EQ(e.where, "own.ply");
         return e.reason;
@@ -66,7 +66,7 @@ TEST(OwnKernelFile, The_header_makes_the_same_kernel) {
         const std::string text = text_of(encode_ply(model));
         EXPECT_NE(text.find("comment SplatKernel: bump_of_files\n"), std::string::npos);
         EXPECT_NE(text.find("comment SplatKernelPolynomial: w = (1 - x)^"), std::string::npos);
-        const SplatModel again = parse(text);
+        const SplatModel again = parse_scene(text);
         EXPECT_EQ(again.kernel, bump());
         EXPECT_EQ(again.footprint, footprint);
         EXPECT_EQ(text_of(encode_ply(again)), text);
@@ -84,7 +84,7 @@ TEST(OwnKernelFile, A_kernel_that_this_program_has_not_seen_is_made_from_the_hea
         "comment SplatKernel: of_elsewhere\n"
         "comment SplatKernelFunction: {\"edge_order\":2,\"series\":[1.0],\"support\":5.0}\n";
     EXPECT_FALSE(kernel_from_name("of_elsewhere"));
-    const SplatModel model = parse(file_with(comments));
+    const SplatModel model = parse_scene(file_with(comments));
     EXPECT_EQ(kernel_name(model.kernel), "of_elsewhere");
     EXPECT_NEAR(kernel_value(model.kernel, Footprint::psi, 2), std::pow(1 - 2 / 5.0, 2), 1e-14);
 }
@@ -93,9 +93,9 @@ TEST(OwnKernelFile, Another_kernel_of_a_known_name_is_renamed_with_a_note) {
     bump();
     std::vector<std::string> notes;
     const SplatModel model =
-        parse(file_with("comment SplatKernel: bump_of_files\ncomment SplatKernelFunction: "
-                        "{\"edge_order\":1,\"series\":[1],\"support\":4}\n"),
-              &notes);
+        parse_scene(file_with("comment SplatKernel: bump_of_files\ncomment SplatKernelFunction: "
+                              "{\"edge_order\":1,\"series\":[1],\"support\":4}\n"),
+                    &notes);
     EXPECT_EQ(kernel_name(model.kernel), "bump_of_files_2");
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_NE(notes[0].find("bump_of_files_2"), std::string::npos) << notes[0];
@@ -106,14 +106,14 @@ TEST(OwnKernelFile, Names_of_the_family_get_a_number) {
     for (const std::string name : {"beta", "sinc"}) {
         std::vector<std::string> notes;
         const SplatModel model =
-            parse(file_with("comment SplatKernel: " + name +
-                            "\ncomment SplatKernelFunction: "
-                            "{\"edge_order\":1,\"series\":[1],\"support\":4}\n"),
-                  &notes);
+            parse_scene(file_with("comment SplatKernel: " + name +
+                                  "\ncomment SplatKernelFunction: "
+                                  "{\"edge_order\":1,\"series\":[1],\"support\":4}\n"),
+                        &notes);
         EXPECT_EQ(kernel_name(model.kernel), name + "_2");
         ASSERT_EQ(notes.size(), 1u);
         EXPECT_NE(notes[0].find(name + "_2"), std::string::npos) << notes[0];
-        EXPECT_EQ(kernel_name(parse(text_of(encode_ply(model))).kernel), name + "_2");
+        EXPECT_EQ(kernel_name(parse_scene(text_of(encode_ply(model))).kernel), name + "_2");
     }
 }
 
@@ -160,7 +160,7 @@ TEST(OwnKernelFile, A_header_cut_or_changed_at_every_byte_is_a_scene_or_an_error
         for (const char byte : {'9', '"', '\n'}) try {
                 std::string changed = whole;
                 changed[at] = byte;
-                const SplatModel model = parse(changed);
+                const SplatModel model = parse_scene(changed);
                 EXPECT_TRUE(std::isfinite(kernel_psi(model.kernel)));
             } catch (const Error&) {
             }

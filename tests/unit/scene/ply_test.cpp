@@ -22,13 +22,13 @@ std::span<const std::byte> bytes_of(const std::string& text) {
     return std::as_bytes(std::span(text.data(), text.size()));
 }
 
-SplatModel parse(const std::string& text, PlyFacts* facts = nullptr) {
+SplatModel parse_text(const std::string& text, PlyFacts* facts = nullptr) {
     return parse_ply(bytes_of(text), "test.ply", facts);
 }
 
-std::string error_of(const std::string& text) {
+std::string error_of_text(const std::string& text) {
     try {
-        parse(text);
+        parse_text(text);
     } catch (const Error& error) {
         return error.what();
     }
@@ -99,7 +99,7 @@ TEST(Ply, rest_coefficients_are_stored_channel_by_channel) {
 }
 
 TEST(Ply, ascii_is_read) {
-    const SplatModel model = parse(ascii_file("2", kAsciiRow + kAsciiRow));
+    const SplatModel model = parse_text(ascii_file("2", kAsciiRow + kAsciiRow));
     ASSERT_EQ(model.size(), 2u);
     EXPECT_EQ(model.sh_degree, 0);
     EXPECT_EQ(model.position, (std::vector<float>{1, 2, 3, 1, 2, 3}));
@@ -112,7 +112,7 @@ TEST(Ply, ascii_numbers_beyond_double_are_infinite_and_those_below_it_0) {
     PlyFacts facts;
     const std::string row = " 2 3 .1 .2 .3 1e999 -5 -6 -7 1 0 0 0.5\n";
     const SplatModel model =
-        parse(ascii_file("3", "1e-999" + row + "-1e999" + row + "1e999" + row), &facts);
+        parse_text(ascii_file("3", "1e-999" + row + "-1e999" + row + "1e999" + row), &facts);
     EXPECT_EQ(facts.dropped, 2u);
     ASSERT_EQ(model.size(), 1u);
     EXPECT_EQ(model.position[0], 0.f);
@@ -122,14 +122,14 @@ TEST(Ply, ascii_numbers_beyond_double_are_infinite_and_those_below_it_0) {
 TEST(Ply, blanks_after_end_header_are_tolerated) {
     std::string text = ascii_file("1", kAsciiRow);
     text.insert(text.find("end_header") + 10, " \t\r");
-    EXPECT_EQ(parse(text).size(), 1u);
+    EXPECT_EQ(parse_text(text).size(), 1u);
 }
 
 TEST(Ply, errors_of_the_header_come_with_a_remedy) {
     const std::string file = ascii_file("1", kAsciiRow);
     const auto with = [&](const std::string& held, const std::string& wanted) {
         std::string text = file;
-        const std::string error = error_of(text.replace(text.find(held), held.size(), wanted));
+        const std::string error = error_of_text(text.replace(text.find(held), held.size(), wanted));
         EXPECT_NE(error.find("\n  "), std::string::npos) << error;
     };
     with("format ascii", "format text");
@@ -147,11 +147,11 @@ TEST(Ply, windows_line_ends_comments_and_other_elements_are_tolerated) {
         "element face 1\nproperty list uchar int vertex_indices\nelement vertex 1\n" +
         kProperties + "property float extra\nelement camera 1\nproperty float fov\n" +
         "end_header\n3 0 0 0\n" + kAsciiRow.substr(0, kAsciiRow.size() - 1) + " 9\n1.5\n";
-    EXPECT_EQ(parse(text).position, (std::vector<float>{1, 2, 3}));
-    EXPECT_TRUE(parse(text).antialias);
+    EXPECT_EQ(parse_text(text).position, (std::vector<float>{1, 2, 3}));
+    EXPECT_TRUE(parse_text(text).antialias);
     for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2)
         text.replace(at, 1, "\r\n");
-    EXPECT_EQ(parse(text).position, (std::vector<float>{1, 2, 3}));
+    EXPECT_EQ(parse_text(text).position, (std::vector<float>{1, 2, 3}));
 }
 
 TEST(Ply, big_endian_and_any_order_and_type_are_read) {
@@ -169,7 +169,7 @@ TEST(Ply, big_endian_and_any_order_and_type_are_read) {
     put(0.25);
     for (int i = 1; i <= 13; ++i) put(static_cast<float>(i));
     put(std::int16_t{-7});
-    const SplatModel model = parse(text);
+    const SplatModel model = parse_text(text);
     EXPECT_EQ(model.position, (std::vector<float>{3, 2, 1}));
     EXPECT_EQ(model.rotation, (std::vector<float>{6, 5, 4, 0.25f}));
     EXPECT_EQ(model.log_scale, (std::vector<float>{9, 8, 7}));
@@ -189,7 +189,7 @@ TEST(Ply, splats_with_nan_or_infinity_are_dropped_and_counted) {
               (std::vector<float>{model.opacity_logit[0], model.opacity_logit[2],
                                   model.opacity_logit[4]}));
     EXPECT_EQ(read.sh_rest.size(), 27u);
-    EXPECT_EQ(parse(ascii_file("1", "nan" + kAsciiRow.substr(1)), &facts).size(), 0u);
+    EXPECT_EQ(parse_text(ascii_file("1", "nan" + kAsciiRow.substr(1)), &facts).size(), 0u);
     EXPECT_EQ(facts.dropped, 1u);
 }
 
@@ -227,9 +227,9 @@ TEST(Ply, bytes_behind_the_last_row_are_left_out_and_said) {
     parse_ply(packed, "test", &facts);
     ASSERT_EQ(facts.notes.size(), 1u);
     EXPECT_NE(facts.notes[0].find("2 rows of sh; the 1 bytes"), std::string::npos);
-    parse(ascii_file("1", kAsciiRow + "\n \n"), &facts);
+    parse_text(ascii_file("1", kAsciiRow + "\n \n"), &facts);
     EXPECT_TRUE(facts.notes.empty());
-    parse(ascii_file("1", kAsciiRow + kAsciiRow), &facts);
+    parse_text(ascii_file("1", kAsciiRow + kAsciiRow), &facts);
     EXPECT_EQ(facts.notes.size(), 1u);
 }
 
@@ -261,36 +261,40 @@ TEST(Ply, truncated_anywhere_is_an_error_that_names_the_file) {
     }
     const std::string text = ascii_file("2", kAsciiRow + kAsciiRow);
     for (std::size_t length = 0; length + 4 <= text.size(); ++length)  // all before the last word
-        EXPECT_NE(error_of(text.substr(0, length)), "no error") << length;
+        EXPECT_NE(error_of_text(text.substr(0, length)), "no error") << length;
 }
 
 TEST(Ply, declared_counts_beyond_the_file_are_refused_before_allocating) {
     for (const char* count : {"2147483648", "4294967296", "9223372036854775808",
                               "18446744073709551615", "1000000000000"})
-        EXPECT_NE(error_of(ascii_file(count, kAsciiRow)).find("declares"), std::string::npos);
-    EXPECT_NE(error_of(ascii_file("18446744073709551616", "")).find("count"), std::string::npos);
-    EXPECT_NE(error_of(ascii_file("-1", "")).find("count"), std::string::npos);
+        EXPECT_NE(error_of_text(ascii_file(count, kAsciiRow)).find("declares"), std::string::npos);
+    EXPECT_NE(error_of_text(ascii_file("18446744073709551616", "")).find("count"),
+              std::string::npos);
+    EXPECT_NE(error_of_text(ascii_file("-1", "")).find("count"), std::string::npos);
 }
 
 TEST(Ply, malformed_headers_are_errors_that_say_why) {
-    EXPECT_NE(error_of("").find("no PLY"), std::string::npos);
-    EXPECT_NE(error_of("ply\nformat binary 1.0\nend_header\n").find("format"), std::string::npos);
-    EXPECT_NE(error_of("ply\nformat ascii 1.0\nend_header\n").find("vertex"), std::string::npos);
+    EXPECT_NE(error_of_text("").find("no PLY"), std::string::npos);
+    EXPECT_NE(error_of_text("ply\nformat binary 1.0\nend_header\n").find("format"),
+              std::string::npos);
+    EXPECT_NE(error_of_text("ply\nformat ascii 1.0\nend_header\n").find("vertex"),
+              std::string::npos);
     std::string no_format = ascii_file("1", kAsciiRow);
     no_format.erase(4, no_format.find("element") - 4);
-    EXPECT_NE(error_of(no_format).find("no format line"), std::string::npos);
-    EXPECT_NE(error_of("ply\nproperty float x\nend_header\n").find("property"), std::string::npos);
+    EXPECT_NE(error_of_text(no_format).find("no format line"), std::string::npos);
+    EXPECT_NE(error_of_text("ply\nproperty float x\nend_header\n").find("property"),
+              std::string::npos);
     std::string text = ascii_file("1", kAsciiRow);
     text.replace(text.find("scale_1"), 7, "other__");
-    EXPECT_NE(error_of(text).find("scale_1"), std::string::npos);
+    EXPECT_NE(error_of_text(text).find("scale_1"), std::string::npos);
     text = ascii_file("1", "x" + kAsciiRow);
-    EXPECT_NE(error_of(text).find("not a number"), std::string::npos);
+    EXPECT_NE(error_of_text(text).find("not a number"), std::string::npos);
     text = ascii_file("1", kAsciiRow);
     text.insert(text.find("end_header"), "property float f_rest_0\n");
-    EXPECT_NE(error_of(text).find("f_rest"), std::string::npos);
+    EXPECT_NE(error_of_text(text).find("f_rest"), std::string::npos);
     text = ascii_file("1", kAsciiRow);
     text.insert(text.find("element"), "comment SplatKernel: square\n");
-    EXPECT_NE(error_of(text).find("SplatKernel"), std::string::npos);
+    EXPECT_NE(error_of_text(text).find("SplatKernel"), std::string::npos);
 }
 
 TEST(Ply, map_coordinates_keep_millimetres) {
@@ -298,7 +302,7 @@ TEST(Ply, map_coordinates_keep_millimetres) {
         ascii_file("2", "450000.001" + kAsciiRow.substr(1) + "450010.002" + kAsciiRow.substr(1));
     for (const char* axis : {"float x", "float y", "float z"})
         text.replace(text.find(axis), 5, "double");
-    const SplatModel model = parse(text);
+    const SplatModel model = parse_text(text);
     EXPECT_EQ(model.origin, glm::dvec3(450012, 0, 0));
     EXPECT_NEAR(model.position[0], -11.999, 1e-6);
     EXPECT_NEAR(model.position[3], -1.998, 1e-6);
@@ -311,7 +315,7 @@ TEST(Ply, map_coordinates_keep_millimetres) {
 TEST(Ply, doubles_are_written_only_where_float32_does_not_resolve_the_positions) {
     const auto header_at = [](double origin) {
         SplatModel model =
-            parse(ascii_file("2", "0.1" + kAsciiRow.substr(1) + "3" + kAsciiRow.substr(1)));
+            parse_text(ascii_file("2", "0.1" + kAsciiRow.substr(1) + "3" + kAsciiRow.substr(1)));
         model.origin.x = origin;
         const std::vector<std::byte> file = encode_ply(model);
         return std::string(reinterpret_cast<const char*>(file.data()), 200);
@@ -322,7 +326,7 @@ TEST(Ply, doubles_are_written_only_where_float32_does_not_resolve_the_positions)
 
 TEST(Ply, float_file_at_map_coordinates_keeps_its_values) {
     const std::string rows = "5000000.5" + kAsciiRow.substr(1) + "5000128" + kAsciiRow.substr(1);
-    const SplatModel model = parse(ascii_file("2", rows));
+    const SplatModel model = parse_text(ascii_file("2", rows));
     EXPECT_EQ(model.origin.x + double{model.position[0]}, 5000000.5);
     const std::vector<std::byte> file = encode_ply(model);
     const std::string text(reinterpret_cast<const char*>(file.data()), file.size());

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-const Reader kRead = [](std::span<const std::byte> file) { return parse_sog(file, "test"); };
+const Reader kReadSog = [](std::span<const std::byte> file) { return parse_sog(file, "test"); };
 
 using Parts = std::map<std::string, FileBytes>;
 
@@ -130,9 +130,9 @@ TEST(Sog, a_zip_and_a_folder_decoded_by_hand) {
 TEST(Sog, without_harmonics_the_degree_is_0) {
     json meta = sample_meta();
     meta.erase("shN");
-    EXPECT_EQ(kRead(zip_of(sample_parts(meta))).sh_degree, 0);
+    EXPECT_EQ(kReadSog(zip_of(sample_parts(meta))).sh_degree, 0);
     meta["count"] = 0;
-    EXPECT_EQ(kRead(zip_of(sample_parts(meta))).size(), 0u);
+    EXPECT_EQ(kReadSog(zip_of(sample_parts(meta))).size(), 0u);
 }
 
 TEST(Sog, anti_aliasing_goes_by_either_name) {
@@ -140,7 +140,7 @@ TEST(Sog, anti_aliasing_goes_by_either_name) {
         json meta = sample_meta();
         meta.erase("antialias");
         meta[key] = value;
-        return kRead(zip_of(sample_parts(meta))).antialias;
+        return kReadSog(zip_of(sample_parts(meta))).antialias;
     };
     EXPECT_TRUE(antialias("model", "antialiased"));
     EXPECT_FALSE(antialias("model", "default"));
@@ -152,10 +152,10 @@ TEST(Sog, anti_aliasing_goes_by_either_name) {
 TEST(Sog, a_zip_of_something_else_is_named_as_such) {
     Parts parts;
     append_text("text", parts["readme.txt"]);
-    std::string error = error_of([&] { kRead(zip_of(parts)); });
+    std::string error = error_of([&] { kReadSog(zip_of(parts)); });
     EXPECT_NE(error.find("no SOG scene"), std::string::npos) << error;
     append_text("ply", parts["scene/point_cloud.ply"]);
-    error = error_of([&] { kRead(zip_of(parts)); });
+    error = error_of([&] { kReadSog(zip_of(parts)); });
     EXPECT_NE(error.find("holds scene/point_cloud.ply"), std::string::npos) << error;
     EXPECT_NE(error.find("Unpack it"), std::string::npos) << error;
 }
@@ -168,7 +168,7 @@ TEST(Sog, null_in_a_codebook_drops_the_splats_that_use_it_alone) {
     EXPECT_EQ(facts.dropped, 1u);
     meta["scales"]["codebook"][1] = 0;
     meta["scales"]["codebook"][200] = nullptr;  // nobody's
-    EXPECT_EQ(kRead(zip_of(sample_parts(meta))).size(), 2u);
+    EXPECT_EQ(kReadSog(zip_of(sample_parts(meta))).size(), 2u);
 }
 
 TEST(Sog, any_count_of_the_palette_is_bounded_by_its_picture) {
@@ -186,7 +186,7 @@ TEST(Sog, any_count_of_the_palette_is_bounded_by_its_picture) {
 std::string error_of_meta(const std::string& pointer, const json& value) {
     json meta = sample_meta();
     meta[json::json_pointer(pointer)] = value;
-    return error_of([&] { kRead(zip_of(sample_parts(meta))); });
+    return error_of([&] { kReadSog(zip_of(sample_parts(meta))); });
 }
 
 TEST(Sog, wrong_meta_json_says_why) {
@@ -206,7 +206,7 @@ TEST(Sog, wrong_meta_json_says_why) {
     EXPECT_NE(error_of_meta("/scales/codebook/3", "x").find("meta.json"), std::string::npos);
     Parts parts = sample_parts(sample_meta());
     parts["meta.json"].pop_back();
-    EXPECT_NE(error_of([&] { kRead(zip_of(parts)); }).find("meta.json"), std::string::npos);
+    EXPECT_NE(error_of([&] { kReadSog(zip_of(parts)); }).find("meta.json"), std::string::npos);
 }
 
 TEST(Sog, a_folder_and_a_zip_read_no_file_outside_them) {
@@ -221,7 +221,7 @@ TEST(Sog, a_folder_and_a_zip_read_no_file_outside_them) {
         meta["quats"]["files"][0] = name;
         Parts parts = sample_parts(meta);
         parts[name] = parts["quats.webp"];  // the zip has such a member
-        EXPECT_NE(error_of([&] { kRead(zip_of(parts)); }).find("no file of its folder"),
+        EXPECT_NE(error_of([&] { kReadSog(zip_of(parts)); }).find("no file of its folder"),
                   std::string::npos)
             << name;
     }
@@ -230,9 +230,9 @@ TEST(Sog, a_folder_and_a_zip_read_no_file_outside_them) {
 TEST(Sog, large_pictures_for_few_splats_are_refused) {
     Parts parts = sample_parts(sample_meta());
     parts["sh0.webp"] = webp(1100, 1100, {});
-    EXPECT_NE(error_of([&] { kRead(zip_of(parts)); }).find("1100 x 1100"), std::string::npos);
+    EXPECT_NE(error_of([&] { kReadSog(zip_of(parts)); }).find("1100 x 1100"), std::string::npos);
     parts["sh0.webp"] = FileBytes(100);
-    EXPECT_NE(error_of([&] { kRead(zip_of(parts)); }).find("no WebP"), std::string::npos);
+    EXPECT_NE(error_of([&] { kReadSog(zip_of(parts)); }).find("no WebP"), std::string::npos);
 }
 
 TEST(Sog, a_flipped_bit_is_an_error_or_changes_nothing) {
@@ -263,8 +263,8 @@ TEST(Sog, a_zip_names_no_file_in_another_folder) {
 
 TEST(Sog, truncated_or_damaged_is_an_error) {
     const FileBytes zip = zip_of(sample_parts(sample_meta()));
-    expect_truncation_is_refused(zip, kRead);
-    expect_damage_is_survived(zip, kRead, 500);
+    expect_truncation_is_refused(zip, kReadSog);
+    expect_damage_is_survived(zip, kReadSog, 500);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace darb::test {
 namespace {
 
-const Reader kRead = [](std::span<const std::byte> file) { return parse_spz(file, "test"); };
+const Reader kReadSpz = [](std::span<const std::byte> file) { return parse_spz(file, "test"); };
 
 FileBytes old_header(std::uint32_t version, std::uint32_t count, int degree, int bits, int flags) {
     FileBytes file;
@@ -100,7 +100,7 @@ TEST(Spz, every_degree_round_trips_within_the_stated_errors) {
                 EXPECT_NEAR(read.sh_rest[rest * i + c], model.sh_rest[rest * i + c],
                             c < 9 ? 1.001 / 32 : 1.001 / 16);
         }
-        const SplatModel again = kRead(encode_spz(read));
+        const SplatModel again = kReadSpz(encode_spz(read));
         EXPECT_EQ(again.position, read.position);
         EXPECT_EQ(again.log_scale, read.log_scale);
         EXPECT_EQ(again.sh_rest, read.sh_rest);
@@ -113,7 +113,7 @@ TEST(Spz, large_and_small_scenes_choose_their_fraction) {
     for (const float size : {1e-3f, 1.f, 100.f, 4000.f, 4e6f}) {
         SplatModel model = sample_model(0, 50);
         for (float& p : model.position) p *= size;
-        const SplatModel read = kRead(encode_spz(model));
+        const SplatModel read = kReadSpz(encode_spz(model));
         for (size_t i = 0; i < model.size(); ++i)
             for (int a = 0; a < 3; ++a)
                 EXPECT_NEAR(position_of(read, i)[a], position_of(model, i)[a],
@@ -125,8 +125,8 @@ TEST(Spz, large_and_small_scenes_choose_their_fraction) {
 }
 
 TEST(Spz, no_splats_round_trip) {
-    EXPECT_EQ(kRead(encode_spz(SplatModel{})).size(), 0u);
-    EXPECT_EQ(kRead(gzip(old_header(2, 0, 0, 12, 0))).size(), 0u);
+    EXPECT_EQ(kReadSpz(encode_spz(SplatModel{})).size(), 0u);
+    EXPECT_EQ(kReadSpz(gzip(old_header(2, 0, 0, 12, 0))).size(), 0u);
 }
 
 TEST(Spz, harmonics_of_degree_4_are_left_out) {
@@ -166,7 +166,8 @@ TEST(Spz, coordinate_systems_are_turned_to_right_down_forward) {
         EXPECT_EQ(model.position, position) << system;
         EXPECT_EQ(facts.extensions, 2);
     }
-    EXPECT_NE(error_of([] { kRead(with_axes(17)); }).find("coordinate system"), std::string::npos);
+    EXPECT_NE(error_of([] { kReadSpz(with_axes(17)); }).find("coordinate system"),
+              std::string::npos);
 }
 
 TEST(Spz, what_is_no_extension_record_is_an_error_in_version_4_alone) {
@@ -185,7 +186,7 @@ TEST(Spz, what_is_no_extension_record_is_an_error_in_version_4_alone) {
     streams.insert(streams.begin() + spz::kHeader, record.begin(), record.end());
     set_value(static_cast<std::uint32_t>(spz::kHeader + record.size()), 16, streams);
     streams[14] = streams[14] | std::byte{spz::kFlagExtensions};
-    EXPECT_NE(error_of([&] { kRead(streams); }).find("extension record 0"), std::string::npos);
+    EXPECT_NE(error_of([&] { kReadSpz(streams); }).find("extension record 0"), std::string::npos);
 }
 
 TEST(Spz, gzip_is_told_by_its_method_and_flags_too) {
@@ -200,18 +201,18 @@ TEST(Spz, gzip_is_told_by_its_method_and_flags_too) {
 
 TEST(Spz, truncated_or_damaged_is_an_error) {
     const SplatModel model = sample_model(1, 5);
-    expect_truncation_is_refused(encode_spz(model), kRead);
-    expect_truncation_is_refused(gzip(one_splat(2)), kRead);
-    expect_truncation_is_refused(one_splat(3), kRead);
-    expect_damage_is_survived(encode_spz(model), kRead, 3000);
-    expect_damage_is_survived(one_splat(1), kRead, 1000);
-    expect_damage_is_survived(gzip(one_splat(3)), kRead, 1000);
+    expect_truncation_is_refused(encode_spz(model), kReadSpz);
+    expect_truncation_is_refused(gzip(one_splat(2)), kReadSpz);
+    expect_truncation_is_refused(one_splat(3), kReadSpz);
+    expect_damage_is_survived(encode_spz(model), kReadSpz, 3000);
+    expect_damage_is_survived(one_splat(1), kReadSpz, 1000);
+    expect_damage_is_survived(gzip(one_splat(3)), kReadSpz, 1000);
 }
 
 TEST(Spz, a_flipped_bit_in_what_has_a_checksum_is_an_error_or_changes_nothing) {
     const SplatModel scene = random_scene({.count = 20, .sh_degree = 1}).model;
     for (const FileBytes& whole : {gzip(one_splat(3)), encode_spz(scene)}) {
-        const SplatModel model = kRead(whole);
+        const SplatModel model = kReadSpz(whole);
         // The head of version 4 has none: its flags may change without a trace.
         const std::size_t from = whole[0] == std::byte{'N'} ? spz::kHeader : 0;
         std::size_t changed = 0;
@@ -219,7 +220,7 @@ TEST(Spz, a_flipped_bit_in_what_has_a_checksum_is_an_error_or_changes_nothing) {
             FileBytes file = whole;
             file[bit / 8] ^= std::byte(1 << bit % 8);
             try {
-                changed += same_splats(kRead(file), model) ? 0 : 1;
+                changed += same_splats(kReadSpz(file), model) ? 0 : 1;
             } catch (const Error&) {
             }
         }
@@ -229,9 +230,9 @@ TEST(Spz, a_flipped_bit_in_what_has_a_checksum_is_an_error_or_changes_nothing) {
 
 TEST(Spz, gzip_with_more_than_the_header_declares_is_an_error) {
     FileBytes file = one_splat(3);
-    EXPECT_EQ(kRead(gzip(file)).size(), 1u);
+    EXPECT_EQ(kReadSpz(gzip(file)).size(), 1u);
     file.push_back(std::byte{0});
-    EXPECT_NE(error_of([&] { kRead(gzip(file)); }).find("more than the 1 splats"),
+    EXPECT_NE(error_of([&] { kReadSpz(gzip(file)); }).find("more than the 1 splats"),
               std::string::npos);
 }
 
@@ -240,21 +241,21 @@ TEST(Spz, declared_counts_beyond_the_file_are_refused_before_allocating) {
         FileBytes old = one_splat(2), streams = encode_spz(sample_model(1, 1));
         set_value(count, 8, old);
         set_value(count, 8, streams);
-        EXPECT_NE(error_of([&] { kRead(gzip(old)); }).find("declares"), std::string::npos);
-        EXPECT_NE(error_of([&] { kRead(old); }).find("declares"), std::string::npos);
-        EXPECT_NE(error_of([&] { kRead(streams); }).find("declares"), std::string::npos);
+        EXPECT_NE(error_of([&] { kReadSpz(gzip(old)); }).find("declares"), std::string::npos);
+        EXPECT_NE(error_of([&] { kReadSpz(old); }).find("declares"), std::string::npos);
+        EXPECT_NE(error_of([&] { kReadSpz(streams); }).find("declares"), std::string::npos);
     }
     for (const std::uint64_t size :
          {std::uint64_t{1} << 31, std::uint64_t{1} << 63, ~std::uint64_t{0}})
         for (const size_t at : {32u, 40u}) {  // packed, whole
             FileBytes file = encode_spz(sample_model(0, 1));
             set_value(size, at, file);
-            EXPECT_NE(error_of([&] { kRead(file); }).find("declares"), std::string::npos);
+            EXPECT_NE(error_of([&] { kReadSpz(file); }).find("declares"), std::string::npos);
         }
     for (const std::uint32_t toc : {0u, 31u, 1u << 31, 0xffffffffu}) {
         FileBytes file = encode_spz(sample_model(0, 1));
         set_value(toc, 16, file);
-        EXPECT_NE(error_of([&] { kRead(file); }).find("table"), std::string::npos);
+        EXPECT_NE(error_of([&] { kReadSpz(file); }).find("table"), std::string::npos);
     }
 }
 
@@ -262,7 +263,7 @@ TEST(Spz, a_bomb_is_bounded_by_what_it_declares) {
     FileBytes bomb = old_header(2, 1, 0, 12, 0);
     bomb.resize(bomb.size() + (100u << 20));  // 100 MiB of zeros
     // Only the 35 bytes that it needs and one more come out.
-    EXPECT_NE(error_of([&] { kRead(gzip(bomb)); }).find("more than"), std::string::npos);
+    EXPECT_NE(error_of([&] { kReadSpz(gzip(bomb)); }).find("more than"), std::string::npos);
     EXPECT_EQ(gunzip(gzip(bomb), 50, "test").size(), 50u);
 }
 
@@ -270,7 +271,7 @@ TEST(Spz, wrong_headers_say_why) {
     const auto error = [](size_t at, int value) {
         FileBytes file = one_splat(2);
         file[at] = std::byte(value);
-        return error_of([&] { kRead(gzip(file)); });
+        return error_of([&] { kReadSpz(gzip(file)); });
     };
     EXPECT_NE(error(0, 'X').find("no SPZ"), std::string::npos);
     EXPECT_NE(error(4, 9).find("version 9"), std::string::npos);
