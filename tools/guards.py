@@ -310,7 +310,7 @@ def run(names):
     build = os.path.join(copy, "build")
     # So that ccache, where there is one, knows the objects of the project's own build.
     os.environ.update(CCACHE_BASEDIR=copy, CCACHE_NOHASHDIR="1")
-    made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release",
+    made = shell(["cmake", "-G", "Ninja", "-S", copy, "-B", build, "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON",
                   "-DDARB_WERROR=OFF"])
     if made.returncode:
         sys.exit(made.stdout)

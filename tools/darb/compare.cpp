@@ -59,16 +59,6 @@ void check_flags(CompareFlags& flags) {
             together({files_of(dataset_path(dataset)), flags.lpips, flags.kernel_files}));
 }
 
-// What runs say names their data set, the output and files of their options, and no folder around
-// these.
-void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags) {
-    std::vector<std::filesystem::path> paths = paths_in_options(flags);
-    paths.insert(paths.end(), {dataset_path(dataset.path.string()), flags.output});
-    for (ComparedRun& run : dataset.runs)
-        for (std::string* text : {&run.failure, &run.notes})
-            for (const std::filesystem::path& path : paths) *text = without_folders(*text, path);
-}
-
 // Paths as the file sees them.
 nlohmann::json shared_json(Comparison comparison, const std::filesystem::path& file) {
     for (ComparedDataset& dataset : comparison.datasets) {
@@ -104,10 +94,12 @@ int compare(Ranks& ranks, CompareFlags flags) {
     if (ranks.is_first()) lock.emplace(flags.output);
     const std::atomic<bool>& stop = stop_on_signals();
     int exit_code = 0;
+    bool stopped = any_stops(ranks, stop);
     for (const std::string& dataset : flags.datasets) {
-        if (any_stops(ranks, stop)) break;
+        if (stopped) break;
         comparison.datasets.push_back(
             compare_on(flags, dataset, kernels, lpips ? &*lpips : nullptr, ranks, stop));
+        stopped = any_stops(ranks, stop);
         if (!ranks.is_first()) continue;
         leave_folders_out(comparison.datasets.back(), flags);
         for (const ComparedRun& run : comparison.datasets.back().runs)
@@ -121,14 +113,16 @@ int compare(Ranks& ranks, CompareFlags flags) {
         "{}{}\n{}",
         flags.quiet ? "" : comparison_table(comparison) + comparison.lpips_note + "\nreport   ",
         flags.html.string(),
-        stop ? fmt::format("interrupted by {}; the same command goes on\n", stop_name()) : "");
+        stopped ? fmt::format("interrupted{}; the same command goes on\n",
+                              stop ? fmt::format(" by {}", stop_name()) : " on another rank")
+                : "");
     const std::string text = printable(shown, true);
     if (flags.json == "-")
         say_text(text);
     else if (!write_or_let_go(text))
         throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
                     "The runs are complete: " + flags.html.string() + " shows them.");
-    return stop ? stop_exit_code() : exit_code;
+    return stopped ? std::max(stop_exit_code(), 1) : exit_code;
 }
 
 }  // namespace

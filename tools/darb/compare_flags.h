@@ -55,17 +55,22 @@ std::vector<std::filesystem::path> paths_in_options(const CompareFlags& flags);
 /// What the runs have in common, as sentences; paths in them as seen from the output.
 std::string settings_of(const CompareFlags& flags);
 
-/// Throws Error where ranks have other photos or options. fingerprint: of the data set, empty where
-/// it cannot be read. All ranks call it.
+/// What runs say names their data set, the output and files of their options, and no folder around
+/// these.
+void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags);
+
+/// Throws Error where ranks have other photos or options, or would measure other things.
+/// fingerprint: of the data set, empty where it cannot be read. All ranks call it.
 void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string& dataset,
-                     const std::vector<int>& kernels, const std::string& fingerprint);
+                     const std::vector<int>& kernels, const std::string& fingerprint,
+                     const std::string& measurements);
 
 /// Of --lpips; note: which, or why none.
 std::optional<Lpips> load_lpips(const CompareFlags& flags, std::string& note);
 
 /// Trains what is not there yet and reads and measures everything, one data set; ends early, with
-/// what there is, when *stop is set. lpips may be null. Several ranks train a share of the runs
-/// each, into the same folders; the first reads them all.
+/// what there is, when *stop is set. lpips may be null. Several ranks train and measure a share of
+/// the runs each, into the same folders; all get them all, the first with blending.
 ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset,
                            const std::vector<int>& kernels, const Lpips* lpips, Ranks& ranks,
                            const std::atomic<bool>& stop);

@@ -39,14 +39,24 @@ std::string settings_of(const CompareFlags& flags) {
                        words.empty() ? " the defaults" : words);
 }
 
+void leave_folders_out(ComparedDataset& dataset, const CompareFlags& flags) {
+    std::vector<std::filesystem::path> paths = paths_in_options(flags);
+    paths.insert(paths.end(), {dataset_path(dataset.path.string()), flags.output});
+    for (ComparedRun& run : dataset.runs)
+        for (std::string* text : {&run.failure, &run.notes})
+            for (const std::filesystem::path& path : paths) *text = without_folders(*text, path);
+}
+
 void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string& dataset,
-                     const std::vector<int>& kernels, const std::string& fingerprint) {
+                     const std::vector<int>& kernels, const std::string& fingerprint,
+                     const std::string& measurements) {
     if (ranks.count() == 1) return;
     std::string runs = fmt::format("with seeds {}, kernels", flags.seeds);
     for (const int kernel : kernels) runs += fmt::format(" {}", kernel_name(kernel));
     RankFacts facts = rank_facts();
     facts.emplace_back("data set", fingerprint.empty() ? "unread" : fingerprint);
     facts.emplace_back("runs", runs);
+    facts.emplace_back("measurements", measurements);
     facts.emplace_back("settings",
                        settings_text(train_flags_of(flags, dataset, kernels.front(), 0).train));
     check_same(ranks, facts);

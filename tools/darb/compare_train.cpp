@@ -41,13 +41,14 @@ class Comparer {
 
     const std::vector<View>& views() const { return dataset_.views; }
     std::string fingerprint() const { return dataset_fingerprint(dataset_, photos_); }
+    RunMeasurer& measurer() { return *measurer_; }
+    std::vector<View> held_out() const { return held_out_views(dataset_.views); }
     /// Of all runs, by seed and then kernel, those of this rank; up to the stop.
     std::vector<ComparedRun> runs(const std::vector<int>& kernels, const Ranks& ranks,
                                   const std::atomic<bool>& stop);
 
   private:
     ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
-    std::vector<View> held_out() const { return held_out_views(dataset_.views); }
     void train(TrainFlags& f, const std::atomic<bool>& stop);
 
     const CompareFlags& flags_;
@@ -105,7 +106,7 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
         count_exception(e, run);
     }
     if (run.failure.empty())
-        measurer_->measure(run, held_out());  // as the effects of the run have them
+        measurer_->measure(run);
     else
         read_unfinished_run(run, flags_.iterations, settings_text(f.train),
                             format_camera_list(dataset_.views));
@@ -123,27 +124,25 @@ ComparedDataset compare_on(const CompareFlags& flags, const std::string& dataset
     try {
         comparer.emplace(flags, dataset, kernels.front(), lpips);
     } catch (const Error& e) {
-        ComparedRun failed;
+        check_same_runs(ranks, flags, dataset, kernels, "", "");
+        ComparedRun& failed = result.runs.emplace_back();
         failed.kernel = "every kernel";
         failed.failure = e.what();
         failed.exit_code = 2;
         say_what_went_wrong(failed);
-        result.runs.push_back(std::move(failed));
+        return result;
     }
-    check_same_runs(ranks, flags, dataset, kernels, comparer ? comparer->fingerprint() : "");
-    std::vector<ComparedRun> own;
-    if (comparer) {
-        refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
-        own = comparer->runs(kernels, ranks, stop);
-    }
-    const std::size_t items = kernels.size() * static_cast<std::size_t>(flags.seeds);
-    std::vector<ComparedRun> all = runs_of_all(ranks, own, items);
-    if (!comparer) return result;
-    for (const ComparedRun& run : all)
+    check_same_runs(ranks, flags, dataset, kernels, comparer->fingerprint(),
+                    comparer->measurer().measurements());
+    refuse_to_overwrite_inputs({flags.json, flags.html}, files_of(comparer->views()));
+    const std::vector<ComparedRun> own = comparer->runs(kernels, ranks, stop);
+    result.runs = runs_of_all(ranks, own, kernels.size() * static_cast<std::size_t>(flags.seeds));
+    for (const ComparedRun& run : result.runs)
         if (std::none_of(own.begin(), own.end(),
                          [&](const ComparedRun& its) { return its.folder == run.folder; }))
             say_what_went_wrong(run);
-    result.runs = std::move(all);
+    if (ranks.is_first() && !stop)
+        comparer->measurer().measure_blending(result.runs, comparer->held_out());
     return result;
 }
 

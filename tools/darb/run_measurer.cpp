@@ -1,6 +1,8 @@
 #include "tools/darb/run_measurer.h"
 
-#include <functional>
+#include <fmt/format.h>
+
+#include <set>
 
 #include "engine/core/say.h"
 #include "engine/scene/splat_file.h"
@@ -19,7 +21,10 @@ void say_what_went_wrong(const ComparedRun& run) {
 
 RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
                          const Dataset& dataset, const TrainFlags& first, const Lpips* lpips)
-    : flags_(flags), lpips_(lpips), off_path_(off_path_of(path, dataset.options)) {
+    : flags_(flags),
+      lpips_(lpips),
+      off_path_(off_path_of(path, dataset.options)),
+      lpips_name_(lpips ? lpips->net_name() : "none") {
     for (const double scale : flags.scales)
         scaled_.push_back(scaled_views(held_out_views(dataset.views), scale));
     options_.background = glm::vec3(first.train.white_background ? 1.0f : 0.0f);
@@ -43,27 +48,46 @@ void RunMeasurer::measure_models(ComparedRun& run, Device& device) const {
     }
 }
 
-void RunMeasurer::measure(ComparedRun& run, const std::vector<View>& held_out) {
+void RunMeasurer::on_device(ComparedRun& run, const char* what,
+                            const std::function<void(Device&)>& measurement) const {
+    attempt(run, what, [&] {
+        DeviceOptions options = command_device(flags_.device);
+        Device device(options);
+        settle_tuning(device);
+        measurement(device);
+    });
+}
+
+void RunMeasurer::measure(ComparedRun& run) {
     attempt(run, "LPIPS", [&] { lpips_.measure(run); });
     attempt(run, "learned shapes", [&] { read_shapes_of(run); });
-    const auto on_device = [&](const char* what, const std::function<void(Device&)>& measurement) {
-        attempt(run, what, [&] {
-            DeviceOptions options = command_device(flags_.device);
-            Device device(options);
-            settle_tuning(device);
-            measurement(device);
-        });
-    };
     if (!scaled_.empty() || !off_path_.views.empty())
-        on_device("other sizes and views off the path",
+        on_device(run, "other sizes and views off the path",
                   [&](Device& device) { measure_models(run, device); });
-    if (flags_.blending_views == 0 || blended_.contains(run.kernel)) return;
-    on_device("blending", [&](Device& device) {
-        std::vector<Camera> cameras;
-        for (const View& view : held_out) cameras.push_back(view.camera);
-        measure_blending_of(run, device, cameras, flags_.blending_views);
-        blended_.insert(run.kernel);
-    });
+}
+
+void RunMeasurer::measure_blending(std::vector<ComparedRun>& runs,
+                                   const std::vector<View>& held_out) const {
+    if (flags_.blending_views == 0) return;
+    std::vector<Camera> cameras;
+    for (const View& view : held_out) cameras.push_back(view.camera);
+    std::set<std::string> done;  // kernels
+    for (ComparedRun& run : runs) {
+        if (!run.failure.empty() || done.contains(run.kernel)) continue;
+        const std::string before = run.notes;
+        on_device(run, "blending", [&](Device& device) {
+            measure_blending_of(run, device, cameras, flags_.blending_views);
+            done.insert(run.kernel);
+        });
+        if (run.notes != before) say_note("note: " + run.notes.substr(before.size()));
+    }
+}
+
+std::string RunMeasurer::measurements() const {
+    std::string text =
+        fmt::format("LPIPS {}, {} views off the path, sizes", lpips_name_, off_path_.views.size());
+    for (const double scale : flags_.scales) text += fmt::format(" {}", scale);
+    return text;
 }
 
 }  // namespace darb

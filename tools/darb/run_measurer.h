@@ -2,7 +2,7 @@
 // other sizes and off the path, and blending.
 #pragma once
 
-#include <set>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,7 +13,7 @@
 
 namespace darb {
 
-/// A run's failure and its notes, for people; -q hides the notes.
+/// A run's failure, unless it was interrupted, and its notes, for people; -q hides the notes.
 void say_what_went_wrong(const ComparedRun& run);
 
 /// Of one data set.
@@ -24,11 +24,18 @@ class RunMeasurer {
     RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
                 const Dataset& dataset, const TrainFlags& first, const Lpips* lpips);
 
-    /// Of a run that came to its end; blending of the first of a kernel. held_out: as its effects
-    /// have them. What fails here becomes a note and leaves the run as it is.
-    void measure(ComparedRun& run, const std::vector<View>& held_out);
+    // Of runs that came to their end. What fails here becomes a note and leaves the run as it is.
+
+    /// All but blending.
+    void measure(ComparedRun& run);
+    /// Of each kernel's first run that came to its end: on one device, as times are compared.
+    void measure_blending(std::vector<ComparedRun>& runs, const std::vector<View>& held_out) const;
+    /// What is measured, in words: ranks that differ in it would give numbers to some runs alone.
+    std::string measurements() const;
 
   private:
+    void on_device(ComparedRun& run, const char* what,
+                   const std::function<void(Device&)>& measurement) const;
     void measure_models(ComparedRun& run, Device& device) const;
 
     const CompareFlags& flags_;
@@ -36,7 +43,7 @@ class RunMeasurer {
     std::vector<std::vector<View>> scaled_;  // [scale]
     SceneEvaluation options_;
     Dataset off_path_;
-    std::set<std::string> blended_;  // kernels
+    std::string lpips_name_;
 };
 
 }  // namespace darb

@@ -1,7 +1,5 @@
 #include "tools/paper/compare_share.h"
 
-#include <set>
-
 // NLOHMANN_DEFINE_TYPE looks for these by the type's namespace.
 namespace nlohmann {
 template <class T>
@@ -45,14 +43,11 @@ std::vector<ComparedRun> runs_of_all(Ranks& ranks, const std::vector<ComparedRun
     for (const Bytes& bytes : ranks.gather(bytes_of_runs(own)))
         of_rank.push_back(runs_of_bytes(bytes));
     std::vector<ComparedRun> runs;
-    std::set<std::string> blended;  // kernels
     for (std::size_t i = 0; i < items; ++i) {
         std::vector<ComparedRun>& its = of_rank[turn_of(i, of_rank.size())];
         const std::size_t at = i / of_rank.size();
         if (at >= its.size()) continue;
         runs.push_back(std::move(its[at]));
-        std::optional<BlendStatistics>& blending = runs.back().blending;
-        if (blending && !blended.insert(runs.back().kernel).second) blending.reset();
     }
     return runs;
 }

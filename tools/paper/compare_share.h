@@ -13,7 +13,7 @@ Bytes bytes_of_runs(const std::vector<ComparedRun>& runs);
 std::vector<ComparedRun> runs_of_bytes(std::span<const std::byte> bytes);
 
 /// What all ranks did, in the order of the items: see turn_of. Where one ended early, its later
-/// items are left out. Of blending, which each rank measured once a kernel, the first is kept.
+/// items are left out.
 std::vector<ComparedRun> runs_of_all(Ranks& ranks, const std::vector<ComparedRun>& own,
                                      std::size_t items);
 

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A set of photos left/a.JPG (a PNG on disk) and b.png, a COLMAP model of it or a transforms file.
-fs::path write_set(bool colmap) {
+fs::path write_masked_set(bool colmap) {
     const fs::path folder = test_folder();
     std::vector<View> views(2);
     views[0].name = "left/a.JPG";
@@ -41,7 +41,7 @@ INSTANTIATE_TEST_SUITE_P(Sources, Masks, testing::Bool(),
                          [](const auto& test) { return test.param ? "colmap" : "transforms"; });
 
 TEST_P(Masks, are_found_by_every_usual_name) {
-    const fs::path set = write_set(GetParam());
+    const fs::path set = write_masked_set(GetParam());
     for (const char* folder : {"masks", "mask"})
         for (const char* stem : {"left/a.JPG", "left/a"})
             for (const char* tail : {"", ".mask"})
@@ -61,7 +61,7 @@ TEST_P(Masks, are_found_by_every_usual_name) {
 }
 
 TEST_P(Masks, of_which_none_is_a_photos_are_an_error_that_names_the_form) {
-    const fs::path set = write_set(GetParam());
+    const fs::path set = write_masked_set(GetParam());
     fs::create_directories(set / "masks");
     write_file_atomic(set / "masks/.hidden", std::string("x"));
     write_file_atomic(set / "masks/README", std::string("x"));
@@ -75,7 +75,7 @@ TEST_P(Masks, of_which_none_is_a_photos_are_an_error_that_names_the_form) {
 }
 
 TEST(MasksOfTransforms, that_frames_name_are_all_there_are) {
-    const fs::path set = write_set(false);
+    const fs::path set = write_masked_set(false);
     std::string text = read_text_file(set / "transforms.json");
     text.insert(text.find("\"transform_matrix\""), R"("mask_path": "mine.png", )");
     write_file_atomic(set / "transforms.json", text);
