@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <mpi.h>
+#include <poll.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -39,7 +40,7 @@ constexpr double kSilentSeconds = 12;  // DARB_RANK_TIMEOUT has another
 constexpr double kLaterSeconds = 3;
 // What fails on all ranks is said by the first, which ends the others while they wait for that.
 constexpr auto kFirstSpeaks = milliseconds(1500);
-constexpr unsigned kLauncherSeconds = 6;
+constexpr int kLauncherSeconds = 6, kMostFiles = 4096;
 constexpr auto kLongestNap = std::chrono::microseconds(400);
 
 double silent_seconds() {
@@ -49,18 +50,22 @@ double silent_seconds() {
 }
 
 // mpirun waits to hear of a machine that cannot be reached for a quarter of an hour. A process of
-// its own tells it to end after kLauncherSeconds. Open MPI 4.1 then ends by a segmentation fault of
+// its own tells it to end after kLauncherSeconds, and goes with it where it ends before. It holds
+// no file, as the lock of the run's folder. Open MPI 4.1 then ends by a segmentation fault of
 // mpirun, as a signal by hand makes it.
 void end_launcher_later() {
     const pid_t launcher = ::getppid();
     std::string name;
     std::getline(std::ifstream(fmt::format("/proc/{}/comm", launcher)), name);
     if (name != "mpirun" && name != "mpiexec" && name != "orterun" && name != "prterun") return;
-    const long handle = ::syscall(SYS_pidfd_open, launcher, 0);
+    const int handle = static_cast<int>(::syscall(SYS_pidfd_open, launcher, 0));
     if (handle < 0 || ::fork() != 0) return;
     ::setsid();  // mpirun ends what is in this process's group
-    ::sleep(kLauncherSeconds);
-    ::syscall(SYS_pidfd_send_signal, handle, SIGTERM, nullptr, 0);
+    for (int file = 0; file < kMostFiles; ++file)
+        if (file != handle) ::close(file);
+    pollfd launcher_ends{handle, POLLIN, 0};
+    if (::poll(&launcher_ends, 1, 1000 * kLauncherSeconds) == 0)
+        ::syscall(SYS_pidfd_send_signal, handle, SIGTERM, nullptr, 0);
     std::_Exit(0);
 }
 
