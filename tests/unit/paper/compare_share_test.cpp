@@ -41,6 +41,9 @@ ComparedRun measured_run(const std::string& kernel, std::uint64_t seed) {
     at.ssim = NAN;
     at.lpips = 0.25;
     at.splats = 3e9;
+    at.model = "point_cloud.ply";
+    at.model_mb = 0.5;
+    at.arc_db = 11;
     at.views = {{"a.jpg", 20.125, 0.5, std::nullopt, "a.png"}};
     at.scales = {{0.5, 30, 0.75}};
     at.off_path_db = 12;
@@ -68,7 +71,8 @@ TEST(CompareShare, Runs_keepEveryFieldOnTheirWay) {
     EXPECT_TRUE(std::isinf(got[0].at[0].psnr_db) && std::isnan(got[0].at[0].ssim));
     EXPECT_EQ(got[0].at[0].views[0].picture, fs::path("a.png"));
     EXPECT_EQ(got[0].at[0].lpips, 0.25);
-    EXPECT_FALSE(got[0].at[0].arc_db || got[1].blending || got[1].shapes || got[1].peak_mb);
+    EXPECT_EQ(got[0].at[0].model, fs::path("point_cloud.ply"));
+    EXPECT_FALSE(got[0].at[0].views[0].lpips || got[1].blending || got[1].shapes || got[1].peak_mb);
 }
 
 TEST(CompareShare, RunsOfRanks_comeInTheirOrder) {
