@@ -325,8 +325,8 @@ int predict_degree(const TrainOptions& options, int iterations) {
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
     TrainOptions usual = options;
     usual.strategy = Strategy{};
-    if (usual.start == StartPoints::dense)  // the same before its points are there
-        usual.start = StartPoints::automatic;
+    if (usual.start != StartPoints::random)  // the same before the points of stereo are there
+        usual.start = dataset.points.size() > 0 ? StartPoints::points : StartPoints::random;
     std::uint64_t pixels = 0;
     for (const View& view : dataset.views)
         if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;

@@ -27,8 +27,8 @@ constexpr double kSurfaceWidth = 0.6, kSurfaceThickness = 0.3, kSurfaceOpacity =
 const PointCloud& given_points(const Dataset& dataset, const TrainOptions& options) {
     static const PointCloud kNone;
     if (options.start == StartPoints::random) return kNone;
-    const bool dense = options.start == StartPoints::dense && dataset.start.size() > 0;
-    return dense ? dataset.start : dataset.points;
+    const bool takes_start = options.start != StartPoints::points && dataset.start.size() > 0;
+    return takes_start ? dataset.start : dataset.points;
 }
 
 }  // namespace

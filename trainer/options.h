@@ -15,8 +15,9 @@ namespace darb {
 
 constexpr std::uint32_t kAnyNumberOfSplats = std::numeric_limits<std::uint32_t>::max();
 
-// What training starts from. automatic: the points of the data set, random ones where it has none.
-// dense: points that stereo finds on the surfaces (engine/stereo), beside those of the data set.
+// What training starts from. automatic: the points of the data set; where it has none those of
+// Dataset::start, and random ones where that is empty, too. dense: points that stereo finds on the
+// surfaces (engine/stereo), beside those of the data set.
 enum class StartPoints { automatic, points, dense, random };
 
 struct TrainOptions {

@@ -154,5 +154,15 @@ TEST(InitialModel, a_random_start_leaves_the_points_aside) {
     EXPECT_EQ(initial_model(d, options).size(), 50U);
 }
 
+TEST(InitialModel, points_of_stereo_stand_in_for_those_that_are_not_there) {
+    Dataset d = looking_at(0, false);
+    d.start = looking_at(7, false).points;
+    EXPECT_FALSE(starts_random(d, {}));
+    EXPECT_EQ(initial_model(d, {}).size(), 7U);
+    TrainOptions options;
+    options.start = StartPoints::random;
+    EXPECT_TRUE(starts_random(d, options));
+}
+
 }  // namespace
 }  // namespace darb::test

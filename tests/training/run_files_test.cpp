@@ -46,6 +46,11 @@ class RunFiles : public testing::Test {
         EXPECT_EQ(o.err.find("json.exception"), std::string::npos) << o.err;
         EXPECT_NE(o.err.find("\n  "), std::string::npos) << "no remedy: " << o.err;
     }
+    void forget_points() const {
+        fs::remove_all(data() / "sparse" / "0");
+        fs::copy(fs::path(DARB_SOURCE_DIR) / "assets" / "scene" / "transforms_train.json",
+                 data() / "transforms_train.json");
+    }
     // What was trained 2 iterations long and then interrupted.
     void leave_unfinished(const std::string& options = "") const {
         ASSERT_EQ(train("--checkpoint-iterations 2 " + options).code, 0);
@@ -159,9 +164,7 @@ TEST_F(RunFiles, a_checkpoint_that_contradicts_its_settings_is_refused) {
 }
 
 TEST_F(RunFiles, a_start_without_room_is_refused_with_the_number_that_fits) {
-    fs::remove_all(data() / "sparse" / "0");
-    fs::copy(fs::path(DARB_SOURCE_DIR) / "assets" / "scene" / "transforms_train.json",
-             data() / "transforms_train.json");
+    forget_points();
     const std::string train =
         fmt::format("train '{}' -o '{}' -r 8 -q --iterations 1 --no-report --random-points ",
                     data().string(), run().string());
@@ -172,6 +175,23 @@ TEST_F(RunFiles, a_start_without_room_is_refused_with_the_number_that_fits) {
     fs::remove_all(run());
     expect_input_error(darb(train + "2000 --start points"), {"no points for --start points"});
     EXPECT_FALSE(fs::exists(run() / "checkpoint.darb"));
+}
+
+TEST_F(RunFiles, without_points_splats_start_on_surfaces_where_photos_show_enough_long) {
+    forget_points();
+    const auto started = [&](const std::string& options) {
+        fs::remove_all(run());
+        const Outcome o = darb(fmt::format("train '{}' -o '{}' --iterations 1 --no-report {}",
+                                           data().string(), run().string(), options));
+        EXPECT_EQ(o.code, 0) << o.err;
+        const bool dense = (o.out + o.err).find("start: dense, ") != std::string::npos;
+        EXPECT_EQ(fs::exists(run() / "dense_start" / "points.ply"), dense) << o.err;
+        return dense;
+    };
+    EXPECT_TRUE(started("-r 2"));
+    EXPECT_FALSE(started("-r 8")) << "photos of 25 px";
+    EXPECT_FALSE(started("-r 2 --random-points 2000"));
+    EXPECT_FALSE(started("-r 2 --start random"));
 }
 
 TEST_F(RunFiles, a_dense_start_leaves_its_points_and_pictures_and_a_resumed_run_goes_on_long) {

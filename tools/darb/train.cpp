@@ -47,15 +47,20 @@ void leave_page(Device& device, const Dataset& dataset, const TrainFlags& flags,
                                              dataset.views, file));
 }
 
+void refuse_stereo(const Dataset& dataset, const TrainFlags& flags, int ranks) {
+    if (ranks == 1 || !starts_from_stereo(dataset, flags)) return;
+    const std::string others =
+        fmt::format("a run of {} ranks: their devices may find other ones", ranks);
+    if (dataset.points.size() > 0 || flags.train.start == StartPoints::dense)
+        throw Error("--start dense", "finds no points for " + others,
+                    "Begin it on one rank; several go on with --resume, or use --start points.");
+    throw Error(dataset.root.string(), "has no points, and stereo finds none for " + others,
+                "Begin it on one rank; several go on with --resume, or use --start random.");
+}
+
 // Whatever takes a folder or a window for itself.
 void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
     if (ranks.count() == 1) return;
-    if (flags.train.start == StartPoints::dense && flags.run.resume_from.empty())
-        throw Error("--start dense",
-                    fmt::format("has no place in a run of {} ranks: their devices may find other "
-                                "points",
-                                ranks.count()),
-                    "Begin it on one rank; several go on with --resume, or use --start points.");
     if (flags.view)
         throw Error("--view", fmt::format("has no place in a run of {} ranks", ranks.count()),
                     "Leave it out; darb view opens what the run saves.");
@@ -87,6 +92,7 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::strin
         if (!lock) lock.emplace(flags.run.output);
     }
     plan_effects(dataset, flags);
+    refuse_stereo(dataset, flags, ranks.count());
     plan_start(device, dataset, flags);
     plan_strategy(dataset, flags);
     std::atomic<bool>& stop = stop_on_signals();

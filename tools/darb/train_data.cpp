@@ -103,8 +103,7 @@ Dataset load_training_data(TrainFlags& flags, std::optional<RunLock>& lock) {
                                   : photos_without_cameras(flags.dataset, flags.data.images_folder);
     Dataset dataset = photos.empty() ? load_dataset(flags.dataset, flags.data)
                                      : load_through_colmap(photos, flags, lock);
-    if (dataset.points.size() == 0)
-        dataset.notes.push_back("There are no sparse points; training starts from random ones.");
+    if (dataset.points.size() == 0) dataset.notes.push_back("There are no sparse points.");
     if (flags.train.random_points && dataset.points.size() > 0)
         dataset.notes.push_back(
             fmt::format("--random-points {} is for data sets without points; this one has {}.",

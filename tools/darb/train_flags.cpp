@@ -54,7 +54,8 @@ void add_scene_flags(CLI::App& command, TrainFlags& f) {
         ->group(option_group::kScene);
     command
         .add_option("--start", f.train.start,
-                    "what splats start from; dense: surfaces that stereo between the photos finds")
+                    "what splats start from; dense: surfaces that stereo between the photos finds; "
+                    "auto: points of the data set, else dense, else random")
         ->transform(CLI::CheckedTransformer(kStarts, CLI::ignore_case).description(""))
         ->type_name("TEXT:{auto,points,dense,random}")
         ->default_str("auto")

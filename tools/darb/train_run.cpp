@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.h"
+#include "engine/core/say.h"
 #include "engine/data/source.h"
 #include "engine/data/track_adjustment.h"
 #include "tools/darb/effect_flags.h"
@@ -16,6 +17,9 @@
 namespace darb {
 
 namespace {
+
+// Fewer say little of a scene: random points are never fewer, either.
+constexpr std::size_t kLeastOnSurfaces = 1'000;
 
 EffectChoice training_choice(const TrainFlags& flags) {
     EffectChoice choice = parse_effects(flags.effects);
@@ -67,18 +71,29 @@ void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos) {
         plan_json(plan).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-void plan_start(Device& device, Dataset& dataset, TrainFlags& flags) {
-    const StartPoints wanted = flags.train.start;
-    if (wanted == StartPoints::points && dataset.points.size() == 0)
-        throw Error(dataset.root.string(), "has no points for --start points",
-                    "Use --start dense or --start random.");
-    if (wanted != StartPoints::dense || !flags.run.resume_from.empty()) return;
+bool starts_from_stereo(const Dataset& dataset, const TrainFlags& flags) {
+    if (!flags.run.resume_from.empty()) return false;
+    return flags.train.start == StartPoints::dense ||
+           (flags.train.start == StartPoints::automatic && dataset.points.size() == 0 &&
+            !flags.train.random_points);
+}
+
+namespace {
+
+void find_start(Device& device, Dataset& dataset, TrainFlags& flags) {
     if (flags.run.photos.empty()) flags.run.photos = load_photos(dataset.views);
+    say_note("start: stereo between the photos, about a second for each of 400 px");
     const bool opaque = !flags.train.alpha && dataset.has_alpha;
     DenseStart start = dense_start(
         device, dataset,
         opaque ? photos_of_run(dataset, flags.train, flags.run.photos) : flags.run.photos,
         flags.train.seed);
+    if (flags.train.start == StartPoints::automatic && start.on_surfaces < kLeastOnSurfaces) {
+        flags.start_note = fmt::format(
+            "start: random points, as stereo between the photos finds surfaces at {} places alone",
+            start.on_surfaces);
+        return;
+    }
     if (start.on_surfaces == 0)
         throw Error(dataset.root.string(), "no surface is seen alike in several photos",
                     "Use --start points or --start random.");
@@ -93,6 +108,15 @@ void plan_start(Device& device, Dataset& dataset, TrainFlags& flags) {
         write_dense_start(start, folder);
         start = {};  // it holds every photo
     };
+}
+
+}  // namespace
+
+void plan_start(Device& device, Dataset& dataset, TrainFlags& flags) {
+    if (flags.train.start == StartPoints::points && dataset.points.size() == 0)
+        throw Error(dataset.root.string(), "has no points for --start points",
+                    "Use --start dense or --start random.");
+    if (starts_from_stereo(dataset, flags)) find_start(device, dataset, flags);
 }
 
 void plan_strategy(const Dataset& dataset, TrainFlags& flags) {

@@ -12,6 +12,10 @@ namespace darb {
 /// yet; sees_photos false: the plan does without.
 void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos = true);
 
+/// Whether splats start from points that stereo has still to find: --start dense, or auto without
+/// points.
+bool starts_from_stereo(const Dataset& dataset, const TrainFlags& flags);
+
 /// Finds the points that --start asks for and leaves them in dataset.start, in flags.start_note
 /// what that brought, and what writes its pictures in flags.run; after plan_effects. Throws Error
 /// where it asks for points and there are none.

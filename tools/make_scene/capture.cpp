@@ -89,17 +89,17 @@ constexpr int kTurns = 3;
 double path_azimuth(double share) {
     return kTau * kTurns * share + 0.4;
 }
-double path_elevation(double share) {
-    return glm::radians(31 + 17 * std::sin(kTau * 5 * share + 0.9));
+double path_elevation(const Heights& heights, double share) {
+    return glm::radians(heights.middle + heights.swing * std::sin(kTau * 5 * share + 0.9));
 }
 double path_radius(double share) {
     return 3.1 + 0.35 * std::sin(kTau * 7 * share);
 }
 
 /// Elevation between the two turns of the path that lie farthest apart at this azimuth.
-double between_turns(double share) {
+double between_turns(const Heights& path, double share) {
     std::array<double, kTurns> heights;
-    for (int t = 0; t < kTurns; ++t) heights[t] = path_elevation(share + double(t) / kTurns);
+    for (int t = 0; t < kTurns; ++t) heights[t] = path_elevation(path, share + double(t) / kTurns);
     std::sort(heights.begin(), heights.end());
     const bool lower = heights[1] - heights[0] > heights[2] - heights[1];
     return lower ? (heights[0] + heights[1]) / 2 : (heights[1] + heights[2]) / 2;
@@ -122,18 +122,18 @@ Camera look_at(const dvec3& eye, const dvec3& target, double scale) {
     return camera;
 }
 
-std::vector<View> camera_path(int scale) {
+std::vector<View> camera_path(int scale, const Heights& heights) {
     std::vector<View> views;
     for (int i = 0; i < kViews; ++i) {
         const double share = static_cast<double>(i) / kViews;
         views.push_back(view_from(fmt::format("view_{:02d}.png", i), path_azimuth(share),
-                                  path_elevation(share), path_radius(share), scale));
+                                  path_elevation(heights, share), path_radius(share), scale));
         views.back().is_test = i % kTestEvery == kTestOffset;
     }
     return views;
 }
 
-std::vector<View> off_path_views(int scale) {
+std::vector<View> off_path_views(int scale, const Heights& heights) {
     constexpr double kGoldenAngle = 2.399963229728653;  // spreads them evenly around
     const struct {
         const char* name;
@@ -152,7 +152,7 @@ std::vector<View> off_path_views(int scale) {
     for (int i = 0; static_cast<int>(views.size()) < kOffPath; ++i) {
         const double share = (5.0 * i + 2) / kViews;
         views.push_back(view_from(fmt::format("between_{}.png", i), path_azimuth(share),
-                                  between_turns(share), 3.1, scale));
+                                  between_turns(heights, share), 3.1, scale));
     }
     for (View& view : views) view.is_test = true;
     return views;

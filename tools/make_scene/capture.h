@@ -25,6 +25,11 @@ struct CaptureSettings {
     int samples = 0;             // per pixel; 0: kSamples shared out
 };
 
+/// Of a path, degrees: in the middle, and up and down from there.
+struct Heights {
+    double middle = 31, swing = 17;
+};
+
 /// From eye to target, z up; the photo's sides are scaled.
 Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, double scale);
 
@@ -35,11 +40,11 @@ struct Capture {
 
 /// Three turns around the scene at changing heights; View::is_test marks the held-out ones. scale
 /// >= 1 multiplies the sides of the photos.
-std::vector<View> camera_path(int scale = 1);
+std::vector<View> camera_path(int scale = 1, const Heights& heights = {});
 
 /// Views away from that path, all held out, whose pictures show what views along it hide:
 /// closer_N, higher_N, lower_N, outside_N and between_N (its turns), kOffPath in all.
-std::vector<View> off_path_views(int scale = 1);
+std::vector<View> off_path_views(int scale = 1, const Heights& heights = {});
 
 /// Their pictures (gamma 2.2, 8 bits). Uses all cores; the result does not depend on their number.
 std::vector<ImageU8> take_photos(const World& world, const std::vector<View>& views,

@@ -2,6 +2,7 @@
 // training and 8 held-out cameras, with a COLMAP model, and 16 views off that path. The same bytes
 // on every run. SCALE 1 to 8 multiplies the photos' sides of 200 x 150 px.
 // make_scene depths FOLDER [SCALE]: the same with the true depths of all views beside the photos.
+// make_scene outdoors FOLDER [SCALE]: from near the ground, under clouds. Depths as well.
 // make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
 #include <cstdio>
 #include <cstdlib>
@@ -21,6 +22,23 @@ void make_town(const std::filesystem::path& folder, int side, double scale) {
     write_scene(folder, views, capture_views(town(), views, town_capture(views.size())));
 }
 
+void make_still_life(const std::filesystem::path& folder, int scale, bool outdoors, bool depths) {
+    using namespace darb::make_scene;
+    World world = still_life();
+    Heights heights;
+    if (outdoors) {
+        world.clouds = 1;
+        heights = {8, 6};
+    }
+    const std::vector<darb::View> views = camera_path(scale, heights);
+    write_scene(folder, views, capture_views(world, views));
+    const std::vector<darb::View> away = off_path_views(scale, heights);
+    write_test_views(folder / "off_path", away, take_photos(world, away, views.size()));
+    if (!depths) return;
+    write_depths(folder, views, take_depths(world, views));
+    write_depths(folder / "off_path", away, take_depths(world, away));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -37,7 +55,8 @@ int main(int argc, char** argv) {
         }
         return 0;
     }
-    const bool depths = argc >= 3 && std::strcmp(argv[1], "depths") == 0;
+    const bool outdoors = argc >= 3 && std::strcmp(argv[1], "outdoors") == 0;
+    const bool depths = outdoors || (argc >= 3 && std::strcmp(argv[1], "depths") == 0);
     if (depths) {
         --argc;
         ++argv;
@@ -48,22 +67,12 @@ int main(int argc, char** argv) {
             stderr,
             "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
             "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
+            "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
             "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n");
         return 2;
     }
     try {
-        const World world = still_life();
-        const std::vector<darb::View> views = camera_path(scale);
-        const Capture capture = capture_views(world, views);
-        write_scene(argv[1], views, capture);
-        const std::vector<darb::View> away = off_path_views(scale);
-        write_test_views(std::filesystem::path(argv[1]) / "off_path", away,
-                         take_photos(world, away, views.size()));
-        if (depths) {
-            write_depths(argv[1], views, take_depths(world, views));
-            write_depths(std::filesystem::path(argv[1]) / "off_path", away,
-                         take_depths(world, away));
-        }
+        make_still_life(argv[1], scale, outdoors, depths);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "error: %s\n", error.what());
         return 2;

@@ -50,9 +50,14 @@ Hit nearest(const World& world, const Ray& ray, double t_max = kFar) {
     return hit;
 }
 
-dvec3 sky(const dvec3& direction) {
+dvec3 sky(const World& world, const dvec3& direction) {
     const double up = std::clamp(direction.z, 0.0, 1.0);
-    const dvec3 blue = glm::mix(dvec3(0.80, 0.86, 0.92), dvec3(0.24, 0.44, 0.78), std::sqrt(up));
+    dvec3 blue = glm::mix(dvec3(0.80, 0.86, 0.92), dvec3(0.24, 0.44, 0.78), std::sqrt(up));
+    if (world.clouds > 0) {  // low ones are seen from the side, and flat
+        const double cloud = fbm(direction * dvec3(3, 3, 7), 5);
+        blue = glm::mix(blue, dvec3(1.0, 0.98, 0.95),
+                        world.clouds * glm::smoothstep(0.42, 0.62, cloud));
+    }
     const double glow = std::max(0.0, glm::dot(direction, kSun));
     return blue + dvec3(1.0, 0.85, 0.6) * (0.35 * std::pow(glow, 12) + 6 * std::pow(glow, 900));
 }
@@ -79,7 +84,7 @@ dvec3 diffuse_light(const World& world, const dvec3& point, const dvec3& normal,
 
 dvec3 shade(const World& world, const Ray& ray, int bounces, Pcg32& rng) {
     const Hit hit = nearest(world, ray);
-    if (!hit.any()) return sky(ray.direction);
+    if (!hit.any()) return sky(world, ray.direction);
     const dvec3 point = ray.at(hit.t) + kSkin * hit.normal;
     const Material& m = hit.floor ? world.floor : hit.object->material;
     dvec3 local = point, local_normal = hit.normal;
@@ -101,7 +106,7 @@ dvec3 shade(const World& world, const Ray& ray, int bounces, Pcg32& rng) {
     if (!hit.floor) return colour;
     const double away =
         glm::smoothstep(world.fades_from, world.fades_to, glm::length(glm::dvec2(point)));
-    return glm::mix(colour, sky(dvec3(ray.direction.x, ray.direction.y, 0)) * 0.92, away);
+    return glm::mix(colour, sky(world, dvec3(ray.direction.x, ray.direction.y, 0)) * 0.92, away);
 }
 
 dvec3 rgb(double r, double g, double b) {  // sRGB bytes to linear, by a plain power of 2.2

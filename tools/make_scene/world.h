@@ -33,6 +33,7 @@ struct World {
     Material floor;
     double floor_z = 0;
     double fades_from = 2.6, fades_to = 7.5;  // the floor into the sky, by the distance from 0
+    double clouds = 0;                        // how white they are, 0 to 1
 };
 
 World still_life();
