@@ -98,6 +98,11 @@ ImageU8 picture_of(const DenseStart& start, std::size_t photo) {
 
 }  // namespace
 
+bool lacks_points(const Dataset& dataset, const TrainOptions& options) {
+    return options.start == StartPoints::automatic && dataset.points.size() == 0 &&
+           !options.random_points;
+}
+
 DenseStart dense_start(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
                        std::uint64_t seed) {
     const auto begin = std::chrono::steady_clock::now();

@@ -9,6 +9,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "engine/stereo/surface_points.h"
+#include "trainer/options.h"
 
 namespace darb {
 
@@ -22,6 +23,13 @@ struct DenseStart {
     std::vector<PlaneMap> maps;
     std::vector<ImageU8> consistent;  // [H][W] of a photo: 255 where others agree
 };
+
+/// Surfaces at fewer places say little of a scene: a run that asked for nothing starts at random
+/// ones, which are never fewer unless --random-points says so.
+inline constexpr std::size_t kLeastOnSurfaces = 1'000;
+
+/// Whether a run that is not told what to start from (TrainOptions::start) asks stereo first.
+bool lacks_points(const Dataset& dataset, const TrainOptions& options);
 
 /// photos: as load_photos gives them, of every view.
 DenseStart dense_start(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,

@@ -52,7 +52,7 @@ std::uint64_t usable_bytes(const DeviceInfo& info);
 int predict_degree(const TrainOptions& options, int iterations);
 
 /// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
-/// end with, from the same start.
+/// end with from its points, or from random ones where there are none.
 std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options);
 
 /// Mean count over the run; adc: where it grows evenly while density control runs.

@@ -23,7 +23,7 @@ constexpr double kFarOff = 4;
 // as a share of the distance to the next point, that across it as a share of that along.
 constexpr double kSurfaceWidth = 0.6, kSurfaceThickness = 0.3, kSurfaceOpacity = 0.5;
 
-// Without points: random ones.
+// Empty: random ones.
 const PointCloud& given_points(const Dataset& dataset, const TrainOptions& options) {
     static const PointCloud kNone;
     if (options.start == StartPoints::random) return kNone;

@@ -433,7 +433,8 @@ const OptionRow kRows[] = {
      .setting = "/random_points",
      .member = &Opt::random_points,
      .group = option_group::kStart,
-     .help = "splats to start from where the data set has no points",
+     .help = "splats at random places to start from where the data set has no points, in place of "
+             "stereo",
      .usual = "one for 32 pixels of the photos, 1,000 to 100,000",
      .least = 1,
      .most = 4294967295.0,

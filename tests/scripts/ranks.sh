@@ -43,6 +43,13 @@ for ranks in 1 2; do
 done
 [[ $(grep -c '"psnr_db": [0-9]' "$folder/figures.1") -gt 1 ]] || { echo "FAILED  compare: no figures"; cat "$folder/compare.log"; failed=1; }
 check 'two ranks compare what one compares' "^$(sha256sum <"$folder/figures.1")\$" "$(sha256sum <"$folder/figures.2")"
+mkdir "$folder/photos"
+ln -s "$data/images" "$folder/photos/images"
+cp "$data/transforms_train.json" "$folder/photos"
+said=$(timeout 100 mpirun -n 2 "$darb" train "$folder/photos" -o "$folder/refused" --batch 2 -r 50 -q 2>&1)
+check 'two ranks do not begin from stereo' 'no points, and stereo in their place is not begun by 2 ranks' "$said"
+check 'they say how to begin instead' 'or use --start random' "$said"
+check 'they leave no folder' '^none$' "$(ls "$folder/refused" 2>/dev/null || echo none)"
 [[ $what == long ]] || exit "$failed"
 
 train 4 "$folder/four" "${run[@]}" --iterations 30 --start-checkpoint "$folder/one/chkpnt20.darb"

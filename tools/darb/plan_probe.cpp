@@ -11,6 +11,7 @@
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_stats.h"
+#include "trainer/dense_start.h"
 #include "trainer/initial_model.h"
 #include "trainer/trainer.h"
 
@@ -79,6 +80,14 @@ Dataset probed_dataset(const Dataset& source, const EffectPlan& plan) {
     return dataset;
 }
 
+// As darb train begins.
+void find_points(Device& device, const std::vector<ImageU8>& photos, const TrainOptions& run,
+                 Dataset& dataset) {
+    if (!lacks_points(dataset, run)) return;
+    DenseStart start = dense_start(device, dataset, photos, run.seed);
+    if (start.on_surfaces >= kLeastOnSurfaces) dataset.start = std::move(start.cloud);
+}
+
 SceneEvaluation evaluation_of(const Dataset& dataset, const TrainOptions& run) {
     SceneEvaluation evaluation;
     evaluation.alpha_is_mask = dataset.alpha_is_mask;
@@ -90,12 +99,13 @@ SceneEvaluation evaluation_of(const Dataset& dataset, const TrainOptions& run) {
 
 ShapeProbe probe_shape(const DeviceOptions& device_options, const Dataset& source,
                        const TrainOptions& options, const EffectPlan& plan) {
-    const Dataset dataset = probed_dataset(source, plan);
+    Dataset dataset = probed_dataset(source, plan);
     Device device(device_options);
     settle_tuning(device);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     TrainOptions run = options;
     apply_plan(plan, run);
+    find_points(device, photos, run, dataset);
     const SceneEvaluation evaluation = evaluation_of(dataset, run);
     const std::vector<View> views = held_out_views(dataset.views);
     TrainOptions fixed = run;
@@ -113,13 +123,14 @@ ShapeProbe probe_shape(const DeviceOptions& device_options, const Dataset& sourc
 
 AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Dataset& source,
                                const TrainOptions& options, const EffectPlan& plan) {
-    const Dataset dataset = probed_dataset(source, plan);
+    Dataset dataset = probed_dataset(source, plan);
     const std::vector<View> held_out = held_out_views(dataset.views);
     Device device(device_options);
     settle_tuning(device);
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     TrainOptions run = options;
     apply_plan(plan, run);
+    find_points(device, photos, run, dataset);
     TrainOptions plain = run;
     plain.antialias = false;
     run.antialias = true;

@@ -49,13 +49,13 @@ void leave_page(Device& device, const Dataset& dataset, const TrainFlags& flags,
 
 void refuse_stereo(const Dataset& dataset, const TrainFlags& flags, int ranks) {
     if (ranks == 1 || !starts_from_stereo(dataset, flags)) return;
-    const std::string others =
-        fmt::format("a run of {} ranks: their devices may find other ones", ranks);
-    if (dataset.points.size() > 0 || flags.train.start == StartPoints::dense)
-        throw Error("--start dense", "finds no points for " + others,
-                    "Begin it on one rank; several go on with --resume, or use --start points.");
-    throw Error(dataset.root.string(), "has no points, and stereo finds none for " + others,
-                "Begin it on one rank; several go on with --resume, or use --start random.");
+    const bool asked = flags.train.start == StartPoints::dense;
+    throw Error(
+        asked ? "--start dense" : dataset.root.string(),
+        fmt::format("{} begun by {} ranks: each device may find other points",
+                    asked ? "is not" : "has no points, and stereo in their place is not", ranks),
+        fmt::format("Begin on one rank; several go on with --resume, or use --start {}.",
+                    dataset.points.size() > 0 ? "points" : "random"));
 }
 
 // Whatever takes a folder or a window for itself.
@@ -87,12 +87,12 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::strin
     take_tuning_of_first(ranks, device, flags.allow_mixed || !tune.choice.empty());
     std::optional<RunLock> lock;
     Dataset dataset = load_training_data(flags, lock);
+    refuse_stereo(dataset, flags, ranks.count());
     if (ranks.is_first()) {
         check_run_folder(flags.run.output, dataset);
         if (!lock) lock.emplace(flags.run.output);
     }
     plan_effects(dataset, flags);
-    refuse_stereo(dataset, flags, ranks.count());
     plan_start(device, dataset, flags);
     plan_strategy(dataset, flags);
     std::atomic<bool>& stop = stop_on_signals();

@@ -18,9 +18,6 @@ namespace darb {
 
 namespace {
 
-// Fewer say little of a scene: random points are never fewer, either.
-constexpr std::size_t kLeastOnSurfaces = 1'000;
-
 EffectChoice training_choice(const TrainFlags& flags) {
     EffectChoice choice = parse_effects(flags.effects);
     if (flags.antialiasing) choice.changed[EFFECT_ANTIALIAS] = true;
@@ -74,29 +71,31 @@ void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos) {
 bool starts_from_stereo(const Dataset& dataset, const TrainFlags& flags) {
     if (!flags.run.resume_from.empty()) return false;
     return flags.train.start == StartPoints::dense ||
-           (flags.train.start == StartPoints::automatic && dataset.points.size() == 0 &&
-            !flags.train.random_points);
+           (flags.schedule != "3dgs" && lacks_points(dataset, flags.train));
 }
 
 namespace {
 
 void find_start(Device& device, Dataset& dataset, TrainFlags& flags) {
     if (flags.run.photos.empty()) flags.run.photos = load_photos(dataset.views);
-    say_note("start: stereo between the photos, about a second for each of 400 px");
+    say_note("start: stereo between the photos, up to two seconds of a core for each");
     const bool opaque = !flags.train.alpha && dataset.has_alpha;
     DenseStart start = dense_start(
         device, dataset,
         opaque ? photos_of_run(dataset, flags.train, flags.run.photos) : flags.run.photos,
         flags.train.seed);
     if (flags.train.start == StartPoints::automatic && start.on_surfaces < kLeastOnSurfaces) {
-        flags.start_note = fmt::format(
-            "start: random points, as stereo between the photos finds surfaces at {} places alone",
-            start.on_surfaces);
+        flags.start_note =
+            start.photos.empty()
+                ? "start: random points, as stereo does not compare photos with a lens"
+                : fmt::format("start: random points, as stereo finds surfaces in only {} places",
+                              start.on_surfaces);
         return;
     }
     if (start.on_surfaces == 0)
-        throw Error(dataset.root.string(), "no surface is seen alike in several photos",
-                    "Use --start points or --start random.");
+        throw Error(
+            dataset.root.string(), "no surface is seen alike in several photos",
+            fmt::format("Use --start {}random.", dataset.points.size() > 0 ? "points or " : ""));
     flags.start_note = fmt::format(
         "start: dense, {} points on surfaces and {} of the data set, in {:.1f} s; "
         "photos agree on {:.0f} % of their pixels",

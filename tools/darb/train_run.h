@@ -17,8 +17,9 @@ void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos = true);
 bool starts_from_stereo(const Dataset& dataset, const TrainFlags& flags);
 
 /// Finds the points that --start asks for and leaves them in dataset.start, in flags.start_note
-/// what that brought, and what writes its pictures in flags.run; after plan_effects. Throws Error
-/// where it asks for points and there are none.
+/// what that brought, and what writes its pictures in flags.run; after plan_effects. Where auto
+/// finds too few (kLeastOnSurfaces) dataset.start stays empty. Throws Error where it asks for
+/// points and there are none.
 void plan_start(Device& device, Dataset& dataset, TrainFlags& flags);
 
 /// Sets the count that mcmc and budget grow to where none was given; after plan_effects.

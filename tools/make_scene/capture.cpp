@@ -138,7 +138,7 @@ std::vector<View> off_path_views(int scale, const Heights& heights) {
     const struct {
         const char* name;
         int count;
-        double elevation, radius;  // degrees; world units. The path has 14 to 48, 2.75 to 3.45
+        double elevation, radius;  // degrees; world units. The usual path: 14 to 48, 2.75 to 3.45
     } rings[] = {{"closer", 4, 25, 1.7},
                  {"higher", 3, 72, 3.1},
                  {"lower", 3, 6, 3.1},

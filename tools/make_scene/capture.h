@@ -43,7 +43,7 @@ struct Capture {
 std::vector<View> camera_path(int scale = 1, const Heights& heights = {});
 
 /// Views away from that path, all held out, whose pictures show what views along it hide:
-/// closer_N, higher_N, lower_N, outside_N and between_N (its turns), kOffPath in all.
+/// closer_N, higher_N, lower_N (6 degrees), outside_N and between_N (its turns), kOffPath in all.
 std::vector<View> off_path_views(int scale = 1, const Heights& heights = {});
 
 /// Their pictures (gamma 2.2, 8 bits). Uses all cores; the result does not depend on their number.
