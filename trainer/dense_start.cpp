@@ -122,6 +122,13 @@ DenseStart dense_start(Device& device, const Dataset& dataset, const std::vector
     return start;
 }
 
+void find_lacking_points(Device& device, const std::vector<ImageU8>& photos,
+                         const TrainOptions& options, Dataset& dataset) {
+    if (!lacks_points(dataset, options)) return;
+    DenseStart start = dense_start(device, dataset, photos, options.seed);
+    if (start.on_surfaces >= kLeastOnSurfaces) dataset.start = std::move(start.cloud);
+}
+
 void write_dense_start(const DenseStart& start, const std::filesystem::path& folder) {
     write_file_atomic(folder / "points.ply", points_ply(start.cloud));
     std::set<std::string> used;

@@ -35,6 +35,10 @@ bool lacks_points(const Dataset& dataset, const TrainOptions& options);
 DenseStart dense_start(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
                        std::uint64_t seed);
 
+/// Leaves them in dataset.start where it lacks points and stereo finds enough.
+void find_lacking_points(Device& device, const std::vector<ImageU8>& photos,
+                         const TrainOptions& options, Dataset& dataset);
+
 /// FOLDER/points.ply (x y z, nx ny nz, red green blue) and for each photo NAME.png: the photo, its
 /// depths from near (yellow) to far (blue), and those of them that other photos agree on.
 void write_dense_start(const DenseStart& start, const std::filesystem::path& folder);

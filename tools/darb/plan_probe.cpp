@@ -80,14 +80,6 @@ Dataset probed_dataset(const Dataset& source, const EffectPlan& plan) {
     return dataset;
 }
 
-// As darb train begins.
-void find_points(Device& device, const std::vector<ImageU8>& photos, const TrainOptions& run,
-                 Dataset& dataset) {
-    if (!lacks_points(dataset, run)) return;
-    DenseStart start = dense_start(device, dataset, photos, run.seed);
-    if (start.on_surfaces >= kLeastOnSurfaces) dataset.start = std::move(start.cloud);
-}
-
 SceneEvaluation evaluation_of(const Dataset& dataset, const TrainOptions& run) {
     SceneEvaluation evaluation;
     evaluation.alpha_is_mask = dataset.alpha_is_mask;
@@ -105,7 +97,7 @@ ShapeProbe probe_shape(const DeviceOptions& device_options, const Dataset& sourc
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     TrainOptions run = options;
     apply_plan(plan, run);
-    find_points(device, photos, run, dataset);
+    find_lacking_points(device, photos, run, dataset);
     const SceneEvaluation evaluation = evaluation_of(dataset, run);
     const std::vector<View> views = held_out_views(dataset.views);
     TrainOptions fixed = run;
@@ -130,7 +122,7 @@ AntialiasProbe probe_antialias(const DeviceOptions& device_options, const Datase
     const std::vector<ImageU8> photos = load_photos(dataset.views);
     TrainOptions run = options;
     apply_plan(plan, run);
-    find_points(device, photos, run, dataset);
+    find_lacking_points(device, photos, run, dataset);
     TrainOptions plain = run;
     plain.antialias = false;
     run.antialias = true;
