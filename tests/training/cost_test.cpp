@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "tests/support/chromium.h"
@@ -213,6 +214,19 @@ TEST(TrainCost, prices_every_setting_of_training_long) {
     EXPECT_TRUE(names.contains("sh degree 2 by the iteration"));
     EXPECT_EQ(train_cost_json(result)["rows"].size(), result.rows.size());
     expect_all_drawn(train_cost_html(result), 3);
+}
+
+TEST(TrainCost, has_the_exact_footprint_where_the_kernel_has_it) {
+    const auto has_row = [](int kernel) {
+        TrainOptions options;
+        options.kernel = kernel;
+        return std::ranges::any_of(training_rows(options), [](const TrainCostRow& r) {
+            return r.name == "footprint exact";
+        });
+    };
+    EXPECT_TRUE(has_row(KERNEL_GAUSSIAN));
+    EXPECT_FALSE(has_row(KERNEL_GES_PUBLISHED));
+    EXPECT_FALSE(has_row(KERNEL_RAISED_COSINE_2_PULSES));
 }
 
 }  // namespace

@@ -80,6 +80,8 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
     return rows;
 }
 
+}  // namespace
+
 std::vector<TrainCostRow> training_rows(const TrainOptions& options) {
     std::vector<TrainCostRow> rows(1);
     for (int s = 0; s < kAccuracyCount; ++s) {
@@ -88,7 +90,9 @@ std::vector<TrainCostRow> training_rows(const TrainOptions& options) {
             TrainCostRow row;
             row.accuracy.choice[s] = static_cast<int>(c);
             if (!row.accuracy.of(s).in_training) continue;
-            if (s == kFootprint && row.accuracy.value(s) == FOOTPRINT_PSI) continue;  // the default
+            if (s == kFootprint && (row.accuracy.value(s) == FOOTPRINT_PSI ||  // the default
+                                    !has_exact_footprint(options.kernel)))
+                continue;
             rows.push_back(row);
         }
     }
@@ -102,12 +106,16 @@ std::vector<TrainCostRow> training_rows(const TrainOptions& options) {
     return rows;
 }
 
+namespace {
+
 TrainOptions with(TrainOptions options, const TrainCostRow& row, int seed) {
     if (row.change) {
         row.change(options);
     } else {
         options.accuracy = row.accuracy;
-        if (row.accuracy.value(kFootprint) == FOOTPRINT_EXACT) options.footprint = Footprint::exact;
+        if (row.accuracy.value(kFootprint) == FOOTPRINT_EXACT &&
+            has_exact_footprint(options.kernel))
+            options.footprint = Footprint::exact;
     }
     options.seed += static_cast<std::uint64_t>(seed);
     return options;

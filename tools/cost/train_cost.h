@@ -43,6 +43,10 @@ struct TrainCostResult {
     std::string device, driver, dataset;
 };
 
+/// The rows of a run with these options, not measured yet: settings of accuracy that the kernel has
+/// and that mean something in training, presets, departures from 3DGS.
+std::vector<TrainCostRow> training_rows(const TrainOptions& options);
+
 /// Trains every row with every seed, row after row within a seed, so that drift hits all alike.
 /// dataset needs held-out views. Throws Error without.
 TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
