@@ -78,7 +78,7 @@ namespace {
 
 void find_start(Device& device, Dataset& dataset, TrainFlags& flags) {
     if (flags.run.photos.empty()) flags.run.photos = load_photos(dataset.views);
-    say_note("start: stereo between the photos, up to two seconds of a core for each");
+    say_note("start: stereo between the photos, about a second of a core for each");
     const bool opaque = !flags.train.alpha && dataset.has_alpha;
     DenseStart start = dense_start(
         device, dataset,

@@ -2,7 +2,7 @@
 // training and 8 held-out cameras, with a COLMAP model, and 16 views off that path. The same bytes
 // on every run. SCALE 1 to 8 multiplies the photos' sides of 200 x 150 px.
 // make_scene depths FOLDER [SCALE]: the same with the true depths of all views beside the photos.
-// make_scene outdoors FOLDER [SCALE]: from near the ground, under clouds. Depths as well.
+// make_scene outdoors FOLDER [SCALE]: photos from near the ground, under clouds.
 // make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
 #include <cstdio>
 #include <cstdlib>
@@ -56,8 +56,8 @@ int main(int argc, char** argv) {
         return 0;
     }
     const bool outdoors = argc >= 3 && std::strcmp(argv[1], "outdoors") == 0;
-    const bool depths = outdoors || (argc >= 3 && std::strcmp(argv[1], "depths") == 0);
-    if (depths) {
+    const bool depths = argc >= 3 && std::strcmp(argv[1], "depths") == 0;
+    if (outdoors || depths) {
         --argc;
         ++argv;
     }
