@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs every check that a commit must pass; under 30 minutes on two cores.
-# Ends with the names of what failed, then "N passed, N failed" (ctest cases of all runs, plus one per other step).
+# Ends with the names of what failed, then "N passed, N failed" (cases of all runs, plus one per other step).
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
@@ -14,11 +14,11 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all 
   unit       tests that need no device
   sync       the quick device tests, under Vulkan synchronization validation
   gpu        the other device tests: training, long frames, numerics, scripts
-  clang      build command, unit tests and fuzzers with clang, ASan and UBSan; warnings are errors
+  clang      build libraries, unit tests and fuzzers with clang, ASan and UBSan; warnings are errors
   sanitize   unit tests of that build
   fuzz       the fuzzers of that build, a second each (tools/fuzz.sh)
   includes   build all with clang without precompiled headers: a forgotten include is an error
-  pipelines  build the rest of the tests with clang, ASan and UBSan, and run the quick ones of pipelines
+  pipelines  build command and the rest of the tests with clang, ASan and UBSan, and run the quick ones of pipelines
   long       device tests that take minutes
   python     the Python module: installs what it needs, builds it and the command, runs tests/python
   quick      = setup style release unit
@@ -42,35 +42,43 @@ trap 'rm -rf "$logs"' EXIT
 
 # Device tests start their own threads, one per core, so two at a time are plenty.
 # A device test runs once here, under validation (sync) or without (gpu); those of pipelines also under sanitizers, in
-# the step of that name.
+# the step of that name, a process a case.
 # Without validation: cases whose name ends in _slow, those that look at SPIR-V or at other vector widths;
 # those in _long in the step of that name.
 long='_long(/|$| )' # a space: ctest adds the parameter
-gpu_alone="_slow(/|\$)|$long|^PassSpirv|_at_vector_width_"
+gpu_alone="_slow(/|\$)|$long|(^|\.)PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others, or the same host code for long: not under sanitizers.
-numerics='^every|^settings/|^Reference/|^(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)\.|for_every_kernel$|Accuracy_switch_changes|^trained_command_test$|splats_far_off_coarsen'
+numerics='(^|\.)(every|settings|Reference)/|(^|\.)(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)(\.|$)|for_every_kernel$|^trained_command_test$'
 # Of processes and of scripts, seconds each: they find nothing new under sanitizers or validation.
-once='^(scripts|pages|Outputs)\.'
+once='^(scripts|pages)\.|(^|\.)Outputs(\.|$)'
 # Passes that other tests also record, with other numbers: without validation.
 same_passes='^(kernel_gradient|walk|accuracy_walk|hard_case|blend|blend_backward|project|effect_picture|viewer_picture)_test$'
 without_validation="$gpu_alone|$once|$same_passes"
+# A line for each test of ctest's log: passed, failed and skipped cases of GoogleTest, or the test itself as one.
+count_cases='
+/^[0-9]+\/[0-9]+ Testing: / { cases = bad = out = 0 }
+/^\[       OK \] .* ms\)$/ { ++cases }
+/^\[  FAILED  \] .* ms\)$/ { ++bad }
+/^\[  SKIPPED \] .* ms\)$/ { ++out }
+/^Test (Pass|Fail|Timeout|Skip|Not Run|.*Exception)/ {
+    good = /^Test Passed/
+    if (/^Test Skip/ || /SKIP_RETURN_CODE/) print 0, 0, 1
+    else if (cases + bad + out == 0) print good, !good, 0
+    else print cases, (good ? 0 : bad ? bad : 1), out
+}'
 run_ctest() {
     local preset=$1 log
     log=$(mktemp "$logs/$step.XXXX")
     shift
     ctest --test-dir "$preset" --output-on-failure --no-tests=error -j2 "$@" 2>&1 | tee "$log"
-    local status=${PIPESTATUS[0]} total bad left_out
-    left_out=$(grep -cE '\((Skipped|Disabled)\)$' "$log")
-    mapfile -t -O "${#failed_cases[@]}" failed_cases < <( # ctest's own list at its end
-        sed -nE "/^The following tests FAILED:/,\$ s/^[[:space:]]+[0-9]+ - (.*)/$step: \1/p" "$log")
-    read -r bad total < <(sed -nE 's/.* ([0-9]+) tests? failed out of ([0-9]+)$/\1 \2/p' "$log")
-    if [[ -n ${total:-} ]]; then
-        passed=$((passed + total - bad - left_out)) failed=$((failed + bad))
-        skipped=$((skipped + left_out))
-        [[ $status == 0 || $bad != 0 ]] || failed=$((failed + 1))
-    else
-        failed=$((failed + 1))
-    fi
+    local status=${PIPESTATUS[0]} good bad out
+    mapfile -t -O "${#failed_cases[@]}" failed_cases < <( # ctest's own list at its end, and GoogleTest's cases
+        sed -nE "/^The following tests FAILED:/,\$ s/^[[:space:]]+[0-9]+ - (.*)/$step: \1/p" "$log"
+        sed -nE "s/^\[  FAILED  \] (.*) \([0-9]+ ms\)\$/$step: \1/p" "$log")
+    read -r good bad out < <(awk "$count_cases" "$preset/Testing/Temporary/LastTest.log" |
+        awk '{ good += $1; bad += $2; out += $3 } END { print good + 0, bad + 0, out + 0 }')
+    passed=$((passed + good)) failed=$((failed + bad)) skipped=$((skipped + out))
+    [[ $status == 0 || $bad != 0 ]] || failed=$((failed + 1))
     return "$status"
 }
 
@@ -90,7 +98,7 @@ do_setup() {
 }
 do_style() { tools/check_style.sh; }
 do_release() { build release; }
-do_clang() { build asan darb unit_tests fuzzers make_seeds; }
+do_clang() { build asan unit_tests fuzzers make_seeds; }
 do_unit() { run_ctest build -L '^unit$'; }
 do_sync() { DARB_VALIDATION=1 run_ctest build -L '^(shader|pipeline)$' -E "$without_validation" --timeout 300; }
 do_gpu() {

@@ -96,6 +96,7 @@ Device::State::State(const DeviceOptions& options, bool validation)
     : instance(validation, options.instance_extensions) {
     faults = options.faults;
     compile_only = options.compile_only;
+    if (options.keep_pipelines) pipelines.keep();
     const std::vector<ListedDevice> all = list_devices(instance);
     const std::size_t chosen = choose(all, options.select);
     physical = all[chosen].handle;
@@ -217,6 +218,7 @@ Device::State::~State() {
 void Device::State::release() noexcept {
     if (device == VK_NULL_HANDLE) return;
     device_memory.reset();
+    pipelines.clear();
     vkDestroyCommandPool(device, copy_pool, nullptr);
     vkDestroyPipelineCache(device, cache, nullptr);
     vkDestroyDevice(device, nullptr);

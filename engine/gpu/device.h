@@ -66,6 +66,9 @@ struct DeviceOptions {
     /// Nothing is given to the queue: what is downloaded is 0. Pipelines are compiled anew, past
     /// every cache, and Device::compiled says what the driver tells of them.
     bool compile_only = false;
+    /// A pipeline lives as long as the device, also while nothing uses it: for whoever makes and
+    /// drops what draws again and again, as lavapipe takes a quarter of a second for a frame's.
+    bool keep_pipelines = false;
     /// Compiled pipelines and the record of the tuner are kept there; "" = nowhere.
     std::filesystem::path cache_folder;
     /// For a window: surface extensions of the instance, VK_KHR_swapchain of the device. A name

@@ -271,6 +271,12 @@ void PipelineTable::add(const PipelineKey& key, const std::shared_ptr<const Pipe
     const std::lock_guard lock(mutex_);
     std::erase_if(made_, [](const auto& entry) { return entry.second.expired(); });
     made_[key] = made;
+    if (keeps_) kept_.push_back(made);
+}
+
+void PipelineTable::clear() {
+    const std::lock_guard lock(mutex_);
+    kept_.clear();
 }
 
 }  // namespace darb

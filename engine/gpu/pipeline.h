@@ -93,6 +93,9 @@ std::vector<PipelineKey> live_pipelines(const Device& device);
 class PipelineTable {
   public:
     std::vector<PipelineKey> keys() const;
+    /// Keeps those that are made from now on alive, until clear().
+    void keep() { keeps_ = true; }
+    void clear();
 
   private:
     friend class Pipeline;
@@ -101,6 +104,8 @@ class PipelineTable {
 
     mutable std::mutex mutex_;
     std::map<PipelineKey, std::weak_ptr<const Pipeline::Made>> made_;
+    std::vector<std::shared_ptr<const Pipeline::Made>> kept_;
+    bool keeps_ = false;
 };
 
 }  // namespace darb

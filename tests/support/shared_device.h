@@ -29,7 +29,11 @@ inline testing::Environment* const kSharedDevice =
 
 inline Device& shared_device() {
     std::unique_ptr<Device>& slot = SharedDevice::slot();
-    if (!slot) slot = std::make_unique<Device>(test::device_options());
+    if (!slot) {
+        DeviceOptions options = test::device_options();
+        options.keep_pipelines = true;  // the cases of a process draw with the same ones
+        slot = std::make_unique<Device>(options);
+    }
     return *slot;
 }
 

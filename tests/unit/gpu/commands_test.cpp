@@ -127,6 +127,15 @@ TEST(Pipeline, equal_ones_of_a_device_are_one_while_it_lives) {
     EXPECT_EQ(live_pipelines(second), live_pipelines(device));
 }
 
+TEST(Pipeline, one_that_nobody_uses_stays_where_the_device_keeps_them) {
+    DeviceOptions options = test::device_options();
+    options.keep_pipelines = true;
+    Device device{options};
+    const VkPipeline first = Pipeline(device, "scan_top", {{"THREADS", 64}}).handle();
+    ASSERT_EQ(live_pipelines(device).size(), 1U);
+    EXPECT_EQ(Pipeline(device, "scan_top", {{"THREADS", 64}}).handle(), first);
+}
+
 TEST(PipelineDeathTest, unknown_shader_aborts_with_its_name) {
     GTEST_FLAG_SET(death_test_style, "threadsafe");
     Device device{test::device_options()};
