@@ -116,8 +116,9 @@ VkPipelineLayout create_layout(VkDevice device, const VkDescriptorSetLayout& set
 
 VkPipeline create_pipeline(const Device::State& state, VkPipelineLayout layout,
                            std::span<const std::uint32_t> words,
-                           const VkSpecializationInfo& specialization, bool full,
-                           std::uint32_t subgroup_size, const std::string& what) {
+                           const VkSpecializationInfo& specialization,
+                           VkPipelineShaderStageCreateFlags flags, std::uint32_t subgroup_size,
+                           const std::string& what) {
     VkShaderModuleCreateInfo module_info{};
     module_info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
     module_info.codeSize = words.size_bytes();
@@ -133,7 +134,7 @@ VkPipeline create_pipeline(const Device::State& state, VkPipelineLayout layout,
     info.layout = layout;
     info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
     info.stage.pNext = subgroup_size != 0 ? &size_info : nullptr;
-    info.stage.flags = full ? VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT : 0;
+    info.stage.flags = flags;
     info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
     info.stage.module = module;
     info.stage.pName = "main";
@@ -193,17 +194,23 @@ Pipeline::Made::Made(Device& of, const PipelineKey& key) : shader(key.shader) {
     threads_x = specialization.threads_x;
     check_device_limits(state, bindings.size(), push_constant_bytes, threads_x, what);
 
-    bool full = key.require_full_subgroups && interface.uses_subgroups;
+    const bool any = key.subgroup_size == kAnySubgroupSize;
+    bool full = key.require_full_subgroups && interface.uses_subgroups && !any;
     const std::uint32_t size =
-        interface.uses_subgroups
+        interface.uses_subgroups && !any
             ? fitting_subgroup_size(state.info, threads_x, key.subgroup_size, full)
             : 0;
+    VkPipelineShaderStageCreateFlags flags = 0;
+    if (full) flags |= VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT;
+    if (any && interface.uses_subgroups &&
+        state.info.min_subgroup_size != state.info.max_subgroup_size)
+        flags |= VK_PIPELINE_SHADER_STAGE_CREATE_ALLOW_VARYING_SUBGROUP_SIZE_BIT;
     const VkSpecializationInfo specialization_info = specialization.info();
     try {
         set_layout = create_set_layout(device, bindings.size(), what);
         layout = create_layout(device, set_layout, push_constant_bytes, what);
         const auto begun = std::chrono::steady_clock::now();
-        pipeline = create_pipeline(state, layout, words, specialization_info, full, size, what);
+        pipeline = create_pipeline(state, layout, words, specialization_info, flags, size, what);
         const std::chrono::duration<double, std::milli> took =
             std::chrono::steady_clock::now() - begun;
         if (state.compile_only)

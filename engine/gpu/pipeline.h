@@ -22,6 +22,10 @@ namespace darb {
 using SpecValue = std::variant<std::int32_t, float>;
 using SpecConstants = std::map<std::string, SpecValue, std::less<>>;
 
+/// In place of a size: the driver chooses one for each shader, as many lanes as it has registers
+/// for. For a shader that computes the same with any.
+inline constexpr std::uint32_t kAnySubgroupSize = ~0u;
+
 /// All that a pipeline is made of: equal keys are one pipeline of a device.
 struct PipelineKey {
     std::string shader;
@@ -39,8 +43,8 @@ class Pipeline {
     /// shader: a name of the embedded table. Compiled here, or at first dispatch on lavapipe.
     /// Of a shader that uses subgroups: require_full_subgroups asks the driver for subgroups
     /// without idle lanes; where the workgroup is no multiple of the device's subgroup size, a
-    /// smaller size is asked for if there is one. subgroup_size: 0 = the device's own choice; else
-    /// one between its minimum and maximum.
+    /// smaller size is asked for if there is one. subgroup_size: 0 = the device's own; else one
+    /// between its minimum and maximum, or kAnySubgroupSize, whose lanes may be idle.
     Pipeline(Device& device, std::string_view shader, const SpecConstants& constants = {},
              bool require_full_subgroups = true, std::uint32_t subgroup_size = 0);
     Pipeline(Device& device, const PipelineKey& key);

@@ -83,9 +83,9 @@ Pipeline& Forward::project_pipeline(int sh_degree, int sh_stored) {
     const auto found = project_.find({sh_degree, sh_stored});
     if (found != project_.end()) return found->second;
     return project_
-        .emplace(
-            std::pair(sh_degree, sh_stored),
-            Pipeline(*device_, "project", projection_constants(options_, sh_degree, sh_stored)))
+        .emplace(std::pair(sh_degree, sh_stored),
+                 Pipeline(*device_, "project", projection_constants(options_, sh_degree, sh_stored),
+                          false, kAnySubgroupSize))
         .first->second;
 }
 

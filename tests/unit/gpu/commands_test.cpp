@@ -136,6 +136,15 @@ TEST(Pipeline, one_that_nobody_uses_stays_where_the_device_keeps_them) {
     EXPECT_EQ(Pipeline(device, "scan_top", {{"THREADS", 64}}).handle(), first);
 }
 
+TEST(Pipeline, the_driver_may_choose_the_size_of_subgroups) {
+    Device device{test::device_options()};
+    const Pipeline own(device, "scan_reduce"),
+        any(device, "scan_reduce", {}, true, kAnySubgroupSize);
+    EXPECT_TRUE(any);
+    EXPECT_EQ(live_pipelines(device).size(), 2U);
+    EXPECT_EQ(any.threads_x(), own.threads_x());
+}
+
 TEST(PipelineDeathTest, unknown_shader_aborts_with_its_name) {
     GTEST_FLAG_SET(death_test_style, "threadsafe");
     Device device{test::device_options()};
