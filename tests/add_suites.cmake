@@ -1,9 +1,10 @@
 # Run by ctest at its start, for an executable of many files: a test for each suite (TEST(suite, case)), whose cases
 # share pipelines, which take longer to make than they run. EXECUTABLE.SUITE is its name; cases whose own names end in
 # _slow or _long are tests beside it, EXECUTABLE.SUITE_slow and EXECUTABLE.SUITE_long. Wants EXECUTABLE, PROPERTIES.
-get_filename_component(name "${EXECUTABLE}" NAME)
+get_filename_component(name "${EXECUTABLE}" NAME_WE)
 if(NOT EXISTS "${EXECUTABLE}")
   add_test("${name}_is_not_built" "${EXECUTABLE}")
+  set_tests_properties("${name}_is_not_built" PROPERTIES ${PROPERTIES})
   return()
 endif()
 execute_process(COMMAND "${EXECUTABLE}" --gtest_list_tests OUTPUT_VARIABLE listed RESULT_VARIABLE failed TIMEOUT 60)

@@ -26,7 +26,8 @@ class Browser:
     """One page. said: console messages and exceptions; requests: addresses asked for, data: and blob: left out."""
 
     def __init__(self, width=1280, height=720):
-        self.profile = tempfile.TemporaryDirectory()
+        # Its helpers may still write there when it has ended.
+        self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         read_end, self.write_to = os.pipe()
         self.read_from, write_end = os.pipe()
 

@@ -48,35 +48,48 @@ trap 'rm -rf "$logs"' EXIT
 long='_long(/|$| )' # a space: ctest adds the parameter
 gpu_alone="_slow(/|\$)|$long|(^|\.)PassSpirv|_at_vector_width_"
 # Of the device, with no more host code than others, or the same host code for long: not under sanitizers.
-numerics='(^|\.)(every|settings|Reference)/|(^|\.)(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)(\.|$)|for_every_kernel$|^trained_command_test$'
+# Names are those of suites, for pipelines those of cases.
+numerics='(^|\.)(every[a-z_]*|settings|Reference)/|(^|\.)(WalkCases|TuningWalk|Psi|HardCases|EffectPicture|EffectTraining)(\.|$)|for_every_kernel$|Accuracy_switch_changes|^trained_command_test$'
 # Of processes and of scripts, seconds each: they find nothing new under sanitizers or validation.
 once='^(scripts|pages)\.|(^|\.)Outputs(\.|$)'
 # Passes that other tests also record, with other numbers: without validation.
 same_passes='^(kernel_gradient|walk|accuracy_walk|hard_case|blend|blend_backward|project|effect_picture|viewer_picture)_test$'
 without_validation="$gpu_alone|$once|$same_passes"
-# A line for each test of ctest's log: passed, failed and skipped cases of GoogleTest, or the test itself as one.
+# Passed, failed and skipped cases of ctest's output and its log, by the numbers of its tests: those of GoogleTest one by
+# one, any other test as one.
 count_cases='
-/^[0-9]+\/[0-9]+ Testing: / { cases = bad = out = 0 }
-/^\[       OK \] .* ms\)$/ { ++cases }
-/^\[  FAILED  \] .* ms\)$/ { ++bad }
-/^\[  SKIPPED \] .* ms\)$/ { ++out }
-/^Test (Pass|Fail|Timeout|Skip|Not Run|.*Exception)/ {
-    good = /^Test Passed/
-    if (/^Test Skip/ || /SKIP_RETURN_CODE/) print 0, 0, 1
-    else if (cases + bad + out == 0) print good, !good, 0
-    else print cases, (good ? 0 : bad ? bad : 1), out
+NR == FNR {
+    if (match($0, /Test +#[0-9]+: /)) {
+        number = substr($0, RSTART, RLENGTH)
+        gsub(/[^0-9]/, "", number)
+        state[number] = /\*\*\*Skipped|\(Disabled\)/ ? "out" : / Passed +[0-9.]+ sec$/ ? "good" : "bad"
+    }
+    next
+}
+/^[0-9]+\/[0-9]+ Testing: / { number = $1 + 0 }
+/^\[       OK \] .* ms\)$/ { ++good[number] }
+/^\[  FAILED  \] .* ms\)$/ { ++bad[number] }
+/^\[  SKIPPED \] .* ms\)$/ { ++out[number] }
+END {
+    for (t in state) {
+        if (state[t] == "good" && good[t] + out[t] == 0) good[t] = 1
+        if (state[t] == "bad" && bad[t] == 0) bad[t] = 1
+        if (state[t] == "out" && out[t] == 0) out[t] = 1
+        g += good[t]; b += bad[t]; o += out[t]
+    }
+    print g + 0, b + 0, o + 0
 }'
 run_ctest() {
     local preset=$1 log
     log=$(mktemp "$logs/$step.XXXX")
     shift
+    rm -f "$preset/Testing/Temporary/LastTest.log"
     ctest --test-dir "$preset" --output-on-failure --no-tests=error -j2 "$@" 2>&1 | tee "$log"
     local status=${PIPESTATUS[0]} good bad out
     mapfile -t -O "${#failed_cases[@]}" failed_cases < <( # ctest's own list at its end, and GoogleTest's cases
         sed -nE "/^The following tests FAILED:/,\$ s/^[[:space:]]+[0-9]+ - (.*)/$step: \1/p" "$log"
         sed -nE "s/^\[  FAILED  \] (.*) \([0-9]+ ms\)\$/$step: \1/p" "$log")
-    read -r good bad out < <(awk "$count_cases" "$preset/Testing/Temporary/LastTest.log" |
-        awk '{ good += $1; bad += $2; out += $3 } END { print good + 0, bad + 0, out + 0 }')
+    read -r good bad out < <(awk "$count_cases" "$log" "$preset/Testing/Temporary/LastTest.log")
     passed=$((passed + good)) failed=$((failed + bad)) skipped=$((skipped + out))
     [[ $status == 0 || $bad != 0 ]] || failed=$((failed + 1))
     return "$status"
