@@ -45,8 +45,8 @@ GPUS = {
     "a740": (NEW, "freedreno", "freedreno", {"FD_GPU_ID": "740"}),
 }
 CHECKED = ("navi31", "navi21", "vega10")
-NAMES = {"navi31": "RDNA 3 (navi31)", "navi21": "RDNA 2 (navi21)", "vega10": "Vega", "dg2": "Arc A770 (dg2)", "bmg": "Battlemage", "turing": "Turing", "ada": "Ada",
-         "hopper": "Hopper", "blackwell": "Blackwell", "m1": "M1", "a630": "Adreno 630", "a740": "Adreno 740"}
+NAMES = {"navi31": "RDNA 3 (navi31)", "navi21": "RDNA 2 (navi21)", "vega10": "Vega", "dg2": "Arc A770 (dg2)",
+         "bmg": "Battlemage", "turing": "Turing", "ada": "Ada", "hopper": "Hopper", "blackwell": "Blackwell", "m1": "M1", "a630": "Adreno 630", "a740": "Adreno 740"}
 
 PACKAGES = {
     STABLE: "mesa-vulkan-drivers mesa-drm-shim libdrm2 libdrm-common libdrm-amdgpu1",

@@ -83,13 +83,15 @@ run_ctest() {
     local preset=$1 log
     log=$(mktemp "$logs/$step.XXXX")
     shift
-    rm -f "$preset/Testing/Temporary/LastTest.log"
+    local cases=$preset/Testing/Temporary/LastTest.log
+    rm -f "$cases"
     ctest --test-dir "$preset" --output-on-failure --no-tests=error -j2 "$@" 2>&1 | tee "$log"
     local status=${PIPESTATUS[0]} good bad out
     mapfile -t -O "${#failed_cases[@]}" failed_cases < <( # ctest's own list at its end, and GoogleTest's cases
         sed -nE "/^The following tests FAILED:/,\$ s/^[[:space:]]+[0-9]+ - (.*)/$step: \1/p" "$log"
         sed -nE "s/^\[  FAILED  \] (.*) \([0-9]+ ms\)\$/$step: \1/p" "$log")
-    read -r good bad out < <(awk "$count_cases" "$log" "$preset/Testing/Temporary/LastTest.log")
+    [[ -e $cases ]] || cases=/dev/null # ctest found nothing to run
+    read -r good bad out < <(awk "$count_cases" "$log" "$cases")
     passed=$((passed + good)) failed=$((failed + bad)) skipped=$((skipped + out))
     [[ $status == 0 || $bad != 0 ]] || failed=$((failed + 1))
     return "$status"

@@ -67,7 +67,7 @@ struct DeviceOptions {
     /// every cache, and Device::compiled says what the driver tells of them.
     bool compile_only = false;
     /// A pipeline lives as long as the device, also while nothing uses it: for whoever makes and
-    /// drops what draws again and again, as lavapipe takes a quarter of a second for a frame's.
+    /// drops again and again what draws.
     bool keep_pipelines = false;
     /// Compiled pipelines and the record of the tuner are kept there; "" = nowhere.
     std::filesystem::path cache_folder;

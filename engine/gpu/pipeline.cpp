@@ -195,11 +195,10 @@ Pipeline::Made::Made(Device& of, const PipelineKey& key) : shader(key.shader) {
     check_device_limits(state, bindings.size(), push_constant_bytes, threads_x, what);
 
     const bool any = key.subgroup_size == kAnySubgroupSize;
-    bool full = key.require_full_subgroups && interface.uses_subgroups && !any;
+    const bool one_size = interface.uses_subgroups && !any;
+    bool full = key.require_full_subgroups && one_size;
     const std::uint32_t size =
-        interface.uses_subgroups && !any
-            ? fitting_subgroup_size(state.info, threads_x, key.subgroup_size, full)
-            : 0;
+        one_size ? fitting_subgroup_size(state.info, threads_x, key.subgroup_size, full) : 0;
     VkPipelineShaderStageCreateFlags flags = 0;
     if (full) flags |= VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT;
     if (any && interface.uses_subgroups &&
