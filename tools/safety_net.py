@@ -36,7 +36,7 @@ RUNS = {f"{kernel}_{footprint}": ["--kernel", kernel, "--footprint", footprint, 
 RUNS |= {
     "mcmc": ["--strategy", "mcmc", "--max-splats", "5000", "--iterations", "200"],
     "mcmc_sinc": ["--strategy", "mcmc", "--max-splats", "4500", "--kernel", "sinc", "--iterations", "200"],
-    "budget": ["--strategy", "budget", "--max-splats", "5000", "--iterations", "200"],
+    "budget": ["--strategy", "budget", "--max-splats", "5000", "--iterations", "400"],
     "antialias": ["--effects", "+antialias", "--iterations", "200"],
     "exposure": ["--effects", "+exposure", "--iterations", "120"],
     "colour": ["--effects", "+sh", "--sh-degree", "3", "--iterations", "1000", "-r", "50"],
@@ -49,7 +49,7 @@ RUNS |= {
     "random_start": ["--random-points", "2000", "--iterations", "160", "--average-from", "1"],
     "every_effect": ["--effects", "all", "--seed", "3", "--iterations", "160"],
 }
-RESUMED = {"resumed": ("gaussian_psi", "80"), "resumed_mcmc": ("mcmc", "100"), "resumed_budget": ("budget", "100")}
+RESUMED = {"resumed": ("gaussian_psi", "80"), "resumed_mcmc": ("mcmc", "100"), "resumed_budget": ("budget", "150")}
 
 # name: (the run whose scene it draws, options); each leaves three pictures.
 PICTURES = {f"draw_{run}": (run, []) for run in RUNS if run != "buckets"}

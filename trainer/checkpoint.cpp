@@ -44,7 +44,6 @@ void for_each_array(State& state, Visit visit) {
     visit(state.smoothing);
     visit(state.exposure);
     visit(state.cameras);
-    visit(state.error_shares);
     for (auto& values : state.mean) visit(values);
 }
 
@@ -66,7 +65,6 @@ Json header_of(const Checkpoint& c) {
                 {"smoothing", c.state.smoothing.size()},
                 {"exposure", c.state.exposure.size()},
                 {"cameras", c.state.cameras.size()},
-                {"error_shares", c.state.error_shares.size()},
                 {"rest_sum", c.state.rest_sum.size()},
                 {"averaged", c.state.averaged},
                 {"splats", m.size()},
@@ -208,27 +206,27 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     if (header_bytes > file.size() - kHeadBytes) throw fail("truncated in the header");
     const auto* text = reinterpret_cast<const char*>(file.data() + kHeadBytes);
     Checkpoint c;
-    std::uint64_t splats = 0, smoothing = 0, exposure = 0, cameras = 0, shares = 0, rest = 0;
+    std::uint64_t splats = 0, smoothing = 0, exposure = 0, cameras = 0, rest = 0;
     try {
         const Json header = Json::parse(text, text + header_bytes);
         read_header(header, c, where);
         splats = whole_of<std::uint64_t>(header, "splats", where);
         smoothing = whole_of<std::uint64_t>(header, "smoothing", where);
         exposure = whole_of<std::uint64_t>(header, "exposure", where);
-        shares = header.value("error_shares", std::uint64_t{0});  // absent in earlier files
+        if (header.value("error_shares", std::uint64_t{0}) != 0)
+            throw fail("it is of the strategy budget of an earlier version, by the photos' error");
         cameras = header.value("cameras", std::uint64_t{0});
         rest = header.value("rest_sum", std::uint64_t{0});
         const auto rest_floats = static_cast<std::uint64_t>(c.state.model.rest_count());
         if ((smoothing != 0 && smoothing != splats) || exposure > kMaxSplats ||
-            cameras > kMaxSplats || (shares != 0 && shares != 2 * splats) ||
-            (rest != 0 && rest != rest_floats * splats))
+            cameras > kMaxSplats || (rest != 0 && rest != rest_floats * splats))
             throw fail("the header's sizes make no sense");
     } catch (const Json::exception& e) {
         throw fail(std::string("the header cannot be read: ") + e.what());
     }
     const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
     const std::uint64_t floats =
-        splats * floats_per_splat(c.state) + smoothing + exposure + cameras + shares + rest;
+        splats * floats_per_splat(c.state) + smoothing + exposure + cameras + rest;
     const std::uint64_t expected = floats * sizeof(float);
     if (payload.size() != expected)
         throw fail(fmt::format("{} bytes of data for {} splats, {} expected: truncated",
@@ -239,7 +237,6 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
     c.state.smoothing.resize(smoothing);
     c.state.exposure.resize(exposure);
     c.state.cameras.resize(cameras);
-    c.state.error_shares.resize(shares);
     c.state.rest_sum.resize(rest);
     size_t at = 0;
     for_each_array(c.state, [&](std::vector<float>& values) {

@@ -13,18 +13,17 @@ std::size_t nodes_of(int batch) {
 
 }  // namespace
 
-GradientTree::GradientTree(Device& device, int batch, bool scores)
-    : device_(&device), scores_(scores), nodes_(nodes_of(batch)) {}
+GradientTree::GradientTree(Device& device, int batch) : device_(&device), nodes_(nodes_of(batch)) {}
 
-std::uint64_t GradientTree::device_bytes(std::uint64_t splats, int sh_degree, int kernel, int batch,
-                                         bool scores) {
-    return nodes_of(batch) * GradientBuffers::device_bytes(splats, sh_degree, kernel, scores);
+std::uint64_t GradientTree::device_bytes(std::uint64_t splats, int sh_degree, int kernel,
+                                         int batch) {
+    return nodes_of(batch) * GradientBuffers::device_bytes(splats, sh_degree, kernel);
 }
 
 void GradientTree::reserve(const GpuSplats& splats) {
     if (nodes_.front().is_of(splats)) return;
     for (GradientBuffers& node : nodes_) node = {};  // first, so that there are never two trees
-    for (GradientBuffers& node : nodes_) node = GradientBuffers(*device_, splats, scores_);
+    for (GradientBuffers& node : nodes_) node = GradientBuffers(*device_, splats);
 }
 
 void GradientTree::record_pair(Commands& commands) {

@@ -11,12 +11,11 @@ namespace darb {
 
 class GradientTree {
   public:
-    /// Of batches of so many views at most, a power of two. scores: whether nodes have some.
-    GradientTree(Device& device, int batch, bool scores);
+    /// Of batches of so many views at most, a power of two.
+    GradientTree(Device& device, int batch);
 
     /// Device memory of a tree of so many views, with the buffers of reserve().
-    static std::uint64_t device_bytes(std::uint64_t splats, int sh_degree, int kernel, int batch,
-                                      bool scores);
+    static std::uint64_t device_bytes(std::uint64_t splats, int sh_degree, int kernel, int batch);
     /// Buffers for these splats; where they change, what they held is gone. The queue must be idle.
     void reserve(const GpuSplats& splats);
 
@@ -37,7 +36,6 @@ class GradientTree {
     void record_pair(Commands& commands);
 
     Device* device_;
-    bool scores_;
     std::vector<GradientBuffers> nodes_;  // sums of complete subtrees, the largest first, a leaf
     int views_ = 0, held_ = 0;            // so far; nodes that hold something
 };

@@ -82,10 +82,7 @@ std::uint64_t effect_bytes(const MemoryDemand& demand) {
 std::uint64_t strategy_bytes(const MemoryDemand& demand) {
     std::uint64_t bytes = demand.streams ? 0 : demand.small_pixels * 4;
     if (demand.small_cameras > 0) bytes += cameras_bytes(demand.small_cameras);
-    const std::uint64_t pixels = std::uint64_t(demand.width) * demand.height;
-    return bytes +
-           strategy_row(demand.strategy)
-               .device_bytes({demand.splats, pixels, demand.list_segments, demand.frame.kernel});
+    return bytes + strategy_row(demand.strategy).device_bytes(demand.frame.kernel);
 }
 
 MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
@@ -100,9 +97,8 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     plan.frame = bytes.splats;
     if (demand.cameras) plan.frame += CameraSums::device_bytes(size.splats);
     if (demand.by_views)
-        plan.frame +=
-            GradientTree::device_bytes(demand.splats, demand.sh_degree, demand.frame.kernel,
-                                       demand.batch, strategy_row(demand.strategy).scores_views);
+        plan.frame += GradientTree::device_bytes(demand.splats, demand.sh_degree,
+                                                 demand.frame.kernel, demand.batch);
     plan.intersections = bytes.intersections;
     const std::uint64_t words = demand.photo_pixels + demand.depth_pixels;
     plan.photos = words * 4;

@@ -19,9 +19,6 @@ constexpr double kAboveZero = 1e-30;  // a limit that 0 itself is beyond
 bool has_noise(const Opt& o, const Sched&) {
     return strategy_row(o.strategy).has_setting("noise_lr");
 }
-bool has_decay(const Opt& o, const Sched&) {
-    return strategy_row(o.strategy).has_setting("opacity_decay");
-}
 bool refines_cameras(const Opt& o, const Sched&) {
     return o.refine_cameras;
 }
@@ -260,10 +257,8 @@ const OptionRow kRows[] = {
      .member = &Opt::sh_rest_every,
      .group = option_group::kRates,
      .help = "these bands make a step in every so many iterations, of the mean gradient of these",
-     .usual = "1, with budget 16",
      .least = 1,
-     .most = 1'000,
-     .resolved = [](const Opt&, const Sched& s) -> Json { return s.rest_every; }},
+     .most = 1'000},
     {.setting = "/position_lr_falls",
      .member = &Opt::position_lr_falls,
      .group = option_group::kRates,
@@ -354,7 +349,7 @@ const OptionRow kRows[] = {
      .unit = "iterations",
      .least = 1,
      .most = 1'000'000'000,
-     .strategies = "adc"},
+     .strategies = "adc budget"},
     {.setting = "/opacity_reset/1",  // of --prune-opacity
      .group = option_group::kDensity,
      .resolved = [](const Opt&, const Sched& s) -> Json { return s.resets.to; }},
@@ -370,16 +365,6 @@ const OptionRow kRows[] = {
      .help = "of the noise on positions, with mcmc",
      .strategies = "mcmc",
      .stands = has_noise},
-    {.flags = "--opacity-decay",
-     .setting = "/opacity_decay",
-     .member = &Opt::opacity_decay,
-     .group = option_group::kDensity,
-     .help = "share of its opacity that a splat loses in a round, with budget",
-     .usual = "0.01",
-     .most = 0.99,
-     .strategies = "budget",
-     .resolved = [](const Opt&, const Sched& s) -> Json { return s.opacity_decay; },
-     .stands = has_decay},
     {.flags = "--morton-order",
      .setting = "/morton_order",
      .member = &Opt::morton_order,

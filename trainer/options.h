@@ -73,9 +73,8 @@ struct TrainOptions {
     // at most 10: they come late in a run. docs/experiments/harmonics.md has what that brings.
     bool speed_up_sh_rest = true;
     // These bands make a step in every so many iterations, of their mean gradient, at the root of
-    // as many times the rate: what Adam reads and writes for them is most of what it moves. Absent:
-    // as the strategy has it.
-    std::optional<int> sh_rest_every;
+    // as many times the rate: what Adam reads and writes for them is most of what it moves.
+    int sh_rest_every = 1;
     // From this share of the run on, once density control is over, the mean of the splats is taken,
     // and the run ends with it; 1: never, as 3DGS. See iterate_average.h.
     double average_from = 0.85;
@@ -111,8 +110,7 @@ struct TrainOptions {
     std::optional<std::uint32_t> max_splats;        // absent: any number
     std::optional<std::uint64_t> max_memory_bytes;  // of device memory: growth stops before it
 
-    float noise_lr = 5e5f;               // mcmc: noise on positions, over the rate of positions
-    std::optional<float> opacity_decay;  // budget: share of its opacity that a splat loses a round
+    float noise_lr = 5e5f;  // mcmc: noise on positions, over the rate of positions
     // The first iterations see smaller photos; see trainer/resolution_ramp.h.
     bool resolution_ramp = true;
 

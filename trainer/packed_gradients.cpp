@@ -12,13 +12,12 @@ namespace darb {
 
 namespace {
 
-constexpr AttributeRows kPairs{2, 0};  // of views and scores
+constexpr AttributeRows kPairs{2, 0};  // of views
 
 // What travels of a splat, one buffer after the other: visit(buffer, its rows, floats in use).
 template <class Gradients, class Visit>
 void for_each_column(Gradients& gradients, int sh_degree, Visit visit) {
     visit(gradients.views(), kPairs, std::size_t{2});
-    if (gradients.scores()) visit(gradients.scores(), kPairs, std::size_t{2});
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::size_t held = gradients.stride(a);
         const std::size_t floats =

@@ -86,8 +86,7 @@ Schedule::Schedule(const TrainOptions& o)
     initial_opacity = o.initial_opacity.value_or(defaults.initial_opacity);
     initial_scale = o.initial_scale.value_or(defaults.initial_scale);
     prune_opacity = o.prune_opacity.value_or(defaults.prune_opacity);
-    opacity_decay = o.opacity_decay.value_or(defaults.opacity_decay);
-    rest_every = o.sh_rest_every.value_or(defaults.sh_rest_every);
+    rest_every = o.sh_rest_every;
 
     degree_interval = sped_up(o.sh_interval, 1'000, speedup);
     rounds.begin = sped_up(o.densify_from, 500, speedup);

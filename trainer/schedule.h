@@ -71,7 +71,7 @@ class Schedule {
     int batch = 1;
     Strategy strategy;
     // Where they are not given, the strategy's.
-    float initial_opacity = 0, initial_scale = 0, prune_opacity = 0, opacity_decay = 0;
+    float initial_opacity = 0, initial_scale = 0, prune_opacity = 0;
     int rest_every = 1;  // see TrainOptions::sh_rest_every
     /// How many times faster a run below kShortRun iterations learns shapes and opacities, grows,
     /// and comes to its degrees of colour: at most kMostSpeedup times.

@@ -109,7 +109,6 @@ void TrainingStep::launch(Flight& flight, const StepInput& input) {
     flight.commands.begin();
     const StepInput placed = with_photo(flight.commands, input);
     if (!picture_gradient) record_picture(flight.commands, placed);
-    record_before_loss(flight.commands, placed);
     if (picture_gradient)
         flight.commands.copy(given_d_image_, d_image_, std::uint64_t{input.view.size()} * 12);
     else
@@ -128,19 +127,7 @@ StepInput TrainingStep::with_photo(Commands& commands, const StepInput& input) {
 }
 
 StepFrame TrainingStep::step_frame(Commands& commands, const StepInput& input) {
-    Frame& frame = buffers_.frame();
-    const Buffer& compared = exposure_ ? exposure_->mapped() : frame.images.image;
-    const bool scores = input.gradients && input.gradients->scores();
-    return {commands,
-            input.view.frame,
-            frame,
-            backward_,
-            *splats_,
-            compared,
-            *input.view.pixels,
-            d_image_,
-            input.iteration,
-            scores ? &input.gradients->scores() : nullptr};
+    return {commands, *splats_, buffers_.frame().counters.status, input.iteration};
 }
 
 ExposedPicture TrainingStep::exposed(const TrainingView& view) {
@@ -153,12 +140,6 @@ void TrainingStep::record_picture(Commands& commands, const StepInput& input) {
     Frame& frame = buffers_.frame();
     forward_.record(commands, *splats_, view.frame, frame);
     if (exposure_) exposure_->record(commands, exposed(view), view.photo, view.size());
-}
-
-void TrainingStep::record_before_loss(Commands& commands, const StepInput& input) {
-    if (input.gradients && input.gradients->scores()) commands.fill(input.gradients->scores(), 0);
-    if (input.strategy && input.measures)
-        input.strategy->record_before_loss(step_frame(commands, input));
 }
 
 void TrainingStep::record_loss(Commands& commands, const StepInput& input, const Buffer& loss) {
@@ -219,10 +200,7 @@ void TrainingStep::record_update(Commands& commands, std::span<const StepInput> 
     if (exposure_)
         for (const StepInput& input : views)
             exposure_->record_step(commands, status, exposure_step(input), input.place);
-    if (!last.strategy) return;
-    if (sum.scores())
-        last.strategy->record_scores(commands, sum.scores(), status, splats_->count());
-    last.strategy->record_after_update(step_frame(commands, last));
+    if (last.strategy) last.strategy->record_after_update(step_frame(commands, last));
 }
 
 // A frame that did not fit is drawn again before anybody sees it: the step behind it then fits.

@@ -47,7 +47,6 @@ struct StepInput {
     float exposure_rate = 0;
     int exposure_visits = 1;              // of this photo, this step counted
     DensityStrategy* strategy = nullptr;  // that records into the step
-    bool measures = true;                 // false: not before the loss, for its rounds
     // Of a batch: where the view's gradients go, in place of a step, and which of it the view is.
     GradientBuffers* gradients = nullptr;
     int place = 0;
@@ -130,7 +129,6 @@ class TrainingStep {
     ExposedPicture exposed(const TrainingView& view);
     StepInput with_photo(Commands& commands, const StepInput& input);
     void record_picture(Commands& commands, const StepInput& input);
-    void record_before_loss(Commands& commands, const StepInput& input);
     void record_loss(Commands& commands, const StepInput& input, const Buffer& loss);
     void record_back(Commands& commands, const StepInput& input);
     void record_update(Commands& commands, std::span<const StepInput> views,

@@ -26,20 +26,11 @@ struct StrategyDefaults {
     // 80,811 splats on fox at 200 px after 2,000 iterations, and 27.47 rather than 26.75 dB on
     // held-out views.
     float prune_opacity = 0.1f;
-    float opacity_decay = 0;
-    int sh_rest_every = 1;
     // Density control ends after this part of the run, and at this iteration at the latest.
     int rounds_part = 1, rounds_of = 2, rounds_latest = 15'000;
     // The share of a run that ends with a mean, over which the position's rate falls.
     double position_lr_falls = 0.35;
     bool regularises_all = false;  // at each iteration also what its frame does not show
-};
-
-/// What the device memory of a strategy depends on.
-struct StrategySize {
-    std::uint64_t splats = 0, pixels = 0;  // pixels: of the largest picture
-    std::uint32_t list_segments = 1;
-    int kernel = 0;
 };
 
 /// What a forecast of the splats at the end goes by.
@@ -112,10 +103,8 @@ struct StrategyRow {
     std::uint64_t (*forecast_until)(const Schedule& schedule, int iteration, double start,
                                     std::uint32_t end) = end_at_once;
 
-    bool scores_views = false;  // DensityStrategy::record_scores
-
-    /// Between rounds.
-    std::uint64_t (*device_bytes)(const StrategySize& size);
+    /// Device memory between rounds.
+    std::uint64_t (*device_bytes)(int kernel);
     std::unique_ptr<DensityStrategy> (*make)(const StrategySetup& setup);
 };
 

@@ -77,9 +77,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
       order_(photos_.views(), options.seed),
       optimizer_(options, schedule_, extent_, scene_reach(dataset), photos_.count()),
       density_(device, options.kernel, options.footprint),
-      strategy_(strategy_row(options.strategy)
-                    .make({device, options_, schedule_, loss_options(options, dataset), extent_,
-                           splats_.count()})),
+      strategy_(strategy_row(options.strategy).make({device, options_, schedule_, extent_})),
       average_(device),
       probe_(options, schedule_),
       step_(device, splats_, photos_, loss_options(options, dataset), options) {
@@ -91,8 +89,7 @@ Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<Image
         smoothing_.emplace(device, forward_options(options).effects, photos_.training_cameras());
     if (options_.morton_order) morton_.emplace(device);
     if (options_.refine_cameras) cameras_.emplace(dataset, options_);
-    if (steps_by_views(options_))
-        tree_.emplace(device, options_.batch, strategy_row(options.strategy).scores_views);
+    if (steps_by_views(options_)) tree_.emplace(device, options_.batch);
     set_resolution(1);
     update_smoothing();
     step_.reserve(photos_.largest_width(), photos_.largest_height());
@@ -305,7 +302,6 @@ void Trainer::probe_degree() {
                 const float clearance = input.adam.clearance;
                 input.adam = optimizer_.trial_step(iteration, share);
                 input.adam.clearance = clearance;
-                input.measures = false;
                 step_.run(input);
             },
         .photo_psnr =
@@ -383,7 +379,6 @@ Trainer::State Trainer::state() {
     if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
     if (step_.exposure()) s.exposure = step_.exposure()->state();
     if (cameras_) s.cameras = cameras_->state();
-    s.error_shares = strategy_->state(splats_.count());
     for (int a = 0; a < kAttributeCount; ++a) s.moments.push_back(splats_.download_moments(a));
     s.rest_sum = splats_.download_rest_sum();
     s.gradient_sum = step_.gradient_sum_values();
@@ -419,7 +414,6 @@ void Trainer::restore(const State& s) {
     iteration_ = s.iteration;
     opened_ = s.iteration > 0 ? -1 : 0;
     totals_.counters = s.counters;
-    strategy_->restore(splats_.count(), s.error_shares);
     set_resolution(std::max(iteration_, 1));
 }
 

@@ -26,10 +26,9 @@ struct TrainCounters {
 struct TrainerState {
     int iteration = 0;
     int next_probe = 0;
-    std::vector<float> smoothing;     // [N], or empty where the effect is off
-    std::vector<float> exposure;      // Exposure::state(), or empty
-    std::vector<float> cameras;       // CameraRefinement::state(), or empty
-    std::vector<float> error_shares;  // DensityStrategy::state(); the name is of the first that had
+    std::vector<float> smoothing;  // [N], or empty where the effect is off
+    std::vector<float> exposure;   // Exposure::state(), or empty
+    std::vector<float> cameras;    // CameraRefinement::state(), or empty
     SplatModel model;
     std::vector<std::vector<float>> moments;
     std::vector<float> rest_sum;           // [N][stride of kShRest]; empty where there is none

@@ -55,13 +55,6 @@ void Backward::reserve(std::uint32_t splats, std::uint32_t intersections, std::u
     if (blend_.window_intersections() != window_intersections) project_.clear();
 }
 
-void Backward::record_shares(Commands& commands, const FrameView& view, const Frame& frame,
-                             const Buffer& image) {
-    FrameView black = view;
-    black.background = glm::vec3(0);
-    blend_.record(commands, black, frame, image);
-}
-
 void Backward::record_project(Commands& commands, const FrameView& view, const Frame& frame,
                               const GpuSplats& splats, Pipeline& pipeline,
                               const gpu::ProjectBackwardArgs& args, const ProjectBuffers& extra) {

@@ -43,14 +43,6 @@ class Backward {
                           const GpuSplats& splats, const Buffer& d_image,
                           const GradientTarget& target);
 
-    /// The backward blend alone: the intersections' sums of alpha T times the planes of `image`,
-    /// float [3][H][W], where record() leaves those of dL/dcolour. Recorded between Forward::record
-    /// and record(); where lists take several dispatches it leaves another final transmittance.
-    void record_shares(Commands& commands, const FrameView& view, const Frame& frame,
-                       const Buffer& image);
-    /// Its partials, [K][8] of each intersection; the last three are those of the colour.
-    const BlendBackward& blend() const { return blend_; }
-
     /// [N][2]: sum of |dL/dmean| in NDC units and the number of frames that saw the splat.
     Buffer& gradient_sum() { return gradient_sum_; }
     void clear_gradient_sum(Commands& commands) { commands.fill(gradient_sum_, 0); }

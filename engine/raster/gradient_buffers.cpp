@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint64_t kViewBytes = 2 * sizeof(float);
 }
 
-GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats, bool scores)
+GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats)
     : device_(&device),
       count_(splats.count()),
       add_(device, "add_gradients", {{"THREADS", SPLAT_GROUP}}) {
@@ -25,7 +25,6 @@ GradientBuffers::GradientBuffers(Device& device, const GpuSplats& splats, bool s
             Buffer(device, std::string("gradients of ") + attribute_name(a), rows(a).bytes(count_));
     }
     views_ = Buffer(device, "views of gradients", count_ * kViewBytes);
-    if (scores) scores_ = Buffer(device, "scores of views", count_ * kViewBytes);
     Commands commands(device);
     commands.begin();
     record_clear(commands);
@@ -39,10 +38,9 @@ bool GradientBuffers::is_of(const GpuSplats& splats) const {
     return true;
 }
 
-std::uint64_t GradientBuffers::device_bytes(std::uint64_t count, int sh_degree, int kernel,
-                                            bool scores) {
+std::uint64_t GradientBuffers::device_bytes(std::uint64_t count, int sh_degree, int kernel) {
     return GpuSplats::parameter_bytes(count, sh_degree, kernel) +
-           (scores ? 2 : 1) * Buffer::charged_bytes(count * kViewBytes);
+           Buffer::charged_bytes(count * kViewBytes);
 }
 
 void GradientBuffers::bind(const SplatRange& range, std::vector<BufferRange>& to) const {
@@ -55,7 +53,6 @@ void GradientBuffers::record_clear(Commands& commands) const {
     for (const Buffer& buffer : gradients_)
         if (buffer.bytes() > 0) commands.fill(buffer, 0);
     commands.fill(views_, 0);
-    if (scores_) commands.fill(scores_, 0);
 }
 
 void GradientBuffers::record_add(Commands& commands, const GradientBuffers& other) {
@@ -79,7 +76,6 @@ void GradientBuffers::record_add(Commands& commands, const GradientBuffers& othe
     for (int a = 0; a < kAttributeCount; ++a)
         if (strides_[a] > 0) add(other.gradients_[a], gradients_[a], rows(a));
     add(other.views_, views_, {2, 0});
-    if (scores_ && other.scores_) add(other.scores_, scores_, {2, 0});
 }
 
 void GradientBuffers::upload(int attribute, const std::vector<float>& values) {

@@ -16,8 +16,8 @@ namespace darb {
 class GradientBuffers {
   public:
     GradientBuffers() = default;
-    /// For splats of this count and these attributes; all zero, of no view. scores: with scores().
-    GradientBuffers(Device& device, const GpuSplats& splats, bool scores = false);
+    /// For splats of this count and these attributes; all zero, of no view.
+    GradientBuffers(Device& device, const GpuSplats& splats);
     /// Whether these are for splats of such counts.
     bool is_of(const GpuSplats& splats) const;
 
@@ -35,10 +35,6 @@ class GradientBuffers {
     Buffer& views() { return views_; }
     const Buffer& views() const { return views_; }
 
-    /// [N][2]: what a strategy of density control sums up of views, as it has it; else empty.
-    Buffer& scores() { return scores_; }
-    const Buffer& scores() const { return scores_; }
-
     /// As GpuSplats::bind_parameters.
     void bind(const SplatRange& range, std::vector<BufferRange>& to) const;
 
@@ -53,15 +49,14 @@ class GradientBuffers {
     std::vector<float> download(int attribute) const;
 
     /// Device memory of so many splats.
-    static std::uint64_t device_bytes(std::uint64_t count, int sh_degree, int kernel,
-                                      bool scores = false);
+    static std::uint64_t device_bytes(std::uint64_t count, int sh_degree, int kernel);
 
   private:
     Device* device_ = nullptr;
     std::uint32_t count_ = 0;
     std::array<std::uint32_t, kAttributeCount> strides_{};
     std::array<Buffer, kAttributeCount> gradients_;
-    Buffer views_, scores_;
+    Buffer views_;
     Pipeline add_;
 };
 

@@ -99,11 +99,6 @@ float split_log_scale(float parent_log_scale) {
     return static_cast<float>(static_cast<double>(parent_log_scale) - std::log(kSplitShrink));
 }
 
-double decayed_opacity(float logit, double keep) {
-    const double opacity = keep * sigmoid(static_cast<double>(logit));
-    return std::log(opacity) - std::log1p(-opacity);
-}
-
 float reset_opacity(float logit) {
     const double limit = std::log(kResetOpacity / (1 - kResetOpacity));
     return static_cast<float>(std::min(static_cast<double>(logit), limit));

@@ -51,9 +51,6 @@ glm::dvec3 split_offset(const float* rotation, const float* log_scale, const glm
                         double radius);
 float split_log_scale(float parent_log_scale);
 
-/// The logit of opacity * keep.
-double decayed_opacity(float logit, double keep);
-
 /// The logit of min(opacity, kResetOpacity).
 float reset_opacity(float logit);
 

@@ -1,6 +1,6 @@
-// Adds what the views of a step show of each splat to the sums that density control reads; with SEEN the second is 1
-// of whatever any view showed, not their number. Place: after adam_update. Work: one thread a splat. Shared memory: none. Does nothing when a frame overflowed its
-// intersection buffers; a splat with a gradient that was not finite adds nothing.
+// Adds what the views of a step show of each splat to the sums that density control reads. Place: after adam_update.
+// Work: one thread a splat. Shared memory: none. Does nothing when a frame overflowed its intersection buffers; a splat
+// with a gradient that was not finite adds nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -10,7 +10,6 @@
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 0) const uint THREADS = 64;
-layout(constant_id = 1) const int SEEN = 0;
 
 #include "lib/linear_id.glsl"
 
@@ -22,6 +21,5 @@ layout(set = 0, binding = 2, scalar) readonly buffer Status { FrameStatus status
 void main() {
     const uint i = linear_id();
     if (i >= args.splat_count || status.overflow != 0u || views[i].y <= 0.0) return;
-    const vec2 sum = gradient_sum[i] + views[i];
-    gradient_sum[i] = SEEN == 1 ? vec2(sum.x, 1.0) : sum;
+    gradient_sum[i] += views[i];
 }

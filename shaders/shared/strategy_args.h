@@ -1,4 +1,4 @@
-// Arguments of the passes of the strategies mcmc and budget, and of the resolution ramp.
+// Arguments of the passes of the strategy mcmc, and of the resolution ramp.
 #ifndef DARB_STRATEGY_ARGS_H
 #define DARB_STRATEGY_ARGS_H
 
@@ -26,21 +26,6 @@ struct NoiseArgs {
     uint seed;           // differs at each iteration
     float rate;          // 1 / world unit: what the covariance times a normal vector is scaled by
     float dead_opacity;  // the noise is gated by sigmoid(-100 (opacity - dead_opacity))
-};
-
-struct DecayOpacityArgs {
-    uint splat_count;
-    float keep;  // what every opacity is multiplied by
-};
-
-struct ErrorImageArgs {
-    uint width, height;  // px
-    float background_r, background_g, background_b;
-};
-
-struct ErrorShareArgs {
-    uint splat_count;
-    float scale;  // 1 / (H W)
 };
 
 struct DownsampleArgs {

@@ -51,7 +51,6 @@ const std::map<std::string, std::string> kOtherValues{
     {"/prune_extent", "0.001"},
     {"/opacity_reset/0", "5"},
     {"/noise_lr", "1"},
-    {"/opacity_decay", "0.5"},
     {"/regularisers/0", "0.5"},
     {"/regularisers/1", "0.5"},
     {"/largest_scale", "0.01"},
@@ -105,7 +104,8 @@ TinyTraining run_for(const OptionRow& row) {
     o.clearance = 0.9f;
     o.exposure = key.starts_with("/effects/exposure_lr");
     o.depth = key == "/effects/depth_weight";
-    if (o.depth) add_measured_depths(tiny_truth({.width = 32, .height = 24}), t);
+    if (key.starts_with("/effects/depth"))
+        add_measured_depths(tiny_truth({.width = 32, .height = 24}), t);
     o.refine_cameras = key.starts_with("/effects/camera_");
     if (o.refine_cameras) add_tracks(t.dataset);
     const std::string strategies = row.strategies;
@@ -159,7 +159,8 @@ TEST(OptionEffect, another_value_of_each_option_trains_another_scene_long) {
         const bool special = key == "/resolution_ramp" || key == "/random_points";
         const std::string run = strategy_name(t.options.strategy).data() + std::string(" ") +
                                 (special ? key : "") + (t.options.exposure ? "exposure" : "") +
-                                (t.options.depth ? "depth" : "") +
+                                (t.dataset.views[0].depth.empty() ? "" : "depths") +
+                                (t.options.depth ? " compared" : "") +
                                 (t.options.refine_cameras ? "cameras" : "");
         if (!usual_of.contains(run)) usual_of[run] = trained(t);
         const std::optional<TrainerState>& usual = usual_of[run];

@@ -22,7 +22,8 @@ class EveryStrategy : public testing::TestWithParam<Strategy> {};
 
 // Photos of 210 px: the ramp of budget has a step, up to iteration 18.
 TEST_P(EveryStrategy, a_resumed_run_equals_one_that_never_stopped) {
-    const TinyTraining t = tiny_with(GetParam(), {.width = 210, .height = 60});
+    TinyTraining t = tiny_with(GetParam(), {.width = 210, .height = 60});
+    if (GetParam() == Strategy::budget) t.options.sh_rest_every = 16;
     Trainer whole = t.trainer();
     run_to(whole, 42);
     EXPECT_GT(whole.splat_count(), 60U) << "growth must take part";
@@ -105,8 +106,7 @@ TEST_P(EveryStrategy, held_out_picture_gets_closer_to_the_photo) {
     EXPECT_EQ(trainer.counters().bad_gradients, 0U);
 }
 
-// Frames that want more intersections than there is room for are done again, noise and scores with
-// them.
+// Frames that want more intersections than there is room for are done again, noise with them.
 TEST_P(EveryStrategy, frames_that_overflow_leave_no_trace) {
     TinyTraining t =
         tiny_with(GetParam(), {.width = 320, .height = 200, .splats = 24, .close_up = 3});
@@ -120,7 +120,6 @@ TEST_P(EveryStrategy, frames_that_overflow_leave_no_trace) {
     run_to(tight, 30);
     run_to(roomy, 30);
     EXPECT_TRUE(same_state(tight, roomy));
-    EXPECT_EQ(tight.state().error_shares, roomy.state().error_shares);
     EXPECT_GT(tight.counters().redone_iterations, 0U);
     EXPECT_EQ(roomy.counters().redone_iterations, 0U) << "the comparison must not overflow";
 }

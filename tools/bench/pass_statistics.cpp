@@ -56,7 +56,7 @@ void compile_training(Device& device) {
     TrainOptions options;
     const Schedule schedule(options);
     for (const Strategy strategy : all_strategies())
-        strategy_row(strategy).make({device, options, schedule, LossOptions{}, 1.0, kSplats});
+        strategy_row(strategy).make({device, options, schedule, 1.0});
     const DensityControl control(device, options.kernel);
     const MortonOrder order(device);
     const Exposure exposure(device, 2, kSide * kSide);

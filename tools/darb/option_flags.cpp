@@ -23,6 +23,8 @@ constexpr Removed kRemoved[] = {
     {"--final-lr-share", "is no option any more",
      "It follows from --average-from: rates stay in a run that ends with a mean, and fall in one "
      "that does not."},
+    {"--opacity-decay", "is no option any more",
+     "The strategy budget is adc, steered to a number: it resets opacities as adc does."},
 };
 
 }  // namespace

@@ -70,7 +70,7 @@ const StrategyRow& adc_row() {
         .forecast_end = end_by_photos,
         .forecast_mean = even_mean,
         .forecast_until = even_until,
-        .device_bytes = [](const StrategySize&) { return std::uint64_t{0}; },
+        .device_bytes = [](int) { return std::uint64_t{0}; },
         .make = [](const StrategySetup&) -> std::unique_ptr<DensityStrategy> {
             return std::make_unique<Adc>();
         }};

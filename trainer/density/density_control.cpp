@@ -71,7 +71,6 @@ DensityControl::DensityControl(Device& device, int kernel, Footprint footprint)
     split["QUANTILES"] = kQuantiles;
     split_ = Pipeline(device, "densify_split", split);
     reset_ = Pipeline(device, "reset_opacity", threads);
-    decay_ = Pipeline(device, "decay_opacity", threads);
     quantile_ = Buffer(device, "radius quantiles", fixed_bytes(kernel));
     quantile_.upload(radius_quantiles(kernel, footprint));
 }
@@ -187,17 +186,6 @@ void DensityControl::reset_opacity(GpuSplats& splats, float opacity) {
                        {splats.trained(splats.parameters(kOpacityLogit), 1),
                         splats.trained(splats.moments(kOpacityLogit), 2)},
                        g.x, g.y);
-    commands_.submit_and_wait();
-}
-
-void DensityControl::decay_opacity(GpuSplats& splats, float keep) {
-    const std::uint32_t n = splats.trained_count();
-    if (n == 0) return;
-    const Groups g = groups_for(n);
-    commands_.begin();
-    commands_.pass("decay opacity");
-    commands_.dispatch(decay_, gpu::DecayOpacityArgs{n, keep},
-                       {splats.trained(splats.parameters(kOpacityLogit), 1)}, g.x, g.y);
     commands_.submit_and_wait();
 }
 

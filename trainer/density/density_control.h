@@ -43,8 +43,6 @@ class DensityControl {
 
     /// Every opacity down to at most `opacity`, its moments to zero.
     void reset_opacity(GpuSplats& splats, float opacity);
-    /// Every opacity times `keep`, between 0 and 1.
-    void decay_opacity(GpuSplats& splats, float keep);
 
     /// Parameters and moments to a generation of `count`: sources holds, for each, the splat that
     /// it comes from and DENSIFY_*; what is not kept starts with moments of zero. The queue must be
@@ -60,7 +58,7 @@ class DensityControl {
 
     Device* device_;
     Commands commands_;
-    Pipeline decide_, sources_, gather_, gather_columns_, split_, reset_, decay_;
+    Pipeline decide_, sources_, gather_, gather_columns_, split_, reset_;
     Buffer quantile_;
 };
 

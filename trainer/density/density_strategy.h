@@ -4,9 +4,7 @@
 
 #include <cstdint>
 #include <memory>
-#include <vector>
 
-#include "engine/raster/loss.h"
 #include "trainer/density/density_control.h"
 #include "trainer/density/step_frame.h"
 #include "trainer/schedule.h"
@@ -24,27 +22,16 @@ struct DensityRound {
     std::uint32_t limit;  // no more splats than these, whatever it is that sets it
 };
 
-/// What a run makes of a row. The queue is idle in round(), state() and restore().
+/// What a run makes of a row. It keeps nothing from round to round. The queue is idle in round().
 class DensityStrategy {
   public:
     virtual ~DensityStrategy() = default;
 
-    /// Recorded between a picture and its loss. Not while a probe tries something out.
-    virtual void record_before_loss(const StepFrame&) {}
-    /// After a batch: what record_before_loss left in StepFrame::scores of its views, added up,
-    /// goes to the strategy's own sums. Of a strategy whose row scores views.
-    virtual void record_scores(Commands&, const Buffer& /*scores*/, const Buffer& /*status*/,
-                               std::uint32_t /*splats*/) {}
     /// Recorded after the optimizer's step. A frame that overflowed must change nothing.
     virtual void record_after_update(const StepFrame&) {}
 
     /// One round. Parameters, moments and the count of splats follow.
     virtual DensityResult round(const DensityRound& round) = 0;
-
-    /// What a checkpoint holds of it: some floats a splat, or nothing.
-    virtual std::vector<float> state(std::uint32_t /*splats*/) const { return {}; }
-    /// Begins anew for so many splats, with what state() gave, where that is not empty.
-    virtual void restore(std::uint32_t /*splats*/, const std::vector<float>& /*state*/) {}
 };
 
 /// What a strategy is made with.
@@ -52,9 +39,7 @@ struct StrategySetup {
     Device& device;
     const TrainOptions& options;
     const Schedule& schedule;
-    LossOptions photos;    // how the loss reads them
-    double extent;         // of the scene, world units
-    std::uint32_t splats;  // at the start
+    double extent;  // of the scene, world units
 };
 
 }  // namespace darb

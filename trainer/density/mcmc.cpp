@@ -43,8 +43,8 @@ class Mcmc : public DensityStrategy {
                             std::sqrt(static_cast<double>(schedule_.batch));
         const auto stream = 0x6E6F697Eull << 32 | static_cast<std::uint32_t>(f.iteration);
         Pcg32 random(options_.seed, stream);
-        relocation_.record_noise(f.commands, f.splats, f.frame.counters.status,
-                                 static_cast<float>(rate), schedule_.prune_opacity, random.next());
+        relocation_.record_noise(f.commands, f.splats, f.status, static_cast<float>(rate),
+                                 schedule_.prune_opacity, random.next());
     }
 
     DensityResult round(const DensityRound& r) override {
@@ -81,7 +81,7 @@ const StrategyRow& mcmc_row() {
         .settings = {"noise_lr"},
         .prunes_random_start = false,
         .target = grow_by_share,
-        .device_bytes = [](const StrategySize& of) { return Relocation::device_bytes(of.kernel); },
+        .device_bytes = [](int kernel) { return Relocation::device_bytes(kernel); },
         .make = [](const StrategySetup& setup) -> std::unique_ptr<DensityStrategy> {
             return std::make_unique<Mcmc>(setup);
         }};
