@@ -39,6 +39,7 @@ RUNS |= {
     "budget": ["--strategy", "budget", "--max-splats", "5000", "--iterations", "400"],
     "antialias": ["--effects", "+antialias", "--iterations", "200"],
     "exposure": ["--effects", "+exposure", "--iterations", "120"],
+    "exposure_grid": ["--exposure-grid", "--iterations", "120"],
     "colour": ["--effects", "+sh", "--sh-degree", "3", "--iterations", "1000", "-r", "50"],
     "probe": ["--sh-degree", "1", "--iterations", "500", "-r", "50"],
     "3dgs": ["--schedule", "3dgs", "--iterations", "700", "-r", "50"],

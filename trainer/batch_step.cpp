@@ -94,7 +94,7 @@ void share_exposures(TrainingStep& step, Ranks& ranks, const Part& part) {
         all.resize(before + bytes.size() / sizeof(float));
         if (!bytes.empty()) std::memcpy(all.data() + before, bytes.data(), bytes.size());
     }
-    const std::size_t each = Exposure::gradient_floats();
+    const std::size_t each = step.exposure()->gradient_floats();
     for (std::size_t place = 0; place * each < all.size(); ++place)
         step.exposure()->set_gradient(
             static_cast<int>(place),

@@ -307,7 +307,8 @@ std::string contradiction(const TrainerState& s, const TrainOptions& o, size_t p
                            o.sh_degree);
     if (m.antialias != o.antialias || (!s.smoothing.empty() && !o.antialias) ||
         (!s.exposure.empty() &&
-         (!o.exposure || s.exposure.size() != Exposure::state_size(photos))) ||
+         (!o.exposure || s.exposure.size() !=
+                             exposure_maps(o, static_cast<std::uint32_t>(photos)).state_size())) ||
         (!s.cameras.empty() && !o.refine_cameras) ||
         (!s.rest_sum.empty() && Schedule(o).rest_every <= 1))
         return "holds what the run's effects and strategy have no use for";

@@ -23,38 +23,61 @@ std::uint32_t groups_of(std::uint32_t pixels) {
 gpu::ExposureArgs args_of(const ExposedPicture& picture, std::uint32_t photo,
                           std::uint32_t pixels) {
     const glm::vec3& b = picture.background;
-    return {pixels, photo, groups_of(pixels), b.r, b.g, b.b};
+    return {pixels, photo, groups_of(pixels), b.r, b.g, b.b, picture.width};
 }
 
-constexpr std::uint64_t kGradientFloats = EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS;
-constexpr std::uint64_t kGradientBytes = kGradientFloats * sizeof(float);
-static_assert(kGradientBytes % 256 == 0);  // where a binding may begin
+// Adam's steps for vertices of a grid, of which each sees a few pixels.
+constexpr float kGridRate = 4;
+
+std::uint64_t gradient_floats_of(const ExposureMaps& maps) {
+    return maps.grid ? maps.terms() : EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS;
+}
+std::uint64_t gradient_bytes_of(const ExposureMaps& maps) {
+    return gradient_floats_of(maps) * sizeof(float);
+}
+static_assert(EXPOSURE_MAX_GROUPS * EXPOSURE_TERMS % 64 == 0);  // where a binding may begin
+static_assert(EXPOSURE_GRID_VERTICES * EXPOSURE_TERMS % 64 == 0);
 
 }  // namespace
 
-Exposure::Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels, int batch)
-    : photos_(photos),
-      map_(device, "exposure", {{"THREADS", SPLAT_GROUP}}),
-      backward_(device, "exposure_backward", {}, false),
-      update_(device, "exposure_update", {}, false) {
-    make_buffers(device, *this, buffers(photos, pixels, batch), "exposure");
+std::size_t ExposureMaps::terms() const {
+    return std::size_t{EXPOSURE_TERMS} * (grid ? EXPOSURE_GRID_VERTICES : 1);
+}
+
+ExposureMaps exposure_maps(const TrainOptions& options, std::uint32_t photos) {
+    return {photos, options.exposure_grid, options.batch};
+}
+
+Exposure::Exposure(Device& device, const ExposureMaps& maps, std::uint64_t pixels)
+    : of_(maps), update_(device, "exposure_update", {{"THREADS", SPLAT_GROUP}}) {
+    const SpecConstants threads{{"THREADS", SPLAT_GROUP}};
+    map_ = Pipeline(device, maps.grid ? "exposure_grid" : "exposure", threads);
+    gradient_ =
+        Pipeline(device, maps.grid ? "exposure_grid_gradient" : "exposure_backward", {}, false);
+    if (maps.grid) backward_ = Pipeline(device, "exposure_grid_backward", threads);
+    make_buffers(device, *this, buffers(maps, pixels), "exposure");
     std::vector<float> start;
-    for (std::uint32_t p = 0; p < photos; ++p)
+    for (std::size_t m = 0; m < maps.photos * maps.terms() / EXPOSURE_TERMS; ++m)
         start.insert(start.end(), kIdentityColours.begin(), kIdentityColours.end());
-    start.resize(state_size(photos));
+    start.resize(maps.state_size());
     restore(start);
 }
 
-BufferList<Exposure> Exposure::buffers(std::uint64_t photos, std::uint64_t pixels, int batch) {
-    return {{&Exposure::maps_, "exposure maps", photos * EXPOSURE_TERMS * 4},
-            {&Exposure::moments_, "exposure moments", photos * EXPOSURE_TERMS * 8},
+BufferList<Exposure> Exposure::buffers(const ExposureMaps& maps, std::uint64_t pixels) {
+    return {{&Exposure::maps_, "exposure maps", maps.photos * maps.terms() * 4},
+            {&Exposure::moments_, "exposure moments", maps.photos * maps.terms() * 8},
             {&Exposure::mapped_, "mapped image", pixels * 12},
             {&Exposure::partials_, "exposure partials",
-             kGradientBytes * static_cast<std::uint64_t>(batch)}};
+             gradient_bytes_of(maps) * static_cast<std::uint64_t>(maps.batch)}};
 }
 
-std::uint64_t Exposure::device_bytes(std::uint32_t photos, std::uint64_t pixels, int batch) {
-    return charged_bytes(buffers(photos, pixels, batch));
+std::uint64_t Exposure::device_bytes(const ExposureMaps& maps, std::uint64_t pixels) {
+    return charged_bytes(buffers(maps, pixels));
+}
+
+BufferRange Exposure::partials(int place) const {
+    const std::uint64_t bytes = gradient_bytes_of(of_);
+    return {partials_, bytes * static_cast<std::uint64_t>(place), bytes};
 }
 
 void Exposure::record(Commands& commands, const ExposedPicture& picture, std::uint32_t photo,
@@ -68,11 +91,15 @@ void Exposure::record(Commands& commands, const ExposedPicture& picture, std::ui
 void Exposure::record_backward(Commands& commands, const ExposedPicture& picture,
                                const Buffer& d_image, const ExposureStep& step, int place) {
     commands.pass("exposure");
-    const std::uint32_t groups = groups_of(step.pixels);
-    const BufferRange partials(partials_, kGradientBytes * static_cast<std::uint64_t>(place),
-                               kGradientBytes);
-    commands.dispatch(backward_, args_of(picture, step.photo, step.pixels),
-                      {maps_, picture.image, d_image, partials, picture.transmittance}, groups);
+    const gpu::ExposureArgs args = args_of(picture, step.photo, step.pixels);
+    const std::uint32_t groups = of_.grid ? EXPOSURE_GRID_X * EXPOSURE_GRID_Y : args.groups;
+    commands.dispatch(gradient_, args,
+                      {maps_, picture.image, d_image, partials(place), picture.transmittance},
+                      groups);
+    if (!of_.grid) return;
+    const Groups g = groups_for(step.pixels);
+    commands.dispatch(backward_, args, {maps_, picture.image, d_image, picture.transmittance}, g.x,
+                      g.y);
 }
 
 void Exposure::record_step(Commands& commands, const Buffer& status, const ExposureStep& step,
@@ -80,49 +107,58 @@ void Exposure::record_step(Commands& commands, const Buffer& status, const Expos
     commands.pass("exposure");
     const double correction1 = 1.0 - std::pow(0.9, step.visits),
                  correction2 = 1.0 - std::pow(0.999, step.visits);
-    const gpu::ExposureUpdateArgs args{step.photo, photos_, groups_of(step.pixels),
-                                       static_cast<float>(step.rate / correction1),
+    const auto terms = static_cast<std::uint32_t>(of_.terms());
+    const float rate = of_.grid ? kGridRate * step.rate : step.rate;
+    const gpu::ExposureUpdateArgs args{step.photo,
+                                       of_.photos,
+                                       of_.grid ? 1 : groups_of(step.pixels),
+                                       terms,
+                                       static_cast<float>(rate / correction1),
                                        static_cast<float>(1.0 / std::sqrt(correction2))};
-    const BufferRange partials(partials_, kGradientBytes * static_cast<std::uint64_t>(place),
-                               kGradientBytes);
-    commands.dispatch(update_, args, {partials, maps_, moments_, status}, 1);
+    const Groups g = groups_for(terms);
+    commands.dispatch(update_, args, {partials(place), maps_, moments_, status}, g.x, g.y);
 }
 
 std::vector<float> Exposure::gradient(int place) const {
-    return partials_.download<float>(kGradientFloats,
-                                     kGradientBytes * static_cast<std::uint64_t>(place));
+    return partials_.download<float>(gradient_floats(),
+                                     gradient_bytes_of(of_) * static_cast<std::uint64_t>(place));
 }
 
-std::size_t Exposure::gradient_floats() {
-    return kGradientFloats;
+std::size_t Exposure::gradient_floats() const {
+    return gradient_floats_of(of_);
 }
 
 void Exposure::set_gradient(int place, const std::vector<float>& values) {
-    DARB_CHECK(values.size() == kGradientFloats, "{} floats", values.size());
-    partials_.upload(values, kGradientBytes * static_cast<std::uint64_t>(place));
+    DARB_CHECK(values.size() == gradient_floats(), "{} floats", values.size());
+    partials_.upload(values, gradient_bytes_of(of_) * static_cast<std::uint64_t>(place));
 }
 
 std::vector<ColourMap> Exposure::maps() const {
-    const auto values = maps_.download<float>(std::size_t{photos_} * EXPOSURE_TERMS);
-    std::vector<ColourMap> maps(photos_);
+    const std::size_t each = of_.terms() / EXPOSURE_TERMS;
+    const auto values = maps_.download<float>(of_.photos * of_.terms());
+    std::vector<ColourMap> maps(of_.photos);
     for (std::size_t p = 0; p < maps.size(); ++p)
-        std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(p * EXPOSURE_TERMS),
-                    EXPOSURE_TERMS, maps[p].begin());
+        for (std::size_t k = 0; k < EXPOSURE_TERMS; ++k) {
+            double sum = 0;
+            for (std::size_t m = 0; m < each; ++m)
+                sum += double{values[(p * each + m) * EXPOSURE_TERMS + k]};
+            maps[p][k] = static_cast<float>(sum / static_cast<double>(each));
+        }
     return maps;
 }
 
 std::vector<float> Exposure::state() const {
-    auto values = maps_.download<float>(std::size_t{photos_} * EXPOSURE_TERMS);
-    const auto moments = moments_.download<float>(std::size_t{photos_} * EXPOSURE_TERMS * 2);
+    auto values = maps_.download<float>(of_.photos * of_.terms());
+    const auto moments = moments_.download<float>(of_.photos * of_.terms() * 2);
     values.insert(values.end(), moments.begin(), moments.end());
     return values;
 }
 
 void Exposure::restore(const std::vector<float>& state) {
-    if (state.size() != state_size(photos_))
-        throw Error("exposure", fmt::format("{} values for {} photos", state.size(), photos_),
+    if (state.size() != of_.state_size())
+        throw Error("exposure", fmt::format("{} values for {} photos", state.size(), of_.photos),
                     "Restore what state() gave for as many photos.");
-    const auto middle = state.begin() + std::ptrdiff_t{EXPOSURE_TERMS} * photos_;
+    const auto middle = state.begin() + static_cast<std::ptrdiff_t>(of_.photos * of_.terms());
     maps_.upload(std::vector<float>(state.begin(), middle));
     moments_.upload(std::vector<float>(middle, state.end()));
 }

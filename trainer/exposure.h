@@ -1,6 +1,7 @@
-// Per-photo exposure in training: an affine map of colours a photo between picture and loss,
-// trained by Adam beside the splats. Off in pictures for evaluation. The mean of all maps stays the
-// identity. It maps what the splats show and leaves the background as it is.
+// Per-photo exposure in training: an affine map of colours a photo, or a bilateral grid of them,
+// between picture and loss, trained by Adam beside the splats. Off in pictures for evaluation. The
+// mean of all maps stays the identity. It maps what the splats show and leaves the background as it
+// is.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -10,6 +11,7 @@
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 #include "trainer/exposure_fit.h"
+#include "trainer/options.h"
 
 namespace darb {
 
@@ -25,15 +27,29 @@ struct ExposedPicture {
     const Buffer& image;          // float [3][H W]
     const Buffer& transmittance;  // float [H W], what of the background is seen
     glm::vec3 background;
+    std::uint32_t width = 0;  // px, read for grids
 };
+
+/// What is trained for each photo.
+struct ExposureMaps {
+    std::uint32_t photos = 0;
+    bool grid = false;          // a grid of maps, EXPOSURE_GRID_*; false: one map
+    int batch = 1;              // views of a step
+    std::size_t terms() const;  // floats a photo
+    /// Of Exposure::state().
+    std::size_t state_size() const { return photos * terms() * 3; }
+};
+
+/// What these options train, of so many photos.
+ExposureMaps exposure_maps(const TrainOptions& options, std::uint32_t photos);
 
 class Exposure {
   public:
-    /// For `photos` photos of at most `pixels` pixels, all identities; steps of `batch` views.
-    Exposure(Device& device, std::uint32_t photos, std::uint64_t pixels, int batch = 1);
+    /// For photos of at most `pixels` pixels, all identities.
+    Exposure(Device& device, const ExposureMaps& maps, std::uint64_t pixels);
 
     /// Device memory of an Exposure made with these arguments.
-    static std::uint64_t device_bytes(std::uint32_t photos, std::uint64_t pixels, int batch = 1);
+    static std::uint64_t device_bytes(const ExposureMaps& maps, std::uint64_t pixels);
 
     /// image [3][H W] over picture.background -> mapped(), the picture as this photo shows it.
     void record(Commands& commands, const ExposedPicture& picture, std::uint32_t photo,
@@ -52,19 +68,22 @@ class Exposure {
     /// What record_backward left for this place, and as another process has it. The queue must be
     /// idle.
     std::vector<float> gradient(int place) const;
-    static std::size_t gradient_floats();
+    std::size_t gradient_floats() const;
     void set_gradient(int place, const std::vector<float>& values);
 
+    /// Of each photo; of a grid the mean of its maps.
     std::vector<ColourMap> maps() const;
-    /// maps and moments as one array, for checkpoints: [photos][12] maps, [photos][12][2] moments.
+    /// maps and moments as one array, for checkpoints: [photos][terms], [photos][terms][2].
     std::vector<float> state() const;
     void restore(const std::vector<float>& state);
-    static std::size_t state_size(std::size_t photos) { return photos * 36; }
 
   private:
-    static BufferList<Exposure> buffers(std::uint64_t photos, std::uint64_t pixels, int batch);
-    std::uint32_t photos_;
-    Pipeline map_, backward_, update_;
+    static BufferList<Exposure> buffers(const ExposureMaps& maps, std::uint64_t pixels);
+    BufferRange partials(int place) const;
+
+    ExposureMaps of_;
+    Pipeline map_, gradient_, backward_,
+        update_;  // backward_ of grids, of one map gradient_ is both
     Buffer maps_, moments_, mapped_, partials_;
 };
 

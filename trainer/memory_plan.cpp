@@ -75,7 +75,8 @@ std::uint64_t effect_bytes(const MemoryDemand& demand) {
         bytes = Buffer::charged_bytes(std::max<std::uint64_t>(demand.splats, 1) * 4) +
                 cameras_bytes(demand.smoothing_photos);
     if (demand.exposure_photos > 0)
-        bytes += Exposure::device_bytes(demand.exposure_photos, demand.image_pixels, demand.batch);
+        bytes += Exposure::device_bytes(
+            {demand.exposure_photos, demand.exposure_grid, demand.batch}, demand.image_pixels);
     return bytes;
 }
 
@@ -172,6 +173,7 @@ void add_photos(const std::vector<View>& views, const TrainOptions& options, Mem
         ++training;
     }
     demand.exposure_photos = options.exposure ? training : 0;
+    demand.exposure_grid = options.exposure_grid;
     demand.smoothing_photos = options.antialias ? training : 0;
     // With HugeSplatPath::always every frame is cut and shared from the first on.
     if (options.huge_splat_path == HugeSplatPath::always) {

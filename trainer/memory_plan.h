@@ -32,6 +32,7 @@ struct MemoryDemand {
     std::uint64_t photo_pixels = 0;      // of all training photos together
     std::uint64_t depth_pixels = 0;      // of those with measured depths that are compared
     std::uint32_t exposure_photos = 0;   // photos whose exposure is trained; 0: the effect is off
+    bool exposure_grid = false;          // each by a grid of maps
     std::uint32_t smoothing_photos = 0;  // photos that the 3D filter looks at; 0: no anti-aliasing
     Strategy strategy{};
     int batch = 1;

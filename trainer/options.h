@@ -40,6 +40,7 @@ struct TrainOptions {
     bool probe_sh = false;
     bool antialias = false;  // opacity compensation and the 3D smoothing filter of Mip-Splatting
     bool exposure = false;   // an affine map of colours per photo, trained beside the splats
+    bool exposure_grid = false;  // with exposure: a bilateral grid of maps per photo in its place
     float exposure_lr_init = 0.001f, exposure_lr_final = 0.0001f;
     // Rendered depths are compared with those that were measured: see depth_loss.h.
     bool depth = false;

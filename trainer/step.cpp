@@ -64,7 +64,7 @@ TrainingStep::TrainingStep(Device& device, GpuSplats& splats, TrainingPhotos& ph
                photos.largest_photo() * 4 * d_image_planes(forward_options(options))),
       flights_{Flight(device), Flight(device)} {
     if (options.exposure)
-        exposure_.emplace(device, photos.count(), photos.largest_photo(), options.batch);
+        exposure_.emplace(device, exposure_maps(options, photos.count()), photos.largest_photo());
     if (options.depth) depth_.emplace(device, loss.use_alpha, options.exposure);
     if (steps_by_views(options)) adam_.emplace(device);
     if (options.refine_cameras) cameras_.emplace(device);
@@ -132,7 +132,8 @@ StepFrame TrainingStep::step_frame(Commands& commands, const StepInput& input) {
 
 ExposedPicture TrainingStep::exposed(const TrainingView& view) {
     const FrameImages& images = buffers_.frame().images;
-    return {images.image, images.final_transmittance, view.frame.background};
+    return {images.image, images.final_transmittance, view.frame.background,
+            view.frame.camera.width};
 }
 
 void TrainingStep::record_picture(Commands& commands, const StepInput& input) {

@@ -8,6 +8,14 @@
 #define EXPOSURE_MAX_GROUPS 128  // of exposure_backward: partial sums that the update adds
 #define EXPOSURE_TERMS 12        // a 3 x 4 map of colours, row-major
 
+// A bilateral grid of maps: vertices across the picture, down, and by luminance.
+#define EXPOSURE_GRID_X 8
+#define EXPOSURE_GRID_Y 8
+#define EXPOSURE_GRID_L 4
+#define EXPOSURE_GRID_VERTICES 256
+#define EXPOSURE_GRID_THREADS 32        // of a group of exposure_grid_gradient
+#define EXPOSURE_GRID_SMOOTHNESS 0.001  // of the loss: half the squared differences of neighbours
+
 #ifdef __cplusplus
 namespace darb::gpu {
 #endif
@@ -17,12 +25,14 @@ struct ExposureArgs {
     uint view;    // whose map
     uint groups;  // of exposure_backward
     float background_r, background_g, background_b;
+    uint width;  // of the picture
 };
 
 struct ExposureUpdateArgs {
     uint view;
     uint views;   // that share the mean
-    uint groups;  // of exposure_backward
+    uint groups;  // partial sums of each term
+    uint terms;   // of a view: one map's, or those of a grid
     float rate;   // lr / (1 - beta1^t), t the visits of this view
     float inverse_sqrt_correction2;
 };
@@ -33,8 +43,9 @@ struct SmoothingArgs {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(ExposureArgs) == 24);
-static_assert(sizeof(ExposureUpdateArgs) == 20);
+static_assert(sizeof(ExposureArgs) == 28);
+static_assert(sizeof(ExposureUpdateArgs) == 24);
+static_assert(EXPOSURE_GRID_VERTICES == EXPOSURE_GRID_X * EXPOSURE_GRID_Y * EXPOSURE_GRID_L);
 }  // namespace darb::gpu
 #endif
 #endif

@@ -224,7 +224,7 @@ TEST(CallerMistakes, photos_and_states_that_do_not_fit_the_run) {
     photos[1] = ImageU8(7, 5, 4);
     EXPECT_NE(refusal(train).find("7x5x4"), std::string::npos);
 
-    Exposure exposure(shared_device(), 2, 64);
+    Exposure exposure(shared_device(), {2}, 64);
     EXPECT_NE(refusal([&] { exposure.restore({1, 2, 3}); }).find("3 values"), std::string::npos);
     EXPECT_NE(refusal([&] { bake_smoothing(whole.model, {}); }), "");
     EXPECT_NE(refusal([] { static_cast<void>(option_row("--no-such")); }).find("--no-such"),

@@ -47,6 +47,8 @@ TEST(Command, bad_usage_is_exit_code_2) {
                     {train + "--render-scale 1/2", "-r 2"},
                     {train + "--strategy no_such", "no such strategy"},
                     {train + "--strategy mcmc --densify_grad_threshold 1e-4", "--strategy mcmc"},
+                    {train + "--exposure-grid --effects none", "--effects none"},
+                    {train + "--exposure-grid --effects=-exposure", "--effects -exposure"},
                     {train + "--noise-lr 0.1", "goes with --strategy mcmc"},
                     {train + "--resolution-ramp maybe", "--resolution-ramp"},
                     {train + "--kernel beta --html", "convert --kernel gaussian"},

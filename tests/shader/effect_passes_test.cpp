@@ -24,7 +24,7 @@ std::vector<float> random_values(size_t count, std::uint64_t seed) {
 }
 
 std::vector<float> start_state() {
-    std::vector<float> start = random_values(Exposure::state_size(kPhotos), 7);
+    std::vector<float> start = random_values(ExposureMaps{kPhotos}.state_size(), 7);
     for (size_t i = kPhotos * 12; i < start.size(); ++i) start[i] = std::abs(start[i]) * 1e-3f;
     return start;
 }
@@ -46,7 +46,7 @@ ExposureRun run_exposure(const std::vector<float>& open, const std::vector<float
                          std::uint32_t overflow = 0) {
     Device& device = shared_device();
     const auto pixels = static_cast<std::uint32_t>(open.size());
-    Exposure exposure(device, kPhotos, pixels);
+    Exposure exposure(device, {kPhotos}, pixels);
     exposure.restore(start);
     Buffer colours(device, "image", image.size() * 4), d(device, "d_image", open.size() * 16),
         transmittance(device, "transmittance", open.size() * 4),

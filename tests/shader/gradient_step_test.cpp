@@ -180,7 +180,7 @@ struct ExposedStep {
           forward(shared_device(), options),
           backward(shared_device(), options),
           loss(shared_device(), camera.width, camera.height),
-          exposure(shared_device(), 1, pixels()),
+          exposure(shared_device(), {1}, pixels()),
           update(shared_device()),
           splats(shared_device(), scene.model, true),
           gradients(shared_device(), splats),

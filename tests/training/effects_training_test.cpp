@@ -150,6 +150,37 @@ TEST(ExposureTraining, finds_the_gains_of_the_photos) {
         EXPECT_NEAR(sums[k], kIdentityColours[k], 1e-5) << "the mean of the maps, " << k;
 }
 
+// The left of every photo is darker in one half of them, the right in the other.
+TEST(ExposureTraining, a_grid_finds_tones_that_one_map_does_not) {
+    ProbeCase t = training_of(0.0f);
+    t.options.probe_sh = false;
+    t.options.sh_degree = 0;
+    t.options.exposure = true;
+    t.options.exposure_lr_init = 0.01f;
+    t.options.exposure_lr_final = 0.001f;
+    for (size_t v = 0; v < t.photos.size(); ++v)
+        for (size_t i = 0; i < t.photos[v].data.size(); ++i) {
+            const double across = double(i / 4 % size_t(t.photos[v].width)) / t.photos[v].width;
+            if (i % 4 != 3)
+                t.photos[v].data[i] = static_cast<std::uint8_t>(
+                    (0.6 + 0.4 * (v % 2 == 0 ? across : 1 - across)) * t.photos[v].data[i]);
+        }
+    const auto loss = [&](bool grid) {
+        t.options.exposure_grid = grid;
+        Trainer trainer = t.trainer();
+        double sum = 0;
+        trainer.on_result = [&](const IterationResult& r) {
+            if (r.iteration > 360) sum += r.loss;
+        };
+        for (int i = 0; i < 400; ++i) trainer.step();
+        trainer.drain();
+        EXPECT_EQ(trainer.exposures().size(), t.photos.size());
+        return sum / 40;
+    };
+    const double one = loss(false), grid = loss(true);
+    EXPECT_LT(grid, 0.85 * one);
+}
+
 TEST(AntialiasTraining, writes_splats_that_look_as_they_were_trained) {
     ProbeCase t = training_of(0.0f);
     t.options.probe_sh = false;
@@ -170,7 +201,7 @@ TEST(AntialiasTraining, writes_splats_that_look_as_they_were_trained) {
 
 TEST(EffectsTraining, a_run_that_was_restored_goes_on_bit_by_bit_slow) {
     ProbeCase t = training_of(0.25f);
-    t.options.antialias = t.options.exposure = true;
+    t.options.antialias = t.options.exposure = t.options.exposure_grid = true;
     t.options.densify_until = 180;
     Trainer whole = t.trainer();
     for (int i = 0; i < 130; ++i) whole.step();

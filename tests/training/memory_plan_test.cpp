@@ -73,6 +73,9 @@ TEST(MemoryPlan, what_a_trainer_holds_is_met_to_the_byte) {
 TEST(MemoryPlan, exposure_and_antialiasing_are_met_to_the_byte) {
     compare_to_the_byte(options_of(0, true), 4'000);
     compare_to_the_byte(options_of(3, true), 8'000);
+    TrainOptions tones = options_of(0, true);
+    tones.exposure_grid = true;
+    compare_to_the_byte(tones, 4'000);
     MemoryDemand with, without;
     const Dataset dataset = small_scene();
     add_photos(dataset.views, options_of(0, true), with);

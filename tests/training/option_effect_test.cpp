@@ -102,7 +102,7 @@ TinyTraining run_for(const OptionRow& row) {
     o.densify_interval = 4;
     o.opacity_reset_interval = 7;
     o.clearance = 0.9f;
-    o.exposure = key.starts_with("/effects/exposure_lr");
+    o.exposure = key.starts_with("/effects/exposure_");
     o.depth = key == "/effects/depth_weight";
     if (key.starts_with("/effects/depth"))
         add_measured_depths(tiny_truth({.width = 32, .height = 24}), t);

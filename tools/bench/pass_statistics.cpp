@@ -59,7 +59,7 @@ void compile_training(Device& device) {
         strategy_row(strategy).make({device, options, schedule, 1.0});
     const DensityControl control(device, options.kernel);
     const MortonOrder order(device);
-    const Exposure exposure(device, 2, kSide * kSide);
+    const Exposure exposure(device, {2}, kSide * kSide), tones(device, {2, true}, kSide * kSide);
     const IterateAverage average(device);
     const ResolutionRamp ramp(device);
     ProjectionEffects effects;

@@ -78,6 +78,11 @@ bool asks_for_exposure(const std::string& text) {
     return choice.changed[EFFECT_EXPOSURE].value_or(choice.base == EffectChoice::Base::all);
 }
 
+bool refuses_exposure(const std::string& text) {
+    const EffectChoice choice = parse_effects(text);
+    return !choice.changed[EFFECT_EXPOSURE].value_or(choice.base != EffectChoice::Base::none);
+}
+
 bool asks_for_cameras(const std::string& text) {
     return parse_effects(text).changed[EFFECT_CAMERAS].value_or(false);  // `all` leaves it off
 }

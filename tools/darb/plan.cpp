@@ -43,11 +43,11 @@ int run_plan(PlanFlags flags) {
     refuse_to_overwrite_inputs({flags.json}, files_of(s.training ? s.dataset.views : s.views));
     EffectPlan plan = plan_of(s, flags, choice);
     std::optional<AntialiasProbe> probe;
-    std::optional<ShapeProbe> shape;
+    std::vector<Trial> trials;
     if (flags.probe) {
         probe = probe_subject(s, flags, plan);
         take_probe(*probe, plan);
-        shape = probe_subject_shape(s, flags, plan);
+        trials = try_on_subject(s, flags, plan);
     }
     const bool empty = !s.training && s.model.size() == 0;
     EffectPrices prices;
@@ -62,13 +62,13 @@ int run_plan(PlanFlags flags) {
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
     print_priced(out, plan, prices, s.training);
     if (probe) print_probe(out, *probe);
-    if (shape) print_probe(out, *shape);
+    for (const Trial& trial : trials) print_trial(out, trial);
     const char* kind = s.training ? "data set" : "scene";
     json result{{"path", name_in_json(flags.json, flags.what)},
                 {"kind", kind},
                 {"effects", priced_json(plan, prices)}};
     if (probe) result["probe"] = probe_json(*probe);
-    if (shape) result["shape_probe"] = probe_json(*shape);
+    for (const Trial& trial : trials) result["trials"].push_back(trial_json(trial));
     if (flags.compare && !empty) result["compared"] = compare_choices(s, flags);
     write_json(flags.json, result);
     tell_paths(flags.quiet, {flags.json});
@@ -102,7 +102,8 @@ void add_plan(CLI::App& app, Action& action) {
     auto* probe = command->add_flag(
         "--probe", flags->probe,
         "of a data set: decide on anti-aliasing by two short runs, measured at 1/2, 1, 2 and 4 "
-        "times the size of -r; and by two more whether a --kernel that learns shapes pays");
+        "times the size of -r; by two more each whether a --kernel that learns shapes pays, and "
+        "--exposure-grid where exposure is on");
     command->add_option("--probe-iterations", flags->probe_iterations, "of each of the runs")
         ->capture_default_str()
         ->check(CLI::Range(20, 1'000'000))

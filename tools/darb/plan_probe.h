@@ -7,7 +7,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "engine/plan/shape_probe.h"
+#include "engine/plan/trial.h"
 #include "trainer/options.h"
 
 namespace darb {
@@ -19,12 +19,16 @@ AntialiasProbe probe_antialias(const DeviceOptions& device, const Dataset& datas
                                const TrainOptions& options, const EffectPlan& plan);
 
 /// Of options.kernel, whose shape each splat learns, beside the Gaussian; both as the plan has it.
-ShapeProbe probe_shape(const DeviceOptions& device, const Dataset& dataset,
-                       const TrainOptions& options, const EffectPlan& plan);
+Trial try_shape(const DeviceOptions& device, const Dataset& dataset, const TrainOptions& options,
+                const EffectPlan& plan);
+/// Of --exposure-grid beside one map a photo, where the plan has exposure. Pictures are fitted to
+/// the held-out photos' exposure before they are measured.
+Trial try_exposure_grid(const DeviceOptions& device, const Dataset& dataset,
+                        const TrainOptions& options, const EffectPlan& plan);
 
 void print_probe(std::FILE* out, const AntialiasProbe& probe);
-void print_probe(std::FILE* out, const ShapeProbe& probe);
-nlohmann::json probe_json(const ShapeProbe& probe);
+void print_trial(std::FILE* out, const Trial& trial);
+nlohmann::json trial_json(const Trial& trial);
 nlohmann::json probe_json(const AntialiasProbe& probe);
 
 }  // namespace darb

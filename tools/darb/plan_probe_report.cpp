@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/say.h"
-#include "engine/kernels/kernel_family.h"
 #include "tools/darb/plan_probe.h"
 #include "tools/paper/compare_stats.h"
 
@@ -48,22 +47,22 @@ nlohmann::json probe_json(const AntialiasProbe& probe) {
             {"with", arm_json(probe.with)}};
 }
 
-void print_probe(std::FILE* out, const ShapeProbe& probe) {
-    tell(out, "\n{}, a probe of {} iterations beside {}: {}\n", kernel_name(probe.kernel),
-         probe.iterations, kernel_name(probe.fixed_kernel), probe.advice());
+void print_trial(std::FILE* out, const Trial& trial) {
+    tell(out, "\n{}, a probe of {} iterations beside {}: {}\n", trial.tried, trial.iterations,
+         trial.usual, trial.advice());
 }
 
-nlohmann::json probe_json(const ShapeProbe& probe) {
-    return {{"iterations", probe.iterations},
-            {"kernel", kernel_name(probe.kernel)},
-            {"beside", kernel_name(probe.fixed_kernel)},
-            {"psnr_db", probe.learned_db},
-            {"beside_psnr_db", probe.fixed_db},
-            {"gain_db", probe.gain_db()},
-            {"price", probe.price},
-            {"pays", probe.pays()},
-            {"learned", arm_json(probe.learned)},
-            {"fixed", arm_json(probe.fixed)}};
+nlohmann::json trial_json(const Trial& trial) {
+    return {{"tried", trial.tried},
+            {"beside", trial.usual},
+            {"iterations", trial.iterations},
+            {"psnr_db", trial.tried_db},
+            {"beside_psnr_db", trial.usual_db},
+            {"gain_db", trial.gain_db()},
+            {"price", trial.price},
+            {"pays", trial.pays()},
+            {"tried_run", arm_json(trial.tried_run)},
+            {"beside_run", arm_json(trial.usual_run)}};
 }
 
 }  // namespace darb

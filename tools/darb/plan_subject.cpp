@@ -108,11 +108,17 @@ AntialiasProbe probe_subject(const PlanSubject& s, const PlanFlags& flags, const
                            probed_options(flags), plan);
 }
 
-std::optional<ShapeProbe> probe_subject_shape(const PlanSubject& s, const PlanFlags& flags,
-                                              const EffectPlan& plan) {
+std::vector<Trial> try_on_subject(const PlanSubject& s, const PlanFlags& flags,
+                                  const EffectPlan& plan) {
     const TrainOptions options = probed_options(flags);
-    if (!kernel_has_shape(options.kernel)) return std::nullopt;
-    return probe_shape(command_device(flags.device), probed_set(s, flags, plan), options, plan);
+    const bool shapes = kernel_has_shape(options.kernel), tones = plan.on(EFFECT_EXPOSURE);
+    std::vector<Trial> trials;
+    if (!shapes && !tones) return trials;
+    const DeviceOptions device = command_device(flags.device);
+    const Dataset dataset = probed_set(s, flags, plan);
+    if (shapes) trials.push_back(try_shape(device, dataset, options, plan));
+    if (tones) trials.push_back(try_exposure_grid(device, dataset, options, plan));
+    return trials;
 }
 
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan) {

@@ -42,9 +42,9 @@ EffectPlan plan_of(const PlanSubject& s, const PlanFlags& flags, const EffectCho
 std::vector<int> switchable_effects(const PlanSubject& s, const PlanFlags& flags);
 /// Of a data set, see plan_probe.h.
 AntialiasProbe probe_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan);
-/// Nothing where the kernel to train with has no shapes.
-std::optional<ShapeProbe> probe_subject_shape(const PlanSubject& s, const PlanFlags& flags,
-                                              const EffectPlan& plan);
+/// Of shapes where the kernel to train with has some, of grids where exposure is on.
+std::vector<Trial> try_on_subject(const PlanSubject& s, const PlanFlags& flags,
+                                  const EffectPlan& plan);
 /// On the device that the flags name; a scene without cameras is looked at from around it.
 Measured measure_subject(const PlanSubject& s, const PlanFlags& flags, const EffectPlan& plan);
 

@@ -102,7 +102,7 @@ void check_for_blocks(const TrainFlags& flags) {
     refuse(flags.allow_mixed, "--allow-mixed", "Leave it out: each block is trained on one rank.");
     refuse(flags.train.start == StartPoints::dense || flags.train.start == StartPoints::random,
            "--start dense or random", "Use --start auto or points.");
-    refuse(asks_for_exposure(flags.effects), "--effects with exposure",
+    refuse(asks_for_exposure(flags.effects) || flags.train.exposure_grid, "exposure",
            "Leave exposure out: each block would find other colours for the same photo.");
     refuse(flags.refine_cameras == "on" || asks_for_cameras(flags.effects), "--refine-cameras",
            "Leave it out: each block would find another pose for the same photo.");

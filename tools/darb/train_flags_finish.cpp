@@ -94,6 +94,9 @@ void finish_train_flags(TrainFlags& f) {
                     "there is no such kernel",
                     "Only raised_cosine and sinc have --pulses 2 or 3; others have one.");
     choose_effects(f.effects, EffectUse::training, f.data);
+    if (f.train.exposure_grid && refuses_exposure(f.effects))
+        throw Error("--exposure-grid", fmt::format("means nothing with --effects {}", f.effects),
+                    "Leave one of the two out.");
     finish_strategy(f);
     f.train.kernel = *row;
     f.train.accuracy = chosen_accuracy(f.accuracy, true);
