@@ -83,6 +83,11 @@ bool refuses_exposure(const std::string& text) {
     return !choice.changed[EFFECT_EXPOSURE].value_or(choice.base != EffectChoice::Base::none);
 }
 
+std::string with_exposure(const std::string& text) {
+    if (asks_for_exposure(text)) return text;
+    return text == "auto" ? "+exposure" : text + ",+exposure";
+}
+
 bool asks_for_cameras(const std::string& text) {
     return parse_effects(text).changed[EFFECT_CAMERAS].value_or(false);  // `all` leaves it off
 }

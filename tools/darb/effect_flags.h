@@ -24,6 +24,8 @@ EffectChoice choose_effects(const std::string& text, EffectUse use, DatasetOptio
 /// Whether --effects turns exposure on, or refined cameras.
 bool asks_for_exposure(const std::string& text);
 bool refuses_exposure(const std::string& text);
+/// The same changes, with exposure.
+std::string with_exposure(const std::string& text);
 bool asks_for_cameras(const std::string& text);
 
 /// A row an effect: name, on, overridden, measured, reason.

@@ -9,6 +9,7 @@
 #include "engine/kernels/shaped_kernel.h"
 #include "tools/cost/views.h"
 #include "tools/darb/device_options.h"
+#include "tools/darb/effect_flags.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 
@@ -111,7 +112,9 @@ AntialiasProbe probe_subject(const PlanSubject& s, const PlanFlags& flags, const
 std::vector<Trial> try_on_subject(const PlanSubject& s, const PlanFlags& flags,
                                   const EffectPlan& plan) {
     const TrainOptions options = probed_options(flags);
-    const bool shapes = kernel_has_shape(options.kernel), tones = plan.on(EFFECT_EXPOSURE);
+    TrainOptions planned = options;
+    apply_plan(plan, planned);
+    const bool shapes = kernel_has_shape(options.kernel), tones = planned.exposure;
     std::vector<Trial> trials;
     if (!shapes && !tones) return trials;
     const DeviceOptions device = command_device(flags.device);

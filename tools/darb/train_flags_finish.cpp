@@ -97,6 +97,7 @@ void finish_train_flags(TrainFlags& f) {
     if (f.train.exposure_grid && refuses_exposure(f.effects))
         throw Error("--exposure-grid", fmt::format("means nothing with --effects {}", f.effects),
                     "Leave one of the two out.");
+    if (f.train.exposure_grid) f.effects = with_exposure(f.effects);
     finish_strategy(f);
     f.train.kernel = *row;
     f.train.accuracy = chosen_accuracy(f.accuracy, true);

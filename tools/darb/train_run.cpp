@@ -21,7 +21,6 @@ namespace {
 EffectChoice training_choice(const TrainFlags& flags) {
     EffectChoice choice = parse_effects(flags.effects);
     if (flags.antialiasing) choice.changed[EFFECT_ANTIALIAS] = true;
-    if (flags.train.exposure_grid) choice.changed[EFFECT_EXPOSURE] = true;
     if (flags.refine_cameras != "auto")
         choice.changed[EFFECT_CAMERAS] = flags.refine_cameras == "on";
     return choice;
