@@ -151,7 +151,7 @@ TEST(ExposureTraining, finds_the_gains_of_the_photos) {
 }
 
 // The left of every photo is darker in one half of them, the right in the other.
-TEST(ExposureTraining, a_grid_finds_tones_that_one_map_does_not) {
+TEST(ExposureTraining, a_grid_finds_tones_that_one_map_does_not_long) {
     ProbeCase t = training_of(0.0f);
     t.options.probe_sh = false;
     t.options.sh_degree = 0;
