@@ -1,8 +1,8 @@
 // The gradient of exposure_grid.comp to a photo's grid of maps, with that of its smoothness. Place: between loss and
 // exposure_grid_backward.
 // Work: a group a vertex of the picture's plane, for all luminances: it walks over the pixels around, which are its
-// own alone, so that the sum is the same in every run. Shared memory: 12 floats a thread, reduced as a tree. Reads the
-// picture before the map, transmittance, maps, d_image; writes the gradient [vertices][12].
+// own alone, so that the sum is the same in every run. Shared memory: 48 floats a thread, which a thread a term
+// adds up. Reads the picture before the map, transmittance, maps, d_image; writes the gradient [vertices][12].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -21,7 +21,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer FinalT { float final_transm
 #include "effects/covered.glsl"
 #include "effects/exposure_grid.glsl"
 
-shared vec4 sums[EXPOSURE_GRID_THREADS][3];
+shared vec4 sums[EXPOSURE_GRID_THREADS][3 * EXPOSURE_GRID_L];  // rows of the maps
 
 // Of half the squared differences from the neighbours.
 float roughness(uvec3 at, uint term) {
@@ -62,18 +62,15 @@ void main() {
         }
     }
     for (uint l = 0u; l < EXPOSURE_GRID_L; ++l) {
-        sums[lane][0] = red[l];
-        sums[lane][1] = green[l];
-        sums[lane][2] = blue[l];
-        for (uint half_count = EXPOSURE_GRID_THREADS / 2u; half_count > 0u; half_count /= 2u) {
-            barrier();
-            if (lane < half_count)
-                for (uint r = 0u; r < 3u; ++r) sums[lane][r] += sums[lane + half_count][r];
-        }
-        barrier();
-        if (lane < EXPOSURE_TERMS)
-            d_maps[grid_rows(0u, uvec3(at, l)) * 4u + lane] =
-                sums[0][lane / 4u][lane % 4u] + roughness(uvec3(at, l), lane);
-        barrier();
+        sums[lane][3u * l] = red[l];
+        sums[lane][3u * l + 1u] = green[l];
+        sums[lane][3u * l + 2u] = blue[l];
+    }
+    barrier();
+    for (uint k = lane; k < EXPOSURE_GRID_L * EXPOSURE_TERMS; k += EXPOSURE_GRID_THREADS) {
+        const uint l = k / EXPOSURE_TERMS, term = k % EXPOSURE_TERMS;
+        float total = roughness(uvec3(at, l), term);
+        for (uint i = 0u; i < EXPOSURE_GRID_THREADS; ++i) total += sums[i][k / 4u][k % 4u];
+        d_maps[grid_rows(0u, uvec3(at, l)) * 4u + term] = total;
     }
 }
