@@ -31,6 +31,8 @@ run=(-r 50 --densify-from-iter 6 --densification-interval 6 --densify-until-iter
 train 1 "$folder/one" "${run[@]}" --iterations 30 --checkpoint-iterations 20
 train 2 "$folder/two" "${run[@]}" --iterations 30
 same 'two ranks leave what one leaves' "$folder/one" "$folder/two" 30
+for ranks in 1 2; do train "$ranks" "$folder/grid.$ranks" -r 50 --exposure-grid --iterations 12; done
+same 'two ranks train the grids of exposure that one trains' "$folder/grid.1" "$folder/grid.2" 12
 for ranks in 1 2; do
     mpirun -n "$ranks" "$darb" eval "$folder/one" "$data" -r 50 -q --json "$folder/eval.$ranks" >"$folder/eval.log" 2>&1
 done

@@ -192,6 +192,32 @@ TEST_F(RunFiles, without_points_splats_start_on_surfaces_where_photos_show_enoug
     EXPECT_FALSE(started("-r 8")) << "photos of 25 px";
     EXPECT_FALSE(started("-r 2 --random-points 2000"));
     EXPECT_FALSE(started("-r 2 --start random"));
+    // A fisheye lens stays in the pictures where it is asked for, and stereo does not compare such.
+    json cameras = json::parse(read_text_file(data() / "transforms_train.json"));
+    cameras.merge_patch(
+        {{"camera_model", "OPENCV_FISHEYE"}, {"k1", 0.01}, {"k2", 0}, {"k3", 0}, {"k4", 0}});
+    std::ofstream(data() / "transforms_train.json") << cameras.dump();
+    EXPECT_FALSE(started("-r 2 --lens original"));
+}
+
+// A run that began on surfaces and has no points to begin from again: it goes on with its splats.
+TEST_F(RunFiles, a_run_without_points_goes_on_without_looking_for_surfaces_again_long) {
+    forget_points();
+    const std::string options = fmt::format("train '{}' -o '{}' -r 4 --eval --iterations ",
+                                            data().string(), run().string());
+    const Outcome first = darb(options + "4 --checkpoint-iterations 2");
+    ASSERT_EQ(first.code, 0) << first.err;
+    const Bytes whole = read_file(run() / "point_cloud" / "iteration_4" / "point_cloud.ply");
+    fs::rename(run() / "chkpnt2.darb", run() / "checkpoint.darb");
+    fs::remove_all(run() / "point_cloud");
+    edit("metrics.json", [](json& m) {
+        m["iteration"] = 2;
+        m["interrupted"] = true;
+    });
+    const Outcome o = darb("train --resume -o " + run().string());
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ((o.out + o.err).find("stereo"), std::string::npos) << o.err;
+    EXPECT_EQ(read_file(run() / "point_cloud" / "iteration_4" / "point_cloud.ply"), whole);
 }
 
 TEST_F(RunFiles, a_dense_start_leaves_its_points_and_pictures_and_a_resumed_run_goes_on_long) {
