@@ -128,8 +128,8 @@ std::uint32_t wanted_splats(const Device& device, const Dataset& dataset,
                             std::uint32_t start) {
     const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
                                          GpuSplats::max_count(device, options.sh_degree, true));
-    return predict_splats(start, photos.photo_pixels, options, limit,
-                          starts_random(dataset, options));
+    return predict_splats(options, {start, photos.photo_pixels, dataset.detail, limit,
+                                    starts_random(dataset, options), dataset.start.size() > 0});
 }
 
 // Splats and intersections at the end: of the splats that are wanted no more than a budget of
@@ -279,10 +279,8 @@ void find_peak(const Device& device, const TrainOptions& options, const MemoryDe
 
 }  // namespace
 
-std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
-                             const TrainOptions& options, std::uint32_t limit, bool random_start) {
-    return strategy_row(options.strategy)
-        .forecast_end(options, {start, photo_pixels, limit, random_start});
+std::uint32_t predict_splats(const TrainOptions& options, const GrowthStart& start) {
+    return strategy_row(options.strategy).forecast_end(options, start);
 }
 
 std::uint64_t usable_bytes(const DeviceInfo& info) {
@@ -330,9 +328,9 @@ std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options
     std::uint64_t pixels = 0;
     for (const View& view : dataset.views)
         if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
-    return predict_splats(initial_count(dataset, usual), pixels, usual,
-                          options.max_splats.value_or(kAnyNumberOfSplats),
-                          starts_random(dataset, usual));
+    return predict_splats(
+        usual, {initial_count(dataset, usual), pixels, dataset.detail,
+                options.max_splats.value_or(kAnyNumberOfSplats), starts_random(dataset, usual)});
 }
 
 double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {

@@ -10,6 +10,7 @@
 #include "engine/scene/splat_model.h"
 #include "trainer/memory_plan.h"
 #include "trainer/options.h"
+#include "trainer/strategy.h"
 
 namespace darb {
 
@@ -30,12 +31,8 @@ struct Forecast {
     MemoryDemand peak;
 };
 
-/// Splats at the end, from those at the start and the pixels of all training photos: a rule of
-/// thumb, see the constants in the .cpp. limit: what the device and options.max_splats allow.
-/// random_start: without points; adc's first rounds take most of it, so fewer may be left.
-std::uint32_t predict_splats(std::uint32_t start, std::uint64_t photo_pixels,
-                             const TrainOptions& options, std::uint32_t limit,
-                             bool random_start = false);
+/// Splats at the end: by the strategy's rule of thumb.
+std::uint32_t predict_splats(const TrainOptions& options, const GrowthStart& start);
 
 /// Whether training photos wait on the host and stream: as Tuning::photos says, else where a run
 /// from so many splats has no room for them. A device with memory of its own has it where all that

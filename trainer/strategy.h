@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/data/dataset.h"
 #include "trainer/options.h"
 
 namespace darb {
@@ -37,8 +38,10 @@ struct StrategyDefaults {
 struct GrowthStart {
     std::uint32_t splats = 0;
     std::uint64_t photo_pixels = 0;  // of all training photos
-    std::uint32_t limit = 0;
-    bool random = false;  // without points
+    PhotoDetail detail{};            // of them, as Dataset::detail
+    std::uint32_t limit = 0;         // what the device and options.max_splats allow
+    bool random = false;             // adc's first rounds take most of these, so fewer may be left
+    bool dense = false;              // points on surfaces, found by comparing photos
 };
 
 /// What 3DGS does where the defaults depart from it (docs/experiments/README.md says why): constant

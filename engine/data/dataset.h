@@ -70,6 +70,13 @@ struct DatasetOptions {
     bool original_where_wide = false;  // true: so do those of too_wide_to_undistort
 };
 
+/// What photo_detail() finds.
+struct PhotoDetail {
+    double per_pixel = 0;  // mean of |4 g - its four neighbours|, g the grey value, 0 to 1
+    double opaque = 0;     // share of the pixels that are opaque, as are their four neighbours; 0:
+                           // nothing is known
+};
+
 struct Dataset {
     std::filesystem::path root;
     DatasetOptions options;          // that it was loaded with
@@ -79,6 +86,7 @@ struct Dataset {
     PointCloud start;                // what training starts from in place of points; may be empty
     bool has_alpha = false;          // some photo has an alpha channel, a mask or a frame with gaps
     double depth_scale = 1;          // of the views' depths: world units a metre
+    PhotoDetail detail;              // of its views, or none: not measured
     bool alpha_is_mask = false;      // some of it comes from masks or gaps: pixels to leave out
     std::vector<std::string> notes;  // what was skipped, scaled or dropped, a sentence each
 };
@@ -121,6 +129,10 @@ bool photos_reach(const std::vector<View>& views, double scale);
 /// reads the first, where all of them or one take more than that.
 std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads = 0,
                                  std::uint64_t memory = 0);
+
+/// How much of the photos' opaque part is detail: of eight training photos, evenly picked, or all
+/// of fewer, at the size of their views. Throws Error as load_photo.
+PhotoDetail photo_detail(const std::vector<View>& views);
 
 /// scene extent of 3DGS: 1.1 x the largest distance of a training camera from their mean centre.
 /// Where that says nothing, as one camera or several in one place stand there: the median distance

@@ -244,19 +244,20 @@ TEST(GrowthTarget, follows_its_rule_to_the_limit) {
 
 TEST(GrowthTarget, the_forecast_knows_it) {
     TrainOptions options;
+    const GrowthStart start{.splats = 4'000, .limit = 100'000};
     for (const Strategy strategy : {Strategy::mcmc, Strategy::budget}) {
         SCOPED_TRACE(std::string(strategy_name(strategy)));
         options.strategy = strategy;
-        EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 100'000U);
+        EXPECT_EQ(predict_splats(options, start), 100'000U);
         const double mean = mean_splats(4'000, 100'000, options);
         EXPECT_GT(mean, 50'000);
         EXPECT_LT(mean, 100'000);
     }
     options.speed_up_short_runs = false;
     options.iterations = 1'200;  // one round of budget, which at most doubles
-    EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 4'000U);
+    EXPECT_EQ(predict_splats(options, start), 4'000U);
     options.iterations = 1'300;
-    EXPECT_EQ(predict_splats(4'000, 0, options, 100'000), 8'000U);
+    EXPECT_EQ(predict_splats(options, start), 8'000U);
 }
 
 TEST(ResolutionRamp, a_divided_camera_sees_the_same) {

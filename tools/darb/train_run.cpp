@@ -118,8 +118,9 @@ void plan_start(Device& device, Dataset& dataset, TrainFlags& flags) {
     if (starts_from_stereo(dataset, flags)) find_start(device, dataset, flags);
 }
 
-void plan_strategy(const Dataset& dataset, TrainFlags& flags) {
+void plan_strategy(Dataset& dataset, TrainFlags& flags) {
     TrainOptions& t = flags.train;
+    if (dataset.detail.opaque == 0) dataset.detail = photo_detail(dataset.views);
     if (!strategy_row(t.strategy).grows_to_limit) return;
     const bool given = t.max_splats.has_value();
     if (!given) t.max_splats = default_budget(dataset, t);

@@ -22,7 +22,8 @@ bool starts_from_stereo(const Dataset& dataset, const TrainFlags& flags);
 /// points and there are none.
 void plan_start(Device& device, Dataset& dataset, TrainFlags& flags);
 
-/// Sets the count that mcmc and budget grow to where none was given; after plan_effects.
-void plan_strategy(const Dataset& dataset, TrainFlags& flags);
+/// Measures the photos' detail, which forecasts go by, and sets the count that mcmc and budget grow
+/// to where none was given; after plan_effects.
+void plan_strategy(Dataset& dataset, TrainFlags& flags);
 
 }  // namespace darb

@@ -9,12 +9,28 @@ namespace darb {
 
 namespace {
 
-// Rule of thumb for the growth, of nine runs on photos of 200 and 400 px: splats go up to about so
-// many times the root of the photos' pixels (photos of the same scene show each other's pixels), up
-// to so many for one point of the start, and not faster than so much a round.
+// Rules of thumb for the growth, of runs on photos of 100 to 400 px (docs/experiments/growth.md).
+// Splats go up by the detail of the photos' opaque pixels and, as photos of one scene show the
+// same, slowly by their number. Beyond the most pixels that were tried, and where the detail is not
+// known, it goes by the root of the pixels. A dense start grows by so much at least; splats go up
+// to so many for one of the start, and not faster than so much a round.
+constexpr double kSplatsByDetail = 8'600, kDetailPower = 0.7, kPixelPower = 0.25;
+constexpr double kMostPixelsTried = 5e6;
 constexpr double kSplatsPerRootPixel = 25;
+constexpr double kDenseGrowth = 1.3;
 constexpr double kMaxGrowth = 60;
 constexpr double kGrowthPerRound = 1.4;
+
+double splats_wanted(const GrowthStart& start) {
+    const auto pixels = static_cast<double>(start.photo_pixels);
+    const auto& [per_pixel, opaque] = start.detail;
+    if (opaque == 0) return kSplatsPerRootPixel * std::sqrt(pixels);
+    const double tried = std::min(pixels, kMostPixelsTried);
+    const double by_detail = kSplatsByDetail * std::pow(per_pixel * opaque, kDetailPower) *
+                             std::pow(tried * opaque, kPixelPower) *
+                             std::sqrt(pixels / std::max(tried, 1.0));
+    return start.dense ? std::max(by_detail, kDenseGrowth * start.splats) : by_detail;
+}
 
 class Adc : public DensityStrategy {
   public:
@@ -35,8 +51,7 @@ std::uint32_t end_by_photos(const TrainOptions& options, const GrowthStart& star
     const int rounds = std::max(0, last - first);
     const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
     const double most = std::min(growth * start.splats, static_cast<double>(start.limit));
-    const double wanted = kSplatsPerRootPixel * std::sqrt(static_cast<double>(start.photo_pixels));
-    const auto end = static_cast<std::uint32_t>(std::min(wanted, most));
+    const auto end = static_cast<std::uint32_t>(std::min(splats_wanted(start), most));
     return start.random && rounds > 0 ? end : std::max(start.splats, end);
 }
 

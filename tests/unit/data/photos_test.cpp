@@ -333,6 +333,37 @@ TEST(LoadPhotos, order_is_kept_and_errors_arrive) {
     EXPECT_NE(error_of([&] { load_photos(views); }).find("missing.png"), std::string::npos);
 }
 
+TEST(PhotoDetail, is_the_mean_difference_from_the_neighbours_in_training_photos) {
+    const auto folder = test_folder();
+    // Stripes a pixel wide; the same with a transparent left half; stripes that are held out; grey.
+    std::vector<View> views(4);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        ImageU8 image(12, 6, 4);
+        for (int y = 0; y < 6; ++y)
+            for (int x = 0; x < 12; ++x) {
+                const int grey = i == 3 ? 90 : x % 2 * 255;
+                for (int c = 0; c < 3; ++c) image.at(x, y, c) = static_cast<std::uint8_t>(grey);
+                image.at(x, y, 3) = i == 1 && x < 6 ? 0 : 255;
+            }
+        views[i].photo = folder / (std::to_string(i) + ".png");
+        views[i].lens = {"PINHOLE", {1, 1, 1, 1}, 12, 6};
+        views[i].camera = {.width = 12, .height = 6};
+        views[i].is_test = i == 2;
+        write_png(views[i].photo, image);
+    }
+    const auto expect = [&](const std::vector<View>& of, double per_pixel, double opaque) {
+        const PhotoDetail found = photo_detail(of);
+        EXPECT_NEAR(found.per_pixel, per_pixel, 1e-12);
+        EXPECT_NEAR(found.opaque, opaque, 1e-12);
+    };
+    expect({views[0]}, 2, 1);
+    expect({views[1]}, 2, 0.4);  // 4 of 10 columns
+    expect({views[3]}, 0, 1);
+    expect(views, 2 * (1 + 0.4) / 2.4, 2.4 / 3);
+    expect({}, 0, 0);
+    expect({views[2]}, 0, 0);
+}
+
 TEST(LoadPhotos, what_does_not_fit_into_memory_is_said_before_anything_is_read) {
     const auto folder = test_folder();
     std::vector<View> views(6);
