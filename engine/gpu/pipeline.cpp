@@ -24,6 +24,26 @@ std::span<const std::uint32_t> find_shader(std::string_view name) {
     return {};
 }
 
+// Read once a process.
+const ShaderInterface& interface_of(const std::string& shader) {
+    static std::mutex mutex;
+    static std::map<std::string, ShaderInterface> known;
+    const std::lock_guard lock(mutex);
+    const auto found = known.find(shader);
+    if (found != known.end()) return found->second;
+    return known.emplace(shader, reflect_spirv(find_shader(shader), shader)).first->second;
+}
+
+// Without what the shader does not declare, so that pipelines that are alike are one.
+PipelineKey declared(PipelineKey key) {
+    const auto& constants = interface_of(key.shader).constants;
+    std::erase_if(key.constants, [&](const auto& given) {
+        return std::none_of(constants.begin(), constants.end(),
+                            [&](const auto& constant) { return constant.name == given.first; });
+    });
+    return key;
+}
+
 std::uint32_t bits_of(const SpecValue& value, const ShaderInterface::Constant& constant,
                       std::string_view shader) {
     using Type = ShaderInterface::ScalarType;
@@ -180,7 +200,7 @@ Pipeline::Made::Made(Device& of, const PipelineKey& key) : shader(key.shader) {
     device = state.device;
     const std::string what = "shader " + shader;
     const std::span<const std::uint32_t> words = find_shader(shader);
-    const ShaderInterface interface = reflect_spirv(words, shader);
+    const ShaderInterface& interface = interface_of(shader);
     for (std::size_t i = 0; i < interface.bindings.size(); ++i) {
         const ShaderInterface::Binding& b = interface.bindings[i];
         DARB_CHECK(b.set == 0 && b.binding == i && b.storage_buffer,
@@ -240,7 +260,8 @@ Pipeline::Pipeline(Device& device, std::string_view shader, const SpecConstants&
                    bool require_full_subgroups, std::uint32_t subgroup_size)
     : Pipeline(device, {std::string(shader), constants, require_full_subgroups, subgroup_size}) {}
 
-Pipeline::Pipeline(Device& device, const PipelineKey& key) {
+Pipeline::Pipeline(Device& device, const PipelineKey& given) {
+    const PipelineKey key = declared(given);
     PipelineTable& table = device.state().pipelines;
     // A device that only compiles has a row of its table for each.
     if (!device.state().compile_only) made_ = table.find(key);

@@ -26,7 +26,8 @@ using SpecConstants = std::map<std::string, SpecValue, std::less<>>;
 /// for. For a shader that computes the same with any.
 inline constexpr std::uint32_t kAnySubgroupSize = ~0u;
 
-/// All that a pipeline is made of: equal keys are one pipeline of a device.
+/// All that a pipeline is made of: equal keys are one pipeline of a device. Constants that the
+/// shader does not declare make no difference.
 struct PipelineKey {
     std::string shader;
     SpecConstants constants;

@@ -138,8 +138,7 @@ uint project(uint i, out int reason) {
         if (is_nan(shape[i])) return 0u;
         exponent = shape_exponent(shape[i], by_shape);
     }
-    float reach = kernel_reach(opacity, exponent);
-    if (!(reach > 0.0) || is_nan(logit)) return 0u;
+    if (!(opacity >= ALPHA_CUTOFF) || is_nan(logit)) return 0u;
 
     reason = CULL_COVARIANCE;
     const vec3 raw_scale = log_scale[i];
@@ -160,13 +159,13 @@ uint project(uint i, out int reason) {
         reason = CULL_OPACITY;
         if (ANTIALIAS == 1) opacity *= compensation(r1, r2, f);
         if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);
-        reach = kernel_reach(opacity, exponent);
-        if (!(reach > 0.0) || is_nan(opacity)) return 0u;
+        if (!(opacity >= ALPHA_CUTOFF)) return 0u;
     }
 
     reason = CULL_OUTSIDE;
     vec2 mean;
     if (!pixel_of(camera, p, mean)) return 0u;
+    const float reach = kernel_reach(opacity, exponent);
     TileCover c;
     const uint count = find_cover(camera, mean, f, reach, c);
     if (count == 0u) return 0u;

@@ -21,15 +21,6 @@ layout(constant_id = 186) const float BLEND_C6 = 0.0;
 layout(constant_id = 187) const float BLEND_C7 = 0.0;
 layout(constant_id = 188) const float BLEND_C8 = 0.0;
 
-void first_value_slope(float q, out float w, out float slope) {
-    if (KERNEL_FORM == KERNEL_FORM_COMPACT)
-        compact_value_slope(q, w, slope);
-    else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN)
-        gaussian_value_slope(q, w, slope);
-    else
-        quadric_value_slope(q, w, slope);
-}
-
 #define KERNEL_DEGREE BLEND_DEGREE
 #define KERNEL_HALF_POWER BLEND_HALF_POWER
 #define KERNEL_SQUARED_VARIABLE BLEND_SQUARED_VARIABLE
@@ -87,14 +78,13 @@ void second_value_slope(float q, out float w, out float slope) {
 #undef quadric_integral
 #undef quadric_value_slope
 
-// Also dw/dm.
-void blend_value_slope(float q, float m, out float w, out float slope, out float by_exponent) {
-    float w1, slope1, w2, slope2;
-    first_value_slope(q, w1, slope1);
+// From w and slope of the first those of the blend, and dw/dm.
+void blend_value_slope(float q, float m, inout float w, inout float slope, out float by_exponent) {
+    float w2, slope2;
     second_value_slope(q, w2, slope2);
-    by_exponent = w2 - w1;
-    w = w1 + m * by_exponent;
-    slope = slope1 + m * (slope2 - slope1);
+    by_exponent = w2 - w;
+    w += m * by_exponent;
+    slope += m * (slope2 - slope);
 }
 
 // m of the shape's weight 1 / (1 + exp(-shape)): with exact that of the normalised line integrals.
@@ -113,19 +103,6 @@ float blend_farthest(float least) {
     const float gaussian = -2.0 * log(least);
     return max(KERNEL_FORM == KERNEL_FORM_GAUSSIAN ? gaussian : KERNEL_SUPPORT,
                BLEND_FORM == KERNEL_FORM_GAUSSIAN ? gaussian : BLEND_SUPPORT);
-}
-
-float blend_reach(float m, float least) {
-    float low = 0.0, high = blend_farthest(least) * 1.0001;
-    for (int step = 0; step < 24; ++step) {
-        const float middle = 0.5 * (low + high);
-        float w, slope, by_exponent;
-        blend_value_slope(middle, m, w, slope, by_exponent);
-        const bool inside = w >= least;
-        low = inside ? middle : low;
-        high = inside ? high : middle;
-    }
-    return high;
 }
 
 float blend_covariance_scale(float m) {

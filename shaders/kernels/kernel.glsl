@@ -41,21 +41,28 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 #include "kernels/quadric.glsl"
 #include "kernels/shaped.glsl"
 
+// Of a kernel without shapes, or of a blend. Apart, so that a shader has few copies of all kernels: drivers inline
+// each call, and some only afterwards fold the constants.
+void fixed_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
+    if (EVALUATION == EVALUATION_BUILTIN && BLENDED == 0 && builtin_exists())
+        builtin_value_slope(q, w, slope);
+    else if (KERNEL_FORM == KERNEL_FORM_COMPACT)
+        compact_value_slope(q, w, slope);
+    else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN)
+        gaussian_value_slope(q, w, slope);
+    else
+        quadric_value_slope(q, w, slope);
+    if (BLENDED == 1) blend_value_slope(q, exponent, w, slope, by_exponent);
+}
+
 // w and its derivative by q, for q >= 0; both 0 at and after the support's edge, w never negative. The slope is
 // the derivative of the w computed here. exponent: the splat's, of a kernel with shapes; by_exponent: dw by it.
 void kernel_value_slope(float q, float exponent, out float w, out float slope, out float by_exponent) {
     by_exponent = 0.0;
-    if (SHAPED) {
+    if (SHAPED && BLENDED == 0)
         shaped_value_slope(q, exponent, w, slope, by_exponent);
-    } else if (EVALUATION == EVALUATION_BUILTIN && builtin_exists()) {
-        builtin_value_slope(q, w, slope);
-    } else if (KERNEL_FORM == KERNEL_FORM_COMPACT) {
-        compact_value_slope(q, w, slope);
-    } else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
-        gaussian_value_slope(q, w, slope);
-    } else {
-        quadric_value_slope(q, w, slope);
-    }
+    else
+        fixed_value_slope(q, exponent, w, slope, by_exponent);
 }
 
 float kernel_value(float q, float exponent) {
@@ -64,17 +71,24 @@ float kernel_value(float q, float exponent) {
     return w;
 }
 
-// Where w falls for the last time through `least`, which is at most 1: outside the peak of that pulse.
+// Where w falls for the last time through `least`, which is at most 1: outside the peak of that pulse. Of RINGS.
 void last_flank(float least, out float low, out float high) {
+    float w, slope;
     low = KERNEL_C0;
     high = KERNEL_C1;
-    if (KERNEL_PULSES > 1 && kernel_value(KERNEL_C2, 0.0) >= least) {
-        low = KERNEL_C2;
-        high = KERNEL_C3;
+    if (KERNEL_PULSES > 1) {
+        builtin_value_slope(KERNEL_C2, w, slope);
+        if (w >= least) {
+            low = KERNEL_C2;
+            high = KERNEL_C3;
+        }
     }
-    if (KERNEL_PULSES > 2 && kernel_value(KERNEL_C4, 0.0) >= least) {
-        low = KERNEL_C4;
-        high = KERNEL_C5;
+    if (KERNEL_PULSES > 2) {
+        builtin_value_slope(KERNEL_C4, w, slope);
+        if (w >= least) {
+            low = KERNEL_C4;
+            high = KERNEL_C5;
+        }
     }
 }
 
@@ -85,18 +99,20 @@ float kernel_reach(float opacity, float exponent) {
     if (!(opacity >= ALPHA_CUTOFF)) return 0.0;
     const float least = ALPHA_CUTOFF * (1.0 - KERNEL_REACH_MARGIN) / opacity;
     float q;
-    if (SHAPED) {
+    if (SHAPED && BLENDED == 0) {
         q = shaped_reach(exponent, least);
-    } else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
+    } else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN && BLENDED == 0) {
         q = -2.0 * log(least);
-    } else if (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI) {
+    } else if (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI && BLENDED == 0) {
         q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
     } else {
-        float low = 0.0, high = KERNEL_SUPPORT;
+        float low = 0.0, high = BLENDED == 1 ? blend_farthest(least) * 1.0001 : KERNEL_SUPPORT;
         if (KERNEL_FORM == KERNEL_FORM_RINGS) last_flank(least, low, high);
         for (int step = 0; step < 24; ++step) {
             const float middle = 0.5 * (low + high);
-            const bool inside = kernel_value(middle, 0.0) >= least;
+            float w, slope, by_exponent;
+            fixed_value_slope(middle, exponent, w, slope, by_exponent);
+            const bool inside = w >= least;
             low = inside ? middle : low;
             high = inside ? high : middle;
         }

@@ -10,11 +10,9 @@ const bool SHAPED = BLENDED == 1 || KERNEL_FORM == KERNEL_FORM_BETA || KERNEL_FO
 #include "kernels/blend.glsl"
 #include "kernels/ges.glsl"
 
-// Also dw by the exponent, 0 on entry.
+// Of a kernel that is no blend. Also dw by the exponent, 0 on entry.
 void shaped_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
-    if (BLENDED == 1)
-        blend_value_slope(q, exponent, w, slope, by_exponent);
-    else if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL)
+    if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL)
         exponential_value_slope(q, exponent, w, slope, by_exponent);
     else if (KERNEL_FORM == KERNEL_FORM_GES)
         ges_value_slope(q, w, slope);
@@ -30,9 +28,8 @@ float shape_exponent(float shape, out float by_shape) {
     return beta_exponent(shape, by_shape);
 }
 
-// Where w is `least`, below 1.
+// Where w is `least`, below 1, of a kernel that is no blend.
 float shaped_reach(float exponent, float least) {
-    if (BLENDED == 1) return blend_reach(exponent, least);
     if (KERNEL_FORM == KERNEL_FORM_EXPONENTIAL) return exponential_reach(exponent, least);
     if (KERNEL_FORM == KERNEL_FORM_GES) return -2.0 * log(least);
     return beta_reach(exponent, least);

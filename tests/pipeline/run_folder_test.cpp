@@ -9,7 +9,9 @@
 #include <sstream>
 
 #include "engine/core/files.h"
+#include "engine/data/dataset.h"
 #include "tests/support/run_command.h"
+#include "trainer/forecast.h"
 
 namespace darb::test {
 namespace {
@@ -147,6 +149,26 @@ TEST_F(RunFolder, schedule_of_3dgs_is_what_is_trained_and_other_options_count) {
     const Outcome o = train("--iterations 1 --schedule 3dgs --strategy mcmc");
     EXPECT_EQ(o.code, 2);
     EXPECT_NE(o.err.find("--schedule 3dgs"), std::string::npos) << o.err;
+}
+
+// The number goes by the photos' detail, which the command measures; the device is lost soon after
+// it is written.
+TEST_F(RunFolder, mcmc_has_the_splats_that_the_detail_of_the_photos_asks_for) {
+    TrainOptions options;
+    options.iterations = 1'600;
+    DatasetOptions small;
+    small.resolution = 8;
+    Dataset dataset = load_dataset(kScene, small);
+    for (View& view : dataset.views) view.is_test = false;  // without --eval all are trained on
+    const std::uint32_t without = default_budget(dataset, options);
+    dataset.detail = photo_detail(dataset.views);
+    const std::uint32_t by_detail = default_budget(dataset, options);
+    ASSERT_GT(std::abs(double(without) - by_detail), 0.1 * by_detail);
+    ::setenv("DARB_FAULT", "lost:40", 1);
+    const Outcome o = train("--iterations 1600 -q --strategy mcmc");
+    ::unsetenv("DARB_FAULT");
+    EXPECT_EQ(o.code, 2) << o.err;
+    EXPECT_EQ(settings().at("max_splats"), by_detail);
 }
 
 TEST_F(RunFolder, schedule_of_3dgs_has_the_lengths_of_a_gaussian_for_every_kernel) {

@@ -96,6 +96,7 @@ int check_command(CheckFlags flags) {
                     "Add --scene, --cameras and --dump.");
     flags.checks.kernel = chosen_kernel(flags.kernel);
     DeviceOptions options = command_device(flags.device);
+    options.keep_pipelines = true;  // most checks walk with the same ones
     Device device(options);
     settle_tuning(device, flags.tune);
     const DeviceInfo& info = device.info();

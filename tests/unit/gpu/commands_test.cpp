@@ -117,6 +117,8 @@ TEST(Pipeline, equal_ones_of_a_device_are_one_while_it_lives) {
     {
         const Pipeline same(device, "scan_top", {{"THREADS", 64}}), other(device, "scan_top");
         EXPECT_EQ(same.handle(), first.handle());
+        EXPECT_EQ(Pipeline(device, "scan_top", {{"NOT_THERE", 1}, {"THREADS", 64}}).handle(),
+                  first.handle());
         EXPECT_NE(other.handle(), first.handle());
         EXPECT_EQ(live_pipelines(device).size(), 2U);
     }
