@@ -17,7 +17,7 @@ on_swiftshader=(env "VK_DRIVER_FILES=$folder/icd.json" "VK_ICD_FILENAMES=$folder
 "${on_swiftshader[@]}" check >"$folder/check" || { grep -B 3 FAIL "$folder/check" | head -60; exit 1; }
 tail -n 1 "$folder/check"
 
-train() { "$@" train assets/scene -q --no-report -r 100 --iterations 50 --eval -o "$folder/$name" >/dev/null; }
+train() { "$@" train assets/scene -q --no-report -r 50 --iterations 50 --eval -o "$folder/$name" >/dev/null; }
 name=own train "$darb"
 name=swiftshader train "${on_swiftshader[@]}"
 python3 - "$folder" <<'PYTHON'
