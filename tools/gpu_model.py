@@ -28,6 +28,7 @@ WAIT = 4.5                       # cycles
 LAUNCH_US, BARRIER_US = 1.5, 2.5
 REACHED_BYTES = 0.7              # of the memory's rate, by scattered accesses of 16 bytes and more
 TILE_PIXELS, TOUCHED = 256, 0.6  # share of a tile's blocks that a splat touches
+WALKED = 0.7                     # of these, before all of a block's pixels are opaque
 LONGEST = 4                      # the longest list over the mean one
 
 # Shader -> instructions of the inner loop for one splat and 64 pixels: (Ada, RDNA 3), read off the listings of Mesa's
@@ -52,10 +53,10 @@ def blend_time(shader, work, gpu):
     """(issue, longest tile) in ms."""
     _, cores, rate, lanes, clock, _ = gpu
     loop = LOOPS[shader][1 if lanes == 64 else 0]
-    pairs = work["intersections"] * TOUCHED * 4  # splat-blocks of 64 pixels
+    pairs = work["intersections"] * TOUCHED * WALKED * 4  # splat-blocks of 64 pixels
     issue = pairs * loop / (cores * rate * clock * 1e6)
     tiles = work["pixels"] / TILE_PIXELS
-    longest = work["intersections"] / tiles * TOUCHED * LONGEST
+    longest = work["intersections"] / tiles * TOUCHED * WALKED * LONGEST
     return issue, longest * SUBGROUP_SERIAL[shader] * loop * WAIT / (clock * 1e6)
 
 
