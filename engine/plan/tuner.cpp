@@ -19,7 +19,7 @@ namespace darb {
 namespace {
 
 constexpr double kGain = 0.97;              // less is not worth another way
-constexpr std::chrono::seconds kEnough{1};  // frames that take so long need not be repeated
+constexpr std::chrono::seconds kEnough{2};  // frames that take so long need not be repeated
 constexpr int kFormat = 4;
 
 // A frame of a CPU must not take long, one of a GPU must not be too short to tell ways apart.
