@@ -116,11 +116,8 @@ std::vector<TuningGroup> measured_groups(const DeviceInfo& info) {
 }
 
 // The least of the frames' times for each of several sets of passes.
-std::vector<double> measure(Device& device, const TuningNames& names,
+std::vector<double> measure(TuningFrame& frame, const Size& size,
                             const std::vector<TuningGroup>& groups) {
-    device.set_tuning(with_names(usual_tuning(device.info()), names));
-    TuningFrame frame(device);
-    const Size size = size_for(device.info());
     for (int i = 0; i < size.warm_up; ++i) frame.run({});
     std::vector<double> least(groups.size(), std::numeric_limits<double>::infinity());
     const auto start = std::chrono::steady_clock::now();
@@ -197,18 +194,19 @@ std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
 TuningRecord measure_tuning(Device& device) {
     const Tuning before = device.tuning();
     const std::vector<TuningGroup> groups = measured_groups(device.info());
-    const TuningNames usual_names = tuning_names(usual_tuning(device.info()));
-    device.set_tuning(with_names(usual_tuning(device.info()), usual_names));
-    const TuningFrame all_usual(device);  // while it lives others share its pipelines
+    const Size size = size_for(device.info());
+    const Tuning usual_ways = usual_tuning(device.info());
+    device.set_tuning(usual_ways);
+    TuningFrame usual_frame(device);  // while it lives the others share its pipelines
+    const std::vector<double> usual = measure(usual_frame, size, groups);
     TuningRecord record;
-    const std::vector<double> usual = measure(device, usual_names, groups);
     for (std::size_t g = 0; g < groups.size(); ++g) {
         record.times.push_back({groups[g].name, groups[g].choices.front(), usual[g]});
         for (std::size_t w = 1; w < groups[g].choices.size(); ++w) {
-            TuningNames names = usual_names;
-            names[groups[g].name] = groups[g].choices[w];
             try {
-                const double ms = measure(device, names, {groups[g]})[0];
+                device.set_tuning(with_names(usual_ways, {{groups[g].name, groups[g].choices[w]}}));
+                TuningFrame frame(device);
+                const double ms = measure(frame, size, {groups[g]})[0];
                 record.times.push_back({groups[g].name, groups[g].choices[w], ms});
             } catch (const Error&) {
             }

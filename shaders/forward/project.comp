@@ -155,17 +155,15 @@ uint project(uint i, out int reason) {
     if (!is_finite(f.determinant) || any_nan(raw_scale)) return 0u;
     if (!(f.determinant > DETERMINANT_MIN * unit_area * unit_area)) return 0u;
 
-    if (FILTERED) {
-        reason = CULL_OPACITY;
-        if (ANTIALIAS == 1) opacity *= compensation(r1, r2, f);
-        if (STORAGE == STORAGE_FLOAT16) opacity = round_half(opacity);
-        if (!(opacity >= ALPHA_CUTOFF)) return 0u;
-    }
+    reason = CULL_OPACITY;
+    if (ANTIALIAS == 1) opacity *= compensation(r1, r2, f);
+    if (STORAGE == STORAGE_FLOAT16 && FILTERED) opacity = round_half(opacity);
+    const float reach = kernel_reach(opacity, exponent);
+    if (!(reach > 0.0)) return 0u;
 
     reason = CULL_OUTSIDE;
     vec2 mean;
     if (!pixel_of(camera, p, mean)) return 0u;
-    const float reach = kernel_reach(opacity, exponent);
     TileCover c;
     const uint count = find_cover(camera, mean, f, reach, c);
     if (count == 0u) return 0u;

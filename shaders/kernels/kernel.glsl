@@ -41,7 +41,7 @@ layout(constant_id = 128) const float KERNEL_C8 = 0.0;
 #include "kernels/quadric.glsl"
 #include "kernels/shaped.glsl"
 
-// Of a kernel without shapes, or of a blend. Apart, so that a shader has few copies of all kernels: drivers inline
+// Of a fixed kernel, or of a blend of two. Apart, so that a shader has few copies of all kernels: drivers inline
 // each call, and some only afterwards fold the constants.
 void fixed_value_slope(float q, float exponent, out float w, out float slope, inout float by_exponent) {
     if (EVALUATION == EVALUATION_BUILTIN && BLENDED == 0 && builtin_exists())
@@ -92,6 +92,11 @@ void last_flank(float least, out float low, out float high) {
     }
 }
 
+bool has_closed_reach() {
+    return BLENDED == 0 && (SHAPED || KERNEL_FORM == KERNEL_FORM_GAUSSIAN ||
+                            (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI));
+}
+
 // The q beyond which opacity * w < ALPHA_CUTOFF, rounded outwards, at most R^2; 0 below the cut-off. Once per
 // splat: closed forms where there are, else halvings of [0, R^2], or of a pulse's outer flank, on the falling w that
 // is computed.
@@ -99,13 +104,7 @@ float kernel_reach(float opacity, float exponent) {
     if (!(opacity >= ALPHA_CUTOFF)) return 0.0;
     const float least = ALPHA_CUTOFF * (1.0 - KERNEL_REACH_MARGIN) / opacity;
     float q;
-    if (SHAPED && BLENDED == 0) {
-        q = shaped_reach(exponent, least);
-    } else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN && BLENDED == 0) {
-        q = -2.0 * log(least);
-    } else if (KERNEL_FORM == KERNEL_FORM_QUADRIC && FOOTPRINT == FOOTPRINT_PSI && BLENDED == 0) {
-        q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
-    } else {
+    if (!has_closed_reach()) {
         float low = 0.0, high = BLENDED == 1 ? blend_farthest(least) * 1.0001 : KERNEL_SUPPORT;
         if (KERNEL_FORM == KERNEL_FORM_RINGS) last_flank(least, low, high);
         for (int step = 0; step < 24; ++step) {
@@ -117,6 +116,12 @@ float kernel_reach(float opacity, float exponent) {
             high = inside ? high : middle;
         }
         q = high;
+    } else if (SHAPED) {
+        q = shaped_reach(exponent, least);
+    } else if (KERNEL_FORM == KERNEL_FORM_GAUSSIAN) {
+        q = -2.0 * log(least);
+    } else {
+        q = 1.0 / (KERNEL_HALF_POWER == 2 ? least : least * least) - 1.0;
     }
     return min(q * (1.0 + 1e-5), SHAPED ? shaped_support() : KERNEL_SUPPORT);
 }
