@@ -21,6 +21,10 @@ Row compare_row(const std::string& group, const std::string& name, std::span<con
     const reference::ComparisonStats stats = reference::comparison_stats(expected, got, allowed);
     row.detail = reference::comparison_failures(stats, allowed);
     row.pass = row.detail.empty();
+    if (!row.pass && row.count > 0)
+        row.detail +=
+            fmt::format("\n  the worst is value {}: {} expected, {} got", stats.worst_index,
+                        expected[stats.worst_index], got[stats.worst_index]);
     row.outside = stats.failures;
     row.band = reference::values_in_band(allowed, row.count);
     if (row.count == 0) return row;

@@ -58,6 +58,12 @@ struct Stage {
     }
 };
 
+// One of so many values of a colour, in turn. Not 0: there a colour is cut off, and rounding alone
+// decides whether it has a gradient.
+float shade(int i, int count) {
+    return static_cast<float>(i % count + 1) / static_cast<float>(count);
+}
+
 double logit(double opacity) {
     return std::log(opacity / (1 - opacity));
 }
@@ -121,8 +127,8 @@ void Cases::projection() {
     const double depths[] = {-1,   0,    plane / 2, std::nextafter(plane, 0.0f), plane,
                              0.21, 0.25, 0.3,       std::nextafter(plane, 1.0f), 2};
     for (int i = 0; i < 80; ++i)
-        near.add(4 + i * 7 % 88, 4 + i * 11 % 56, 2 + i % 3, 0.5,
-                 {float(i % 2), 0.5f, float(i % 5) / 4}, depths[i % 10]);
+        near.add(4 + i * 7 % 88, 4 + i * 11 % 56, 2 + i % 3, 0.5, {shade(i, 2), 0.5f, shade(i, 5)},
+                 depths[i % 10]);
     for (size_t a = 0; a < 3; ++a) near.scene.model.position[a] = 0;  // the camera's centre
     add("near_plane", "division by a depth of zero, fans", std::move(near.scene));
 
@@ -202,20 +208,20 @@ void Cases::parameters() {
 void Cases::blending() {
     Stage centres = stage();
     for (int i = 0; i < 12; ++i)
-        centres.add(4.5 + 3 * i, 8.5 + i % 4, 0.5 + 0.25 * i, 1, {0.9f, 0.5f, 0.1f * float(i)});
+        centres.add(4.5 + 3 * i, 8.5 + i % 4, 0.5 + 0.25 * i, 1, {0.9f, 0.5f, shade(i, 12)});
     add("mean_on_a_pixel_centre", "NaN in the raised cosine, transparent pixel in sinc",
         std::move(centres.scene));
 
     Stage opaque = stage();
     for (int i = 0; i < 2000; ++i)
         opaque.add(8 + i % 30, 8 + i % 16, 6, i % 2 ? 1e4 : logit(0.985),
-                   {float(i % 2), float(1 - i % 2), 0.5f}, 2 + 0.001 * i);
+                   {shade(i, 2), shade(i + 1, 2), 0.5f}, 2 + 0.001 * i);
     add("opaque_layers", "division by 1 - alpha, underflow of the transmittance",
         std::move(opaque.scene));
 
     Stage layers = stage(16, 16);
     for (int i = 0; i < 10'000; ++i)
-        layers.add(8, 8, 30, logit(3e-4), {float(i % 7) / 7, float(i % 3) / 3, 0.5f}, 2 + 1e-4 * i);
+        layers.add(8, 8, 30, logit(3e-4), {shade(i, 7), shade(i, 3), 0.5f}, 2 + 1e-4 * i);
     HardCase& thin =
         add("thin_layers", "prefix sums of the gradient 3 % wrong", std::move(layers.scene));
     thin.settings.alpha_cutoff = 1e-6f;
@@ -224,7 +230,7 @@ void Cases::blending() {
 
     Stage list = stage(16, 16);
     for (int i = 0; i < 20'000; ++i)
-        list.add(8, 8, 30, logit(1.5e-4), {float(i % 7) / 7, float(i % 3) / 3, 0.5f}, 2 + 1e-4 * i);
+        list.add(8, 8, 30, logit(1.5e-4), {shade(i, 7), shade(i, 3), 0.5f}, 2 + 1e-4 * i);
     HardCase& longest =
         add("long_list", "a driver ends long loops, the rest is missing", std::move(list.scene));
     longest.settings.alpha_cutoff = 1e-6f;
@@ -233,7 +239,7 @@ void Cases::blending() {
 
     Stage ties = stage();
     for (int i = 0; i < 200; ++i)
-        ties.add(6 + i * 7 % 36, 5 + i * 5 % 24, 3, 0.5, {float(i % 2), 0.5f, float(i % 3) / 2});
+        ties.add(6 + i * 7 % 36, 5 + i * 5 % 24, 3, 0.5, {shade(i, 2), 0.5f, shade(i, 3)});
     add("equal_depths", "image depends on the order in memory", std::move(ties.scene));
 
     Stage one = stage(700, 500);

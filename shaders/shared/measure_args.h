@@ -16,6 +16,10 @@ struct FmaArgs {
     float factor, term;
 };
 
+struct CopyArgs {
+    uint vectors;
+};
+
 #ifdef __cplusplus
 }  // namespace darb::gpu
 #endif

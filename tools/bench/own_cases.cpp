@@ -25,12 +25,14 @@ BenchResult measure_own_steps(Device& device, const SplatModel& model, Dataset d
     train.densify_until = 0;        // of the scene as it is
     train.probe_sh = false;
     train.sh_degree = model.sh_degree;
+    train.sh_interval = 1;  // all bands are in use after a few steps
     train.kernel = model.kernel;
     train.footprint = model.footprint;
     if (options.plan_training) options.plan_training(dataset, photos, train);
     train.sh_degree = model.sh_degree;
     train.probe_sh = false;
     Trainer trainer(device, dataset, photos, model, train);
+    for (int i = 0; i < model.sh_degree; ++i) trainer.step();
     const int steps = static_cast<int>(std::min(dataset.views.size(), kStepsASample));
     BenchResult result = measure_steps(trainer, steps, options.sampling);
     result.counts.rest_floats = model.rest_count();

@@ -1,6 +1,7 @@
 #include "tools/bench/scenes.h"
 
 #include <cmath>
+#include <numbers>
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
@@ -30,6 +31,24 @@ SplatModel random_scene(std::size_t splats, int sh_degree) {
         for (std::size_t a = 0; a < 4; ++a) model.rotation[4 * i + a] = normal(0, 1);
         model.opacity_logit[i] = normal(0, 1.5);
         for (std::size_t a = 0; a < rest; ++a) model.sh_rest[rest * i + a] = normal(0, 0.05);
+    }
+    return model;
+}
+
+SplatModel filled_scene(std::size_t splats) {
+    SplatModel model = random_scene(splats);
+    Pcg32 random(2, 100);
+    const double half = 0.99 * std::tan(0.125 * std::numbers::pi);  // of the picture, at distance 1
+    for (std::size_t i = 0; i < splats; ++i) {
+        const double distance = random.uniform(3, 5);
+        model.position[3 * i] = static_cast<float>(random.uniform(-half, half) * distance);
+        model.position[3 * i + 1] = static_cast<float>(random.uniform(-half, half) * distance);
+        model.position[3 * i + 2] = static_cast<float>(4 - distance);
+        model.opacity_logit[i] = static_cast<float>(-3.2 + 1.2 * random.normal());
+        for (std::size_t a = 0; a < 3; ++a) {
+            model.log_scale[3 * i + a] += std::log(1.75f);
+            model.sh_dc[3 * i + a] = static_cast<float>(random.normal());
+        }
     }
     return model;
 }

@@ -14,6 +14,10 @@ namespace darb {
 /// coefficients N(0, 0.05), the colour that of the position; the same at every call.
 SplatModel random_scene(std::size_t splats, int sh_degree = 3);
 
+/// Splats all over the picture of bench_camera({0, 0, 4}, true, 1000, 1000), between 3 and 5 from
+/// it, six tiles each; most of them faint, as in a trained scene. Of degree 3.
+SplatModel filled_scene(std::size_t splats);
+
 /// At centre, looking along -z with y up, where upright; else turned 180 degrees about z, as scenes
 /// with y down want it. Horizontal field of view of 45 degrees.
 Camera bench_camera(const glm::dvec3& centre, bool upright, int width, int height);

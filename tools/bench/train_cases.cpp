@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 
+#include "engine/core/rng.h"
 #include "tools/bench/cases.h"
+#include "tools/bench/scenes.h"
 #include "tools/bench/yardstick.h"
 #include "trainer/initial_model.h"
 #include "trainer/schedule.h"
@@ -15,6 +17,8 @@ namespace {
 
 constexpr int kScheduled = 7'000;  // iterations of the run that the steps are taken from
 constexpr int kYardstickViews = 2;
+constexpr int kFilledSide = 1'000;
+constexpr std::size_t kFilledSplats = 1'000'000;
 
 struct TrainCase {
     const char* dataset;
@@ -68,6 +72,34 @@ BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rat
     return result;
 }
 
+// What tools/gpu_model.py estimates. Rates so small that the scene stays as it is.
+BenchResult measure_filled(Device& device, const DeviceRates& rates, const BenchOptions& options) {
+    Dataset dataset;
+    std::vector<ImageU8> photos;
+    Pcg32 random(3, 100);
+    for (const double x : {-0.01, 0.01}) {
+        dataset.views.push_back(
+            bench_view(bench_camera({x, 0, 4}, true, kFilledSide, kFilledSide), ""));
+        photos.emplace_back(kFilledSide, kFilledSide, 4);
+        for (std::uint8_t& value : photos.back().data)
+            value = static_cast<std::uint8_t>(random.below(256));
+    }
+    TrainOptions train;
+    train.iterations = kScheduled;
+    train.resolution_ramp = train.probe_sh = train.alpha = false;
+    train.densify_until = 0;
+    train.sh_interval = 1;
+    train.position_lr_init = train.position_lr_final = 1e-9f;
+    train.scale_lr = train.rotation_lr = train.opacity_lr = train.sh_dc_lr = 1e-9f;
+    Trainer trainer(device, dataset, photos, filled_scene(kFilledSplats), train);
+    for (int i = 0; i < train.sh_degree; ++i) trainer.step();  // then all bands are in use
+    BenchResult result = measure_steps(trainer, 2, options.sampling);
+    result.counts.rest_floats = attribute_floats(kShRest, train.sh_degree);
+    result.counts.pixels = double(kFilledSide) * kFilledSide;
+    rate_passes(rates, result);
+    return result;
+}
+
 }  // namespace
 
 BenchResult measure_steps(Trainer& trainer, int steps_a_sample, const Sampling& sampling) {
@@ -114,6 +146,7 @@ std::vector<BenchCase> train_cases(bool full) {
                  return measure(device, one, rates, options);
              }});
     }
+    cases.push_back({"train/filled_1M/1000x1000", "", measure_filled});
     return cases;
 }
 

@@ -1,0 +1,42 @@
+// Two shaders that compute the same by the same formulas have the same bits where the driver rounds
+// every operation. Drivers of GPUs fuse a * b + c as they see fit, in each shader on its own, as
+// Vulkan lets them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "tests/support/shared_device.h"
+
+namespace darb::test {
+
+inline bool rounds_every_operation() {
+    return shared_device().info().type == "cpu";
+}
+
+/// Of the same bits on a device that rounds every operation, else within `share` of the largest of
+/// them.
+inline testing::AssertionResult same_but_for_fusing(std::span<const float> a,
+                                                    std::span<const float> b, double share) {
+    if (a.size() != b.size())
+        return testing::AssertionFailure() << a.size() << " and " << b.size() << " values";
+    double largest = 0, worst = 0;
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        largest = std::max(largest, std::abs(double{a[i]}));
+        const double error = a[i] == b[i] ? 0 : std::abs(double{a[i]} - double{b[i]});
+        if (error <= worst) continue;  // of a NaN it is neither
+        worst = error;
+        at = i;
+    }
+    if (std::equal(a.begin(), a.end(), b.begin())) return testing::AssertionSuccess();
+    if (!rounds_every_operation() && worst > 0 && worst <= share * largest)
+        return testing::AssertionSuccess();
+    return testing::AssertionFailure() << "value " << at << " is " << a[at] << " and " << b[at]
+                                       << ", the largest is " << largest;
+}
+
+}  // namespace darb::test
