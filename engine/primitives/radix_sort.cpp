@@ -20,6 +20,7 @@ constexpr std::uint32_t kRowBytes = RADIX_MAX_DIGITS * 4;  // counters of a subg
 // 1024 keys a thread make the 256 counters of its column cheap; 8 lanes are then 8192 keys a block.
 constexpr std::uint32_t kColumnItems = 1024;
 constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
+constexpr std::uint32_t kSumBytes = 64 * 4;  // of subgroups, at most
 
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,
                         bool iota) {
@@ -43,8 +44,10 @@ RadixSort::Shape RadixSort::choose_shape(const Device& device, SortScatter scatt
                                          std::uint32_t subgroup_size) {
     const std::uint32_t lanes = subgroup_size != 0 ? subgroup_size : device.info().subgroup_size;
     if (scatter == SortScatter::columns) return {lanes, kColumnItems, 1};
-    const std::uint32_t rows = std::bit_floor(device.info().shared_memory_bytes / kRowBytes);
-    const std::uint32_t threads = std::max(std::min(kBallotThreads, rows * lanes), lanes);
+    // Of a thread: its share of a subgroup's row, and its keys. Besides a row of the block.
+    const std::uint32_t bytes = kRowBytes / lanes + kBallotItems * 4;
+    const std::uint32_t room = device.info().shared_memory_bytes - kRowBytes - kSumBytes;
+    const std::uint32_t threads = std::clamp(std::bit_floor(room / bytes), lanes, kBallotThreads);
     return {threads, kBallotItems, threads / lanes};
 }
 

@@ -19,11 +19,11 @@ void add_pixel(inout Sums s, inout float transmittance, inout float behind, vec2
     kernel_value_slope(x * x + y * y, exponent, w, slope, by_exponent);
     const float raw = light.w * w;
     const bool counts = raw >= ALPHA_CUTOFF && reached;
-    const float alpha = counts ? min(raw, ALPHA_MAX) : 0.0;
+    const float alpha = mix(0.0, min(raw, ALPHA_MAX), counts);
     const float before = transmittance / (1.0 - alpha);
     float ahead = dot(light.rgb, d_colour) - behind;
     if (DEPTH_SUM == 1) ahead += z * d_z;
-    const float d_alpha = counts && raw < ALPHA_MAX ? before * ahead : 0.0;
+    const float d_alpha = mix(0.0, before * ahead, counts && raw < ALPHA_MAX);
     const float g = d_alpha * slope, gx = g * x, gdy = g * to_mean.y;
     s.gx += gx;
     s.gxx += gx * x;

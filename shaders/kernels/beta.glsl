@@ -14,7 +14,7 @@ float log2_of_rest(float t) {
     const float u = 1.0 - t;
     const int k = (floatBitsToInt(u) - 0x3F3504F3) >> 23;
     const float m = intBitsToFloat(floatBitsToInt(u) - (k << 23));
-    return float(k) + log2_series((k == 0 ? -t : m - 1.0) / (m + 1.0));
+    return float(k) + log2_series(mix(m - 1.0, -t, k == 0) / (m + 1.0));
 }
 
 // 2^y, y <= 0: as the Gaussian's.
@@ -34,8 +34,8 @@ void beta_value_slope(float q, float exponent, out float w, out float slope, out
     const float log_u = built_in ? log2(1.0 - safe) : log2_of_rest(safe);
     w = built_in ? exp2(exponent * log_u) : power_of_two(exponent * log_u);
     w = inside ? w : 0.0;
-    slope = inside ? -KERNEL_INVERSE_SUPPORT * exponent * w / u : 0.0;
-    by_exponent = inside ? 0.69314718 * w * log_u : 0.0;
+    slope = mix(0.0, -KERNEL_INVERSE_SUPPORT * exponent * w / u, inside);
+    by_exponent = mix(0.0, 0.69314718 * w * log_u, inside);
 }
 
 // The exponent of a splat's shape, and its derivative, 0 where it is held.

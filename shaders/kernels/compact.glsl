@@ -15,7 +15,7 @@ void compact_value_slope(float q, out float w, out float slope) {
         KERNEL_SQUARED_VARIABLE != 0 ? 2.0 * KERNEL_INVERSE_SUPPORT * t : KERNEL_INVERSE_SUPPORT;
     const float u = 1.0 - x;
     float lower = u > 0.0 ? 1.0 : 0.0;  // u^(a-1); u^0 for a = 0. The mask is needed for a <= 1 only
-    if (KERNEL_HALF_POWER == 1) lower = u > 0.0 ? inversesqrt(u) : 0.0;
+    if (KERNEL_HALF_POWER == 1) lower = mix(0.0, inversesqrt(u), u > 0.0);
     if (KERNEL_HALF_POWER > 2) lower = compact_power(u);
     float p, dp;
     kernel_polynomial(x, p, dp);

@@ -5,7 +5,7 @@ void quadric_integral(float q, out float w, out float slope) {
     const float scale = 1.0 / (1.0 + KERNEL_SUPPORT);
     const float v = (1.0 + q) * scale;
     const float r = 1.0 / sqrt(v), x = v * r;
-    const float u = q < KERNEL_SUPPORT ? (KERNEL_SUPPORT - q) * KERNEL_INVERSE_SUPPORT : 1.0;
+    const float u = mix(1.0, (KERNEL_SUPPORT - q) * KERNEL_INVERSE_SUPPORT, q < KERNEL_SUPPORT);
     const float dx = 0.5 * scale * r, dr = -dx * r * r;  // by q
     float p, dp;
     if (KERNEL_HALF_POWER == 2) {

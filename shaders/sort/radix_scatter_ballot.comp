@@ -1,17 +1,25 @@
 // Radix sort, step 3 of 3 of a pass, for GPUs: a subgroup ranks a row of keys by one ballot a digit
-// bit; rows of a subgroup are contiguous, so that all reads are. After Adinets and Merrill 2022.
-// One workgroup a block of THREADS * ITEMS keys. Shared memory: a KiB a subgroup.
+// bit; rows of a subgroup are contiguous, so that all reads are. The block's keys are brought in order in shared memory,
+// so that those of a digit are written side by side. After Adinets and Merrill 2022.
+// One workgroup a block of THREADS * ITEMS keys. Shared memory: the block's keys, and a KiB a subgroup and one more.
 // Reads offsets [RADIX_MAX_DIGITS][blocks], keys and values [n]; writes keys and values [n].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "shaders/shared/radix_args.h"
 #include "shaders/sort/radix_scatter.glsl"
 
 layout(constant_id = 3) const uint SUBGROUPS = 4;  // at least gl_NumSubgroups
 
+const uint RUN = RADIX_MAX_DIGITS / THREADS;  // digits of a thread, where it counts them
+
 shared uint counters[SUBGROUPS * RADIX_MAX_DIGITS];  // [subgroup][digit]
+shared uint digit_places[RADIX_MAX_DIGITS];          // where a digit's keys go, less where they are in the block
+shared uint subgroup_sums[SUBGROUPS];
+shared uint block_words[THREADS * ITEMS];            // in order
 
 // The lanes of the subgroup that hold the same digit; only lanes that are valid.
 uvec4 peers_of(uint digit, bool valid) {
@@ -24,20 +32,43 @@ uvec4 peers_of(uint digit, bool valid) {
     return peers;
 }
 
+// Counts become places in the block: digit by digit, and keys of earlier subgroups first.
+void place_digits() {
+    // Not by gl_LocalInvocationID: its order need not be that of the subgroups.
+    const uint first = RUN * (gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID);
+    uint total = 0;
+    for (uint d = first; d < first + RUN; ++d) {
+        digit_places[d] = total;
+        for (uint s = 0; s < gl_NumSubgroups; ++s) total += counters[s * RADIX_MAX_DIGITS + d];
+    }
+    const uint inclusive = subgroupInclusiveAdd(total);
+    if (gl_SubgroupInvocationID == gl_SubgroupSize - 1) subgroup_sums[gl_SubgroupID] = inclusive;
+    barrier();
+    uint before = inclusive - total;
+    for (uint s = 0; s < gl_SubgroupID; ++s) before += subgroup_sums[s];
+    for (uint d = first; d < first + RUN; ++d) {
+        uint place = digit_places[d] + before;
+        digit_places[d] = block_offset(d) - place;
+        for (uint s = 0; s < gl_NumSubgroups; ++s) {
+            const uint count = counters[s * RADIX_MAX_DIGITS + d];
+            counters[s * RADIX_MAX_DIGITS + d] = place;
+            place += count;
+        }
+    }
+}
+
 void main() {
-    const uint n = plan.count;
-    const uint row = gl_SubgroupID * RADIX_MAX_DIGITS;
-    const uint begin = gl_WorkGroupID.x * THREADS * ITEMS + gl_SubgroupID * gl_SubgroupSize * ITEMS +
-                       gl_SubgroupInvocationID;
-    for (uint i = gl_LocalInvocationID.x; i < SUBGROUPS * RADIX_MAX_DIGITS; i += THREADS)
-        counters[i] = 0;
+    const uint row = gl_SubgroupID * RADIX_MAX_DIGITS, thread = gl_LocalInvocationID.x;
+    const uint block = gl_WorkGroupID.x * THREADS * ITEMS, count = min(plan.count - block, THREADS * ITEMS);
+    const uint begin = gl_SubgroupID * gl_SubgroupSize * ITEMS + gl_SubgroupInvocationID;
+    for (uint i = thread; i < SUBGROUPS * RADIX_MAX_DIGITS; i += THREADS) counters[i] = 0;
     barrier();
 
     uint keys[ITEMS], ranks[ITEMS];
-    for (uint i = 0; i < ITEMS; ++i) {
-        const uint index = begin + i * gl_SubgroupSize;
-        const bool valid = index < n;
-        keys[i] = valid ? keys_in[index] : 0;
+    [[unroll]] for (uint i = 0; i < ITEMS; ++i) {
+        const uint at = begin + i * gl_SubgroupSize;
+        const bool valid = at < count;
+        keys[i] = valid ? keys_in[block + at] : 0;
         const uint digit = digit_of(keys[i]);
         const uvec4 peers = peers_of(digit, valid);
         const uint before = subgroupBallotExclusiveBitCount(peers);
@@ -49,21 +80,29 @@ void main() {
         subgroupBarrier();
     }
     barrier();
-    // Counts become places: keys of earlier subgroups go first.
-    for (uint d = gl_LocalInvocationID.x; d < args.digits; d += THREADS) {
-        uint place = block_offset(d);
-        for (uint s = 0; s < gl_NumSubgroups; ++s) {
-            const uint count = counters[s * RADIX_MAX_DIGITS + d];
-            counters[s * RADIX_MAX_DIGITS + d] = place;
-            place += count;
+    place_digits();
+    barrier();
+    [[unroll]] for (uint i = 0; i < ITEMS; ++i) {
+        ranks[i] += counters[row + digit_of(keys[i])];
+        if (begin + i * gl_SubgroupSize < count) block_words[ranks[i]] = keys[i];
+    }
+    barrier();
+    [[unroll]] for (uint i = 0; i < ITEMS; ++i) {
+        const uint at = thread + i * THREADS;
+        if (at < count) {
+            const uint key = block_words[at];
+            keys[i] = digit_places[digit_of(key)] + at;
+            keys_out[keys[i]] = key;
         }
     }
     barrier();
-    for (uint i = 0; i < ITEMS; ++i) {
-        const uint index = begin + i * gl_SubgroupSize;
-        if (index >= n) break;
-        const uint place = counters[row + digit_of(keys[i])] + ranks[i];
-        keys_out[place] = keys[i];
-        values_out[place] = value_of(index);
+    [[unroll]] for (uint i = 0; i < ITEMS; ++i) {
+        const uint at = begin + i * gl_SubgroupSize;
+        if (at < count) block_words[ranks[i]] = value_of(block + at);
+    }
+    barrier();
+    [[unroll]] for (uint i = 0; i < ITEMS; ++i) {
+        const uint at = thread + i * THREADS;
+        if (at < count) values_out[keys[i]] = block_words[at];
     }
 }
