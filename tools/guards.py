@@ -103,7 +103,7 @@ GUARDS = [
      "next >= MIN_TRANSMITTANCE;", "before >= 0.0;",
      "blend_test", "every_kernel/Blend.opaque_stack_stops_before_the_transmittance_limit/gaussian_psi"),
     ("opacity at 1, thousands of opaque layers", "alpha_limit_gradient", SPLAT_SUMS,
-     "counts && raw < ALPHA_MAX ? before * ahead : 0.0", "counts ? before * ahead : 0.0",
+     "mix(0.0, before * ahead, counts && raw < ALPHA_MAX)", "mix(0.0, before * ahead, counts)",
      "blend_backward_test", "BlendBackwardCases/EveryWay.alpha_at_its_limit_moves_only_the_colour/subgroup"),
     ("10,000 thin layers in one pixel", "gradient_ends_where_the_pixel_ended", BLEND_BACK,
      "px.d_colour[k], d_z, number <= px.last[k]);", "px.d_colour[k], d_z, true);",
