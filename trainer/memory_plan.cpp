@@ -45,16 +45,12 @@ SplatFloats floats_of(const MemoryDemand& demand) {
     return {demand.sh_degree, demand.frame.kernel, demand.rest_sum};
 }
 
-std::uint64_t moment_bytes(std::uint64_t splats, const SplatFloats& of, bool largest) {
-    std::uint64_t sum = 0, most = 0;
+std::uint64_t moment_bytes(std::uint64_t splats, const SplatFloats& of) {
+    std::uint64_t sum = 0;
     const auto strides = GpuSplats::strides(of.sh_degree, of.kernel);
-    for (int a = 0; a < kAttributeCount; ++a) {
-        const AttributeRows rows = attribute_rows(a, strides[a], 2);
-        const std::uint64_t bytes = Buffer::charged_bytes(rows.bytes(splats));
-        sum += bytes;
-        most = std::max(most, bytes);
-    }
-    return largest ? most : sum;
+    for (int a = 0; a < kAttributeCount; ++a)
+        sum += Buffer::charged_bytes(attribute_rows(a, strides[a], 2).bytes(splats));
+    return sum;
 }
 
 std::uint64_t cameras_bytes(std::uint64_t cameras) {
@@ -93,7 +89,7 @@ MemoryPlan plan_resident(const Device& device, const MemoryDemand& demand) {
     MemoryPlan plan;
     plan.parameters =
         GpuSplats::parameter_bytes(demand.splats, demand.sh_degree, demand.frame.kernel);
-    plan.moments = moment_bytes(demand.splats, floats_of(demand), false) +
+    plan.moments = moment_bytes(demand.splats, floats_of(demand)) +
                    rest_sum_bytes(demand.splats, floats_of(demand));
     plan.frame = bytes.splats;
     if (demand.cameras) plan.frame += CameraSums::device_bytes(size.splats);
@@ -129,8 +125,6 @@ MemoryPlan plan_memory(const Device& device, const MemoryDemand& demand) {
         plan.densify = round_peak(device, demand, n, n) - plan.resident();
     }
     if (demand.averages) plan.average = plan.parameters;
-    if (!device.info().unified_memory)
-        plan.staging = Buffer::staging_bytes(moment_bytes(demand.splats, floats_of(demand), true));
     return plan;
 }
 

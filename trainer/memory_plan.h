@@ -54,15 +54,15 @@ struct MemoryPlan {
     std::uint64_t images = 0;         // picture, its gradient, what the passes share
     std::uint64_t effects = 0;        // of per-photo exposure, of the 3D filter and of the strategy
     // For a time, beyond the rest: while density control runs; after it, the mean of the last
-    // iterations, and while host and device copy.
-    std::uint64_t densify = 0, average = 0, staging = 0;
+    // iterations.
+    std::uint64_t densify = 0, average = 0;
     std::uint64_t waiting_photos = 0;  // on the host, in no sum here
 
     /// What is there between iterations, before the mean is.
     std::uint64_t resident() const {
         return parameters + moments + frame + intersections + photos + images + effects;
     }
-    std::uint64_t total() const { return resident() + std::max(densify, average + staging); }
+    std::uint64_t total() const { return resident() + std::max(densify, average); }
 };
 
 /// resident() is what Device::allocated_bytes says of a Trainer at this demand, to the byte;

@@ -85,7 +85,8 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
         *memory_ = state.device_memory->take(needs, kind, what);
         check_vulkan(vkBindBufferMemory(state.device, buffer_, memory_->handle, memory_->offset),
                      what);
-        if (kind != Memory::device || (memory_->flags & kCached) != 0) direct_ = memory_->mapped;
+        const bool shared = state.info.unified_memory && (memory_->flags & kCached) != 0;
+        if (kind != Memory::device || shared) direct_ = memory_->mapped;
         if (kind != Memory::device) mapped_ = direct_;
     } catch (...) {
         release();
@@ -95,10 +96,6 @@ Buffer::Buffer(Device& device, std::string name, std::uint64_t bytes, Memory kin
     const std::uint64_t now = state.allocated += allocated_;
     if (now > state.peak) state.peak = now;
     state.set_name(VK_OBJECT_TYPE_BUFFER, reinterpret_cast<std::uint64_t>(buffer_), name_);
-}
-
-std::uint64_t Buffer::staging_bytes(std::uint64_t copied) {
-    return std::min(kStagingBytes, copied);
 }
 
 void Buffer::release() noexcept {
@@ -146,7 +143,8 @@ void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
         std::memcpy(static_cast<std::byte*>(direct_) + offset, source.data(), source.size());
         return;
     }
-    const Buffer staging(*device_, "staging", staging_bytes(source.size()), Memory::host);
+    const Buffer staging(*device_, "staging", std::min(kStagingBytes, std::uint64_t{source.size()}),
+                         Memory::waiting);
     for (std::uint64_t done = 0; done < source.size(); done += kStagingBytes) {
         const std::uint64_t piece = std::min(kStagingBytes, source.size() - done);
         std::memcpy(staging.direct_, source.data() + done, piece);
@@ -179,7 +177,8 @@ void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
         std::memcpy(target.data(), static_cast<const std::byte*>(direct_) + offset, target.size());
         return;
     }
-    const Buffer staging(*device_, "staging", staging_bytes(target.size()), Memory::host);
+    const Buffer staging(*device_, "staging", std::min(kStagingBytes, std::uint64_t{target.size()}),
+                         Memory::waiting);
     for (std::uint64_t done = 0; done < target.size(); done += kStagingBytes) {
         const std::uint64_t piece = std::min(kStagingBytes, target.size() - done);
         state.copy_now(buffer_, offset + done, staging.buffer_, 0, piece, "download of " + name_);

@@ -69,10 +69,6 @@ class Buffer {
         return values;
     }
 
-    /// Of the buffer that copies to and from memory which the host cannot map go through, for a
-    /// copy of so many bytes.
-    static std::uint64_t staging_bytes(std::uint64_t copied);
-
   private:
     Device* device_ = nullptr;
     std::string name_;

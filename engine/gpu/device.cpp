@@ -104,6 +104,7 @@ Device::State::State(const DeviceOptions& options, bool validation)
     for (std::size_t i = 0; i < all.size(); ++i)
         if (i != chosen && all[i].info.usable) others.push_back(all[i].info.name);
     if (faults.binding_bytes != 0) info.max_storage_buffer_bytes = faults.binding_bytes;
+    if (faults.discrete) info.unified_memory = false;
     if (faults.allocation_bytes != 0) info.max_allocation_bytes = faults.allocation_bytes;
     info.max_storage_buffer_bytes =
         std::min(info.max_storage_buffer_bytes, info.max_allocation_bytes);

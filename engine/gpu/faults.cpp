@@ -29,6 +29,10 @@ void parse_one(std::string_view text, Faults& faults) {
         faults.out_of_memory.emplace_back(text.substr(kOom.size()));
         return;
     }
+    if (text == "discrete") {
+        faults.discrete = true;
+        return;
+    }
     const std::pair<std::string_view, std::uint64_t*> counts[] = {
         {"lost:", &faults.lost_at_submit},
         {"binding:", &faults.binding_bytes},
@@ -45,8 +49,8 @@ void parse_one(std::string_view text, Faults& faults) {
         return;
     }
     throw Error("DARB_FAULT", "\"" + std::string(text) + "\" is no fault",
-                "Write oom:BUFFER, lost:N, binding:N, allocation:N, allocations:N, memory:N or "
-                "timestamps:BITS, separated by commas, or unset it.");
+                "Write oom:BUFFER, lost:N, binding:N, allocation:N, allocations:N, memory:N, "
+                "timestamps:BITS or discrete, separated by commas, or unset it.");
 }
 
 }  // namespace

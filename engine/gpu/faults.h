@@ -5,6 +5,7 @@
 //   allocation:N  the device says that a buffer has at most N bytes
 //   allocations:N  the driver allows N allocations of memory at once
 //   timestamps:N  of a timestamp only the lowest N bits are right; 0: there are none
+//   discrete   the device has memory of its own, which the host does not reach
 //   memory:N   buffers beyond N bytes in all fail as if the device were out of memory
 // None in normal use. A text that is none of these is an Error.
 #pragma once
@@ -25,6 +26,7 @@ struct Faults {
     std::uint64_t memory_bytes = 0;          // 0 = no limit
     std::uint64_t allocations = 0;           // 0 = what the driver allows
     std::optional<std::uint32_t> timestamp_bits;
+    bool discrete = false;
 
     /// in_all: bytes of all buffers, this one included.
     bool fails_allocation(std::string_view buffer, std::uint64_t in_all) const;

@@ -58,6 +58,25 @@ VkDebugUtilsMessengerCreateInfoEXT messenger_info(std::atomic<std::uint64_t>* co
     return info;
 }
 
+// The last instance that goes takes its drivers along, and NVIDIA's of 2026 does not come back
+// after a few dozen times: one instance stays until the process ends.
+void keep_drivers_loaded(const VkApplicationInfo& application, bool portable) {
+    static const VkInstance kept = [&] {
+        const char* portability = VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME;
+        VkInstanceCreateInfo info{};
+        info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+        info.pApplicationInfo = &application;
+        if (portable) {
+            info.flags = VK_INSTANCE_CREATE_ENUMERATE_PORTABILITY_BIT_KHR;
+            info.enabledExtensionCount = 1;
+            info.ppEnabledExtensionNames = &portability;
+        }
+        VkInstance instance = VK_NULL_HANDLE;
+        return vkCreateInstance(&info, nullptr, &instance) == VK_SUCCESS ? instance : VkInstance{};
+    }();
+    static_cast<void>(kept);
+}
+
 }  // namespace
 
 Instance::Instance(bool validation, const std::vector<std::string>& extensions)
@@ -105,6 +124,7 @@ Instance::Instance(bool validation, const std::vector<std::string>& extensions)
         info.ppEnabledLayerNames = &kValidationLayer;
     }
     check_vulkan(vkCreateInstance(&info, nullptr, &instance_), "Vulkan instance");
+    keep_drivers_loaded(application, portable);
     if (debug) load_debug(validation);
 }
 

@@ -39,7 +39,6 @@ struct Tuning {
     SortScatter scatter = SortScatter::ballot;
     std::uint32_t blend_threads = 0;  // of the forward blend's workgroup, which has a tile
     std::uint32_t blend_lanes = 0;    // of a subgroup of both blends; 0: the device's own
-    bool turns_shared = false;        // lib/in_turn.glsl: of both blends' splats
     BackwardBlend backward = BackwardBlend::subgroup;
     LossWay loss = LossWay::strips;
     PhotoPlace photos = PhotoPlace::automatic;

@@ -122,7 +122,6 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
          usual_first(kBackwardBlends, usual_tuning(info).backward),
          {"blend", "blend backward"},
          true},
-        {"turns", {"broadcast", "shared"}, {"blend", "blend backward"}},
         {"loss", usual_first(kLossWays, usual_tuning(info).loss), {"loss"}},
         {"photos", usual_first(kPhotoPlaces, usual_tuning(info).photos), {}}};
     if (const std::vector<std::string> lanes = blend_lanes(info); lanes.size() > 1)
@@ -150,8 +149,7 @@ TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
 
 std::string names_text(const TuningNames& names) {
     std::string text;
-    for (const char* name :
-         {"scan", "scatter", "blend", "backward", "turns", "loss", "photos", "lanes"})
+    for (const char* name : {"scan", "scatter", "blend", "backward", "loss", "photos", "lanes"})
         if (const auto found = names.find(name); found != names.end())
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, found->second);
     return text;
@@ -162,7 +160,6 @@ TuningNames tuning_names(const Tuning& tuning) {
                       {"scatter", kSortScatters[static_cast<std::size_t>(tuning.scatter)]},
                       {"blend", shape_name(tuning.blend_threads)},
                       {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
-                      {"turns", tuning.turns_shared ? "shared" : "broadcast"},
                       {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]},
                       {"photos", kPhotoPlaces[static_cast<std::size_t>(tuning.photos)]}};
     if (tuning.blend_lanes != 0) names["lanes"] = std::to_string(tuning.blend_lanes);
@@ -178,7 +175,6 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
         if (name == "lanes")
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_lanes);
         if (name == "backward") tuning.backward = named<BackwardBlend>(kBackwardBlends, choice);
-        if (name == "turns") tuning.turns_shared = choice == "shared";
         if (name == "loss") tuning.loss = named<LossWay>(kLossWays, choice);
         if (name == "photos") tuning.photos = named<PhotoPlace>(kPhotoPlaces, choice);
     }

@@ -68,14 +68,12 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);
     segmented_ = segmented;
-    constants["TURNS_SHARED"] = turns_shared(*device_, subgroup, subgroup) ? 1 : 0;
     if (method_ == BackwardBlend::subgroup) {
         blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);
         return;
     }
     if (method_ == BackwardBlend::team) {
         constants["THREADS"] = static_cast<std::int32_t>(4 * subgroup);  // a subgroup a block
-        constants["TURNS_SHARED"] = turns_shared(*device_, 4 * subgroup, subgroup) ? 1 : 0;
         blend_ = Pipeline(*device_, "blend_backward_team", constants, true, subgroup);
         return;
     }

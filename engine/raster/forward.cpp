@@ -60,13 +60,6 @@ std::uint32_t add_block_constants(const Device& device, SpecConstants& constants
     return subgroup;
 }
 
-bool turns_shared(const Device& device, std::uint32_t threads, std::uint32_t subgroup) {
-    constexpr std::uint32_t list_bytes = 128 * 8,
-                            turn_bytes = 9 * 4;  // lib/hits.glsl, lib/in_turn.glsl
-    return device.tuning().turns_shared && threads / subgroup * list_bytes + threads * turn_bytes <=
-                                               device.info().shared_memory_bytes;
-}
-
 Forward::Forward(Device& device, const ForwardOptions& options)
     : device_(&device),
       options_(options),
@@ -106,7 +99,6 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
     blend["THREADS"] = static_cast<std::int32_t>(blend_threads_);
-    blend["TURNS_SHARED"] = turns_shared(*device_, blend_threads_, subgroup) ? 1 : 0;
     blend["PIXELS"] = static_cast<std::int32_t>(TILE_SIZE * TILE_SIZE / blend_threads_);
     blend["CHECKPOINTS"] = frame.size.bucket > 0 ? 1 : 0;
     if (frame.size.bucket > 0) blend["BUCKET"] = static_cast<std::int32_t>(frame.size.bucket);

@@ -24,9 +24,6 @@ std::uint32_t bucket_length(const Device& device);
 /// Sets what shaders/lib/area.glsl and lockstep.glsl ask for, an area a block; returns the subgroup
 /// size to require.
 std::uint32_t add_block_constants(const Device& device, SpecConstants& constants);
-/// TURNS_SHARED of a blend of so many threads: as the tuning has it, where the shared memory is
-/// enough.
-bool turns_shared(const Device& device, std::uint32_t threads, std::uint32_t subgroup);
 
 class Forward {
   public:

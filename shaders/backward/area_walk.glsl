@@ -59,35 +59,32 @@ void blend_hits(inout Pixels px, vec2 centre, uint count) {
         rest -= size;
         vec4 shape = vec4(0.0), light = vec4(0.0);
         float l22 = 0.0, exponent = 0.0, depth = 0.0;
-        uint index = 0u, place = 0u;
+        uint number = 0u, place = 0u;
         if (gl_SubgroupInvocationID < size) {
             const uint at = hits_base() + rest + gl_SubgroupInvocationID;
             const uint splat = hit_splat[at];
-            index = hit_index[at];
-            if (TURNS_SHARED == 0) place = place_of(index);
+            number = hit_index[at] + 1u;
+            place = place_of(hit_index[at]);
             shape = load_shape(splat, l22);
             light = load_light(splat);
             if (SHAPED) exponent = splat_exponent[splat];
             if (DEPTH_SUM == 1) depth = splat_bound[splat].z;
         }
-        give_turns(shape, light, l22);
         uint lane = size;
         do {
             --lane;
-            const vec4 s = shape_in_turn(shape, lane);
-            const vec4 c = light_in_turn(light, lane);
-            const uint j = index_in_turn(index, rest + lane, lane);
-            const Sums sums = splat_sums(px, s.xy - centre, s, c, l22_in_turn(l22, lane),
+            const vec4 s = subgroupBroadcast(shape, lane);
+            const vec4 c = subgroupBroadcast(light, lane);
+            const Sums sums = splat_sums(px, s.xy - centre, s, c, subgroupBroadcast(l22, lane),
                                          SHAPED ? subgroupBroadcast(exponent, lane) : 0.0,
                                          DEPTH_SUM == 1 ? subgroupBroadcast(depth, lane) : 0.0,
-                                         j + 1u);
+                                         subgroupBroadcast(number, lane));
             float parts[PARTIALS] =
                 float[](sums.gx * c.w, sums.gxx * c.w, sums.gxdy * c.w, sums.gdy * c.w,
                         sums.opacity, sums.colour.r, sums.colour.g, sums.colour.b);
-            const uint to = TURNS_SHARED == 1 ? place_of(j) : subgroupBroadcast(place, lane);
-            put_sums(to, parts, sums.gdydy * c.w);
-            if (SHAPED) put_exponent(to, sums.exponent * c.w);
-            if (DEPTH_SUM == 1) put_depth(to, sums.depth);
+            put_sums(subgroupBroadcast(place, lane), parts, sums.gdydy * c.w);
+            if (SHAPED) put_exponent(subgroupBroadcast(place, lane), sums.exponent * c.w);
+            if (DEPTH_SUM == 1) put_depth(subgroupBroadcast(place, lane), sums.depth);
         } while (lane > 0u);
     } while (rest > 0u);
 }

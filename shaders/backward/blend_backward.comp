@@ -45,7 +45,6 @@ layout(set = 0, binding = 17, scalar) buffer PartialExponent { float partial_exp
 #include "lib/list_part.glsl"
 const uint CHUNK = 128u;
 #include "lib/hits.glsl"
-#include "lib/in_turn.glsl"
 #define PARTIALS_BINDING 9
 #define PARTIALS_PUT +=
 #include "lib/partials.glsl"

@@ -44,7 +44,6 @@ layout(set = 0, binding = 17, scalar) writeonly buffer PartialExponent { float p
 #include "lib/list_part.glsl"
 const uint CHUNK = 32u;
 #include "lib/hits.glsl"
-#include "lib/in_turn.glsl"
 #define PARTIALS_BINDING 9
 #define PARTIALS_PUT =
 #include "lib/partials.glsl"

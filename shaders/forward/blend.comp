@@ -45,7 +45,6 @@ layout(set = 0, binding = 10, scalar) readonly buffer SplatExponent { float spla
 #include "lib/bucket.glsl"
 const uint CHUNK = CHECKPOINTS == 1 ? BUCKET : 128u;
 #include "lib/hits.glsl"
-#include "lib/in_turn.glsl"
 #include "lib/window.glsl"
 
 struct Pixels {
@@ -105,27 +104,26 @@ bool blend_hits(inout Pixels px, vec2 centre, uint count) {
         vec4 shape = vec4(0.0), light = vec4(0.0);
         vec3 depth = vec3(0.0);
         float l22 = 0.0, exponent = 0.0;
-        uint index = 0u;
+        uint number = 0u;
         if (mine < count) {
             const uint splat = hit_splat[hits_base() + mine];
-            index = hit_index[hits_base() + mine];
+            number = hit_index[hits_base() + mine] + 1u;
             shape = load_shape(splat, l22);
             light = load_light(splat);
             if (SHAPED) exponent = splat_exponent[splat];
             if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) depth = load_depth(splat);
             if (DEPTH_SUM == 1) depth.x = splat_bound[splat].z;
         }
-        give_turns(shape, light, l22);
         const uint end = min(SUBGROUP_SIZE, count - batch);
         uint lane = 0u;
         do {
-            const vec4 s = shape_in_turn(shape, lane);
+            const vec4 s = subgroupBroadcast(shape, lane);
             vec3 z = vec3(0.0);
             if (DEPTH_ORDER == DEPTH_ORDER_PIXEL) z = subgroupBroadcast(depth, lane);
             if (DEPTH_SUM == 1) z.x = subgroupBroadcast(depth.x, lane);
-            blend_splat(px, s.xy - centre, s, light_in_turn(light, lane), l22_in_turn(l22, lane),
-                        SHAPED ? subgroupBroadcast(exponent, lane) : 0.0,
-                        index_in_turn(index, batch + lane, lane) + 1u, z);
+            blend_splat(px, s.xy - centre, s, subgroupBroadcast(light, lane),
+                        subgroupBroadcast(l22, lane), SHAPED ? subgroupBroadcast(exponent, lane) : 0.0,
+                        subgroupBroadcast(number, lane), z);
         } while (++lane < end);
         alive = px.transmittance[0];
         for (uint k = 1u; k < PIXELS; ++k) alive = max(alive, px.transmittance[k]);

@@ -67,7 +67,9 @@ TEST(Limits, a_run_without_room_for_smaller_photos_trains_on_whole_ones) {
     TinyTraining t = tiny_training({.width = 800, .height = 64, .splats = 8});
     t.options.densify_until = 0;
     t.options.average_from = 1;
-    Device roomy_device, narrow_device;
+    Device roomy_device{device_options()}, narrow_device{device_options()};
+    const ScopedVariants roomy_photos(roomy_device, "photos=resident");
+    const ScopedVariants narrow_photos(narrow_device, "photos=resident");
     Trainer roomy(roomy_device, t.dataset, t.photos, t.start(), t.options);
     run_to(roomy, 6);
     t.options.max_memory_bytes = roomy_device.allocated_bytes() + 150'000;
@@ -86,7 +88,9 @@ TEST(Limits, a_run_without_room_for_smaller_photos_trains_on_whole_ones) {
 TEST(Limits, a_run_without_room_for_its_mean_ends_without) {
     TinyTraining t = tiny_training();
     t.options.densify_until = 0;
-    Device roomy_device, narrow_device;
+    Device roomy_device{device_options()}, narrow_device{device_options()};
+    const ScopedVariants roomy_photos(roomy_device, "photos=resident");
+    const ScopedVariants narrow_photos(narrow_device, "photos=resident");
     t.options.average_from = 0.5;
     Trainer roomy(roomy_device, t.dataset, t.photos, t.start(), t.options);
     run_to(roomy, 30);

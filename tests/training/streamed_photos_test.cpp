@@ -120,9 +120,10 @@ TEST(StreamedPhotos, stream_where_the_device_does_not_hold_what_the_run_comes_to
     };
     EXPECT_FALSE(stream_in(std::uint64_t{1} << 30));
     EXPECT_TRUE(stream_in(1'000));
-    std::uint64_t least = 1'000;  // of a heap that holds all
+    std::uint64_t least = 1'000;  // the largest heap that does not hold all
     for (std::uint64_t step = std::uint64_t{1} << 29; step > 0; step /= 2)
         if (stream_in(least + step)) least += step;
+    device.state().info.heap_bytes = least;
     const Forecast f = forecast_training(device, t.dataset, t.options, false);
     EXPECT_TRUE(f.peak.streams);
     MemoryDemand resident = f.peak;

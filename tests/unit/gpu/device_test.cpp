@@ -310,6 +310,19 @@ TEST(Faults, lost_device_names_the_passes) {
         << text;
 }
 
+// What goes there and back goes through a buffer of the host, which is no memory of the device.
+TEST(Faults, memory_of_its_own_is_reached_by_copies) {
+    const Environment environment("discrete");
+    Device device{test::device_options()};
+    EXPECT_FALSE(device.info().unified_memory);
+    std::vector<std::uint32_t> values(10'000'000);  // more than one piece
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::uint32_t>(i * i);
+    Buffer buffer(device, "buffer", values.size() * 4);
+    buffer.upload(values);
+    EXPECT_EQ(buffer.download<std::uint32_t>(values.size()), values);
+    EXPECT_EQ(device.peak_bytes(), values.size() * 4);
+}
+
 TEST(PipelineCache, broken_file_is_ignored) {
     const auto folder = std::filesystem::path(::testing::TempDir()) / "darb_cache_test";
     std::filesystem::remove_all(folder);
