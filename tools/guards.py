@@ -73,7 +73,7 @@ GUARDS = [
      "if (abs(raw) <= LOG_SCALE_LIMIT) g.log_scale[c]", "g.log_scale[c]",
      "adam_update_test", "AdamUpdate.regularisers_leave_scales_beyond_their_limit"),
     ("splat that outgrows the scene where no photo looks", "largest_scale", BACK,
-     "greaterThan(scale, largest)", "bvec3(false)",
+     "at_most(scale, max(scale_before, vec3(args.largest_log_scale)))", "scale",
      "adam_update_test", "AdamUpdate.no_scale_grows_beyond_the_largest"),
     ("splat on the path of the cameras, a veil between two photos", "clearance", BACK,
      "opacity_logit[i] -= FADING", "opacity_logit[i] -= 0.0",

@@ -167,8 +167,7 @@ void update_splat(uint i, SplatGradient g) {
     vec3 scale = scale_before;
     UPDATE_ATTRIBUTE(Moments3, scale, m_log_scale[i], d_log_scale[i], g.log_scale, ATTRIBUTE_LOG_SCALE)
     if (UPDATE == UPDATE_ADAM) {
-        const vec3 largest = max(scale_before, vec3(args.largest_log_scale));
-        log_scale[i] = mix(scale, largest, greaterThan(scale, largest));
+        log_scale[i] = at_most(scale, max(scale_before, vec3(args.largest_log_scale)));
     }
     UPDATE_ATTRIBUTE(Moments3, sh_dc[i], m_sh_dc[i], d_sh_dc[i], (DIRECT_COLOUR == 1 ? 1.0 : SH_C0) * g.colour,
                      ATTRIBUTE_SH_DC)

@@ -20,4 +20,11 @@ bool magnitude_below(vec3 x, float limit) { return below(magnitude(x), limit); }
 bool magnitude_below(vec4 x, float limit) { return below(magnitude(x), limit); }
 bool is_finite(float x) { return magnitude(x) < INFINITY_BITS; }
 
+// x, at most `largest`; what is no number stays none. Not by the comparison alone: NVIDIA's compiler makes a minimum of
+// x > largest ? largest : x, and that of NaN and a number is the number.
+float at_most(float x, float largest) { return is_nan(x) ? x : min(x, largest); }
+vec3 at_most(vec3 x, vec3 largest) {
+    return vec3(at_most(x.x, largest.x), at_most(x.y, largest.y), at_most(x.z, largest.z));
+}
+
 #endif

@@ -103,8 +103,7 @@ void main() {
     vec2 m = moment[at];
     float after = adam_step(before, m, g, args.rate);
     if (STEP == STEP_SCALE) {
-        const float largest = max(before, args.largest);
-        after = after > largest ? largest : after;  // not min: what is no number stays none
+        after = at_most(after, max(before, args.largest));
     }
     value[at] = after;
     moment[at] = m;

@@ -9,6 +9,7 @@
 
 #include "engine/core/files.h"
 #include "tests/support/run_command.h"
+#include "tests/support/same_rounding.h"
 #include "tests/support/test_data.h"
 
 namespace darb {
@@ -105,7 +106,13 @@ TEST(EffectCommand, without_the_lens_effect_a_wide_fisheye_is_straightened_as_by
         EXPECT_EQ(o.code, 0) << o.err;
         return json::parse(read_text_file(file));
     };
-    EXPECT_EQ(measured("--effects all,-lens"), measured("--effects all --lens undistort"));
+    const json left_out = measured("--effects all,-lens"),
+               straight = measured("--effects all --lens undistort");
+    if (rounds_every_operation()) {
+        EXPECT_EQ(left_out, straight);
+    }
+    EXPECT_NEAR(left_out["mean"]["psnr_db"].get<double>(),
+                straight["mean"]["psnr_db"].get<double>(), 1e-3);
 }
 
 TEST(EffectCommand, the_plan_prices_the_lens_where_photos_are_distorted_long) {
