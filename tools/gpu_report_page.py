@@ -45,11 +45,12 @@ def clean(folder, photos):
 
 
 def measured_passes(folder):
-    """Pass -> (ms, counts) of the largest case of the bench that has passes and splats."""
+    """Pass -> (ms, counts) of the bench's case that the model estimates, else of its largest frame."""
     if not (folder / "bench.json").exists():
         return {}, None
-    cases = json.loads(read(folder / "bench.json"))["benchmarks"]
-    cases = [case for case in cases if case["name"].startswith("render/") and case.get("passes")]
+    cases = [case for case in json.loads(read(folder / "bench.json"))["benchmarks"] if case.get("passes")]
+    cases = ([case for case in cases if case["name"].startswith("train/filled")] or
+             [case for case in cases if case["name"].startswith("render/")])
     if not cases:
         return {}, None
     case = max(cases, key=lambda one: one["pixels"])
@@ -63,9 +64,14 @@ def predicted_and_measured(folder):
         return ""
     report = json.loads(read(folder / "passes.json"))
     work = report["iteration"]
-    scale = {"project": case["visible"] / work["splats"], "blend": case["pairs"] / work["intersections"]}
+    of_splats = ("project", "compact", "depth sort", "project backward")
     for row in work["passes"]:
-        row["bytes"] *= scale["project" if row["pass"] in ("project", "compact", "depth sort") else "blend"]
+        if row["pass"] == "loss":
+            row["bytes"] *= case["pixels"] / work["pixels"]
+        elif row["pass"] in of_splats:
+            row["bytes"] *= case["visible"] / work["splats"]
+        else:
+            row["bytes"] *= case["pairs"] / work["intersections"]
     work["passes"] = [row for row in work["passes"] if row["pass"] in ms]
     work |= {"splats": case["visible"], "pixels": case["pixels"], "intersections": case["pairs"]}
     backward = gpu_model.chosen(report)
