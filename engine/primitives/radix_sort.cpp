@@ -44,11 +44,15 @@ RadixSort::Shape RadixSort::choose_shape(const Device& device, SortScatter scatt
                                          std::uint32_t subgroup_size) {
     const std::uint32_t lanes = subgroup_size != 0 ? subgroup_size : device.info().subgroup_size;
     if (scatter == SortScatter::columns) return {lanes, kColumnItems, 1};
+    // On Intel all threads of a subgroup share 4 KiB of registers: keys and ranks of 16 would fill
+    // them.
+    const std::uint32_t fewest = device.info().min_subgroup_size;
+    const std::uint32_t items = fewest <= 16 && fewest < lanes ? kBallotItems / 2 : kBallotItems;
     // Of a thread: its share of a subgroup's row, and its keys. Besides a row of the block.
-    const std::uint32_t bytes = kRowBytes / lanes + kBallotItems * 4;
+    const std::uint32_t bytes = kRowBytes / lanes + items * 4;
     const std::uint32_t room = device.info().shared_memory_bytes - kRowBytes - kSumBytes;
     const std::uint32_t threads = std::clamp(std::bit_floor(room / bytes), lanes, kBallotThreads);
-    return {threads, kBallotItems, threads / lanes};
+    return {threads, items, threads / lanes};
 }
 
 RadixSort::RadixSort(Device& device, std::uint32_t capacity, std::optional<SortScatter> scatter,
