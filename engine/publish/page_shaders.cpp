@@ -15,7 +15,8 @@ namespace {
 constexpr std::string_view kPreamble =
     "#version 300 es\n"
     "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
-    "precision highp sampler2DArray;\n";
+    "precision highp sampler2DArray;\n"
+    "#define precise\n";  // which GLSL ES 3.00 does not know
 
 std::string constant_text(const SpecValue& value) {
     if (const auto* integer = std::get_if<std::int32_t>(&value)) return fmt::format("{}", *integer);

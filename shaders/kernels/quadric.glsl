@@ -6,7 +6,7 @@ void quadric_integral(float q, out float w, out float slope) {
     const float v = (1.0 + q) * scale;
     const float r = 1.0 / sqrt(v), x = v * r;
     // precise: NVIDIA's compiler makes it 1 - q / R^2, which cancels at the edge.
-    precise const float u = mix(1.0, (KERNEL_SUPPORT - q) * KERNEL_INVERSE_SUPPORT, q < KERNEL_SUPPORT);
+    precise float u = mix(1.0, (KERNEL_SUPPORT - q) * KERNEL_INVERSE_SUPPORT, q < KERNEL_SUPPORT);
     const float dx = 0.5 * scale * r, dr = -dx * r * r;  // by q
     float p, dp;
     if (KERNEL_HALF_POWER == 2) {
