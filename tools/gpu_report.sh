@@ -47,7 +47,7 @@ fi
 mkdir -p "$out" || exit 2
 out=$(cd "$out" && pwd)
 # Of a report before this one.
-for name in devices passes check bench growth train photos validation model; do
+for name in devices passes check bench filled growth train photos validation model; do
     rm -f "$out/$name.txt" "$out/$name.json"
 done
 
@@ -71,10 +71,9 @@ step() {
 : >"$out/steps.txt"
 step devices 5 "$darb" devices "${device[@]}"
 step passes 10 "$darb" devices --passes "${device[@]}" --json "$out/passes.json"
-step check 30 "$darb" check "${device[@]}"
-filled='|train/filled' # a million splats: minutes on a CPU
-if grep -q '^ *type *cpu' "$out/devices.txt"; then filled=; fi
-step bench 15 "$darb" bench "random_100k|sort/|scan/|tuning$filled" "${device[@]}" --seconds 0.5 --samples 5 --json "$out/bench.json"
+step check 25 "$darb" check "${device[@]}"
+step bench 15 "$darb" bench 'random_100k|sort/|scan/|tuning' "${device[@]}" --seconds 0.5 --samples 5 --json "$out/bench.json"
+step filled 5 "$darb" bench train/filled "${device[@]}" --seconds 0.5 --samples 5 --json "$out/filled.json"
 step growth 10 "$darb" bench --growth "${device[@]}" --seconds 0.2 --samples 3 --json "$out/growth.json"
 if [[ -d $here/assets/scene ]]; then
     step train 15 "$darb" train "$here/assets/scene" -o "$out/scene" "${device[@]}" --iterations 300 --eval

@@ -45,15 +45,13 @@ def clean(folder, photos):
 
 
 def measured_passes(folder):
-    """Pass -> (ms, counts) of the bench's case that the model estimates, else of its largest frame."""
-    if not (folder / "bench.json").exists():
-        return {}, None
-    cases = [case for case in json.loads(read(folder / "bench.json"))["benchmarks"] if case.get("passes")]
-    cases = ([case for case in cases if case["name"].startswith("train/filled")] or
-             [case for case in cases if case["name"].startswith("render/")])
+    """Pass -> (ms, counts) of the case that the model estimates, else of the largest frame."""
+    files = [folder / name for name in ("filled.json", "bench.json") if (folder / name).exists()]
+    cases = [case for file in files for case in json.loads(read(file))["benchmarks"]
+             if case.get("passes") and case["name"].startswith(("train/filled", "render/"))]
     if not cases:
         return {}, None
-    case = max(cases, key=lambda one: one["pixels"])
+    case = max(cases, key=lambda one: (one["name"].startswith("train/"), one["pixels"]))
     return {name: row["median"] for name, row in case["passes"].items()}, case
 
 

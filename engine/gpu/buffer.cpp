@@ -61,6 +61,12 @@ void check_limits(const Device::State& state, const std::string& name, std::uint
         check_vulkan(VK_ERROR_OUT_OF_DEVICE_MEMORY, what);
 }
 
+// What a copy of so many bytes goes through where the host cannot map the buffer: memory of the
+// host.
+Buffer staging_for(Device& device, std::uint64_t bytes) {
+    return Buffer(device, "staging", std::min(kStagingBytes, bytes), Memory::waiting);
+}
+
 }  // namespace
 
 Buffer::Buffer() = default;
@@ -143,8 +149,7 @@ void Buffer::upload(std::span<const std::byte> source, std::uint64_t offset) {
         std::memcpy(static_cast<std::byte*>(direct_) + offset, source.data(), source.size());
         return;
     }
-    const Buffer staging(*device_, "staging", std::min(kStagingBytes, std::uint64_t{source.size()}),
-                         Memory::waiting);
+    const Buffer staging = staging_for(*device_, source.size());
     for (std::uint64_t done = 0; done < source.size(); done += kStagingBytes) {
         const std::uint64_t piece = std::min(kStagingBytes, source.size() - done);
         std::memcpy(staging.direct_, source.data() + done, piece);
@@ -177,8 +182,7 @@ void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
         std::memcpy(target.data(), static_cast<const std::byte*>(direct_) + offset, target.size());
         return;
     }
-    const Buffer staging(*device_, "staging", std::min(kStagingBytes, std::uint64_t{target.size()}),
-                         Memory::waiting);
+    const Buffer staging = staging_for(*device_, target.size());
     for (std::uint64_t done = 0; done < target.size(); done += kStagingBytes) {
         const std::uint64_t piece = std::min(kStagingBytes, target.size() - done);
         state.copy_now(buffer_, offset + done, staging.buffer_, 0, piece, "download of " + name_);

@@ -1,8 +1,7 @@
 // Faults injected for tests, as text a comma-separated list (the command reads it from DARB_FAULT):
 //   oom:NAME   creating the buffer NAME fails as if the device were out of memory
-//   lost:N     the N-th submit of the device (from 1; copies between host and device do not count)
-//   and all later ones
-//              report a lost device
+//   lost:N     the N-th submit of the device (from 1) and all later ones report a lost device;
+//              copies between host and device do not count
 //   binding:N  the device says that a storage buffer binding holds at most N bytes
 //   allocation:N  the device says that a buffer has at most N bytes
 //   allocations:N  the driver allows N allocations of memory at once

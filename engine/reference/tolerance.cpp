@@ -37,7 +37,7 @@ constexpr Tolerance kTable[] = {
      "1 - q/9 is 1e-5 at the cut-off, and float32 knows it to a percent"},
     {"gradient_thin_layers", 1.5e-3, 1e-2, 0, 1 - 1e-6, 2e-3,
      "for compare_scaled; as image_thin_layers, forward and back, where each layer divides: Vulkan "
-     "lets that be off by 2.5 ulp, always to the same side; and sums over the tile that cancel"},
+     "lets that be off by 2.5 ulp, in each to the same side; and sums over the tile that cancel"},
     {"gradient_thin_layers_walk", 3e-3, 1e-2, 0.001, 1 - 1e-5, 4e-3,
      "as gradient_thin_layers, on to the parameters: the shape's sums cancel once more"},
     {"project_gradient_float32", 5e-5, 1e-4, 0, 1 - 1e-8, 1e-4,

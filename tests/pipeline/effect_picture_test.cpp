@@ -259,8 +259,8 @@ TEST(EffectTraining, exposure_is_planned_for_gains_and_begins_as_an_identity) {
     on.exposure = true;
     std::uint64_t with = 0, without = 0;
     std::set<std::string> passes_with, passes_without;
-    EXPECT_TRUE(same_training(trained(t, on, 1, &with, &passes_with),
-                              trained(t, plain_options(), 1, &without, &passes_without)));
+    EXPECT_EQ(trained(t, on, 1, &with, &passes_with),
+              trained(t, plain_options(), 1, &without, &passes_without));
     EXPECT_GE(with, without + 64 * 48 * 12) << "the mapped picture";
     EXPECT_TRUE(passes_with.contains("exposure"));
     EXPECT_FALSE(passes_without.contains("exposure"));
@@ -300,7 +300,7 @@ TEST(EffectTraining, cooperation_and_segments_change_no_bit) {
     TrainOptions always = plain_options(), never = always;
     always.huge_splat_path = HugeSplatPath::always;
     never.huge_splat_path = HugeSplatPath::never;
-    EXPECT_TRUE(same_training(trained(t, always, 3), trained(t, never, 3)));
+    EXPECT_EQ(trained(t, always, 3), trained(t, never, 3));
     Device device{test::device_options()};
     Trainer trainer(device, t.dataset, t.photos, t.start(), plain_options());
     trainer.step();
