@@ -17,19 +17,19 @@
 namespace darb {
 namespace {
 
-constexpr int kNodes = 64;
+constexpr int kFitNodes = 64;
 constexpr double kFullAccuracy = 1.2e-7;   // the spacing of float32 above 1
 constexpr double kSlopeShare = 0.25;       // a slope error counts this much of a value error
 constexpr double kPlainSlopeShare = 0.01;  // where the polynomial is the kernel, slope included
 // A device must not be told from a wrong one by what rounding leaves of terms that cancel.
-constexpr double kMostTerms = 100;
+constexpr double kMostSumOfTerms = 100;
 
 /// Chebyshev nodes of (from, to).
 std::vector<double> nodes(double from, double to) {
-    std::vector<double> x(kNodes);
-    for (int j = 0; j < kNodes; ++j)
+    std::vector<double> x(kFitNodes);
+    for (int j = 0; j < kFitNodes; ++j)
         x[static_cast<std::size_t>(j)] =
-            from + (to - from) * (1 - std::cos(std::numbers::pi * (j + 0.5) / kNodes)) / 2;
+            from + (to - from) * (1 - std::cos(std::numbers::pi * (j + 0.5) / kFitNodes)) / 2;
     return x;
 }
 
@@ -182,7 +182,7 @@ KernelCoefficients best_of_degrees(const Fit& fit) {
     for (int degree = kLeastDegree + 1;
          degree <= KERNEL_MAX_DEGREE && best.value_error > kFullAccuracy; ++degree) {
         const KernelCoefficients k = fit(degree);
-        if (k.value_error < best.value_error && sum_of_terms(k) <= kMostTerms) best = k;
+        if (k.value_error < best.value_error && sum_of_terms(k) <= kMostSumOfTerms) best = k;
     }
     return best;
 }

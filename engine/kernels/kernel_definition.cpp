@@ -16,7 +16,7 @@
 namespace darb {
 namespace {
 
-constexpr int kNodes = static_cast<int>(kMostSeriesTerms), kGrid = 2048;
+constexpr int kSeriesNodes = static_cast<int>(kMostSeriesTerms), kGrid = 2048;
 constexpr double kRounding = 1e-9;  // of an expression in double that cancels
 constexpr double kSameProfile = 1e-12;
 constexpr double kZeroAtEdge = 1e-6;  // a value of w / u^k at the edge below this is none
@@ -80,9 +80,9 @@ void check_profile(double support, const std::function<double(double)>& w, doubl
 
 /// Without the terms that are rounding alone.
 std::vector<double> series_of(const std::vector<double>& samples) {
-    constexpr double kNoise = 2e-14;
+    constexpr double kSeriesNoise = 2e-14;
     std::vector<double> series = ChebyshevSeries(samples).coefficients();
-    while (series.size() > 1 && std::abs(series.back()) < kNoise) series.pop_back();
+    while (series.size() > 1 && std::abs(series.back()) < kSeriesNoise) series.pop_back();
     return series;
 }
 
@@ -107,11 +107,11 @@ double divide_by_u(const std::vector<double>& p, std::vector<double>& q) {
 /// The same series, but nearest to w in w: the division leaves the rounding of the samples, and the
 /// rests that it took for 0, where u^m is small.
 void refine(KernelDefinition& d, const std::function<double(double)>& of_u) {
-    constexpr std::size_t kMostTerms = 24;  // what is analytic has some 10
-    if (d.edge_order == 0 || d.series.size() > kMostTerms) return;
+    constexpr std::size_t kMostRefinedTerms = 24;  // what is analytic has some 10
+    if (d.edge_order == 0 || d.series.size() > kMostRefinedTerms) return;
     LinearRows rows;
-    for (int j = 0; j < kNodes; ++j) {
-        const double x = std::cos(std::numbers::pi * (j + 0.5) / kNodes), u = (1 + x) / 2;
+    for (int j = 0; j < kSeriesNodes; ++j) {
+        const double x = std::cos(std::numbers::pi * (j + 0.5) / kSeriesNodes), u = (1 + x) / 2;
         std::vector<double> row;
         for (std::size_t k = 0; k < d.series.size(); ++k)
             row.push_back(std::pow(u, d.edge_order) *
@@ -184,7 +184,7 @@ double centre_of(double support, const std::function<double(double)>& w) {
     double centre = w(0);
     if (std::isnan(centre)) {  // 0/0
         const auto of_u = [&](double u) { return w(support * (1 - u)); };
-        const std::vector<double> samples = chebyshev_samples(of_u, kNodes);
+        const std::vector<double> samples = chebyshev_samples(of_u, kSeriesNodes);
         if (std::ranges::all_of(samples, [](double s) { return std::isfinite(s); })) {
             double slope;
             ChebyshevSeries(samples).evaluate(1, centre, slope);
@@ -198,7 +198,7 @@ double centre_of(double support, const std::function<double(double)>& w) {
 
 void reduce(KernelDefinition& d, const std::function<double(double)>& w, double centre) {
     const auto of_u = [&](double u) { return w(d.support * (1 - u)) / centre; };
-    d.series = series_of(chebyshev_samples(of_u, kNodes));
+    d.series = series_of(chebyshev_samples(of_u, kSeriesNodes));
     divide_edge(d);
     refine(d, of_u);
     normalise(d);

@@ -19,7 +19,7 @@ using Json = nlohmann::json;
 using Rows = std::vector<std::pair<double, double>>;
 
 constexpr std::size_t kMostFileBytes = std::size_t{1} << 22, kMostSourceLength = 2000;
-constexpr const char* kHelp = "docs/kernels.md shows such files.";
+constexpr const char* kFileHelp = "docs/kernels.md shows such files.";
 
 void check_rows(const Rows& rows, const std::string& where) {
     const auto fail = [&](std::size_t row, const std::string& what, const std::string& hint) {
@@ -108,14 +108,14 @@ double cubic_at(const Rows& rows, const std::vector<double>& slope, double q) {
 double number_of(const Json& json, const std::string& what, const std::string& where) {
     if (!json.is_number())
         throw Error(where, fmt::format("{} is no number: {}", what, json.dump().substr(0, 40)),
-                    kHelp);
+                    kFileHelp);
     return json.get<double>();
 }
 
 std::string text_of(const Json& json, const char* key, const std::string& where) {
     const auto at = json.find(key);
     if (at == json.end()) return {};
-    if (!at->is_string()) throw Error(where, fmt::format("'{}' is no text", key), kHelp);
+    if (!at->is_string()) throw Error(where, fmt::format("'{}' is no text", key), kFileHelp);
     return at->get<std::string>();
 }
 
@@ -126,7 +126,7 @@ double support_of(const Json& json, const std::string& where) {
 }
 
 Rows rows_of(const Json& table, const std::string& where) {
-    if (!table.is_array()) throw Error(where, "'table' is no list", kHelp);
+    if (!table.is_array()) throw Error(where, "'table' is no list", kFileHelp);
     Rows rows;
     for (const Json& row : table) {
         if (rows.size() == kMostTableRows)
@@ -134,7 +134,7 @@ Rows rows_of(const Json& table, const std::string& where) {
                         fmt::format("Tables have 3 to {}.", kMostTableRows));
         const std::string name = fmt::format("row {} of its table", rows.size() + 1);
         if (!row.is_array() || row.size() != 2)
-            throw Error(where, name + " is no pair [q, w]", kHelp);
+            throw Error(where, name + " is no pair [q, w]", kFileHelp);
         rows.emplace_back(number_of(row[0], name + ", q", where),
                           number_of(row[1], name + ", w", where));
     }
@@ -142,7 +142,7 @@ Rows rows_of(const Json& table, const std::string& where) {
 }
 
 KernelDefinition function_of(const Json& f, const std::string& name, const std::string& where) {
-    if (!f.is_object()) throw Error(where, "'function' is no object", kHelp);
+    if (!f.is_object()) throw Error(where, "'function' is no object", kFileHelp);
     KernelDefinition d;
     d.name = name;
     d.support = support_of(f, where);
@@ -150,7 +150,7 @@ KernelDefinition function_of(const Json& f, const std::string& name, const std::
     if (f.contains("error")) d.error = number_of(f["error"], "'error'", where);
     if (const std::string like = text_of(f, "like", where); !like.empty()) {
         const std::optional<int> kernel = kernel_from_name(like);
-        if (!kernel) throw Error(where, "'like' names no kernel of the family", kHelp);
+        if (!kernel) throw Error(where, "'like' names no kernel of the family", kFileHelp);
         d.like = *kernel;
     }
     if (f.contains("edge_order")) {
@@ -161,7 +161,7 @@ KernelDefinition function_of(const Json& f, const std::string& name, const std::
         if (!series->is_array() || series->size() > kMostSeriesTerms)
             throw Error(where,
                         fmt::format("'series' is no list of {} numbers at most", kMostSeriesTerms),
-                        kHelp);
+                        kFileHelp);
         for (const Json& c : *series) d.series.push_back(number_of(c, "a term of 'series'", where));
     }
     try {
@@ -173,11 +173,12 @@ KernelDefinition function_of(const Json& f, const std::string& name, const std::
 }
 
 KernelDefinition one_of(const Json& json, const std::string& stem, const std::string& where) {
-    if (!json.is_object()) throw Error(where, "a kernel is no object {...}", kHelp);
+    if (!json.is_object()) throw Error(where, "a kernel is no object {...}", kFileHelp);
     for (const auto& item : json.items())
         if (item.key() != "name" && item.key() != "support" && item.key() != "expression" &&
             item.key() != "table" && item.key() != "function")
-            throw Error(where, fmt::format("'{}' is nothing that a kernel has", item.key()), kHelp);
+            throw Error(where, fmt::format("'{}' is nothing that a kernel has", item.key()),
+                        kFileHelp);
     std::string name = text_of(json, "name", where);
     if (name.empty() && fault_of_kernel_name(stem).empty() && !kernel_from_name(stem)) name = stem;
     if (const std::string fault = fault_of_kernel_name(name); !name.empty() && !fault.empty())
@@ -230,7 +231,7 @@ std::vector<KernelDefinition> parse_kernel_file(std::string_view text, const std
         std::string what = e.what();
         if (const std::size_t begin = what.find("] "); begin != what.npos)
             what = what.substr(begin + 2);
-        throw Error(where, "is no JSON: " + what, kHelp);
+        throw Error(where, "is no JSON: " + what, kFileHelp);
     }
     const std::string stem = std::filesystem::path(where).stem().string();
     if (!json.is_array()) return {one_of(json, stem, where)};

@@ -227,5 +227,6 @@ Vec3<T> blend_tile_backward(const TileLists& lists, size_t tile,
         const RenderSettings&, const ImageGradient<T>&, ProjectedGradient<T>*);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
+#undef DARB_INSTANTIATE
 
 }  // namespace darb::reference

@@ -443,5 +443,6 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
                                    SplatGradients<T>&, CameraGradients<T>*);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
+#undef DARB_INSTANTIATE
 
 }  // namespace darb::reference

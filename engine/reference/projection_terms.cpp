@@ -127,5 +127,6 @@ CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTe
                                                  const T*, T, const Camera&, double, double);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
+#undef DARB_INSTANTIATE
 
 }  // namespace darb::reference

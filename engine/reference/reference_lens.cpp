@@ -161,5 +161,6 @@ RayBounds ray_bounds(const Camera& camera) {
     template Vec2<T> lens_jacobian_backward(const LensTerms&, const Vec2<T>&, const Mat2<T>&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
+#undef DARB_INSTANTIATE
 
 }  // namespace darb::reference

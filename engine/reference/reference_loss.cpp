@@ -172,5 +172,6 @@ Image<T> to_unit_range(const ImageU8& photo) {
     template Image<T> to_unit_range(const ImageU8&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
+#undef DARB_INSTANTIATE
 
 }  // namespace darb::reference

@@ -148,5 +148,6 @@ Gradients backward(const SplatModel& model, const Camera& camera, const RenderSe
                                         const Image<T>&, const Image<T>&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
+#undef DARB_INSTANTIATE
 
 }  // namespace darb::reference

@@ -146,5 +146,6 @@ TileLists make_tile_lists(int width, int height, std::vector<ProjectedSplat<T>>&
                                        const RenderSettings&);
 DARB_INSTANTIATE(double)
 DARB_INSTANTIATE(float)
+#undef DARB_INSTANTIATE
 
 }  // namespace darb::reference

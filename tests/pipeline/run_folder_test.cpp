@@ -171,7 +171,7 @@ TEST_F(RunFolder, mcmc_has_the_splats_that_the_detail_of_the_photos_asks_for) {
     EXPECT_EQ(settings().at("max_splats"), by_detail);
 }
 
-TEST_F(RunFolder, schedule_of_3dgs_has_the_lengths_of_a_gaussian_for_every_kernel) {
+TEST_F(RunFolder, schedule_of_3dgs_has_the_lengths_of_a_gaussian_for_every_kernel_long) {
     const std::string raised_cosine = "--iterations 1 -q --kernel raised_cosine ";
     ASSERT_EQ(train(raised_cosine + "--schedule 3dgs").code, 0);
     EXPECT_FALSE(settings().contains("length_scale"));

@@ -1,12 +1,15 @@
 // The loss of measured depths: its pass against the same in double, its gradient through blending
-// to every parameter against the reference, whose own differences are tested, and smaller photos.
+// to every parameter and to the camera against the reference, whose own differences are tested, and
+// smaller photos.
 #include "trainer/depth_loss.h"
 
 #include "engine/core/rng.h"
 #include "engine/raster/backward.h"
+#include "engine/raster/camera_sums.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
 #include "engine/reference/reference_render.h"
+#include "engine/render/camera_gradient.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_lenses.h"
@@ -59,7 +62,7 @@ DepthGradient gradient_in_double(const reference::RenderResult& r,
 
 ForwardOptions depth_options(const ProjectionEffects& effects) {
     ForwardOptions options;
-    options.store_for_backward = options.depth_sum = true;
+    options.store_for_backward = options.depth_sum = options.camera_gradient = true;
     options.effects = effects;
     return options;
 }
@@ -86,13 +89,17 @@ void expect_gradients_match(const TestScene& scene, const ProjectionEffects& eff
     Frame& frame = buffers.frame();
     backward.reserve(splats.count(), buffers.size().intersections, frame.checkpoint_records());
     DepthLoss loss(device, true, false);
+    CameraSums sums(device);
+    sums.reserve(splats.count());
     Commands commands(device);
     commands.begin();
     forward.record(commands, splats, view, frame);
     loss.record(commands,
                 {frame.images.image, frame.images.final_transmittance, photo, d_image, true},
                 pixels, kWeight, kUsual);
-    backward.record_gradients(commands, view, frame, splats, d_image, {gradients});
+    backward.record_gradients(commands, view, frame, splats, d_image,
+                              {gradients, false, &sums.shares()});
+    sums.record(commands, splats.count(), gradients.of(kPosition));
     commands.submit_and_wait();
     ASSERT_EQ(frame.read_status().overflow, 0u);
 
@@ -114,6 +121,17 @@ void expect_gradients_match(const TestScene& scene, const ProjectionEffects& eff
         EXPECT_TRUE(compare_scaled(std::string(attribute_name(a)), values, got,
                                    tolerance("gradient_scaled_float32")));
     }
+    const auto numbers = [](const auto& focal, const auto& principal, const auto& translation) {
+        return std::vector<double>{focal.x,       focal.y,       principal.x,  principal.y,
+                                   translation.x, translation.y, translation.z};
+    };
+    const CameraGradient camera = camera_gradient(scene.camera, sums.read());
+    EXPECT_TRUE(compare_scaled("camera",
+                               numbers(expected.camera.d_focal, expected.camera.d_principal,
+                                       expected.camera.d_translation),
+                               numbers(glm::dvec2(camera.d_fx, camera.d_fy),
+                                       glm::dvec2(camera.d_cx, camera.d_cy), camera.d_translation),
+                               tolerance("gradient_scaled_float32")));
     for (const float v : gradients.download(kShDc)) ASSERT_EQ(v, 0) << "depth moves no colour";
 }
 

@@ -23,7 +23,7 @@ std::vector<float> random_values(size_t count, std::uint64_t seed) {
     return values;
 }
 
-std::vector<float> start_state() {
+std::vector<float> colours_at_start() {
     std::vector<float> start = random_values(ExposureMaps{kPhotos}.state_size(), 7);
     for (size_t i = kPhotos * 12; i < start.size(); ++i) start[i] = std::abs(start[i]) * 1e-3f;
     return start;
@@ -70,13 +70,13 @@ ExposureRun run_exposure(const std::vector<float>& open, const std::vector<float
 
 ExposureRun run_exposure(std::uint32_t pixels, std::uint32_t overflow = 0) {
     return run_exposure(open_pixels(pixels), random_values(pixels * 3, 1),
-                        random_values(pixels * 3, 2), start_state(), overflow);
+                        random_values(pixels * 3, 2), colours_at_start(), overflow);
 }
 
 TEST(ExposurePass, map_gradient_and_step_match_double_on_any_size) {
     for (const std::uint32_t pixels : {1u, 63u, 65u, 20'000u}) {
         const auto image = random_values(pixels * 3, 1), d = random_values(pixels * 3, 2);
-        const std::vector<float> start = start_state(), open = open_pixels(pixels);
+        const std::vector<float> start = colours_at_start(), open = open_pixels(pixels);
         const ExposureRun run = run_exposure(open, image, d, start);
         std::vector<double> mapped(image.size()), d_image(pixels * 4), d_map(12, 0.0);
         const float* m = &start[12];
@@ -126,7 +126,7 @@ TEST(ExposurePass, what_nothing_covers_keeps_the_background_and_says_nothing_of_
     constexpr size_t kPixels = 100;
     std::vector<float> image;
     for (int c = 0; c < 3; ++c) image.insert(image.end(), kPixels, kBehind[c]);
-    const std::vector<float> start = start_state();
+    const std::vector<float> start = colours_at_start();
     const ExposureRun run = run_exposure(std::vector<float>(kPixels, 1.0f), image,
                                          random_values(3 * kPixels, 2), start);
     EXPECT_EQ(run.mapped, image);
@@ -135,7 +135,7 @@ TEST(ExposurePass, what_nothing_covers_keeps_the_background_and_says_nothing_of_
 }
 
 TEST(ExposurePass, a_frame_that_overflowed_changes_no_map) {
-    EXPECT_EQ(run_exposure(100, 1).state, start_state());
+    EXPECT_EQ(run_exposure(100, 1).state, colours_at_start());
 }
 
 TEST(ExposurePass, repeats_bit_by_bit) {

@@ -12,7 +12,7 @@ namespace {
 constexpr std::uint32_t kWidth = 37, kHeight = 23, kPixels = kWidth * kHeight;
 constexpr int kSides[3] = {EXPOSURE_GRID_X, EXPOSURE_GRID_Y, EXPOSURE_GRID_L};
 constexpr ExposureMaps kMaps{2, true};
-constexpr double kBehind[3] = {0.9, 0.2, 0.6};
+constexpr double kLightBehind[3] = {0.9, 0.2, 0.6};
 
 /// A picture of what splats show and how much of the background is seen, a gradient, two grids.
 struct Case {
@@ -49,7 +49,7 @@ std::array<double, 3> mapped(const Case& c, std::uint32_t p) {
             sum[r] += weight * (m[4 * r] * x[0] + m[4 * r + 1] * x[1] + m[4 * r + 2] * x[2] +
                                 m[4 * r + 3] * (1 - c.open[p]));
     }
-    for (std::size_t r = 0; r < 3; ++r) sum[r] += c.open[p] * kBehind[r];
+    for (std::size_t r = 0; r < 3; ++r) sum[r] += c.open[p] * kLightBehind[r];
     return sum;
 }
 
@@ -94,7 +94,7 @@ GridRun run_grid(const Case& c) {
     exposure.restore(start);
     std::vector<double> image = c.colours;  // over the background
     for (std::size_t i = 0; i < image.size(); ++i)
-        image[i] += c.open[i % kPixels] * kBehind[i / kPixels];
+        image[i] += c.open[i % kPixels] * kLightBehind[i / kPixels];
     Buffer colours(device, "image", image.size() * 4), d(device, "d_image", kPixels * 16),
         transmittance(device, "transmittance", kPixels * 4),
         status(device, "status", sizeof(gpu::FrameStatus));
@@ -103,7 +103,7 @@ GridRun run_grid(const Case& c) {
     d.upload(floats(c.d));
     status.upload(std::vector<gpu::FrameStatus>(1));
     const ExposedPicture picture{
-        colours, transmittance, {kBehind[0], kBehind[1], kBehind[2]}, kWidth};
+        colours, transmittance, {kLightBehind[0], kLightBehind[1], kLightBehind[2]}, kWidth};
     Commands commands(device);
     commands.begin();
     exposure.record(commands, picture, 1, kPixels);
@@ -147,7 +147,7 @@ TEST(ExposureGrid, gradients_of_the_picture_match_finite_differences) {
             const double d_colour = slope(c.colours[k * kPixels + p]);
             expected.push_back(d_colour);
             found.push_back(double{got.d_image[k * kPixels + p]});
-            behind += d_colour * kBehind[k];
+            behind += d_colour * kLightBehind[k];
         }
         // The last plane: dL/d(1 - open) beside that.
         expected.push_back(behind - slope(c.open[p]));

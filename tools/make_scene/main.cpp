@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
         ++argv;
     }
     const int scale = argc == 3 ? std::atoi(argv[2]) : 1;
-    if (argc < 2 || argc > 3 || scale < 1 || scale > 8) {
+    if (argc < 2 || argc > 3 || argv[1][0] == '-' || scale < 1 || scale > 8) {
         std::fprintf(
             stderr,
             "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
