@@ -47,7 +47,8 @@ trap 'rm -rf "$logs"' EXIT
 # those in _long in the step of that name.
 long='_long(/|$| )' # a space: ctest adds the parameter
 gpu_alone="_slow(/|\$)|$long|PassSpirv|_at_vector_width_"
-# Of the device, with no more host code than others, or the same host code for long: not under sanitizers.
+# Of the device, with no more host code than others, the same host code for long, or none that reads files of users: not
+# under sanitizers.
 # Names are those of suites, for pipelines those of cases. ctest takes nine groups in all of an expression.
 numerics='\.(StrategyTable|ClusterRows|Undistort)$|every[a-z_]*/|settings/|Reference/|WalkCases|TuningWalk|^Psi\.|\.Psi$|HardCases|EffectPicture|EffectTraining|for_every_kernel$|Accuracy_switch_changes|^trained_command_test$'
 # Of processes and of scripts, seconds each: they find nothing new under sanitizers or validation.

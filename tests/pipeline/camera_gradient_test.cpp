@@ -11,6 +11,7 @@
 #include "engine/raster/frame_buffers.h"
 #include "engine/reference/reference_render.h"
 #include "engine/render/render_gradients.h"
+#include "tests/support/camera_moves.h"
 #include "tests/support/own_kernels.h"
 #include "tests/support/test_lenses.h"
 #include "tests/support/test_walk.h"
@@ -18,7 +19,6 @@
 namespace darb::test {
 namespace {
 
-constexpr int kFreedoms = 10;
 const glm::vec3 kBackground(0.25f, 0.5f, 0.75f);
 
 ImageF random_image(const Camera& camera, int channels, std::uint64_t seed) {
@@ -52,31 +52,6 @@ Camera moved(Camera camera, int which, double h) {
         *numbers[which - 6] += h;
     }
     return camera;
-}
-
-/// dL of a move, by the gradient of the camera's numbers.
-double along(const CameraGradient& d, const Camera& camera, int which) {
-    if (which >= 6) return std::array{d.d_fx, d.d_fy, d.d_cx, d.d_cy}[size_t(which) - 6];
-    if (which >= 3) return d.d_translation[which - 3];
-    glm::dmat3 generator(0.0);  // of the rotation about that axis
-    const int j = (which + 1) % 3, k = (which + 2) % 3;
-    generator[j][k] = 1;
-    generator[k][j] = -1;
-    const glm::dmat3 d_rotation = generator * camera.rotation;
-    double sum = glm::dot(d.d_translation, generator * camera.translation);
-    for (int c = 0; c < 3; ++c) sum += glm::dot(d.d_rotation[c], d_rotation[c]);
-    return sum;
-}
-
-std::vector<double> along_all(const CameraGradient& d, const Camera& camera) {
-    std::vector<double> all;
-    for (int which = 0; which < kFreedoms; ++which) all.push_back(along(d, camera, which));
-    return all;
-}
-
-CameraGradient as_device(const reference::CameraGradients<double>& d) {
-    return {d.d_rotation, d.d_translation, d.d_focal.x,
-            d.d_focal.y,  d.d_principal.x, d.d_principal.y};
 }
 
 /// sum of weights times picture and opacity.

@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "engine/data/depth_io.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/child.h"
@@ -78,20 +77,6 @@ void expect_cells_of(const SplatModel& joined, const nlohmann::json& manifest) {
     EXPECT_GT(joined.size() - low, 100u);
 }
 
-/// The shipped scene with a measured depth of 3 m in every pixel.
-fs::path scene_with_depths() {
-    const fs::path whole = std::string(DARB_SOURCE_DIR) + "/assets/scene",
-                   copy = scratch() / "with_depths";
-    fs::create_directories(copy / "depths");
-    for (const auto& entry : fs::directory_iterator(whole))
-        fs::create_symlink(entry.path(), copy / entry.path().filename());
-    ImageF depth(200, 150, 1);
-    std::fill(depth.data.begin(), depth.data.end(), 3.0f);
-    for (const auto& photo : fs::directory_iterator(whole / "images"))
-        write_depth_png(copy / "depths" / photo.path().filename(), depth, kMillimetre);
-    return copy;
-}
-
 // The quick test of the whole: bytes of an undisturbed run, from one that was killed within a
 // block.
 TEST_F(BlocksCommand, joins_cells_and_resumes_a_killed_block_to_the_same_bytes) {
@@ -117,22 +102,6 @@ TEST_F(BlocksCommand, joins_cells_and_resumes_a_killed_block_to_the_same_bytes) 
     const Outcome resumed = darb("train --resume -q -o " + other_.string());
     ASSERT_EQ(resumed.code, 0) << resumed.err;
     EXPECT_EQ(read_file(scene(other_)), read_file(scene(whole_)));
-}
-
-TEST_F(BlocksCommand, measured_depths_move_the_splats_of_every_block_long) {
-    std::vector<std::string> arguments = training(whole_);
-    arguments[1] = scene_with_depths().string();
-    ASSERT_EQ(darb(words(arguments)).code, 0);
-    arguments[3] = other_.string();
-    arguments.insert(arguments.end(), {"--effects", "+depth"});
-    const Outcome with_depths = darb(words(arguments));
-    ASSERT_EQ(with_depths.code, 0) << with_depths.err;
-    fs::remove_all(arguments[1]);
-    for (const char* block : {"0x0", "1x0"}) {
-        const fs::path part =
-            fs::path("blocks") / block / "point_cloud/iteration_24/point_cloud.ply";
-        EXPECT_NE(read_file(whole_ / part), read_file(other_ / part)) << block;
-    }
 }
 
 TEST_F(BlocksCommand, what_it_cannot_do_is_refused) {

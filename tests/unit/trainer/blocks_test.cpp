@@ -244,9 +244,13 @@ TEST(BlockScene, a_block_has_its_photos_and_every_point) {
     whole.points.colour = {4, 5, 6};
     whole.points.seen_begin = {0, 1};
     whole.points.seen_by = {3};
+    whole.views[3].depth = "depths/3.png";
+    whole.depth_scale = 2;
     const Dataset block = block_dataset(whole, {1, 3});
     ASSERT_EQ(block.views.size(), 2u);
     EXPECT_EQ(block.views[1].name, "3");
+    EXPECT_EQ(block.views[1].depth, "depths/3.png");
+    EXPECT_EQ(block.depth_scale, 2);
     EXPECT_EQ(block.points.size(), 1u);
     EXPECT_TRUE(block.points.seen_by.empty()) << "by numbers of other views";
 }
@@ -254,8 +258,11 @@ TEST(BlockScene, a_block_has_its_photos_and_every_point) {
 TEST(PartOptions, blocks_share_out_the_splats_by_points) {
     TrainOptions options;
     options.max_splats = 10'000;
+    options.depth = true;
+    options.depth_weight = 0.5f;
     const TrainOptions block = block_options(options, {200, 300}, 1'000, 640, 900);
     EXPECT_EQ(block.max_splats, 3'640u);
+    EXPECT_TRUE(block.depth && block.depth_weight == 0.5f) << "all else is as it was";
     EXPECT_EQ(block_options(options, {200, 300}, 1'000, 640, 5'000).max_splats, 5'000u);
     options.max_splats.reset();
     EXPECT_FALSE(block_options(options, {200, 300}, 1'000, 640, 900).max_splats);

@@ -1,0 +1,41 @@
+// dL/d(camera) along the ten ways that a camera moves: three turns about its own axes, the
+// translation, focal lengths, principal point.
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "engine/reference/reference_render.h"
+#include "engine/render/camera_gradient.h"
+
+namespace darb::test {
+
+constexpr int kFreedoms = 10;
+
+/// dL of a move, by the gradient of the camera's numbers.
+inline double along(const CameraGradient& d, const Camera& camera, int which) {
+    if (which >= 6) return std::array{d.d_fx, d.d_fy, d.d_cx, d.d_cy}[size_t(which) - 6];
+    if (which >= 3) return d.d_translation[which - 3];
+    glm::dmat3 generator(0.0);  // of the rotation about that axis
+    const int j = (which + 1) % 3, k = (which + 2) % 3;
+    generator[j][k] = 1;
+    generator[k][j] = -1;
+    const glm::dmat3 d_rotation = generator * camera.rotation;
+    double sum = glm::dot(d.d_translation, generator * camera.translation);
+    for (int c = 0; c < 3; ++c) sum += glm::dot(d.d_rotation[c], d_rotation[c]);
+    return sum;
+}
+
+inline std::vector<double> along_all(const CameraGradient& d, const Camera& camera) {
+    std::vector<double> all;
+    for (int which = 0; which < kFreedoms; ++which) all.push_back(along(d, camera, which));
+    return all;
+}
+
+inline CameraGradient as_device(const reference::CameraGradients<double>& d) {
+    return {d.d_rotation, d.d_translation, d.d_focal.x,
+            d.d_focal.y,  d.d_principal.x, d.d_principal.y};
+}
+
+}  // namespace darb::test
