@@ -6,17 +6,31 @@ namespace darb {
 
 namespace {
 
-VkBufferMemoryBarrier2 whole_buffer(VkBuffer buffer) {
-    VkBufferMemoryBarrier2 barrier{};
-    barrier.sType = VK_STRUCTURE_TYPE_BUFFER_MEMORY_BARRIER_2;
-    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    barrier.buffer = buffer;
-    barrier.size = VK_WHOLE_SIZE;
+// Every access of a stage, so that one barrier does for all buffers.
+VkAccessFlags2 accesses_of(VkPipelineStageFlags2 stages) {
+    VkAccessFlags2 accesses = 0;
+    if (stages & VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT)
+        accesses |= VK_ACCESS_2_SHADER_STORAGE_READ_BIT | VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
+    if (stages & VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT)
+        accesses |= VK_ACCESS_2_TRANSFER_READ_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT;
+    if (stages & VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT)
+        accesses |= VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
+    return accesses;
+}
+
+VkMemoryBarrier2 memory_barrier() {
+    VkMemoryBarrier2 barrier{};
+    barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2;
     return barrier;
 }
 
 }  // namespace
+
+void BarrierTracker::clear() {
+    states_.clear();
+    stages_ = 0;
+    writes_ = 0;
+}
 
 void BarrierTracker::use(const BufferUse& use) {
     const auto same = std::find_if(pending_.begin(), pending_.end(), [&](const BufferUse& other) {
@@ -31,46 +45,50 @@ void BarrierTracker::use(const BufferUse& use) {
     same->write |= use.write;
 }
 
-const std::vector<VkBufferMemoryBarrier2>& BarrierTracker::resolve() {
-    barriers_.clear();
+std::optional<VkMemoryBarrier2> BarrierTracker::resolve() {
+    VkPipelineStageFlags2 reached = 0;
+    for (const BufferUse& use : pending_) {
+        const State& state = states_[use.buffer];
+        const bool reads_early = state.written && (state.readers & use.stage) != use.stage;
+        const bool writes_early = use.write != 0 && (state.written || state.read) &&
+                                  (state.writers & use.stage) != use.stage;
+        if (reads_early || writes_early) reached |= use.stage;
+    }
+    std::optional<VkMemoryBarrier2> barrier;
+    if (reached != 0) {
+        barrier = memory_barrier();
+        barrier->srcStageMask = stages_;
+        barrier->srcAccessMask = writes_;
+        barrier->dstStageMask = reached;
+        barrier->dstAccessMask = accesses_of(reached);
+        for (auto& [buffer, state] : states_) {
+            state.readers |= reached;
+            state.writers |= reached;
+        }
+    }
     for (const BufferUse& use : pending_) {
         State& state = states_[use.buffer];
-        const bool seen = (state.visible_stages & use.stage) == use.stage &&
-                          (state.visible_access & use.read) == use.read;
-        const bool after_write = state.write_stage != 0 && (use.write != 0 || !seen);
-        const bool after_read = state.read_stages != 0 && use.write != 0;
-        if (after_write || after_read) {
-            VkBufferMemoryBarrier2 barrier = whole_buffer(use.buffer);
-            barrier.srcStageMask = state.write_stage | (use.write != 0 ? state.read_stages : 0);
-            barrier.srcAccessMask = state.write_access;
-            barrier.dstStageMask = use.stage;
-            barrier.dstAccessMask = use.read | use.write;
-            barriers_.push_back(barrier);
-        }
+        state.writers = 0;
+        if (use.read != 0) state.read = true;
         if (use.write != 0) {
-            state = {use.stage, use.write, 0, 0, 0};
-        } else {
-            state.read_stages |= use.stage;
-            state.visible_stages |= use.stage;
-            state.visible_access |= use.read;
+            state.written = true;
+            state.readers = 0;
         }
+        stages_ |= use.stage;
+        writes_ |= use.write;
     }
     pending_.clear();
-    return barriers_;
+    return barrier;
 }
 
-std::vector<VkBufferMemoryBarrier2> BarrierTracker::to_host() const {
-    std::vector<VkBufferMemoryBarrier2> all;
-    for (const auto& [buffer, state] : states_) {
-        if (state.write_stage == 0) continue;
-        VkBufferMemoryBarrier2 barrier = whole_buffer(buffer);
-        barrier.srcStageMask = state.write_stage;
-        barrier.srcAccessMask = state.write_access;
-        barrier.dstStageMask = VK_PIPELINE_STAGE_2_HOST_BIT;
-        barrier.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
-        all.push_back(barrier);
-    }
-    return all;
+std::optional<VkMemoryBarrier2> BarrierTracker::to_host() const {
+    if (writes_ == 0) return {};
+    VkMemoryBarrier2 barrier = memory_barrier();
+    barrier.srcStageMask = stages_;
+    barrier.srcAccessMask = writes_;
+    barrier.dstStageMask = VK_PIPELINE_STAGE_2_HOST_BIT;
+    barrier.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
+    return barrier;
 }
 
 }  // namespace darb

@@ -1,9 +1,12 @@
-// BarrierTracker: which buffers were written and read by what since the last barrier, and the
-// barriers that the next pass needs. Whole buffers only. Private to engine/gpu.
+// BarrierTracker: which buffers were written and read by what, and the memory barrier that the next
+// pass needs. One barrier orders everything before it, not a buffer alone: so drivers carry out
+// barriers of buffers, too, and passes that share nothing may then run side by side. Whole buffers
+// only. Private to engine/gpu.
 #pragma once
 
 #include <vulkan/vulkan.h>
 
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -19,29 +22,28 @@ struct BufferUse {
 class BarrierTracker {
   public:
     /// Forgets everything: what came before is ordered by other means.
-    void clear() { states_.clear(); }
+    void clear();
 
     /// Adds one use of the pass that comes next; uses of one buffer are merged.
     void use(const BufferUse& use);
 
-    /// The barriers that the uses added since the last call need (RAW, WAR, WAW), one per buffer.
-    /// Valid until the next call.
-    const std::vector<VkBufferMemoryBarrier2>& resolve();
+    /// The barrier that the uses added since the last call need (RAW, WAR, WAW), if any.
+    std::optional<VkMemoryBarrier2> resolve();
 
-    /// Barriers that make all writes so far visible to the host.
-    std::vector<VkBufferMemoryBarrier2> to_host() const;
+    /// The barrier that makes all writes so far visible to the host; none where nothing was
+    /// written.
+    std::optional<VkMemoryBarrier2> to_host() const;
 
   private:
     struct State {
-        VkPipelineStageFlags2 write_stage = 0;  // of the last write, 0 = none
-        VkAccessFlags2 write_access = 0;
-        VkPipelineStageFlags2 read_stages = 0;     // readers since that write
-        VkPipelineStageFlags2 visible_stages = 0;  // where that write was made visible
-        VkAccessFlags2 visible_access = 0;
+        bool written = false, read = false;
+        VkPipelineStageFlags2 readers = 0;  // stages that a barrier after the last write reached
+        VkPipelineStageFlags2 writers = 0;  // the same after the last use of any kind
     };
     std::unordered_map<VkBuffer, State> states_;
     std::vector<BufferUse> pending_;
-    std::vector<VkBufferMemoryBarrier2> barriers_;
+    VkPipelineStageFlags2 stages_ = 0;  // of all uses so far
+    VkAccessFlags2 writes_ = 0;
 };
 
 }  // namespace darb

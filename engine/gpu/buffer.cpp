@@ -210,7 +210,8 @@ void Device::State::copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer 
     begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     check_vulkan(vkBeginCommandBuffer(copy_commands, &begin), what);
-    record_full_barrier(copy_commands);  // having waited makes writes available, not visible
+    record_barrier(copy_commands,
+                   full_barrier());  // having waited makes writes available, not visible
     const VkBufferCopy region{from_offset, to_offset, bytes};
     vkCmdCopyBuffer(copy_commands, from, to, 1, &region);
     VkMemoryBarrier2 barrier{};

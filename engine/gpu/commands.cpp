@@ -205,14 +205,10 @@ void Commands::State::bind(const Pipeline& pipeline, std::span<const std::byte> 
 }
 
 void Commands::State::place_barriers() {
-    const std::vector<VkBufferMemoryBarrier2>& needed = barriers.resolve();
-    if (needed.empty()) return;
+    const std::optional<VkMemoryBarrier2> needed = barriers.resolve();
+    if (!needed) return;
     ++now().barriers;
-    VkDependencyInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
-    info.bufferMemoryBarrierCount = static_cast<std::uint32_t>(needed.size());
-    info.pBufferMemoryBarriers = needed.data();
-    vkCmdPipelineBarrier2(commands, &info);
+    record_barrier(commands, *needed);
 }
 
 void Commands::State::finish_pass() {
@@ -250,7 +246,7 @@ void Commands::begin() {
     info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     check_vulkan(vkBeginCommandBuffer(s.commands, &info), "command buffer");
     s.recording = true;
-    record_full_barrier(s.commands);
+    record_barrier(s.commands, full_barrier());
 }
 
 void Commands::pass(std::string_view name) {
@@ -410,14 +406,7 @@ void Commands::submit(VkSemaphore wait_for, VkSemaphore signal) {
     State& s = *state_;
     check_recording(s.recording);
     s.finish_pass();
-    const std::vector<VkBufferMemoryBarrier2> to_host = s.barriers.to_host();
-    if (!to_host.empty()) {
-        VkDependencyInfo info{};
-        info.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
-        info.bufferMemoryBarrierCount = static_cast<std::uint32_t>(to_host.size());
-        info.pBufferMemoryBarriers = to_host.data();
-        vkCmdPipelineBarrier2(s.commands, &info);
-    }
+    if (const auto to_host = s.barriers.to_host()) record_barrier(s.commands, *to_host);
     s.recording = false;
     check_vulkan(vkEndCommandBuffer(s.commands), s.all_passes());
     check_vulkan(vkResetFences(s.device.handle(), 1, &s.fence), s.all_passes());

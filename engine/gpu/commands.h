@@ -51,7 +51,8 @@ class Commands {
     /// constant block. buffers: set 0, binding 0.., as many as the shader declares. groups >= 1 in
     /// each used dimension; a dimension above the device's limit is a check failure.
     /// Memory barriers are placed here: a pass waits for the earlier writers of what it touches,
-    /// and a writer for the earlier readers. Ranges of one buffer count as the whole buffer.
+    /// and a writer for the earlier readers. Ranges of one buffer count as the whole buffer. What
+    /// is recorded between two barriers may run side by side.
     template <class Args>
     void dispatch(const Pipeline& pipeline, const Args& args,
                   std::initializer_list<BufferRange> buffers, std::uint32_t groups_x,

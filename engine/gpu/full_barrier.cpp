@@ -12,8 +12,7 @@ VkMemoryBarrier2 full_barrier() {
     return barrier;
 }
 
-void record_full_barrier(VkCommandBuffer commands) {
-    const VkMemoryBarrier2 barrier = full_barrier();
+void record_barrier(VkCommandBuffer commands, const VkMemoryBarrier2& barrier) {
     VkDependencyInfo dependency{};
     dependency.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
     dependency.memoryBarrierCount = 1;

@@ -7,6 +7,6 @@ namespace darb {
 
 /// After it everything that was written before it is visible to what follows.
 VkMemoryBarrier2 full_barrier();
-void record_full_barrier(VkCommandBuffer commands);
+void record_barrier(VkCommandBuffer commands, const VkMemoryBarrier2& barrier);
 
 }  // namespace darb

@@ -21,6 +21,7 @@ constexpr std::uint32_t kRowBytes = RADIX_MAX_DIGITS * 4;  // counters of a subg
 constexpr std::uint32_t kColumnItems = 1024;
 constexpr std::uint32_t kBallotThreads = 256, kBallotItems = 16;
 constexpr std::uint32_t kSumBytes = 64 * 4;  // of subgroups, at most
+constexpr std::uint32_t kOffsetThreads = 256;
 
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,
                         bool iota) {
@@ -69,40 +70,39 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, std::optional<SortS
     const auto [threads, items, subgroups] = shape_;
     const SpecConstants plain = constants(threads, items, subgroups, false);
     const SpecConstants iota = constants(threads, items, subgroups, true);
+    const bool by_thread = device.tuning().scan_by_thread;
+    const std::uint32_t offset_threads = by_thread ? threads / subgroups : kOffsetThreads;
+    rows_per_group_ = by_thread ? offset_threads : 1;
     prepare_ = Pipeline(device, "radix_prepare");
+    offsets_ = Pipeline(device, "radix_offsets",
+                        {{"THREADS", static_cast<std::int32_t>(offset_threads)},
+                         {"TEAM_IS_THREAD", by_thread ? 1 : 0}},
+                        true, subgroup_size);
     histogram_ = Pipeline(device, histogram_name(scatter_), plain, true, subgroup_size);
     rank_ = Pipeline(device, scatter_name(scatter_), plain, true, subgroup_size);
     rank_iota_ = Pipeline(device, scatter_name(scatter_), iota, true, subgroup_size);
 
     make_buffers(device, *this, buffers(capacity, shape_), "sort");
-    scan_.emplace(device, static_cast<std::uint32_t>(counters(capacity, shape_)));
 }
 
-// One workgroup a block, and a scan over the counters of all blocks.
+// One workgroup a block.
 std::uint64_t RadixSort::max_capacity(const Device& device) {
-    const std::uint64_t counters = Scan::max_capacity(device, Scan::best_strategy(device));
-    const std::uint64_t blocks =
-        std::min<std::uint64_t>(device.info().max_groups_x, counters / RADIX_MAX_DIGITS);
-    return blocks * choose_shape(device, device.tuning().scatter, 0).block();
-}
-
-std::uint64_t RadixSort::counters(std::uint32_t capacity, const Shape& shape) {
-    return (std::uint64_t{capacity} + shape.block() - 1) / shape.block() * RADIX_MAX_DIGITS;
+    return std::uint64_t{device.info().max_groups_x} *
+           choose_shape(device, device.tuning().scatter, 0).block();
 }
 
 BufferList<RadixSort> RadixSort::buffers(std::uint32_t capacity, const Shape& shape) {
     const std::uint64_t pair_bytes = std::uint64_t{capacity} * 4;
+    const std::uint64_t blocks = (std::uint64_t{capacity} + shape.block() - 1) / shape.block();
     return {{&RadixSort::plan_, "sort plan", sizeof(gpu::RadixPlan)},
-            {&RadixSort::histograms_, "sort histograms", counters(capacity, shape) * 4},
-            {&RadixSort::total_, "sort total", 4},
+            {&RadixSort::histograms_, "sort histograms", blocks * kRowBytes},
+            {&RadixSort::totals_, "sort totals", RADIX_MAX_PASSES * kRowBytes},
             {&RadixSort::keys_temp_, "sort keys", pair_bytes},
             {&RadixSort::values_temp_, "sort values", pair_bytes}};
 }
 
 std::uint64_t RadixSort::device_bytes(const Device& device, std::uint32_t capacity) {
-    const Shape shape = choose_shape(device, device.tuning().scatter, 0);
-    return charged_bytes(buffers(capacity, shape)) +
-           Scan::device_bytes(static_cast<std::uint32_t>(counters(capacity, shape)));
+    return charged_bytes(buffers(capacity, choose_shape(device, device.tuning().scatter, 0)));
 }
 
 void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& values,
@@ -118,8 +118,7 @@ void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& val
                     "Give it buffers of its capacity.");
     const gpu::RadixPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4),
                                      block()};
-    commands.dispatch(prepare_, args, {count_buffer, plan_}, 1);
-    scan_->prepare(commands, plan_, offsetof(gpu::RadixPlan, counters));
+    commands.dispatch(prepare_, args, {count_buffer, plan_, totals_}, 1);
 
     const int passes = (key_bits + kDigitBits - 1) / kDigitBits;
     KeyValues from{&keys, &values}, to{&keys_temp_, &values_temp_};
@@ -132,18 +131,20 @@ void RadixSort::record(Commands& commands, const Buffer& keys, const Buffer& val
     for (int pass = 0; pass < passes; ++pass) {
         // Equal digits: 12 bits as 6 + 6 have fewer counters than 8 + 4.
         const int bits = (key_bits - done_bits + passes - pass - 1) / (passes - pass);
-        record_pass(commands, static_cast<std::uint32_t>(done_bits), 1U << bits,
-                    iota_values && pass == 0, from, to);
+        const gpu::RadixPassArgs pass_args{static_cast<std::uint32_t>(done_bits), 1U << bits,
+                                           static_cast<std::uint32_t>(pass) * RADIX_MAX_DIGITS};
+        record_pass(commands, pass_args, iota_values && pass == 0, from, to);
         done_bits += bits;
         std::swap(from, to);
     }
 }
 
-void RadixSort::record_pass(Commands& commands, std::uint32_t shift, std::uint32_t digits,
-                            bool iota, const KeyValues& from, const KeyValues& to) {
-    const gpu::RadixPassArgs args{shift, digits};
-    commands.dispatch_indirect(histogram_, args, {plan_, *from.keys, histograms_}, plan_, 0);
-    scan_->run(commands, histograms_, histograms_, total_);
+void RadixSort::record_pass(Commands& commands, const gpu::RadixPassArgs& args, bool iota,
+                            const KeyValues& from, const KeyValues& to) {
+    commands.dispatch_indirect(histogram_, args, {plan_, *from.keys, histograms_, totals_}, plan_,
+                               0);
+    commands.dispatch(offsets_, args, {plan_, totals_, histograms_},
+                      (args.digits + rows_per_group_ - 1) / rows_per_group_);
     commands.dispatch_indirect(iota ? rank_iota_ : rank_, args,
                                {plan_, histograms_, *from.keys, *from.values, *to.keys, *to.values},
                                plan_, 0);

@@ -1,6 +1,7 @@
 // RadixSort: stable sort of (uint32 key, uint32 value) pairs on the device, least significant digit
-// first, up to 8 bits a pass, each pass histogram -> scan -> scatter. No forward progress between
-// workgroups and no subgroup size is assumed; the result is the one stable order, so it repeats.
+// first, up to 8 bits a pass, each pass histogram -> offsets -> scatter. No forward progress
+// between workgroups and no subgroup size is assumed; the result is the one stable order, so it
+// repeats.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
 #include "engine/gpu/tuning.h"
-#include "engine/primitives/scan.h"
+#include "shaders/shared/radix_args.h"
 
 namespace darb {
 
@@ -49,21 +50,20 @@ class RadixSort {
         std::uint32_t block() const { return threads * items; }
     };
     static BufferList<RadixSort> buffers(std::uint32_t capacity, const Shape& shape);
-    static std::uint64_t counters(std::uint32_t capacity, const Shape& shape);
     static Shape choose_shape(const Device& device, SortScatter scatter,
                               std::uint32_t subgroup_size);
     struct KeyValues {
         const Buffer *keys, *values;
     };
-    void record_pass(Commands& commands, std::uint32_t shift, std::uint32_t digits, bool iota,
+    void record_pass(Commands& commands, const gpu::RadixPassArgs& args, bool iota,
                      const KeyValues& from, const KeyValues& to);
 
     std::uint32_t capacity_;
     SortScatter scatter_;
     Shape shape_;
-    Pipeline prepare_, histogram_, rank_, rank_iota_;
-    Buffer plan_, histograms_, total_, keys_temp_, values_temp_;
-    std::optional<Scan> scan_;
+    std::uint32_t rows_per_group_ = 1;  // of the offsets
+    Pipeline prepare_, histogram_, offsets_, rank_, rank_iota_;
+    Buffer plan_, histograms_, totals_, keys_temp_, values_temp_;
 };
 
 }  // namespace darb

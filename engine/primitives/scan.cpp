@@ -95,34 +95,25 @@ std::uint64_t Scan::device_bytes(std::uint32_t capacity) {
     return charged_bytes(buffers(capacity));
 }
 
-void Scan::prepare(Commands& commands, const Buffer& count_buffer, std::uint64_t count_offset) {
-    check_word(count_buffer, count_offset);
-    const gpu::ScanPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4), kChunk,
-                                    teams_per_group_};
-    commands.dispatch(prepare_, args, {count_buffer, plan_}, 1);
-}
-
-void Scan::run(Commands& commands, const Buffer& counts, const Buffer& offsets,
-               const BufferRange& total) {
+void Scan::record(Commands& commands, const Buffer& counts, const Buffer& offsets,
+                  const Buffer& count_buffer, std::uint64_t count_offset,
+                  const BufferRange& total) {
     const std::uint64_t bytes = std::uint64_t{capacity_} * sizeof(std::uint32_t);
     if (counts.bytes() < bytes || offsets.bytes() < bytes)
         throw Error("scan",
                     fmt::format("buffers of {} and {} bytes, a capacity of {} words",
                                 counts.bytes(), offsets.bytes(), capacity_),
                     "Give it buffers of its capacity.");
+    check_word(count_buffer, count_offset);
     check_word(*total.buffer, total.offset);
+    const gpu::ScanPrepareArgs args{capacity_, static_cast<std::uint32_t>(count_offset / 4), kChunk,
+                                    teams_per_group_};
     const gpu::ScanTopArgs top_args{static_cast<std::uint32_t>(total.offset / 4)};
+    commands.dispatch(prepare_, args, {count_buffer, plan_}, 1);
     commands.dispatch_indirect(reduce_, NoArgs{}, {plan_, counts, chunk_sums_}, plan_, 0);
     commands.dispatch(top_, top_args, {plan_, chunk_sums_, *total.buffer}, 1);
     commands.dispatch_indirect(&counts == &offsets ? apply_in_place_ : apply_, NoArgs{},
                                {plan_, counts, chunk_sums_, offsets}, plan_, 0);
-}
-
-void Scan::record(Commands& commands, const Buffer& counts, const Buffer& offsets,
-                  const Buffer& count_buffer, std::uint64_t count_offset,
-                  const BufferRange& total) {
-    prepare(commands, count_buffer, count_offset);
-    run(commands, counts, offsets, total);
 }
 
 }  // namespace darb

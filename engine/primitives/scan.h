@@ -39,12 +39,6 @@ class Scan {
     void record(Commands& commands, const Buffer& counts, const Buffer& offsets,
                 const Buffer& count_buffer, std::uint64_t count_offset, const BufferRange& total);
 
-    /// The same in two parts, for several scans of one n: prepare once, then run as often as
-    /// needed.
-    void prepare(Commands& commands, const Buffer& count_buffer, std::uint64_t count_offset);
-    void run(Commands& commands, const Buffer& counts, const Buffer& offsets,
-             const BufferRange& total);
-
   private:
     static BufferList<Scan> buffers(std::uint32_t capacity);
 

@@ -151,6 +151,7 @@ void Forward::record_projection(Commands& commands, const GpuSplats& splats, con
     constexpr std::uint64_t of_frame = offsetof(gpu::FrameStatus, bad_gradients);
     const Buffer& status = frame.counters.status;
     commands.fill(BufferRange(status, of_frame, sizeof(gpu::FrameStatus) - of_frame), 0);
+    commands.fill(frame.counters.splats, splats.count());
     const ProjectedSplats& out = frame.splats;
     for (const SplatRange& range : splats.ranges()) {
         const gpu::ProjectArgs args{range.first, range.first + range.count, view.index,
@@ -172,7 +173,6 @@ void Forward::record_depth_order(Commands& commands, std::uint32_t n, float near
     const ProjectedSplats& s = frame.splats;
     const Groups g = groups_for(n);
     commands.pass("compact");
-    commands.fill(c.splats, n);
     frame.sorts.scan->record(commands, s.visible, s.visible_offset, c.splats, 0, c.visible);
     commands.dispatch(groups_visible_, gpu::IntersectionArgs{frame.size.intersections, 0, 0, 0},
                       {c.status, c.groups, c.visible, c.visible_in_use}, 1);
@@ -218,10 +218,10 @@ void Forward::record_tiles(Commands& commands, const gpu::IntersectionArgs& args
     const FrameCounters& c = frame.counters;
     const TileIntersections& t = frame.intersections;
     commands.pass("tile sort");
+    commands.fill(t.tile_range, 0);  // beside the sort
     frame.sorts.by_tile->record(commands, t.tile, t.intersection_from_sorted,
                                 c.intersections_in_use, 0, bits_for(args.tile_count), true);
     commands.pass("tile ranges");
-    commands.fill(t.tile_range, 0);
     commands.dispatch_indirect(tile_ranges_, args, {c.intersections_in_use, t.tile, t.tile_range},
                                c.groups, offsetof(gpu::FrameGroups, intersections_x));
     const Groups g = groups_for(args.tile_count);

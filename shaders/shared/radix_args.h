@@ -5,6 +5,8 @@
 #include "types.h"
 
 #define RADIX_MAX_DIGITS 256  // 8 bits a pass
+#define RADIX_MAX_PASSES 4
+#define RADIX_THREADS 64  // of the pass that prepares
 
 #ifdef __cplusplus
 namespace darb::gpu {
@@ -21,18 +23,18 @@ struct RadixPlan {
     uint groups_x;  // blocks that hold the pairs
     uint groups_y;
     uint groups_z;
-    uint count;     // pairs, at most the capacity
-    uint counters;  // RADIX_MAX_DIGITS * blocks, the length of the histograms
+    uint count;  // pairs, at most the capacity
 };
 
 struct RadixPassArgs {
     uint shift;   // of this pass's digit
     uint digits;  // values of the digit, a power of two up to RADIX_MAX_DIGITS
+    uint first;   // of the pass's totals: RADIX_MAX_DIGITS * its number
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(RadixPrepareArgs) == 12 && sizeof(RadixPlan) == 20);
-static_assert(sizeof(RadixPassArgs) == 8);
+static_assert(sizeof(RadixPrepareArgs) == 12 && sizeof(RadixPlan) == 16);
+static_assert(sizeof(RadixPassArgs) == 12);
 }  // namespace darb::gpu
 #endif
 

@@ -1,6 +1,6 @@
 // Radix sort, step 1 of 3 of a pass: how often each digit occurs in each block.
 // One workgroup a block of THREADS * ITEMS keys. Shared memory: 1 KiB of counters.
-// Reads keys [n]; writes histograms [RADIX_MAX_DIGITS][blocks], all digits, the unused as 0.
+// Reads keys [n]; writes histograms [digits][blocks], and adds to the totals [digits] of the pass.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -14,12 +14,13 @@ layout(push_constant, scalar) uniform Push { RadixPassArgs args; };
 layout(set = 0, binding = 0, scalar) readonly buffer Plan { RadixPlan plan; };
 layout(set = 0, binding = 1, scalar) readonly buffer Keys { uint keys[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Histograms { uint histograms[]; };
+layout(set = 0, binding = 3, scalar) buffer Totals { uint totals[]; };
 
 shared uint counters[RADIX_MAX_DIGITS];
 
 void main() {
     const uint thread = gl_LocalInvocationID.x;
-    for (uint d = thread; d < RADIX_MAX_DIGITS; d += THREADS) counters[d] = 0;
+    for (uint d = thread; d < args.digits; d += THREADS) counters[d] = 0;
     barrier();
     const uint begin = gl_WorkGroupID.x * THREADS * ITEMS;
     const uint end = min(begin + THREADS * ITEMS, plan.count);
@@ -27,6 +28,8 @@ void main() {
     for (uint i = begin + thread; i < end; i += THREADS)
         atomicAdd(counters[(keys[i] >> args.shift) & mask], 1);
     barrier();
-    for (uint d = thread; d < RADIX_MAX_DIGITS; d += THREADS)
+    for (uint d = thread; d < args.digits; d += THREADS) {
         histograms[d * gl_NumWorkGroups.x + gl_WorkGroupID.x] = counters[d];
+        atomicAdd(totals[args.first + d], counters[d]);
+    }
 }

@@ -2,7 +2,7 @@
 // bit; rows of a subgroup are contiguous, so that all reads are. The block's keys are brought in order in shared memory,
 // so that those of a digit are written side by side. After Adinets and Merrill 2022.
 // One workgroup a block of THREADS * ITEMS keys. Shared memory: the block's keys, and a KiB a subgroup and one more.
-// Reads offsets [RADIX_MAX_DIGITS][blocks], keys and values [n]; writes keys and values [n].
+// Reads offsets [digits][blocks], keys and values [n]; writes keys and values [n].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -2,7 +2,7 @@
 // private column of counters, so that neither ranking nor order needs other threads.
 // One workgroup, which is one subgroup, a block of THREADS * ITEMS keys. The columns are an array
 // of registers: on lavapipe these are half as dear as shared memory, and rows of them are vectors.
-// Reads offsets [RADIX_MAX_DIGITS][blocks], keys and values [n]; writes keys and values [n].
+// Reads offsets [digits][blocks], keys and values [n]; writes keys and values [n].
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

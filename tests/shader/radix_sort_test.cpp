@@ -1,5 +1,5 @@
 // RadixSort against std::stable_sort: adversarial sizes, keys and key bits, both scatter
-// strategies, guard words behind all results.
+// strategies, each with the offsets of the devices that take it, guard words behind all results.
 #include "engine/primitives/radix_sort.h"
 
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "engine/core/rng.h"
+#include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
 
 namespace darb {
@@ -42,12 +43,14 @@ struct Pairs {
 
 struct SortRun {
     Device device{test::device_options()};
+    test::ScopedVariants offsets;
     Commands commands{device};
     RadixSort sort;
     Buffer keys, values, count;
 
     SortRun(std::uint32_t capacity, SortScatter strategy, std::uint32_t subgroup_size = 0)
-        : sort(device, capacity, strategy, subgroup_size),
+        : offsets(device, strategy == SortScatter::ballot ? "scan=subgroup" : "scan=thread"),
+          sort(device, capacity, strategy, subgroup_size),
           keys(device, "keys", (capacity + kGuardWords) * 4),
           values(device, "values", (capacity + kGuardWords) * 4),
           count(device, "count", 16) {}
@@ -155,7 +158,7 @@ TEST_P(RadixStrategies, count_above_the_capacity_is_cut) {
 }
 
 TEST_P(RadixStrategies, a_million_pairs_match_and_repeat) {
-    constexpr std::uint32_t kN = 1'000'003;
+    constexpr std::uint32_t kN = 1'100'003;  // rows of offsets longer than a workgroup
     SortRun run(kN, GetParam());
     expect_sorted(run, make_keys("random", kN), kN, 32, "random");
     const Pairs pairs{make_keys("one_digit", kN), make_keys("sorted", kN)};

@@ -140,16 +140,15 @@ TEST_P(ScanTeams, every_subgroup_size_of_the_device_matches) {
     }
 }
 
-TEST_P(ScanTeams, several_runs_after_one_prepare_match) {
+TEST_P(ScanTeams, one_scan_of_another_in_a_recording_matches) {
     ScanRun setup(5000, strategy());
     const Words values = make_values("small", 5000);
     setup.counts.upload(values);
     setup.count.upload(Words{4000});
     const Buffer twice(setup.device, "twice", 5000 * 4);
     setup.commands.begin();
-    setup.scan.prepare(setup.commands, setup.count, 0);
-    setup.scan.run(setup.commands, setup.counts, setup.offsets, setup.total);
-    setup.scan.run(setup.commands, setup.offsets, twice, setup.total);
+    setup.scan.record(setup.commands, setup.counts, setup.offsets, setup.count, 0, setup.total);
+    setup.scan.record(setup.commands, setup.offsets, twice, setup.count, 0, setup.total);
     setup.commands.submit_and_wait();
     Words expected(4000);
     std::exclusive_scan(values.begin(), values.begin() + 4000, expected.begin(), 0U);

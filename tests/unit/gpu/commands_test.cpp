@@ -22,42 +22,60 @@ VkBuffer fake_buffer(std::uintptr_t id) {
     return reinterpret_cast<VkBuffer>(id);
 }
 
-std::size_t barriers_of(BarrierTracker& tracker, std::uintptr_t id, VkAccessFlags2 read,
-                        VkAccessFlags2 write) {
-    tracker.use({fake_buffer(id), kCompute, read, write});
-    return tracker.resolve().size();
+bool waits(BarrierTracker& tracker, std::uintptr_t id, VkAccessFlags2 read, VkAccessFlags2 write,
+           VkPipelineStageFlags2 stage = kCompute) {
+    tracker.use({fake_buffer(id), stage, read, write});
+    return tracker.resolve().has_value();
 }
 
 TEST(BarrierTracker, read_after_write_waits_once_and_write_waits_for_readers) {
     BarrierTracker tracker;
-    EXPECT_EQ(barriers_of(tracker, 1, 0, kWrite), 0U) << "first write";
-    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 1U) << "read after write";
-    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 0U) << "second read";
-    EXPECT_EQ(barriers_of(tracker, 2, kRead, 0), 0U) << "another buffer";
-    EXPECT_EQ(barriers_of(tracker, 1, 0, kWrite), 1U) << "write after read";
-    EXPECT_EQ(barriers_of(tracker, 1, kRead, kWrite), 1U) << "write after write";
+    EXPECT_FALSE(waits(tracker, 1, 0, kWrite)) << "first write";
+    EXPECT_TRUE(waits(tracker, 1, kRead, 0)) << "read after write";
+    EXPECT_FALSE(waits(tracker, 1, kRead, 0)) << "second read";
+    EXPECT_FALSE(waits(tracker, 2, kRead, 0)) << "another buffer";
+    EXPECT_TRUE(waits(tracker, 1, 0, kWrite)) << "write after read";
+    EXPECT_TRUE(waits(tracker, 1, kRead, kWrite)) << "write after write";
     tracker.clear();
-    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 0U) << "after clear";
+    EXPECT_FALSE(waits(tracker, 1, kRead, 0)) << "after clear";
+}
+
+TEST(BarrierTracker, one_barrier_does_for_all_that_came_before) {
+    BarrierTracker tracker;
+    waits(tracker, 1, 0, kWrite);
+    waits(tracker, 2, 0, kWrite);
+    waits(tracker, 3, kRead, 0);
+    ASSERT_TRUE(waits(tracker, 1, kRead, 0));
+    EXPECT_FALSE(waits(tracker, 2, kRead, 0)) << "written before the barrier";
+    EXPECT_FALSE(waits(tracker, 3, 0, kWrite)) << "read before the barrier";
+    EXPECT_TRUE(waits(tracker, 2, 0, kWrite)) << "read after the barrier";
+    EXPECT_FALSE(waits(tracker, 1, 0, kWrite)) << "before the second barrier";
+    EXPECT_FALSE(waits(tracker, 3, kRead, 0)) << "written before the second barrier";
+    EXPECT_TRUE(waits(tracker, 1, kRead, 0)) << "written after it";
 }
 
 TEST(BarrierTracker, reader_in_another_stage_waits_too) {
     BarrierTracker tracker;
-    barriers_of(tracker, 1, 0, kWrite);
-    barriers_of(tracker, 1, kRead, 0);
-    tracker.use({fake_buffer(1), VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT,
-                 VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT, 0});
-    const auto& barriers = tracker.resolve();
-    ASSERT_EQ(barriers.size(), 1U);
-    EXPECT_EQ(barriers[0].srcAccessMask, kWrite);
-    EXPECT_EQ(barriers[0].dstAccessMask, VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT);
+    constexpr VkPipelineStageFlags2 kIndirect = VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;
+    waits(tracker, 1, 0, kWrite);
+    waits(tracker, 1, kRead, 0);
+    tracker.use({fake_buffer(1), kIndirect, VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT, 0});
+    const auto barrier = tracker.resolve();
+    ASSERT_TRUE(barrier.has_value());
+    EXPECT_EQ(barrier->srcAccessMask, kWrite);
+    EXPECT_EQ(barrier->dstStageMask, kIndirect);
+    EXPECT_EQ(barrier->dstAccessMask, VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT);
+    ASSERT_TRUE(waits(tracker, 1, 0, kWrite)) << "a write waits for the indirect read, too";
+    EXPECT_TRUE(
+        waits(tracker, 1, VK_ACCESS_2_TRANSFER_READ_BIT, 0, VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT));
 }
 
 TEST(BarrierTracker, uses_of_one_buffer_in_one_pass_are_one) {
     BarrierTracker tracker;
     tracker.use({fake_buffer(1), kCompute, kRead, 0});
     tracker.use({fake_buffer(1), kCompute, 0, kWrite});
-    EXPECT_TRUE(tracker.resolve().empty());
-    EXPECT_EQ(barriers_of(tracker, 1, kRead, 0), 1U);
+    EXPECT_FALSE(tracker.resolve().has_value());
+    EXPECT_TRUE(waits(tracker, 1, kRead, 0));
 }
 
 ShaderInterface interface_of(std::string_view name) {
