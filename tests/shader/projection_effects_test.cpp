@@ -110,6 +110,32 @@ TEST(ProjectionEffects, antialias_matches_double) {
         }
 }
 
+TEST(ProjectionEffects, splats_that_antialias_leaves_below_the_cutoff_are_culled) {
+    TestScene s = random_scene({.count = 200,
+                                .width = 60,
+                                .height = 40,
+                                .sh_degree = 1,
+                                .min_log_scale = -6,
+                                .max_log_scale = -4,
+                                .min_logit = -4,
+                                .max_logit = 0,
+                                .seed = 22});
+    s.model.antialias = true;
+    const auto splats = reference::make_splats<double>(s.model);
+    const auto& kernel = reference::kernel_table(s.model.kernel, s.model.footprint);
+    const ProjectedFrame frame =
+        project_on_device(s.model, s.camera, 1, EVALUATION_POLYNOMIAL, {.antialias = true});
+    size_t faint = 0;
+    for (size_t i = 0; i < s.model.size(); ++i) {
+        const auto truth = reference::project(splats, i, s.camera, {.sh_degree = 1}, kernel);
+        if (truth.cull != reference::Cull::opacity) continue;
+        ++faint;
+        EXPECT_EQ(frame.visible[i], 0u) << "splat " << i;
+    }
+    EXPECT_GT(faint, 20u);
+    EXPECT_GE(frame.status.culled[CULL_OPACITY], faint);
+}
+
 TEST(ProjectionEffects, smoothing_filter_matches_double) {
     for (const int kernel : {KERNEL_RAISED_COSINE, KERNEL_BETA, KERNEL_GENERALIZED_EXPONENTIAL})
         for (const bool antialias : {false, true}) {
