@@ -52,12 +52,6 @@ bool is_to_stop(Trainer& trainer, const RankGroup& ranks, bool stop) {
     return any_stops(*ranks.all, stop);
 }
 
-std::vector<ImageU8> own_photos(const Dataset& dataset, const TrainOptions& options,
-                                const RunOptions& run) {
-    if (!run.photos.empty() && options.alpha) return {};
-    return photos_of_run(dataset, options, run.photos);
-}
-
 std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& options,
                                    std::vector<ImageU8> loaded) {
     std::vector<ImageU8> photos = loaded.empty() ? load_photos(dataset.views) : std::move(loaded);
@@ -69,13 +63,14 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
 }
 
 RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const RunOptions& run, const std::atomic<bool>* stop) {
-    const std::vector<ImageU8> loaded = own_photos(dataset, options, run);
-    const std::vector<ImageU8>& photos = loaded.empty() ? run.photos : loaded;
+                           const RunOptions& run, const std::atomic<bool>* stop,
+                           std::vector<ImageU8> photos) {
+    photos = photos_of_run(dataset, options, std::move(photos));
     const std::string fingerprint = dataset_fingerprint(dataset, photos);
     const std::optional<Checkpoint> checkpoint = checkpoint_of(device, run);
     Trainer trainer(device, dataset, photos, first_model(dataset, options, checkpoint), options,
                     run.ranks);
+    photos = {};  // they are where steps read them
     check_ranks(device, options, run.ranks, fingerprint);
     if (checkpoint) {
         check_resumable(*checkpoint, run.resume_from, options, dataset, fingerprint);

@@ -30,12 +30,9 @@ void check_ranks(const Device& device, const TrainOptions& options, const RankGr
 /// Before a step, on all ranks: whether any is to stop. Now and then also that they are equal.
 bool is_to_stop(Trainer& trainer, const RankGroup& ranks, bool stop);
 
-/// The photos as they are trained, where RunOptions does not bring them so.
-std::vector<ImageU8> own_photos(const Dataset& dataset, const TrainOptions& options,
-                                const RunOptions& run);
-
 /// run_training() of another rank than the first.
 RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const RunOptions& run, const std::atomic<bool>* stop);
+                           const RunOptions& run, const std::atomic<bool>* stop,
+                           std::vector<ImageU8> photos);
 
 }  // namespace darb

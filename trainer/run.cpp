@@ -10,6 +10,7 @@
 #include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/memory.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/run_events.h"
 #include "engine/plan/tuning_names.h"
@@ -46,13 +47,13 @@ DeviceRates rates_of(Device& device) {
 // One run: the loop and what it writes. The stopwatch counts training alone.
 class Run {
   public:
-    Run(Device& device, const Dataset& dataset, const TrainOptions& options, const RunOptions& run)
+    Run(Device& device, const Dataset& dataset, const TrainOptions& options, const RunOptions& run,
+        std::vector<ImageU8> photos)
         : device_(device),
           dataset_(dataset),
           options_(options),
           run_(run),
-          loaded_(own_photos(dataset, options, run)),
-          photos_(loaded_.empty() ? run.photos : loaded_),
+          photos_(photos_of_run(dataset, options, std::move(photos))),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
           rates_(rates_of(device)),
           tuning_(result_tuning(device)),
@@ -65,7 +66,11 @@ class Run {
                                        options, run.ranks, run.frozen);
                                })),
           log_(run.output),
-          progress_(1, options.iterations, run.quiet) {}
+          progress_(1, options.iterations, run.quiet) {
+        for (std::size_t i = 0; i < photos_.size(); ++i)  // the others are where steps read them
+            if (!dataset.views[i].is_test) photos_[i] = {};
+        give_back_freed_memory();
+    }
 
     RunSummary execute(const std::atomic<bool>* stop);
 
@@ -107,8 +112,7 @@ class Run {
     const Dataset& dataset_;
     const TrainOptions& options_;
     const RunOptions& run_;
-    const std::vector<ImageU8> loaded_;  // empty where RunOptions brought the photos
-    const std::vector<ImageU8>& photos_;
+    std::vector<ImageU8> photos_;  // [view]; while it trains of held-out views alone
     const std::string fingerprint_;
     const DeviceRates rates_;
     const std::string tuning_;              // of this device, before the checkpoint's is used
@@ -447,14 +451,15 @@ void Run::report_troubles() {
 }  // namespace
 
 RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                        const RunOptions& run, const std::atomic<bool>* stop) {
+                        const RunOptions& run, const std::atomic<bool>* stop,
+                        std::vector<ImageU8> photos) {
     for (const View& view : dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
     if (run.ranks.several() && !run.ranks.all->is_first())
-        return follow_training(device, dataset, options, run, stop);
+        return follow_training(device, dataset, options, run, stop, std::move(photos));
     check_run_folder(run.output, dataset);
     if (run.resume_from.empty() && !run.start) check_start_memory(device, dataset, options);
-    return Run(device, dataset, options, run).execute(stop);
+    return Run(device, dataset, options, run, std::move(photos)).execute(stop);
 }
 
 }  // namespace darb

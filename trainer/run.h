@@ -54,7 +54,6 @@ struct RunOptions {
     /// Writes into OUT/start what splats start from, once an earlier run is out of the way; may be
     /// empty.
     std::function<void(const std::filesystem::path& folder)> write_start;
-    std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
     /// What splats start from in place of points, and how many of the first are frozen; null:
     /// initial_model().
     const SplatModel* start = nullptr;
@@ -103,7 +102,10 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
 /// Progress goes to stderr: a bar on a terminal, plain lines elsewhere. Throws Error; the last
 /// checkpoint is then intact, and where the device is not what failed, checkpoint and scene are
 /// saved once more as far as they can be. The caller holds the RunLock of the folder.
+/// photos: already loaded, in the order of the views; else empty. Once training photos are where
+/// steps read them, the run keeps the others alone.
 RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                        const RunOptions& run, const std::atomic<bool>* stop = nullptr);
+                        const RunOptions& run, const std::atomic<bool>* stop = nullptr,
+                        std::vector<ImageU8> photos = {});
 
 }  // namespace darb

@@ -1,5 +1,9 @@
 #include "engine/core/memory.h"
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <fstream>
 #include <limits>
@@ -35,6 +39,12 @@ std::uint64_t control_group() {
 
 std::uint64_t free_memory() {
     return std::min(meminfo(), control_group());
+}
+
+void give_back_freed_memory() {
+#ifdef __GLIBC__
+    ::malloc_trim(0);
+#endif
 }
 
 }  // namespace darb

@@ -1,4 +1,4 @@
-// How much memory the machine has left.
+// How much memory the machine has left, and memory that goes back to it.
 #pragma once
 
 #include <cstdint>
@@ -8,5 +8,8 @@ namespace darb {
 /// Bytes that can be taken before the machine has none: what Linux calls available and its swap, at
 /// most what the control group leaves. The largest number where neither says.
 std::uint64_t free_memory();
+
+/// After large things were freed: glibc keeps their pages otherwise.
+void give_back_freed_memory();
 
 }  // namespace darb

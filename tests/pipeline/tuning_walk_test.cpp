@@ -61,12 +61,11 @@ TEST(TuningWalk, a_run_goes_on_in_the_way_that_it_began) {
     const auto run = [&](const fs::path& output, const fs::path& resume) {
         RunOptions options;
         options.output = output;
-        options.photos = t.photos;
         options.resume_from = resume;
         options.checkpoint_iterations = {7};
         options.quiet = true;
         options.report = false;
-        run_training(shared_device(), t.dataset, t.options, options);
+        run_training(shared_device(), t.dataset, t.options, options, nullptr, t.photos);
         return read_checkpoint(output / "checkpoint.darb");
     };
     Checkpoint whole;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/files.h"
@@ -225,6 +226,57 @@ TEST(RunTime, a_pause_is_left_out) {
     EXPECT_LT(summary.seconds, 0);
     EXPECT_GT(summary.seconds, -1e6);
     std::filesystem::remove_all(run.output);
+}
+
+std::uint64_t resident_bytes() {
+    std::ifstream statm("/proc/self/statm");
+    std::uint64_t pages = 0;
+    statm >> pages >> pages;
+    return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+// What the process grows by while it trains on photos of `scale` times 200x150 px, and their bytes.
+// Each view is there twice, so that photos outweigh all else.
+std::pair<std::uint64_t, std::uint64_t> growth_with_photos(Device& device, int scale) {
+    Dataset dataset = small_scene(1);
+    const std::vector<View> once = dataset.views;
+    for (View view : once) {
+        view.name = "again_" + view.name;
+        dataset.views.push_back(view);
+    }
+    const std::uint64_t before = resident_bytes();
+    std::vector<ImageU8> photos;
+    std::uint64_t bytes = 0;
+    for (View& view : dataset.views) {
+        Camera& c = view.camera;
+        for (double* value : {&c.fx, &c.fy, &c.cx, &c.cy}) *value *= scale;
+        c.width *= scale;
+        c.height *= scale;
+        bytes += photos.emplace_back(c.width, c.height, 4).data.size();
+    }
+    RunOptions run;
+    run.output = std::filesystem::temp_directory_path() / fmt::format("darb_once_{}", ::getpid());
+    run.quiet = true;
+    run.report = false;
+    std::uint64_t during = before;
+    run.on_step = [&](const LiveStep&) { return during = resident_bytes(), 0.0; };
+    TrainOptions options = options_of(0);
+    options.resolution_ramp = false;
+    options.iterations = 1;
+    run_training(device, dataset, options, run, nullptr, std::move(photos));
+    std::filesystem::remove_all(run.output);
+    return {during - std::min(before, during), bytes};
+}
+
+// Once where steps read them: on a CPU's driver that is this process, too.
+TEST(RunMemory, training_photos_are_held_once) {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "AddressSanitizer keeps what is freed";
+#endif
+    Device device{test::device_options()};
+    growth_with_photos(device, 1);  // the driver keeps what it took for its compiler
+    const auto [growth, photos] = growth_with_photos(device, 4);
+    EXPECT_LT(growth, photos + photos * 7 / 10);
 }
 
 TEST(MemoryPlan, photos_count_only_where_they_are_trained_on) {

@@ -60,11 +60,11 @@ class Comparer {
 };
 
 void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
-    if (plan_sees_photos_) f.run.photos = photos_;  // as the plan of `darb train` sees them
-    dataset_.start = {};                            // of the run before
+    if (plan_sees_photos_) f.photos = photos_;  // as the plan of `darb train` sees them
+    dataset_.start = {};                        // of the run before
     plan_effects(dataset_, f);
     plan_strategy(dataset_, f);
-    f.run.photos = photos_;
+    f.photos = photos_;
     const RunState state =
         run_state(f.run.output, settings_text(f.train), format_camera_list(dataset_.views),
                   f.train.iterations, held_out().size(), hold_out_text(f.data.held_out));
@@ -78,7 +78,7 @@ void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
         command_device(flags_.device));  // of its own, so that the peak of memory is this run's
     settle_tuning(device);
     plan_start(device, dataset_, f);
-    run_training(device, dataset_, f.train, f.run, &stop);
+    run_training(device, dataset_, f.train, f.run, &stop, std::move(f.photos));
 }
 
 std::vector<ComparedRun> Comparer::runs(const std::vector<int>& kernels, const Ranks& ranks,

@@ -60,7 +60,7 @@ Refiner::Refiner(const std::filesystem::path& dataset, const DatasetOptions& opt
 
 SplatModel Refiner::refine(Device& device, const SplatModel& model, int iterations) const {
     TrainFlags flags = refine_flags(model, iterations);
-    flags.run.photos = photos_;
+    flags.photos = photos_;
     Dataset dataset = dataset_;
     plan_effects(dataset, flags);
     keep_splats_as_they_are(model, flags.train);

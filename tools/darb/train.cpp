@@ -97,7 +97,7 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::strin
     plan_strategy(dataset, flags);
     std::atomic<bool>& stop = stop_on_signals();
     if (!ranks.is_first()) {
-        run_training(device, dataset, flags.train, flags.run, &stop);
+        run_training(device, dataset, flags.train, flags.run, &stop, std::move(flags.photos));
         return 0;
     }
     if (!recalled) flags.run.command = command_text(std::move(arguments), flags);
@@ -107,7 +107,8 @@ int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::strin
     const std::unique_ptr<LiveView> view =
         live.open(device, dataset, stop, flags.train.white_background);
     if (view) flags.run.on_step = [&](const LiveStep& step) { return view->show(step); };
-    const RunSummary summary = run_training(device, dataset, flags.train, flags.run, &stop);
+    const RunSummary summary =
+        run_training(device, dataset, flags.train, flags.run, &stop, std::move(flags.photos));
     if (!write_or_let_go(summary_text(summary, flags)))
         throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
                     "The run is complete: its folder holds everything.");

@@ -45,6 +45,7 @@ struct TrainFlags {
     DatasetOptions data;
     TrainOptions train;
     RunOptions run;
+    std::vector<ImageU8> photos;  // already loaded, in the order of the views; else empty
 };
 
 /// --preset, and the photos' options. Before the others: values are taken over in this order.

@@ -45,10 +45,10 @@ std::string adjusted_cameras(Dataset& dataset) {
 // The photos stay for the run where the plan had to look at them.
 void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos) {
     if (sees_photos && (!dataset.points.seen_begin.empty() || dataset.has_alpha) &&
-        flags.run.photos.empty())
-        flags.run.photos = load_photos(dataset.views);
+        flags.photos.empty())
+        flags.photos = load_photos(dataset.views);
     const EffectPlan plan =
-        plan_training(dataset, flags.run.photos, flags.train.sh_degree, training_choice(flags));
+        plan_training(dataset, flags.photos, flags.train.sh_degree, training_choice(flags));
     apply_plan(plan, flags.train);
     apply_plan(plan, dataset.views);
     const TrainOptions usual;
@@ -77,12 +77,11 @@ bool starts_from_stereo(const Dataset& dataset, const TrainFlags& flags) {
 namespace {
 
 void find_start(Device& device, Dataset& dataset, TrainFlags& flags) {
-    if (flags.run.photos.empty()) flags.run.photos = load_photos(dataset.views);
+    if (flags.photos.empty()) flags.photos = load_photos(dataset.views);
     say_note("start: stereo between the photos, about a second of a core for each");
     const bool opaque = !flags.train.alpha && dataset.has_alpha;
     DenseStart start = dense_start(
-        device, dataset,
-        opaque ? photos_of_run(dataset, flags.train, flags.run.photos) : flags.run.photos,
+        device, dataset, opaque ? photos_of_run(dataset, flags.train, flags.photos) : flags.photos,
         flags.train.seed);
     if (flags.train.start == StartPoints::automatic && start.on_surfaces < kLeastOnSurfaces) {
         flags.start_note =

@@ -8,7 +8,7 @@
 namespace darb {
 
 /// Plans the effects of the run and sets flags.train, flags.run and the views as it wants them.
-/// Loads the photos into flags.run.photos where the plan has to look at them and they are not there
+/// Loads the photos into flags.photos where the plan has to look at them and they are not there
 /// yet; sees_photos false: the plan does without.
 void plan_effects(Dataset& dataset, TrainFlags& flags, bool sees_photos = true);
 

@@ -102,7 +102,7 @@ void PyTrainer::make_trainer() {
     plan_start(device, dataset_, flags_);
     plan_strategy(dataset_, flags_);
     check_signals();
-    photos_ = photos_of_run(dataset_, flags_.train, std::move(flags_.run.photos));
+    photos_ = photos_of_run(dataset_, flags_.train, std::move(flags_.photos));
     check_signals();
     std::optional<Checkpoint> start;
     if (!flags_.run.resume_from.empty()) {
