@@ -4,6 +4,7 @@
 
 #include "engine/core/doing.h"
 #include "engine/core/files.h"
+#include "engine/core/memory.h"
 #include "engine/plan/tuning_names.h"
 #include "trainer/initial_model.h"
 
@@ -71,6 +72,7 @@ RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOp
     Trainer trainer(device, dataset, photos, first_model(dataset, options, checkpoint), options,
                     run.ranks);
     photos = {};  // they are where steps read them
+    give_back_freed_memory();
     check_ranks(device, options, run.ranks, fingerprint);
     if (checkpoint) {
         check_resumable(*checkpoint, run.resume_from, options, dataset, fingerprint);

@@ -210,8 +210,8 @@ void Device::State::copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer 
     begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     check_vulkan(vkBeginCommandBuffer(copy_commands, &begin), what);
-    record_barrier(copy_commands,
-                   full_barrier());  // having waited makes writes available, not visible
+    // Having waited makes writes available, not visible.
+    record_barrier(copy_commands, full_barrier());
     const VkBufferCopy region{from_offset, to_offset, bytes};
     vkCmdCopyBuffer(copy_commands, from, to, 1, &region);
     VkMemoryBarrier2 barrier{};
@@ -220,11 +220,7 @@ void Device::State::copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer 
     barrier.srcAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT;
     barrier.dstStageMask = VK_PIPELINE_STAGE_2_HOST_BIT;
     barrier.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
-    VkDependencyInfo dependency{};
-    dependency.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO;
-    dependency.memoryBarrierCount = 1;
-    dependency.pMemoryBarriers = &barrier;
-    vkCmdPipelineBarrier2(copy_commands, &dependency);
+    record_barrier(copy_commands, barrier);
     check_vulkan(vkEndCommandBuffer(copy_commands), what);
     check_vulkan(submit(copy_commands, VK_NULL_HANDLE), what);
     check_vulkan(wait_idle(), what);

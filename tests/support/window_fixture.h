@@ -11,7 +11,6 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <optional>
 #include <string>
@@ -21,6 +20,7 @@
 #include "engine/core/files.h"
 #include "engine/core/image.h"
 #include "tests/support/compare_images.h"
+#include "tests/support/resident_bytes.h"
 
 namespace darb::test {
 
@@ -69,12 +69,7 @@ class Process {
         return pid_ > 0;
     }
     // 0 once it has ended.
-    std::uint64_t resident_bytes() const {
-        std::ifstream statm("/proc/" + std::to_string(pid_) + "/statm");
-        std::uint64_t pages = 0;
-        statm >> pages >> pages;
-        return statm ? pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)) : 0;
-    }
+    std::uint64_t resident_bytes() const { return test::resident_bytes(pid_); }
     void terminate() {  // 0 would be this whole process group
         if (pid_ > 0) ::kill(pid_, SIGTERM);
     }

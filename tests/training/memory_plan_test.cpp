@@ -7,10 +7,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/files.h"
+#include "tests/support/resident_bytes.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
 #include "trainer/forecast.h"
@@ -228,13 +228,6 @@ TEST(RunTime, a_pause_is_left_out) {
     std::filesystem::remove_all(run.output);
 }
 
-std::uint64_t resident_bytes() {
-    std::ifstream statm("/proc/self/statm");
-    std::uint64_t pages = 0;
-    statm >> pages >> pages;
-    return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-}
-
 // What the process grows by while it trains on photos of `scale` times 200x150 px, and their bytes.
 // Each view is there twice, so that photos outweigh all else.
 std::pair<std::uint64_t, std::uint64_t> growth_with_photos(Device& device, int scale) {
@@ -244,7 +237,7 @@ std::pair<std::uint64_t, std::uint64_t> growth_with_photos(Device& device, int s
         view.name = "again_" + view.name;
         dataset.views.push_back(view);
     }
-    const std::uint64_t before = resident_bytes();
+    const std::uint64_t before = test::resident_bytes();
     std::vector<ImageU8> photos;
     std::uint64_t bytes = 0;
     for (View& view : dataset.views) {
@@ -259,7 +252,7 @@ std::pair<std::uint64_t, std::uint64_t> growth_with_photos(Device& device, int s
     run.quiet = true;
     run.report = false;
     std::uint64_t during = before;
-    run.on_step = [&](const LiveStep&) { return during = resident_bytes(), 0.0; };
+    run.on_step = [&](const LiveStep&) { return during = test::resident_bytes(), 0.0; };
     TrainOptions options = options_of(0);
     options.resolution_ramp = false;
     options.iterations = 1;
