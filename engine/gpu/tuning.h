@@ -41,6 +41,7 @@ struct Tuning {
     std::uint32_t blend_lanes = 0;    // of a subgroup of both blends; 0: the device's own
     BackwardBlend backward = BackwardBlend::subgroup;
     LossWay loss = LossWay::strips;
+    bool exp_builtin = false;  // by the driver's own exp where kernels may (kEvaluationOfDevice)
     PhotoPlace photos = PhotoPlace::automatic;
     bool operator==(const Tuning&) const = default;
 };

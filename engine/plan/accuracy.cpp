@@ -13,14 +13,13 @@ namespace darb {
 
 namespace {
 
-constexpr double kBuiltin = 0;  // of evaluation; else the degree of the polynomial
+// Of evaluation; else the degree of the polynomial.
+constexpr double kBuiltin = 0, kOfDevice = -1;
 constexpr double kOfFile = -1;
 
-constexpr AccuracyChoice kEvaluations[] = {{"polynomial", kFullDegree},
-                                           {"polynomial4", 4},
-                                           {"polynomial3", 3},
-                                           {"polynomial2", 2},
-                                           {"builtin", kBuiltin}};
+constexpr AccuracyChoice kEvaluations[] = {{"auto", kOfDevice}, {"polynomial", kFullDegree},
+                                           {"polynomial4", 4},  {"polynomial3", 3},
+                                           {"polynomial2", 2},  {"builtin", kBuiltin}};
 constexpr AccuracyChoice kFootprints[] = {
     {"file", kOfFile}, {"psi", FOOTPRINT_PSI}, {"exact", FOOTPRINT_EXACT}};
 constexpr AccuracyChoice kCutoffs[] = {
@@ -36,9 +35,10 @@ constexpr AccuracyChoice kScales[] = {{"1", 1}, {"1/2", 0.5, false}};
 // The presets are choices of index: {fast, balanced, exact}.
 constexpr AccuracySetting kSettings[kAccuracyCount] = {
     {"evaluation",
-     "how w(q) is computed: polynomials of falling degree, or exp, sin and cos",
+     "how w(q) is computed: polynomials of falling degree, or exp, sin and cos; auto: the "
+     "polynomial, or exp where that is as accurate and faster",
      kEvaluations,
-     {2, 0, 0},
+     {3, 0, 1},
      ""},
     {"footprint",
      "psi: the paper's; exact: the kernel's true projection; file: as it was trained",
@@ -147,10 +147,21 @@ bool has_builtin_evaluation(int kernel) {
     return kernel < KERNEL_COUNT && kernel != KERNEL_PARABOLIC;
 }
 
+bool changes_evaluation(const Device& device, const Accuracy& accuracy, int kernel) {
+    ForwardOptions own, usual;
+    own.kernel = usual.kernel = kernel;
+    set_options(accuracy, own);
+    set_options({}, usual);
+    return own.polynomial_degree != usual.polynomial_degree ||
+           evaluation_on(device, own) != evaluation_on(device, usual);
+}
+
 void set_options(const Accuracy& accuracy, ForwardOptions& options) {
     const double evaluation = accuracy.value(kEvaluation);
-    options.evaluation = evaluation == kBuiltin ? EVALUATION_BUILTIN : EVALUATION_POLYNOMIAL;
-    options.polynomial_degree = evaluation == kBuiltin ? kFullDegree : static_cast<int>(evaluation);
+    options.evaluation = evaluation == kBuiltin    ? EVALUATION_BUILTIN
+                         : evaluation == kOfDevice ? kEvaluationOfDevice
+                                                   : EVALUATION_POLYNOMIAL;
+    options.polynomial_degree = evaluation > kBuiltin ? static_cast<int>(evaluation) : kFullDegree;
     options.alpha_cutoff = static_cast<float>(accuracy.value(kAlphaCutoff));
     options.transmittance_stop = static_cast<float>(accuracy.value(kTransmittanceStop));
     options.storage = static_cast<int>(accuracy.value(kStorage));

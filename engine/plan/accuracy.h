@@ -79,5 +79,7 @@ void set_options(const Accuracy& accuracy, ForwardOptions& options);
 /// Whether the choice `builtin` of evaluation changes anything: not of blends, of the parabolic
 /// kernel and of those of one's own but in the forms that need no polynomial.
 bool has_builtin_evaluation(int kernel);
+/// Whether the evaluation is another on this device than the default's.
+bool changes_evaluation(const Device& device, const Accuracy& accuracy, int kernel);
 
 }  // namespace darb

@@ -13,6 +13,9 @@
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
 #include "engine/gpu/shader_table.h"
+#include "engine/kernels/shaped_kernel.h"
+#include "engine/raster/kernel_constants.h"
+#include "shaders/shared/kernel_probe_args.h"
 
 namespace darb {
 
@@ -20,7 +23,7 @@ namespace {
 
 constexpr double kGain = 0.97;              // less is not worth another way
 constexpr std::chrono::seconds kEnough{2};  // frames that take so long need not be repeated
-constexpr int kFormat = 4;
+constexpr int kFormat = 5;
 
 // A frame of a CPU must not take long, one of a GPU must not be too short to tell ways apart.
 struct Size {
@@ -71,6 +74,7 @@ Camera tuning_camera(const Size& size) {
 ForwardOptions tuning_options() {
     ForwardOptions options;
     options.store_for_backward = true;
+    options.evaluation = kEvaluationOfDevice;
     return options;
 }
 
@@ -145,6 +149,36 @@ std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTim
     return best;
 }
 
+double exp_error(Device& device) {
+    std::vector<glm::vec2> probes;  // q, opacity; beyond q = 24 w is below 1e-5
+    for (int i = 0; i < 4096; ++i) probes.emplace_back(24.0f * static_cast<float>(i) / 4096, 1);
+    const auto count = static_cast<std::uint32_t>(probes.size());
+    Buffer input(device, "probes", probes.size() * sizeof(glm::vec2));
+    Buffer output(device, "answers", probes.size() * sizeof(glm::vec4));
+    input.upload(probes);
+    Commands commands(device);
+    double largest = 0;
+    const auto add = [&](int kernel, double exponent, const std::function<double(double)>& truth) {
+        const Pipeline pipeline(device, "kernel_probe",
+                                kernel_constants(kernel, Footprint::psi, EVALUATION_BUILTIN));
+        commands.begin();
+        commands.dispatch(pipeline, gpu::KernelProbeArgs{count, static_cast<float>(exponent)},
+                          {input, output}, (count + KERNEL_PROBE_GROUP - 1) / KERNEL_PROBE_GROUP);
+        commands.submit_and_wait();
+        const std::vector<glm::vec4> answers = output.download<glm::vec4>(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            const double off = std::abs(answers[i].x - truth(probes[i].x));
+            largest = std::max(largest, std::isfinite(off) ? off : 1.0);
+        }
+    };
+    add(KERNEL_GAUSSIAN, 0, [](double q) { return std::exp(-q / 2); });
+    const ShapedKernel& shaped = shaped_kernel(KERNEL_GENERALIZED_EXPONENTIAL);
+    for (const double exponent : shaped.exponents_to_check())
+        add(KERNEL_GENERALIZED_EXPONENTIAL, exponent,
+            [&](double q) { return shaped.value(Footprint::psi, exponent, q).w; });
+    return largest;
+}
+
 TuningFrame::TuningFrame(Device& device)
     : splats_(device, tuning_scene(size_for(device.info())), false),
       buffers_(device, tuning_options()),
@@ -191,9 +225,10 @@ std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
     return ms;
 }
 
-TuningRecord measure_tuning(Device& device) {
+TuningRecord measure_tuning(Device& device, std::string_view group, double exp_tolerance) {
     const Tuning before = device.tuning();
-    const std::vector<TuningGroup> groups = measured_groups(device.info());
+    std::vector<TuningGroup> groups = measured_groups(device.info());
+    std::erase_if(groups, [&](const TuningGroup& g) { return !group.empty() && g.name != group; });
     const Size size = size_for(device.info());
     const Tuning usual_ways = usual_tuning(device.info());
     device.set_tuning(usual_ways);
@@ -204,6 +239,7 @@ TuningRecord measure_tuning(Device& device) {
         record.times.push_back({groups[g].name, groups[g].choices.front(), usual[g]});
         for (std::size_t w = 1; w < groups[g].choices.size(); ++w) {
             try {
+                if (groups[g].name == "exp" && !(exp_error(device) <= exp_tolerance)) continue;
                 device.set_tuning(with_names(usual_ways, {{groups[g].name, groups[g].choices[w]}}));
                 TuningFrame frame(device);
                 const double ms = measure(frame, size, {groups[g]})[0];

@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/gpu/commands.h"
@@ -55,9 +56,18 @@ class TuningFrame {
 /// many a run will need is not known here, so they are for who asks for them.
 std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTime>& times);
 
+/// How far w by the driver's own exp strays from the truth, for the kernels of is_exponential: the
+/// largest difference, of values of at most 1.
+double exp_error(Device& device);
+
+constexpr double kExpTolerance = 3e-6;
+
 /// Each group with all others at their usual choice, and the fastest of each. One that a driver
-/// refuses is left out. The device's tuning and its peak of memory are afterwards as before.
-TuningRecord measure_tuning(Device& device);
+/// refuses is left out, and so is the driver's exp where exp_error is above the tolerance. The
+/// device's tuning and its peak of memory are afterwards as before. group: that one alone; empty:
+/// all.
+TuningRecord measure_tuning(Device& device, std::string_view group = {},
+                            double exp_tolerance = kExpTolerance);
 
 /// The record of this device in the folder of the pipeline cache; nothing where there is none, or
 /// it cannot be read, or it is of another device, driver, subgroup size or set of shaders.

@@ -123,6 +123,7 @@ std::vector<TuningGroup> tuning_groups(const DeviceInfo& info) {
          {"blend", "blend backward"},
          true},
         {"loss", usual_first(kLossWays, usual_tuning(info).loss), {"loss"}},
+        {"exp", {"polynomial", "builtin"}, {"blend", "blend backward"}, true},
         {"photos", usual_first(kPhotoPlaces, usual_tuning(info).photos), {}}};
     if (const std::vector<std::string> lanes = blend_lanes(info); lanes.size() > 1)
         groups.push_back({"lanes", lanes, {"blend", "blend backward"}, true});
@@ -149,7 +150,8 @@ TuningNames checkpoint_tuning(const DeviceInfo& info, std::string_view text,
 
 std::string names_text(const TuningNames& names) {
     std::string text;
-    for (const char* name : {"scan", "scatter", "blend", "backward", "loss", "photos", "lanes"})
+    for (const char* name :
+         {"scan", "scatter", "blend", "backward", "loss", "exp", "photos", "lanes"})
         if (const auto found = names.find(name); found != names.end())
             text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, found->second);
     return text;
@@ -161,6 +163,7 @@ TuningNames tuning_names(const Tuning& tuning) {
                       {"blend", shape_name(tuning.blend_threads)},
                       {"backward", kBackwardBlends[static_cast<std::size_t>(tuning.backward)]},
                       {"loss", kLossWays[static_cast<std::size_t>(tuning.loss)]},
+                      {"exp", tuning.exp_builtin ? "builtin" : "polynomial"},
                       {"photos", kPhotoPlaces[static_cast<std::size_t>(tuning.photos)]}};
     if (tuning.blend_lanes != 0) names["lanes"] = std::to_string(tuning.blend_lanes);
     return names;
@@ -176,6 +179,7 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
             std::from_chars(choice.data(), choice.data() + choice.size(), tuning.blend_lanes);
         if (name == "backward") tuning.backward = named<BackwardBlend>(kBackwardBlends, choice);
         if (name == "loss") tuning.loss = named<LossWay>(kLossWays, choice);
+        if (name == "exp") tuning.exp_builtin = choice == "builtin";
         if (name == "photos") tuning.photos = named<PhotoPlace>(kPhotoPlaces, choice);
     }
     return tuning;
@@ -184,6 +188,7 @@ Tuning with_names(Tuning tuning, const TuningNames& names) {
 Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
                       const std::string& where) {
     tuning.blend_lanes = 0;
+    tuning.exp_builtin = false;
     return with_names(tuning, checkpoint_tuning(info, text, where));
 }
 
@@ -191,6 +196,7 @@ std::string result_tuning(const Device& device) {
     TuningNames names = tuning_names(device.tuning());
     for (const TuningGroup& group : tuning_groups(device.info()))
         if (!group.changes_bits) names.erase(group.name);
+    if (!device.tuning().exp_builtin) names.erase("exp");
     return names_text(names);
 }
 

@@ -20,11 +20,11 @@ struct TuningGroup {
     std::vector<std::string> choices;  // the usual one first
     // Whose time it decides, as Commands::pass names them; none: it is never measured.
     std::vector<std::string> passes;
-    bool changes_bits = false;  // results differ by the order of sums of floats
+    bool changes_bits = false;  // results differ by rounding, or by the order of sums of floats
 };
 
-/// scan, scatter, blend, backward, loss and photos, with what the device allows; lanes where it has
-/// several sizes of subgroups.
+/// scan, scatter, blend, backward, loss, exp and photos, with what the device allows; lanes where
+/// it has several sizes of subgroups.
 std::vector<TuningGroup> tuning_groups(const DeviceInfo& info);
 
 /// Whether the fastest choices are known without measuring: lavapipe, where measuring would take
@@ -45,11 +45,12 @@ TuningNames tuning_names(const Tuning& tuning);
 /// names as parse_tuning gives them.
 Tuning with_names(Tuning tuning, const TuningNames& names);
 /// The tuning of who goes on with what began with this text: the same bits. Lanes that it does not
-/// name were the device's own. Throws as parse_tuning.
+/// name were the device's own, and exp that it does not name a polynomial. Throws as parse_tuning.
 Tuning resumed_tuning(const DeviceInfo& info, Tuning tuning, std::string_view text,
                       const std::string& where);
 
-/// Of the groups that change bits, as text: what a run must keep to repeat.
+/// Of the groups that change bits, as text: what a run must keep to repeat. Without exp it is a
+/// polynomial, as in older files.
 std::string result_tuning(const Device& device);
 
 }  // namespace darb

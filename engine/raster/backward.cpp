@@ -34,7 +34,7 @@ Pipeline& Backward::project_pipeline(int sh_degree, int sh_stored, int update, i
     const std::array<int, 4> key{sh_degree, sh_stored, update, rest};
     const auto found = project_.find(key);
     if (found != project_.end()) return found->second;
-    SpecConstants constants = projection_constants(options_, sh_degree, sh_stored);
+    SpecConstants constants = projection_constants(*device_, options_, sh_degree, sh_stored);
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(blend_.window_intersections());
     constants["CAMERA_GRADIENT"] = options_.camera_gradient && update == UPDATE_STORE ? 1 : 0;
     constants["UPDATE"] = update;

@@ -60,7 +60,7 @@ FrameBytes BlendBackward::device_bytes(const FrameSize& size) {
 }
 
 void BlendBackward::make_pipelines(bool segmented) {
-    SpecConstants constants = kernel_constants(options_);
+    SpecConstants constants = kernel_constants(*device_, options_);
     const std::uint32_t subgroup = add_block_constants(*device_, constants);
     constants["THREADS"] = static_cast<std::int32_t>(subgroup);
     constants["ALPHA_GRADIENT"] = options_.alpha_gradient || options_.depth_sum ? 1 : 0;

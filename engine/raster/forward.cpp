@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "engine/core/error.h"
+#include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
 #include "engine/raster/frame_buffers.h"
@@ -22,9 +23,21 @@ int bits_for(std::uint32_t count) {
 
 }  // namespace
 
-SpecConstants kernel_constants(const ForwardOptions& options) {
+bool is_exponential(int kernel) {
+    if (blend_parts(kernel)) return false;
+    const int form = kernel_profile(kernel).form;
+    return form == KERNEL_FORM_GAUSSIAN || form == KERNEL_FORM_EXPONENTIAL;
+}
+
+int evaluation_on(const Device& device, const ForwardOptions& options) {
+    if (options.evaluation != kEvaluationOfDevice) return options.evaluation;
+    const bool builtin = device.tuning().exp_builtin && is_exponential(options.kernel);
+    return builtin ? EVALUATION_BUILTIN : EVALUATION_POLYNOMIAL;
+}
+
+SpecConstants kernel_constants(const Device& device, const ForwardOptions& options) {
     SpecConstants constants =
-        kernel_constants(options.kernel, options.footprint, options.evaluation,
+        kernel_constants(options.kernel, options.footprint, evaluation_on(device, options),
                          options.polynomial_degree, options.alpha_cutoff);
     constants["STORAGE"] = options.storage;
     constants["DEPTH_ORDER"] = options.depth_order;
@@ -34,8 +47,9 @@ SpecConstants kernel_constants(const ForwardOptions& options) {
     return constants;
 }
 
-SpecConstants projection_constants(const ForwardOptions& options, int sh_degree, int sh_stored) {
-    SpecConstants constants = kernel_constants(options);
+SpecConstants projection_constants(const Device& device, const ForwardOptions& options,
+                                   int sh_degree, int sh_stored) {
+    SpecConstants constants = kernel_constants(device, options);
     constants["THREADS"] = SPLAT_GROUP;
     constants["SH_DEGREE"] = sh_degree;
     constants["SH_STORED"] = sh_stored;
@@ -68,7 +82,7 @@ Forward::Forward(Device& device, const ForwardOptions& options)
         throw Error("frame", "a resorted pixel cannot be walked back",
                     "Use another depth order, or do not store for a backward pass.");
     const SpecConstants per_item{{"THREADS", SPLAT_GROUP}};
-    SpecConstants of_splat = kernel_constants(options);
+    SpecConstants of_splat = kernel_constants(device, options);
     of_splat["THREADS"] = SPLAT_GROUP;
     compact_ = Pipeline(device, "compact", of_splat);
     gather_counts_ = Pipeline(device, "gather_counts", per_item);
@@ -84,8 +98,9 @@ Pipeline& Forward::project_pipeline(int sh_degree, int sh_stored) {
     if (found != project_.end()) return found->second;
     return project_
         .emplace(std::pair(sh_degree, sh_stored),
-                 Pipeline(*device_, "project", projection_constants(options_, sh_degree, sh_stored),
-                          false, kAnySubgroupSize))
+                 Pipeline(*device_, "project",
+                          projection_constants(*device_, options_, sh_degree, sh_stored), false,
+                          kAnySubgroupSize))
         .first->second;
 }
 
@@ -94,7 +109,7 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
     const bool parts = frame.size.list_segments > 1;
     Pipeline& pipeline = blend_[parts ? 1 : 0];
     if (pipeline) return pipeline;
-    SpecConstants blend = kernel_constants(options_);
+    SpecConstants blend = kernel_constants(*device_, options_);
     blend["MIN_TRANSMITTANCE"] = least_transmittance(options_.transmittance_stop);
     blend["STORE_FOR_BACKWARD"] = options_.store_for_backward ? 1 : 0;
     const std::uint32_t subgroup = add_block_constants(*device_, blend);
@@ -109,11 +124,11 @@ Pipeline& Forward::blend_pipeline(const Frame& frame) {
 
 void Forward::make_huge_pipelines() {
     if (emit_huge_) return;
-    SpecConstants constants = kernel_constants(options_);
+    SpecConstants constants = kernel_constants(*device_, options_);
     constants["THREADS"] = SPLAT_GROUP;
     constants["COOPERATE"] = 1;
     emit_others_.emplace(*device_, "emit", constants);
-    emit_huge_.emplace(*device_, "emit_huge", kernel_constants(options_));
+    emit_huge_.emplace(*device_, "emit_huge", kernel_constants(*device_, options_));
 }
 
 void Forward::record(Commands& commands, const GpuSplats& splats, const FrameView& view,

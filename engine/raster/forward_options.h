@@ -10,10 +10,14 @@
 
 namespace darb {
 
+/// An evaluation that is the device's choice: the driver's own functions where is_exponential and
+/// Tuning::exp_builtin, else polynomials.
+constexpr int kEvaluationOfDevice = -1;
+
 struct ForwardOptions {
     int kernel = KERNEL_GAUSSIAN;
     Footprint footprint = Footprint::psi;
-    int evaluation = EVALUATION_POLYNOMIAL;
+    int evaluation = EVALUATION_POLYNOMIAL;  // EVALUATION_*, or kEvaluationOfDevice
     int polynomial_degree = 5;
     float alpha_cutoff = static_cast<float>(ALPHA_CUTOFF_DEFAULT);
     float transmittance_stop = static_cast<float>(TRANSMITTANCE_STOP);
@@ -41,11 +45,16 @@ constexpr std::uint64_t d_image_planes(const ForwardOptions& options) {
     return options.depth_sum ? 5 : options.alpha_gradient ? 4 : 3;
 }
 
+/// Whether an exponential is the slow part of w: the Gaussian and generalized_exponential.
+bool is_exponential(int kernel);
+/// EVALUATION_* of these options on a device.
+int evaluation_on(const Device& device, const ForwardOptions& options);
 /// The constants of these options that several passes share: kernel, storage and depth order.
-SpecConstants kernel_constants(const ForwardOptions& options);
+SpecConstants kernel_constants(const Device& device, const ForwardOptions& options);
 /// Those of the projection, forward and back: the kernel's, the effects', the degree in use and
 /// that of the buffers.
-SpecConstants projection_constants(const ForwardOptions& options, int sh_degree, int sh_stored);
+SpecConstants projection_constants(const Device& device, const ForwardOptions& options,
+                                   int sh_degree, int sh_stored);
 
 /// What the transmittance of a pixel stays at or above: the stop less its slack for rounding.
 constexpr float least_transmittance(float stop) {

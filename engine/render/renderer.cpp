@@ -66,6 +66,13 @@ Renderer::Renderer(Device& device, const SplatModel& model, const FrameAccuracy&
 
 ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int sh_degree,
                         float near_plane) {
+    const Buffer& image = draw(camera, background, sh_degree, near_plane);
+    const size_t floats = size_t(camera.width) * camera.height * 3;
+    return planes_to_image(image.download<float>(floats), camera.width, camera.height);
+}
+
+const Buffer& Renderer::draw(const Camera& camera, const glm::vec3& background, int sh_degree,
+                             float near_plane) {
     const Camera rendered = accuracy_.halved ? halved(camera) : camera;
     if (camera.lens.active && !forward_.options().effects.lens)
         throw Error("render", "the camera has a lens and the effect is off",
@@ -90,8 +97,7 @@ ImageF Renderer::render(const Camera& camera, const glm::vec3& background, int s
         if (!buffers_.make_room(status_)) break;
     }
     pass_times_ = commands_.pass_times();
-    const size_t floats = size_t(camera.width) * camera.height * 3;
-    return planes_to_image(image->download<float>(floats), camera.width, camera.height);
+    return *image;
 }
 
 ImageF Renderer::render_depth() {

@@ -27,6 +27,10 @@ class Renderer {
     /// the frame when it has more splat-tile intersections than before.
     ImageF render(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
                   int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
+    /// The same without its way to the host, for who measures: float [3][H][W] on the device, which
+    /// the next frame overwrites.
+    const Buffer& draw(const Camera& camera, const glm::vec3& background = glm::vec3(0.0f),
+                       int sh_degree = -1, float near_plane = static_cast<float>(NEAR_DEFAULT));
 
     /// Of the camera of the last render, which must have been one. [H][W][2]: the expected depth
     /// sum w z / sum w along the optical axis, world units, and sum w, the opacity of the pixel;

@@ -5,6 +5,7 @@
 #include "engine/core/rng.h"
 #include "engine/plan/accuracy.h"
 #include "engine/reference/reference_render.h"
+#include "tests/support/scoped_variants.h"
 #include "tests/support/test_walk.h"
 
 namespace darb::test {
@@ -46,7 +47,7 @@ std::vector<Chosen> every_choice() {
 
 reference::RenderSettings reference_settings(const ForwardOptions& options) {
     reference::RenderSettings raster;
-    if (options.evaluation == EVALUATION_POLYNOMIAL)
+    if (options.evaluation != EVALUATION_BUILTIN)
         raster.polynomial_degree = options.polynomial_degree;
     raster.alpha_cutoff = options.alpha_cutoff;
     raster.transmittance_stop = options.transmittance_stop;
@@ -124,8 +125,12 @@ double difference(const ImageF& a, const ImageF& b) {
 bool is_same(int kernel, int setting, const AccuracyChoice& choice) {
     if (setting == kFootprint)
         return kernel == KERNEL_GAUSSIAN || choice.value == FOOTPRINT_PSI;  // as the model says
-    if (setting == kEvaluation)
-        return kernel_coefficients(kernel, Footprint::psi, kFullDegree).degree == choice.value;
+    if (setting == kEvaluation && choice.value > 0) {
+        const auto degree = [&](int most) {
+            return kernel_coefficients(kernel, Footprint::psi, most).degree;
+        };
+        return degree(static_cast<int>(choice.value)) == degree(kFullDegree);
+    }
     return setting == kShDegree && choice.value == 3;
 }
 
@@ -161,6 +166,33 @@ TEST_P(EveryKernel, every_choice_changes_the_picture) {
 
 INSTANTIATE_TEST_SUITE_P(settings, EveryKernel,
                          testing::Values(KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE));
+
+// The device's choice of exp is that of `auto` alone, and of kernels that are exponentials.
+TEST(Accuracy, auto_takes_the_drivers_exp_where_the_device_chose_it) {
+    Accuracy polynomial, builtin;
+    polynomial.choice[kEvaluation] = find_choice(kEvaluation, "polynomial");
+    builtin.choice[kEvaluation] = find_choice(kEvaluation, "builtin");
+    for (const int kernel :
+         {KERNEL_GAUSSIAN, KERNEL_RAISED_COSINE, KERNEL_GENERALIZED_EXPONENTIAL, KERNEL_BETA}) {
+        SCOPED_TRACE(kernel_name(kernel));
+        const TestScene scene =
+            random_scene({.count = 400, .width = 96, .height = 64, .kernel = kernel, .seed = 9});
+        const auto drawn = [&](const Accuracy& accuracy, const std::string& exp) {
+            const ScopedVariants variants(shared_device(), "exp=" + exp);
+            return Renderer(shared_device(), scene.model, accuracy).render(scene.camera).data;
+        };
+        const auto exact = drawn(polynomial, "polynomial"), own = drawn(builtin, "polynomial");
+        ASSERT_NE(exact, own);
+        EXPECT_EQ(drawn({}, "polynomial"), exact);
+        EXPECT_EQ(drawn(polynomial, "builtin"), exact);
+        const bool exponential =
+            kernel == KERNEL_GAUSSIAN || kernel == KERNEL_GENERALIZED_EXPONENTIAL;
+        EXPECT_EQ(drawn({}, "builtin"), exponential ? own : exact);
+        const ScopedVariants variants(shared_device(), "exp=builtin");
+        EXPECT_EQ(changes_evaluation(shared_device(), builtin, kernel), !exponential);
+        EXPECT_EQ(changes_evaluation(shared_device(), polynomial, kernel), exponential);
+    }
+}
 
 // Splats that lie one after another at every pixel keep their order whatever sorts them; two that
 // cross do not.

@@ -77,7 +77,7 @@ TEST(Front, leaves_out_what_is_faster_by_less_than_the_spread) {
 TEST(Combinations, join_what_is_fast_and_leave_out_what_is_slow_and_wrong) {
     const std::vector<CostRow> rows = {row(-1, 0, 10, 1e-8), row(kStorage, 1, 8, 2e-8),
                                        row(kAlphaCutoff, 2, 5, 5e-8),
-                                       row(kEvaluation, 4, 13, 1e-3)};
+                                       row(kEvaluation, 5, 13, 1e-3)};
     const std::vector<Accuracy> all = promising_combinations(rows, 10);
     Accuracy both;
     both.choice[kStorage] = 1;
@@ -220,9 +220,9 @@ TEST(TrainCost, has_the_exact_footprint_where_the_kernel_has_it) {
     const auto has_row = [](int kernel) {
         TrainOptions options;
         options.kernel = kernel;
-        return std::ranges::any_of(training_rows(options), [](const TrainCostRow& r) {
-            return r.name == "footprint exact";
-        });
+        return std::ranges::any_of(
+            training_rows(shared_device(), options),
+            [](const TrainCostRow& r) { return r.name == "footprint exact"; });
     };
     EXPECT_TRUE(has_row(KERNEL_GAUSSIAN));
     EXPECT_FALSE(has_row(KERNEL_GES_PUBLISHED));

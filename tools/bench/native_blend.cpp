@@ -116,7 +116,7 @@ BlendFrame download_frame(const ForwardOptions& options, const Frame& frame, con
     const KernelCoefficients& k =
         kernel_coefficients(options.kernel, options.footprint, options.polynomial_degree);
     BlendFrame f;
-    if (k.form != KERNEL_FORM_GAUSSIAN || options.evaluation != EVALUATION_POLYNOMIAL ||
+    if (k.form != KERNEL_FORM_GAUSSIAN || options.evaluation == EVALUATION_BUILTIN ||
         options.storage != STORAGE_FLOAT32 || options.depth_order == DEPTH_ORDER_PIXEL ||
         k.degree >= static_cast<int>(f.polynomial.size()))
         throw Error("native blending", "knows Gaussian splats in float32 alone",

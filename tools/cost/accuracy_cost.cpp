@@ -90,7 +90,7 @@ void Measurement::time_once(Renderer& renderer, Samples& samples) {
     double frame = 0;
     std::vector<std::pair<std::string, double>> passes;
     for (const Camera& camera : views_.cameras) {
-        renderer.render(camera, background_);
+        renderer.draw(camera, background_);
         for (const PassTime& pass : renderer.pass_times()) {
             frame += pass.ms * share;
             const auto known = std::find_if(passes.begin(), passes.end(),
@@ -148,7 +148,7 @@ int Measurement::run(std::vector<CostRow>& rows, size_t first, const CostPlan& p
     return fewest;
 }
 
-std::vector<CostRow> single_rows(const SplatModel& model) {
+std::vector<CostRow> single_rows(const Device& device, const SplatModel& model) {
     std::vector<CostRow> rows(1);
     rows[0].name = accuracy_text({});
     for (int s = 0; s < kAccuracyCount; ++s)
@@ -164,6 +164,8 @@ std::vector<CostRow> single_rows(const SplatModel& model) {
             if (s == kEvaluation && kernel_pulses(model.kernel) > 1) continue;
             if (s == kEvaluation && row.accuracy.of(s).name == std::string_view("builtin") &&
                 !has_builtin_evaluation(model.kernel))
+                continue;
+            if (s == kEvaluation && !changes_evaluation(device, row.accuracy, model.kernel))
                 continue;
             if (s == kFootprint && !has_exact_footprint(model.kernel)) continue;
             rows.push_back(std::move(row));
@@ -198,7 +200,7 @@ CostResult measure_cost(Device& device, const SplatModel& model, const CostViews
     progress(fmt::format("truth: {} views in double precision", views.cameras.size()));
     Measurement measurement(device, model, views, background);
     result.truth_seconds = measurement.truth_seconds();
-    result.rows = single_rows(model);
+    result.rows = single_rows(device, model);
     progress(fmt::format("each setting alone: {} rows", result.rows.size()));
     double alone_ms = 0, together_ms = 0;
     result.repeats = measurement.run(result.rows, 1, plan, result.group, alone_ms);

@@ -82,7 +82,7 @@ std::vector<TrainCostRow> departures(const TrainOptions& options) {
 
 }  // namespace
 
-std::vector<TrainCostRow> training_rows(const TrainOptions& options) {
+std::vector<TrainCostRow> training_rows(const Device& device, const TrainOptions& options) {
     std::vector<TrainCostRow> rows(1);
     for (int s = 0; s < kAccuracyCount; ++s) {
         if (s == kShDegree) continue;  // among the departures: it has its own schedule in training
@@ -90,6 +90,8 @@ std::vector<TrainCostRow> training_rows(const TrainOptions& options) {
             TrainCostRow row;
             row.accuracy.choice[s] = static_cast<int>(c);
             if (!row.accuracy.of(s).in_training) continue;
+            if (s == kEvaluation && !changes_evaluation(device, row.accuracy, options.kernel))
+                continue;
             if (s == kFootprint && (row.accuracy.value(s) == FOOTPRINT_PSI ||  // the default
                                     !has_exact_footprint(options.kernel)))
                 continue;
@@ -304,7 +306,7 @@ TrainCostResult measure_train_cost(Device& device, const Dataset& dataset,
         facts.emplace_back("seeds", std::to_string(plan.seeds));
         check_same(*plan.ranks, facts);
     }
-    result.rows = training_rows(options);
+    result.rows = training_rows(device, options);
     const std::vector<std::vector<TrainedRun>> runs =
         train_by_turns(device, dataset, photos, options, plan, result.rows, progress);
     if (plan.ranks && !plan.ranks->is_first()) return result;

@@ -45,7 +45,7 @@ struct TrainCostResult {
 
 /// The rows of a run with these options, not measured yet: settings of accuracy that the kernel has
 /// and that mean something in training, presets, departures from 3DGS.
-std::vector<TrainCostRow> training_rows(const TrainOptions& options);
+std::vector<TrainCostRow> training_rows(const Device& device, const TrainOptions& options);
 
 /// Trains every row with every seed, row after row within a seed, so that drift hits all alike.
 /// dataset needs held-out views. Throws Error without.

@@ -50,7 +50,7 @@ KNOWN = {
     "--cameras": ["in/cameras.json", "in/colmap", "in/frames", "in/run", "in/path.json", "mine/notes.txt"],
     "--path": ["in/path.json", "in/cameras.json", "none"], "--start-checkpoint": ["in/run/checkpoint.darb", "in/path.json", "in"],
     "--lpips": ["in/weights.safetensors", "in/path.json"], "--source-path": ["in/colmap", "in/frames", "none"],
-    "--tune": ["scatter=ballot", "backward=buckets", "backward=subgroup", "none=1", "=", ","],
+    "--tune": ["scatter=ballot", "backward=buckets", "backward=subgroup", "exp=builtin", "none=1", "=", ","],
     "--random-points": ["1", "10", "1000", "0", "4000000000", "100000000", "18446744073709551615"],
     "--signals": ["square", "all", "none"], "--scene": ["in/scenes/scene.ply", "in/run"],
     "--cap-max": ["1", "5", "40", "100", "4294967295", "4294967296", "0"], "--data": ["in", "none"],

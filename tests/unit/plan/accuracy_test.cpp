@@ -32,7 +32,7 @@ TEST(Accuracy, balanced_is_the_default) {
     EXPECT_EQ(options.alpha_cutoff, plain.alpha_cutoff);
     EXPECT_EQ(options.transmittance_stop, plain.transmittance_stop);
     EXPECT_EQ(options.polynomial_degree, plain.polynomial_degree);
-    EXPECT_EQ(options.evaluation, plain.evaluation);
+    EXPECT_EQ(options.evaluation, kEvaluationOfDevice);
     EXPECT_EQ(options.storage, plain.storage);
     EXPECT_EQ(options.depth_order, plain.depth_order);
 }

@@ -135,6 +135,8 @@ TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
     EXPECT_EQ(device.tuning().scatter, SortScatter::ballot);
     EXPECT_EQ(device.tuning().backward, BackwardBlend::buckets);
     EXPECT_EQ(result_tuning(device), "backward=buckets");
+    const ScopedVariants other(device, "exp=builtin");
+    EXPECT_EQ(result_tuning(device), "backward=buckets,exp=builtin");
     EXPECT_EQ(RadixSort(device, 100).scatter(), SortScatter::ballot);
 }
 
@@ -149,6 +151,25 @@ TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_intersections) 
     EXPECT_EQ(taken("backward", {{"backward", "team", 1}, {"backward", "buckets", 0.1}}), "team");
     EXPECT_EQ(taken("backward", {{"backward", "team", 1}, {"backward", "subgroup", 0.9}}),
               "subgroup");
+}
+
+TEST(Tuning, who_goes_on_with_a_run_that_knew_no_choice_of_exp_takes_polynomials) {
+    Tuning tuning = usual_tuning(some_gpu());
+    EXPECT_FALSE(tuning.exp_builtin);
+    tuning.exp_builtin = true;
+    EXPECT_FALSE(resumed_tuning(some_gpu(), tuning, "backward=team", "file").exp_builtin);
+    EXPECT_TRUE(resumed_tuning(some_gpu(), tuning, "exp=builtin", "file").exp_builtin);
+}
+
+TEST(Tuning, the_drivers_exp_is_a_choice_only_where_it_is_accurate) {
+    Device& device = shared_device();
+    const double error = exp_error(device);
+    EXPECT_GT(error, 1e-8) << "float32 rounds";
+    EXPECT_LT(error, 1e-3);
+    const TuningRecord refused = measure_tuning(device, "exp", 0.5 * error);
+    EXPECT_EQ(refused.choice.at("exp"), "polynomial");
+    EXPECT_EQ(refused.times.size(), 1U);
+    EXPECT_EQ(measure_tuning(device, "exp", error).times.size(), 2U);
 }
 
 TEST_F(Tuner, a_record_is_read_back) {
@@ -262,8 +283,9 @@ TEST_F(Tuner, retuning_measures_every_way_and_keeps_the_choice_slow) {
     std::size_t all = 0;
     for (const TuningGroup& group : tuning_groups(device.info())) {
         if (group.passes.empty()) continue;  // is never measured
-        all += group.choices.size();
         for (const std::string& way : group.choices) {
+            if (way == "builtin" && exp_error(device) > kExpTolerance) continue;
+            ++all;
             const auto time = std::find_if(
                 record->times.begin(), record->times.end(),
                 [&](const auto& t) { return t.group == group.name && t.choice == way; });
