@@ -13,12 +13,12 @@ struct Row {
     int kernel;
     const ShapedKernel& (*shaped)();
 };
-constexpr Row kRows[] = {{KERNEL_BETA, beta_kernel},
-                         {KERNEL_GENERALIZED_EXPONENTIAL, exponential_kernel},
-                         {KERNEL_GES_PUBLISHED, ges_kernel}};
+constexpr Row kShapedKernels[] = {{KERNEL_BETA, beta_kernel},
+                                  {KERNEL_GENERALIZED_EXPONENTIAL, exponential_kernel},
+                                  {KERNEL_GES_PUBLISHED, ges_kernel}};
 
 const ShapedKernel* find(int kernel) {
-    for (const Row& row : kRows)
+    for (const Row& row : kShapedKernels)
         if (row.kernel == kernel) return &row.shaped();
     return blend_parts(kernel) ? &blend_kernel(kernel) : nullptr;
 }
@@ -56,7 +56,7 @@ const ShapedKernel& shaped_kernel(int kernel) {
 
 std::vector<int> shaped_kernels() {
     std::vector<int> kernels;
-    for (const Row& row : kRows) kernels.push_back(row.kernel);
+    for (const Row& row : kShapedKernels) kernels.push_back(row.kernel);
     return kernels;
 }
 

@@ -19,28 +19,28 @@ namespace {
 // The nearest singularity is that of the inverse quadratic, q = -1, at s = 1.054: with 64 pieces
 // the Bernstein ellipse of the last piece has rho = 16, and 16^-12 = 4e-15.
 constexpr int kPieces = 64;
-constexpr int kTerms = 12;
+constexpr int kPieceTerms = 12;
 
-/// Monomial coefficients, in t in [-1, 1], of the interpolant through kTerms Chebyshev nodes.
+/// Monomial coefficients, in t in [-1, 1], of the interpolant through kPieceTerms Chebyshev nodes.
 template <class Function>
-std::array<double, kTerms> fit_piece(const Function& f, double low, double high) {
-    std::array<double, kTerms> samples;
-    std::array<double, kTerms> chebyshev{};
-    for (int i = 0; i < kTerms; ++i) {
-        const double angle = std::numbers::pi * (i + 0.5) / kTerms;
+std::array<double, kPieceTerms> fit_piece(const Function& f, double low, double high) {
+    std::array<double, kPieceTerms> samples;
+    std::array<double, kPieceTerms> chebyshev{};
+    for (int i = 0; i < kPieceTerms; ++i) {
+        const double angle = std::numbers::pi * (i + 0.5) / kPieceTerms;
         samples[i] = f(0.5 * (low + high) + 0.5 * (high - low) * std::cos(angle));
-        for (int k = 0; k < kTerms; ++k) {
-            chebyshev[k] += (k == 0 ? 1.0 : 2.0) / kTerms * samples[i] * std::cos(k * angle);
+        for (int k = 0; k < kPieceTerms; ++k) {
+            chebyshev[k] += (k == 0 ? 1.0 : 2.0) / kPieceTerms * samples[i] * std::cos(k * angle);
         }
     }
     // T_0 = 1, T_1 = t, T_{k+1} = 2 t T_k - T_{k-1}, as rows of monomials.
-    std::array<double, kTerms> previous{}, current{}, result{};
+    std::array<double, kPieceTerms> previous{}, current{}, result{};
     previous[0] = 1;
     current[1] = 1;
     result[0] = chebyshev[0];
-    for (int k = 1; k < kTerms; ++k) {
-        std::array<double, kTerms> next{};
-        for (int j = 0; j < kTerms; ++j) {
+    for (int k = 1; k < kPieceTerms; ++k) {
+        std::array<double, kPieceTerms> next{};
+        for (int j = 0; j < kPieceTerms; ++j) {
             result[j] += chebyshev[k] * current[j];
             next[j] = (j > 0 ? 2 * current[j - 1] : 0.0) - previous[j];
         }
@@ -88,9 +88,9 @@ double KernelTable::evaluate(const std::vector<double>& table, double x) const {
     const double scaled = x * kPieces;
     const int piece = std::min(static_cast<int>(scaled), kPieces - 1);
     const double t = 2 * (scaled - piece) - 1;
-    const double* terms = table.data() + piece * kTerms;
-    double sum = terms[kTerms - 1];
-    for (int k = kTerms - 2; k >= 0; --k) {
+    const double* terms = table.data() + piece * kPieceTerms;
+    double sum = terms[kPieceTerms - 1];
+    for (int k = kPieceTerms - 2; k >= 0; --k) {
         sum = sum * t + terms[k];
     }
     return sum;

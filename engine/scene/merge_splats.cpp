@@ -28,10 +28,10 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kNeighbours = 6;
+constexpr std::size_t kNearest = 6;
 constexpr std::size_t kRoundDivisor = 4;  // a round merges at most a fourth of the splats
 constexpr std::size_t kAlongCurve = 2;    // of a quick merge: so many neighbours, of later splats
-constexpr std::size_t kChunk = 64;        // splats of one code of the curve
+constexpr std::size_t kCurveSplats = 64;  // splats of one code of the curve
 constexpr double kApart = 1e-3;
 constexpr std::size_t kBlock = 1 << 15, kPart = 256;  // splats between reports, of a thread at once
 constexpr std::uint32_t kNone = 0xffffffff;
@@ -112,7 +112,7 @@ SplatModel along_curve(const SplatModel& model) {
     places.opacity_logit = model.opacity_logit;  // their number
     for (std::size_t i = 0; i < model.size(); ++i)
         if (!is_drawn(model, i)) std::fill_n(&places.position[3 * i], 3, 0.0f);
-    return pick_splats(model, chunk_order(places, kChunk));
+    return pick_splats(model, chunk_order(places, kCurveSplats));
 }
 
 Merging::Merging(const SplatModel& model, std::size_t last, const MergeOptions& options)
@@ -197,24 +197,24 @@ void Merging::drop_undrawn(std::size_t count) {
 
 std::vector<std::uint32_t> Merging::find_neighbours() {
     if (options_.quick) {
-        std::vector<std::uint32_t> next(kNeighbours * model_.size(), kNone);
+        std::vector<std::uint32_t> next(kNearest * model_.size(), kNone);
         for (std::size_t i = 0; i < model_.size(); ++i)
             for (std::size_t k = 0; k < kAlongCurve && i + k + 1 < model_.size(); ++k)
-                next[kNeighbours * i + k] = static_cast<std::uint32_t>(i + k + 1);
+                next[kNearest * i + k] = static_cast<std::uint32_t>(i + k + 1);
         return next;
     }
     const std::vector<glm::dvec3> points = apart(moments_);
     const PointsView view{points};
     Tree tree(3, view, nanoflann::KDTreeSingleIndexAdaptorParams(16));
     tree.buildIndex();
-    std::vector<std::uint32_t> neighbours(kNeighbours * model_.size(), kNone);
+    std::vector<std::uint32_t> neighbours(kNearest * model_.size(), kNone);
     for_all(0, 0.5, [&](std::size_t i) {
-        std::uint32_t index[kNeighbours + 1];
-        double distance2[kNeighbours + 1];
+        std::uint32_t index[kNearest + 1];
+        double distance2[kNearest + 1];
         // The splat itself is among them.
-        const std::size_t found = tree.knnSearch(&points[i][0], kNeighbours + 1, index, distance2);
-        std::size_t to = kNeighbours * i;
-        for (std::size_t k = 0; k < found && to < kNeighbours * (i + 1); ++k)
+        const std::size_t found = tree.knnSearch(&points[i][0], kNearest + 1, index, distance2);
+        std::size_t to = kNearest * i;
+        for (std::size_t k = 0; k < found && to < kNearest * (i + 1); ++k)
             if (index[k] != i) neighbours[to++] = index[k];
     });
     return neighbours;
@@ -223,12 +223,12 @@ std::vector<std::uint32_t> Merging::find_neighbours() {
 std::vector<Candidate> Merging::find_candidates(const std::vector<std::uint32_t>& neighbours) {
     std::vector<Candidate> candidates(neighbours.size(), {0, kNone, kNone});
     for_all(0.5, 0.95, [&](std::size_t i) {
-        for (std::size_t k = kNeighbours * i; k < kNeighbours * (i + 1); ++k) {
+        for (std::size_t k = kNearest * i; k < kNearest * (i + 1); ++k) {
             const std::uint32_t other = neighbours[k];
             if (other == kNone) break;
             // A pair that the other has too is the smaller index's.
-            const auto his = neighbours.begin() + static_cast<std::ptrdiff_t>(kNeighbours * other);
-            const auto end = his + static_cast<std::ptrdiff_t>(kNeighbours);
+            const auto his = neighbours.begin() + static_cast<std::ptrdiff_t>(kNearest * other);
+            const auto end = his + static_cast<std::ptrdiff_t>(kNearest);
             if (other < i && std::find(his, end, static_cast<std::uint32_t>(i)) != end) continue;
             const std::uint32_t a = std::min(static_cast<std::uint32_t>(i), other);
             const std::uint32_t b = std::max(static_cast<std::uint32_t>(i), other);

@@ -34,11 +34,11 @@ std::string_view last_value(const PlyHeader& header, std::string_view key) {
 
 int kernel_defined_by(std::string_view name, std::string_view function, const std::string& where,
                       std::vector<std::string>& notes) {
-    const auto json = nlohmann::json::parse(function, nullptr, false);
-    if (!json.is_object())
+    const auto parsed = nlohmann::json::parse(function, nullptr, false);
+    if (!parsed.is_object())
         throw Error(where, "its comment SplatKernelFunction is no JSON object", kCopyAgain);
     return register_kernel_of_file(
-        definition_from_json({{"name", std::string(name)}, {"function", json}}, where), where,
+        definition_from_json({{"name", std::string(name)}, {"function", parsed}}, where), where,
         notes);
 }
 

@@ -25,8 +25,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kNeighbours = 256;  // splats that lie close together, for chunk_order
-constexpr std::size_t kRowEntries = 64;   // palette entries a row of pixels
+constexpr std::size_t kChunkNeighbours = 256;  // splats that lie close together, for chunk_order
+constexpr std::size_t kRowEntries = 64;        // palette entries a row of pixels
 constexpr std::size_t kPaletteStep = 1024, kMostSteps = 64;
 constexpr int kWebpEffort = 4;            // of 9
 constexpr std::size_t kMostSide = 16383;  // px, of WebP
@@ -197,7 +197,7 @@ EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where
             where,
             fmt::format("{} splats are more than a WebP picture has pixels for", scene.size()),
             "Write fewer splats, or a PLY.");
-    const SplatModel model = pick_splats(scene, chunk_order(scene, kNeighbours));
+    const SplatModel model = pick_splats(scene, chunk_order(scene, kChunkNeighbours));
     json meta = {{"version", 2},
                  {"asset", {{"generator", "darb " DARB_VERSION}}},
                  {"count", model.size()},

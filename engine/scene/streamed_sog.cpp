@@ -34,7 +34,7 @@ constexpr int kMostLodDepth = 256;              // of the JSON
 constexpr std::size_t kLeafSplats = 16 << 10;   // of the finest level, at most
 constexpr std::size_t kFileSplats = 256 << 10;  // of a file; a leaf is never cut
 constexpr std::size_t kLeastLevel = 500;        // splats
-constexpr std::size_t kChunkNeighbours = 256;   // for chunk_order
+constexpr std::size_t kLeafNeighbours = 256;    // for chunk_order
 
 /// Rows of a file.
 struct LodRange {
@@ -255,7 +255,7 @@ json leaf_of(LodWriter& writer, const LodSplats& splats) {
                                        {"offset", filling.size()},
                                        {"count", splats[level].size()}};
         const SplatModel leaf = pick_splats(*writer.levels[level], splats[level]);
-        for (const std::uint32_t i : chunk_order(leaf, kChunkNeighbours))
+        for (const std::uint32_t i : chunk_order(leaf, kLeafNeighbours))
             filling.push_back(splats[level][i]);
         writer.counts[level] += splats[level].size();
     }

@@ -63,16 +63,16 @@ ShownFrame render_frame(const SplatModel& model, const Camera& camera,
     return f;
 }
 
-const SceneOptions kScene{.count = 400,
-                          .width = 140,
-                          .height = 90,
-                          .sh_degree = 1,
-                          .min_log_scale = -4,
-                          .max_log_scale = -1,
-                          .seed = 41};
+const SceneOptions kFrameScene{.count = 400,
+                               .width = 140,
+                               .height = 90,
+                               .sh_degree = 1,
+                               .min_log_scale = -4,
+                               .max_log_scale = -1,
+                               .seed = 41};
 
 TEST(Frame, lists_match_the_covers_sorted_by_depth_on_the_host) {
-    const TestScene s = random_scene(kScene);
+    const TestScene s = random_scene(kFrameScene);
     const ShownFrame f = render_frame(s.model, s.camera);
     const ProjectedFrame p = project_on_device(s.model, s.camera);
     Words order;
@@ -119,7 +119,7 @@ SplatModel reordered(const SplatModel& model, const Words& order) {
 }
 
 TEST(Frame, image_does_not_depend_on_the_order_in_the_file) {
-    const TestScene s = random_scene(kScene);
+    const TestScene s = random_scene(kFrameScene);
     Words order(s.model.size());
     std::iota(order.begin(), order.end(), 0U);
     Pcg32 rng(3);
@@ -130,7 +130,7 @@ TEST(Frame, image_does_not_depend_on_the_order_in_the_file) {
 }
 
 TEST(Frame, splats_that_nobody_sees_change_no_bit) {
-    TestScene s = random_scene(kScene);
+    TestScene s = random_scene(kFrameScene);
     const std::vector<float> before = render_frame(s.model, s.camera).image;
     const size_t n = s.model.size();
     s.model.resize(n + 300);
@@ -151,7 +151,7 @@ TEST(Frame, splats_that_nobody_sees_change_no_bit) {
 // The principal point moves by whole tiles. Splats of 1 px, so that none which reaches the window
 // lies beyond the Jacobian's clamp, which depends on the image.
 TEST(Frame, tiles_rendered_apart_equal_the_whole) {
-    SceneOptions options = kScene;
+    SceneOptions options = kFrameScene;
     options.count = 3000;
     options.min_log_scale = -5;
     options.max_log_scale = -3.8;
@@ -180,21 +180,21 @@ void expect_background(const ShownFrame& f) {
 }
 
 TEST(Frame, zero_splats_show_the_background) {
-    expect_background(render_frame({}, random_scene(kScene).camera));
+    expect_background(render_frame({}, random_scene(kFrameScene).camera));
 }
 
 TEST(Frame, zero_visible_splats_show_the_background) {
-    TestScene s = random_scene(kScene);
+    TestScene s = random_scene(kFrameScene);
     s.camera.translation.z = -30;
     expect_background(render_frame(s.model, s.camera));
-    TestScene faint = random_scene(kScene);
+    TestScene faint = random_scene(kFrameScene);
     for (float& logit : faint.model.opacity_logit) logit = -8;
     expect_background(render_frame(faint.model, faint.camera));
 }
 
 TEST(Frame, an_empty_frame_after_a_full_one_is_empty) {
     Device& device = shared_device();
-    const TestScene s = random_scene(kScene);
+    const TestScene s = random_scene(kFrameScene);
     GpuSplats splats(device, s.model, false);
     FrameBuffers buffers(device, forward_options(s.model, {}));
     Forward forward(device, forward_options(s.model, {}));
@@ -432,7 +432,7 @@ TEST(Frame, more_than_65536_tiles_are_told_apart) {
 
 // Positions relative to an origin a thousand kilometres away: the camera moves, not the splats.
 TEST(Frame, an_origin_far_away_leaves_the_image_alone) {
-    TestScene s = random_scene(kScene);
+    TestScene s = random_scene(kFrameScene);
     const std::vector<float> near_zero = render_frame(s.model, s.camera).image;
     s.model.origin = {1e6, -2e6, 5e5};
     s.camera.translation -= s.camera.rotation * s.model.origin;

@@ -213,7 +213,8 @@ TEST_F(Outputs, names_of_files_do_not_steer_the_terminal) {
                          "a\x1b]0;b\x07\x7f\xc2\x9b\xe2\x80\xae"
                          "c";
     fs::create_directories(odd);
-    const std::string s = odd / "s.ply", data = odd / "data", run = odd / "run", json = odd / "j";
+    const std::string s = odd / "s.ply", data = odd / "data", run = odd / "run",
+                      numbers = odd / "j";
     fs::copy(ply(), s);
     fs::copy(run_, run, fs::copy_options::recursive);
     fs::copy(data_, data, fs::copy_options::recursive);
@@ -222,11 +223,11 @@ TEST_F(Outputs, names_of_files_do_not_steer_the_terminal) {
         {"info", data, "--json", "-", "-r", "8"},
         {"info", odd},
         {"plan", s, "--no-price", "--json", "-"},
-        {"plan", run, "--no-price", "--json", json},
+        {"plan", run, "--no-price", "--json", numbers},
         {"convert", s, odd / "o.spz"},
         {"convert", s, odd / "o.none"},
         {"convert", s, odd / "no" / "\x1b[m.ply"},
-        {"eval", s, data, "-r", "8", "--json", json},
+        {"eval", s, data, "-r", "8", "--json", numbers},
         {"eval", s, odd},
         {"render", s, "--cameras", data, "-r", "8", "-o", odd / "frames"},
         {"render", s, "--cameras", s, "-o", odd / "frames"},
@@ -265,7 +266,7 @@ TEST_F(Outputs, names_of_files_do_not_steer_the_terminal) {
 
 // Neither what was named by its whole path nor what a message says of it.
 TEST_F(Outputs, numbers_name_no_folder_of_the_machine_long) {
-    const fs::path far = folder_ / "far", json = far / "n.json";
+    const fs::path far = folder_ / "far", numbers = far / "n.json";
     fs::create_directories(far);
     const std::string data = data_.string(), s = ply().string(), of_far = scratch().string();
     write_file_atomic(data_ / "transforms.json", "{}");  // a note names what is read instead
@@ -273,12 +274,12 @@ TEST_F(Outputs, numbers_name_no_folder_of_the_machine_long) {
          {"info " + s, "info " + data + " -r 8", "info " + run_.string(),
           "plan " + s + " --no-price", "plan " + data + " --no-price -r 8",
           "cost " + s + " --quick --size 32x32 -q"}) {
-        const Outcome o = darb(command + " --json " + json.string());
+        const Outcome o = darb(command + " --json " + numbers.string());
         EXPECT_EQ(o.code, 0) << command << o.err;
         if (command.ends_with("-q")) {
-            EXPECT_EQ(o.out + o.err, json.string() + "\n");
+            EXPECT_EQ(o.out + o.err, numbers.string() + "\n");
         }
-        const std::string text = read_text_file(json);
+        const std::string text = read_text_file(numbers);
         EXPECT_EQ(text.find(of_far), std::string::npos) << command << text;
     }
     const std::string shown = darb("info " + s + " --json -").out;

@@ -186,26 +186,26 @@ TEST(CompareCommand, RunThatCannotBeRead_isSaidWhereProgressIsNot) {
 }
 
 TEST(PsiCommand, TableJsonAndPage_agree) {
-    const fs::path json = scratch() / "psi.json", page = scratch() / "psi.html";
+    const fs::path numbers = scratch() / "psi.json", page = scratch() / "psi.html";
     const Outcome psi = darb("psi --kernel raised_cosine,sinc --samples 4 --cells 32 --json " +
-                             json.string() + " --html " + page.string());
+                             numbers.string() + " --html " + page.string());
     ASSERT_EQ(psi.code, 0) << psi.err;
     EXPECT_NE(psi.out.find("0.655153"), std::string::npos) << psi.out;
     EXPECT_NE(psi.out.find("psi = 1"), std::string::npos) << psi.out;
-    EXPECT_NEAR(read_json(json)["kernels"][1]["exact"].get<double>(), 1.176219, 5e-7);
+    EXPECT_NEAR(read_json(numbers)["kernels"][1]["exact"].get<double>(), 1.176219, 5e-7);
     EXPECT_NE(read_text_file(page).find("<svg"), std::string::npos);
     expect_refused({{"psi --kernel triangle", "no such kernel"},
                     {"psi --kernel sinc_2_pulses", "more than one pulse"}});
 }
 
 TEST(Sim1dCommand, TableJsonAndPage_areWritten) {
-    const fs::path json = scratch() / "sim1d.json", page = scratch() / "sim1d.html";
+    const fs::path numbers = scratch() / "sim1d.json", page = scratch() / "sim1d.html";
     const Outcome sim = darb(
         "sim1d --signals triangle --kernels gaussian,generalised_exponential "
         "-N 1,2 --seeds 2 --steps 50 --samples 100 --json " +
-        json.string() + " --html " + page.string());
+        numbers.string() + " --html " + page.string());
     ASSERT_EQ(sim.code, 0) << sim.err;
-    EXPECT_EQ(read_json(json)["rows"].size(), 4u);
+    EXPECT_EQ(read_json(numbers)["rows"].size(), 4u);
     EXPECT_NE(read_text_file(page).find("N = 2"), std::string::npos);
     expect_refused({{"sim1d --signals noise", "no such signal"},
                     {"sim1d --kernels raised_cosine_2_pulses", "more than one pulse"}});

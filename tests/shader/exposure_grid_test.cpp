@@ -9,7 +9,7 @@
 namespace darb::test {
 namespace {
 
-constexpr std::uint32_t kWidth = 37, kHeight = 23, kPixels = kWidth * kHeight;
+constexpr std::uint32_t kPhotoWidth = 37, kPhotoHeight = 23, kPixels = kPhotoWidth * kPhotoHeight;
 constexpr int kSides[3] = {EXPOSURE_GRID_X, EXPOSURE_GRID_Y, EXPOSURE_GRID_L};
 constexpr ExposureMaps kMaps{2, true};
 constexpr double kLightBehind[3] = {0.9, 0.2, 0.6};
@@ -37,8 +37,9 @@ std::array<double, 3> mapped(const Case& c, std::uint32_t p) {
     std::array<double, 3> x{}, sum{};
     for (std::size_t k = 0; k < 3; ++k) x[k] = c.colours[k * kPixels + p];
     const double light = std::clamp(0.299 * x[0] + 0.587 * x[1] + 0.114 * x[2], 0.0, 1.0);
-    const double at[3] = {(p % kWidth + 0.5) / kWidth * (kSides[0] - 1),
-                          (p / kWidth + 0.5) / kHeight * (kSides[1] - 1), light * (kSides[2] - 1)};
+    const double at[3] = {(p % kPhotoWidth + 0.5) / kPhotoWidth * (kSides[0] - 1),
+                          (p / kPhotoWidth + 0.5) / kPhotoHeight * (kSides[1] - 1),
+                          light * (kSides[2] - 1)};
     for (int v = 0; v < EXPOSURE_GRID_VERTICES; ++v) {
         const int vertex[3] = {v % kSides[0], v / kSides[0] % kSides[1], v / kSides[0] / kSides[1]};
         double weight = 1;
@@ -103,7 +104,7 @@ GridRun run_grid(const Case& c) {
     d.upload(floats(c.d));
     status.upload(std::vector<gpu::FrameStatus>(1));
     const ExposedPicture picture{
-        colours, transmittance, {kLightBehind[0], kLightBehind[1], kLightBehind[2]}, kWidth};
+        colours, transmittance, {kLightBehind[0], kLightBehind[1], kLightBehind[2]}, kPhotoWidth};
     Commands commands(device);
     commands.begin();
     exposure.record(commands, picture, 1, kPixels);

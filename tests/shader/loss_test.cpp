@@ -17,8 +17,8 @@
 namespace darb {
 namespace {
 
-constexpr std::uint32_t kGuard = 0x7fc0dead;  // a NaN
-constexpr int kGuardWords = 64;
+constexpr std::uint32_t kNanGuard = 0x7fc0dead;  // a NaN
+constexpr int kNanGuardWords = 64;
 constexpr std::uint32_t kResultIndex = 2;
 
 struct Case {
@@ -178,19 +178,19 @@ std::uint64_t count_changed(const std::vector<std::uint32_t>& words, std::size_t
     return static_cast<std::uint64_t>(
         std::count_if(words.begin() + static_cast<std::ptrdiff_t>(from),
                       words.begin() + static_cast<std::ptrdiff_t>(to),
-                      [](std::uint32_t word) { return word != kGuard; }));
+                      [](std::uint32_t word) { return word != kNanGuard; }));
 }
 
 Output run(Loss& loss, const Case& c, const Data& data, int repeats = 1) {
     const std::size_t words = data.image.size();
     Buffer image(device(), "image", words * 4);
     Buffer photo(device(), "photo", data.photo.size() * 4);
-    Buffer d_image(device(), "d_image", (words + kGuardWords) * 4);
+    Buffer d_image(device(), "d_image", (words + kNanGuardWords) * 4);
     Buffer results(device(), "results", 4 * sizeof(gpu::LossResult));
     image.upload(data.image);
     photo.upload(data.photo);
-    d_image.upload(std::vector<std::uint32_t>(words + kGuardWords, kGuard));
-    results.upload(std::vector<std::uint32_t>(16, kGuard));
+    d_image.upload(std::vector<std::uint32_t>(words + kNanGuardWords, kNanGuard));
+    results.upload(std::vector<std::uint32_t>(16, kNanGuard));
     Output out;
     out.ms = 1e9;
     for (int i = 0; i < repeats; ++i) {
@@ -201,8 +201,8 @@ Output run(Loss& loss, const Case& c, const Data& data, int repeats = 1) {
         commands.submit_and_wait();
         for (const PassTime& time : commands.pass_times()) out.ms = std::min(out.ms, time.ms);
     }
-    const auto after = d_image.download<std::uint32_t>(words + kGuardWords);
-    out.guards_hit = count_changed(after, words, words + kGuardWords);
+    const auto after = d_image.download<std::uint32_t>(words + kNanGuardWords);
+    out.guards_hit = count_changed(after, words, words + kNanGuardWords);
     const auto slots = results.download<std::uint32_t>(16);
     out.guards_hit += count_changed(slots, 0, 8) + count_changed(slots, 12, 16);
     out.gradient = d_image.download<float>(words);

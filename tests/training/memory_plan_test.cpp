@@ -25,7 +25,7 @@ namespace {
 // Of the peak of a run: what is there for a moment and not planned for, as a picture's one camera.
 constexpr double kTolerance = 0.01;
 
-Dataset small_scene(int resolution = 2) {
+Dataset shipped_scene(int resolution = 2) {
     DatasetOptions options;
     options.resolution = resolution;  // 2: 100 x 75 px, splats and photos weigh about the same
     return load_dataset(std::filesystem::path(DARB_SOURCE_DIR) / "assets" / "scene", options);
@@ -43,7 +43,7 @@ TrainOptions options_of(int sh_degree, bool effects = false) {
 // What is there after an iteration from `splats` splats, by the plan for them and by the device.
 void compare_to_the_byte(const TrainOptions& options, std::uint32_t splats,
                          const std::string& ways = "", int resolution = 2) {
-    const Dataset dataset = small_scene(resolution);
+    const Dataset dataset = shipped_scene(resolution);
     Device device{test::device_options()};
     const test::ScopedVariants variants(device, ways);
     SplatModel start = split_model(initial_model(dataset, options), splats, 1);
@@ -78,7 +78,7 @@ TEST(MemoryPlan, exposure_and_antialiasing_are_met_to_the_byte) {
     tones.exposure_grid = true;
     compare_to_the_byte(tones, 4'000);
     MemoryDemand with, without;
-    const Dataset dataset = small_scene();
+    const Dataset dataset = shipped_scene();
     add_photos(dataset.views, options_of(0, true), with);
     add_photos(dataset.views, {}, without);
     const Device device{test::device_options()};
@@ -106,7 +106,7 @@ TEST(MemoryPlan, strategies_are_met_to_the_byte) {
         options.iterations = 10;
         options.resolution_ramp = strategy == Strategy::budget;
         MemoryDemand demand;
-        add_photos(small_scene(1).views, options, demand);
+        add_photos(shipped_scene(1).views, options, demand);
         EXPECT_EQ(demand.small_pixels > 0, options.resolution_ramp);
         compare_to_the_byte(options, 4'000, "", 1);
         options.batch = 4;
@@ -118,7 +118,7 @@ TEST(MemoryPlan, the_mean_of_the_last_iterations_is_met_to_the_byte) {
     TrainOptions options = options_of(2);
     options.iterations = 10;
     options.average_from = 0.5;
-    const Dataset dataset = small_scene();
+    const Dataset dataset = shipped_scene();
     Device device{test::device_options()};
     Trainer trainer(device, dataset, load_photos(dataset.views), initial_model(dataset, options),
                     options);
@@ -174,7 +174,7 @@ TEST(MemoryPlan, the_peak_of_density_control_is_met) {
     options.max_splats = 9'000;
     for (const int every : {1, 4}) {
         options.sh_rest_every = every;
-        compare_with_run(small_scene(), options, 3);
+        compare_with_run(shipped_scene(), options, 3);
     }
 }
 
@@ -184,7 +184,7 @@ TEST(MemoryPlan, the_peak_of_a_degree_added_on_the_way_is_met) {
     options.densify_until = 0;
     options.probe_sh = true;
     options.sh_interval = 3;
-    Dataset few = small_scene();
+    Dataset few = shipped_scene();
     few.views.resize(6);  // too few photos for a trial: each degree is admitted
     few.points.seen_begin.clear();
     few.points.seen_by.clear();
@@ -203,7 +203,7 @@ TEST(MemoryPlan, the_log_of_a_run_holds_plan_and_peak) {
     run.quiet = true;
     run.report = false;
     Device device{test::device_options()};
-    run_training(device, small_scene(), options, run);
+    run_training(device, shipped_scene(), options, run);
     const auto metrics = nlohmann::json::parse(read_text_file(run.output / "metrics.json"));
     const auto peak = metrics["peak_device_bytes"].get<double>();
     EXPECT_NEAR(metrics["planned_device_bytes"].get<double>(), peak, kTolerance * peak);
@@ -221,7 +221,7 @@ TEST(RunTime, a_pause_is_left_out) {
     int steps = 0;
     run.on_step = [&](const LiveStep&) { return ++steps == 1 ? 1e6 : 0.0; };
     Device device{test::device_options()};
-    const RunSummary summary = run_training(device, small_scene(), options, run);
+    const RunSummary summary = run_training(device, shipped_scene(), options, run);
     EXPECT_GT(steps, 0);
     EXPECT_LT(summary.seconds, 0);
     EXPECT_GT(summary.seconds, -1e6);
@@ -231,7 +231,7 @@ TEST(RunTime, a_pause_is_left_out) {
 // What the process grows by while it trains on photos of `scale` times 200x150 px, and their bytes.
 // Each view is there twice, so that photos outweigh all else.
 std::pair<std::uint64_t, std::uint64_t> growth_with_photos(Device& device, int scale) {
-    Dataset dataset = small_scene(1);
+    Dataset dataset = shipped_scene(1);
     const std::vector<View> once = dataset.views;
     for (View view : once) {
         view.name = "again_" + view.name;
@@ -273,7 +273,7 @@ TEST(RunMemory, training_photos_are_held_once) {
 }
 
 TEST(MemoryPlan, photos_count_only_where_they_are_trained_on) {
-    Dataset dataset = small_scene();
+    Dataset dataset = shipped_scene();
     MemoryDemand all, some;
     add_photos(dataset.views, {}, all);
     dataset.views[0].is_test = true;

@@ -10,13 +10,13 @@ namespace darb {
 
 namespace {
 
-constexpr std::size_t kSplats = 100'000;
-constexpr int kDegree = 3;
+constexpr std::size_t kStepSplats = 100'000;
+constexpr int kStepDegree = 3;
 
 // A sample is a step in each way, one after the other; the case's time is that of both.
 BenchResult measure(Device& device, int width, int height, const BenchOptions& options) {
     const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, width, height);
-    BenchStep frame(device, random_scene(kSplats, kDegree), camera);
+    BenchStep frame(device, random_scene(kStepSplats, kStepDegree), camera);
     BenchResult result;
     take_samples(
         options.sampling, 1,
@@ -35,11 +35,11 @@ BenchResult measure(Device& device, int width, int height, const BenchOptions& o
             return passes;
         },
         result);
-    result.counts.splats = kSplats;
+    result.counts.splats = kStepSplats;
     result.counts.visible = frame.status().visible;
     result.counts.intersections = frame.status().intersections;
     result.counts.pixels = double(width) * height;
-    result.counts.rest_floats = attribute_floats(kShRest, kDegree);
+    result.counts.rest_floats = attribute_floats(kShRest, kStepDegree);
     double fused = 0, apart = 0;
     for (const PassFigure& pass : result.passes) {
         if (pass.name == "step, fused") fused = pass.ms.median;

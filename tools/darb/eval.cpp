@@ -78,29 +78,29 @@ int eval(Ranks& ranks, EvalFlags flags) {
     Device device(device_options);
     settle_tuning(device);
     std::FILE* const out = stream_beside_json(flags.json, flags.quiet);
-    nlohmann::json json;
+    nlohmann::json figures;
     if (flags.scales.empty()) {
         const Evaluation measured = evaluate_scene(device, model, views, options);
-        json = evaluation_json(measured);
+        figures = evaluation_json(measured);
         print_evaluation(out, measured);
     } else {
         const auto scales = evaluate_scales(device, model, flags.scales, sizes, options);
-        json = evaluation_json(scales);
+        figures = evaluation_json(scales);
         print_evaluation(out, scales);
     }
     if (!away.views.empty()) {
         options.alpha_is_mask = away.alpha_is_mask;
         const Evaluation evaluation = evaluate_scene(device, model, beyond, options);
-        json["off_path"] = evaluation_json(evaluation);
+        figures["off_path"] = evaluation_json(evaluation);
         tell(out, "off path, mean of {}: {:.3f} dB, SSIM {:.4f}\n", evaluation.views.size(),
              evaluation.psnr_db, evaluation.ssim);
         print_depth(out, evaluation);
     }
     if (!ranks.is_first()) return 0;
     if (flags.light)
-        json["light_of_few_views"] = told_light(
+        figures["light_of_few_views"] = told_light(
             out, measure_light(device, model, options.effects, dataset.views, views, beyond));
-    write_json(flags.json, json);
+    write_json(flags.json, figures);
     tell_paths(flags.quiet, {flags.json});
     return 0;
 }

@@ -17,7 +17,7 @@ namespace {
 
 // Of the package's ScalingLayer, for colours in [-1, 1].
 constexpr float kShift[3] = {-0.030f, -0.088f, -0.188f}, kScale[3] = {0.458f, 0.448f, 0.450f};
-constexpr float kEpsilon = 1e-10f;
+constexpr float kLengthEpsilon = 1e-10f;
 constexpr std::size_t kColumnFloats = 1u << 20;  // of one block of unfolded patches: 4 MiB
 
 struct Plane {
@@ -140,7 +140,7 @@ LpipsFeatures::Map normalised(const Plane& plane) {
             const float v = map.data[c * map.pixels + p];
             length[p] += v * v;
         }
-    for (float& v : length) v = 1 / (std::sqrt(v) + kEpsilon);
+    for (float& v : length) v = 1 / (std::sqrt(v) + kLengthEpsilon);
     for (std::size_t c = 0; c < map.channels; ++c)
         for (std::size_t p = 0; p < map.pixels; ++p) map.data[c * map.pixels + p] *= length[p];
     return map;

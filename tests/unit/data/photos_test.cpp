@@ -373,13 +373,14 @@ TEST(LoadPhotos, what_does_not_fit_into_memory_is_said_before_anything_is_read) 
         views[i].camera = {.width = 30, .height = 20};
         write_png(views[i].photo, ImageU8(30, 20, 3));
     }
-    constexpr std::uint64_t kOne = 16 * 30 * 20, kAll = 6 * 4 * 30 * 20;
+    constexpr std::uint64_t kOnePhoto = 16 * 30 * 20, kAll = 6 * 4 * 30 * 20;
     EXPECT_EQ(load_photos(views, 6, kAll).size(), 6u);  // one at a time
     EXPECT_NE(error_of([&] { load_photos(views, 6, kAll - 1); }).find("6 photos: take 0 MB"),
               std::string::npos);
     views[3].lens.width = 30'000, views[3].lens.height = 20'000;
-    EXPECT_NE(error_of([&] { load_photos(views, 6, 1000 * kOne); }).find("3.png: takes 9155 MB"),
-              std::string::npos);
+    EXPECT_NE(
+        error_of([&] { load_photos(views, 6, 1000 * kOnePhoto); }).find("3.png: takes 9155 MB"),
+        std::string::npos);
 }
 
 // What is named in place of a data set.

@@ -86,14 +86,14 @@ TEST(KernelPulses, Evaluation_isThatOfTheFamilyInDoubleAndInFloat) {
 }
 
 TEST(KernelPulses, Reach_isWhereTheOutermostVisiblePulseEnds) {
-    constexpr double kCutoff = 1 / 255.0;
+    constexpr double cutoff = 1 / 255.0;
     for (const Rings& r : kRings) {
         double nearest = 1e9, farthest = 0;
         for (const double opacity : {0.0041, 0.01, 0.017, 0.025, 0.05, 0.3, 1.0}) {
-            const double reach = kernel_reach(r.row, Footprint::psi, opacity, kCutoff);
-            EXPECT_GE(opacity * value(r.row, reach * (1 - 1e-9)), kCutoff) << opacity;
+            const double reach = kernel_reach(r.row, Footprint::psi, opacity, cutoff);
+            EXPECT_GE(opacity * value(r.row, reach * (1 - 1e-9)), cutoff) << opacity;
             for (double q = reach * (1 + 1e-9); q < r.radius * r.radius; q += 0.003)
-                ASSERT_LT(opacity * value(r.row, q), kCutoff)
+                ASSERT_LT(opacity * value(r.row, q), cutoff)
                     << kernel_name(r.row) << " opacity " << opacity << ", q = " << q;
             nearest = std::min(nearest, reach);
             farthest = std::max(farthest, reach);
