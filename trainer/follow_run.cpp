@@ -11,7 +11,7 @@
 namespace darb {
 
 namespace {
-constexpr int kStepsApart = 64;  // from one look whether ranks are equal to the next
+constexpr int kStepsBetweenLooks = 64;  // from one look whether ranks are equal to the next
 }  // namespace
 
 std::optional<Checkpoint> checkpoint_of(Device& device, const RunOptions& run) {
@@ -48,7 +48,7 @@ void check_ranks(const Device& device, const TrainOptions& options, const RankGr
 bool is_to_stop(Trainer& trainer, const RankGroup& ranks, bool stop) {
     if (!ranks.several()) return stop;
     const int steps = trainer.iteration() / trainer.views_a_step();
-    if (!ranks.mixed && steps % kStepsApart == 0)
+    if (!ranks.mixed && steps % kStepsBetweenLooks == 0)
         check_equal_splats(*ranks.all, trainer.splats(), trainer.iteration());
     return any_stops(*ranks.all, stop);
 }

@@ -8,8 +8,9 @@ namespace darb {
 
 namespace {
 
-constexpr float kArmIterations = 150;    // over the root of Schedule::speedup
-constexpr std::size_t kFewestViews = 8;  // fewer photos leave none to set aside: the schedule holds
+constexpr float kArmIterations = 150;  // over the root of Schedule::speedup
+constexpr std::size_t kFewestProbedViews =
+    8;  // fewer photos leave none to set aside: the schedule holds
 constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 
 }  // namespace
@@ -62,7 +63,7 @@ void DegreeProbe::run(TrainerState& state, const std::vector<int>& views, bool h
     const int degree = state.model.sh_degree;
     ProbeResult result{state.iteration, degree + 1, std::numeric_limits<double>::quiet_NaN(),
                        has_room};
-    if (has_room && degree == 0 && views.size() >= kFewestViews) {
+    if (has_room && degree == 0 && views.size() >= kFewestProbedViews) {
         set_aside(views);
         const double without = train_arm(state, degree, fork);
         result.gain_db = train_arm(state, degree + 1, fork) - without;

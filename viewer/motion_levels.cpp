@@ -12,7 +12,7 @@ namespace darb {
 
 namespace {
 
-struct Cancelled {};
+struct LevelsCancelled {};
 
 constexpr int kQuickNice = 5, kNice = 15;  // pictures come first
 
@@ -40,7 +40,7 @@ void MotionLevels::run() {
     try {
         make_levels(true);
         make_levels(false);
-    } catch (const Cancelled&) {
+    } catch (const LevelsCancelled&) {
     } catch (const std::bad_alloc&) {  // the important splats do without them
     }
     model_ = SplatModel();
@@ -51,11 +51,11 @@ void MotionLevels::run() {
 void MotionLevels::make_levels(bool quick) {
     setpriority(PRIO_PROCESS, 0, quick ? kQuickNice : kNice);  // of this thread, on Linux
     const MergeOptions options{.threads = 1, .quick = quick, .progress = [this](double) {
-                                   if (cancelled_) throw Cancelled();
+                                   if (cancelled_) throw LevelsCancelled();
                                }};
     SplatModel last;
     for (std::size_t i = 0; i < counts_.size(); ++i) {
-        if (cancelled_) throw Cancelled();
+        if (cancelled_) throw LevelsCancelled();
         last = merge_splats(i == 0 ? model_ : last, counts_[i], options);
         if (!quick && i == 0) model_ = SplatModel();
         {

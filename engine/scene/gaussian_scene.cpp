@@ -13,10 +13,10 @@ namespace darb {
 
 namespace {
 
-constexpr double kMostOpacity = 0.999;
+constexpr double kMostScaledOpacity = 0.999;
 
 float scaled_logit(float logit, double factor) {
-    const double opacity = std::min(factor / (1 + std::exp(-double{logit})), kMostOpacity);
+    const double opacity = std::min(factor / (1 + std::exp(-double{logit})), kMostScaledOpacity);
     return static_cast<float>(std::log(opacity / (1 - opacity)));
 }
 

@@ -12,29 +12,13 @@
 #include "engine/reference/reference_render.h"
 #include "engine/render/render_gradients.h"
 #include "tests/support/camera_moves.h"
+#include "tests/support/given_gradients.h"
 #include "tests/support/own_kernels.h"
 #include "tests/support/test_lenses.h"
 #include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
-
-const glm::vec3 kBackground(0.25f, 0.5f, 0.75f);
-
-ImageF random_image(const Camera& camera, int channels, std::uint64_t seed) {
-    Pcg32 rng(seed);
-    ImageF image(camera.width, camera.height, channels);
-    for (float& w : image.data) w = static_cast<float>(rng.uniform(-1, 1));
-    return image;
-}
-
-reference::RenderSettings truth_settings() {
-    reference::RenderSettings settings;
-    settings.near_z = static_cast<float>(NEAR_DEFAULT);
-    settings.threads = 1;
-    for (int c = 0; c < 3; ++c) settings.background[c] = kBackground[c];
-    return settings;
-}
 
 /// A camera moved along one of its ten degrees of freedom: turned about an axis of its own, moved,
 /// or with another number of the pinhole.

@@ -8,29 +8,14 @@
 #include "engine/reference/reference_render.h"
 #include "engine/render/render_gradients.h"
 #include "tests/support/compare_images.h"
+#include "tests/support/given_gradients.h"
 #include "tests/support/test_walk.h"
 
 namespace darb::test {
 namespace {
 
-ImageF random_image(const Camera& camera, int channels, std::uint64_t seed) {
-    Pcg32 rng(seed);
-    ImageF image(camera.width, camera.height, channels);
-    for (float& w : image.data) w = static_cast<float>(rng.uniform(-1, 1));
-    return image;
-}
-
 TestScene small_scene(int kernel = KERNEL_GAUSSIAN, std::uint64_t seed = 41) {
     return random_scene({.count = 40, .width = 48, .height = 40, .kernel = kernel, .seed = seed});
-}
-
-const glm::vec3 kBackground(0.25f, 0.5f, 0.75f);
-
-reference::RenderSettings truth_settings() {
-    reference::RenderSettings settings;
-    settings.near_z = static_cast<float>(NEAR_DEFAULT);
-    for (int c = 0; c < 3; ++c) settings.background[c] = kBackground[c];
-    return settings;
 }
 
 /// The same splats by opacities and scales.

@@ -17,11 +17,7 @@ constexpr int kCompared = 6;    // frames in motion, each a sixth of a turn from
 
 }  // namespace
 
-double seconds_since(ViewClock::time_point start) {
-    return std::chrono::duration<double>(ViewClock::now() - start).count();
-}
-
-void pump(const Measured& m, double patience_s) {
+void pump(const MeasuredView& m, double patience_s) {
     ViewerWindow& window = m.window;
     if (m.lost) throw Error("window", "the display is gone", "Try again.");
     if (!window.pump(patience_s)) throw Error("--times", "the window was closed", "Try again.");
@@ -29,7 +25,7 @@ void pump(const Measured& m, double patience_s) {
     if (!error.empty()) throw Error("darb view", error);
 }
 
-Rest rest(const Measured& m) {
+Rest rest(const MeasuredView& m) {
     const auto start = ViewClock::now();
     Rest times;
     do {
@@ -47,7 +43,7 @@ void turn(ViewerWindow& window, double seconds) {
     window.redraw();
 }
 
-void move(const Measured& m, double seconds, std::vector<double>& moving_ms) {
+void move(const MeasuredView& m, double seconds, std::vector<double>& moving_ms) {
     const auto start = ViewClock::now();
     for (auto last = start; seconds_since(start) < seconds;) {
         turn(m.window, seconds_since(last));
@@ -57,7 +53,7 @@ void move(const Measured& m, double seconds, std::vector<double>& moving_ms) {
     }
 }
 
-std::vector<double> compare_motion(const Measured& m) {
+std::vector<double> compare_motion(const MeasuredView& m) {
     ViewerWindow& window = m.window;
     Session& s = window.viewer().session();
     const bool panels = std::exchange(s.panels, false);

@@ -29,7 +29,7 @@ double peak_memory_bytes() {
 }
 
 // Several rests after small turns.
-nlohmann::ordered_json rests_json(ViewerWindow& window, const Measured& measured) {
+nlohmann::ordered_json rests_json(ViewerWindow& window, const MeasuredView& measured) {
     std::vector<double> refined_s, whole_s, rest_ms;
     for (int i = 0; i < kRests; ++i) {
         if (i > 0) turn(window, 0.05);
@@ -50,7 +50,7 @@ nlohmann::ordered_json rests_json(ViewerWindow& window, const Measured& measured
 
 void write_view_times(ViewerWindow& window, const Device& device, const std::atomic<bool>& lost,
                       const std::filesystem::path& file) {
-    const Measured measured{window, lost};
+    const MeasuredView measured{window, lost};
     const auto start = ViewClock::now();
     const Session& s = window.viewer().session();
     rest(measured);

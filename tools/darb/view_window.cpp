@@ -15,7 +15,7 @@ namespace darb {
 
 namespace {
 
-constexpr double kNap_s = 0.2;  // between looks for signals and for the end of the display
+constexpr double kSignalNap_s = 0.2;  // between looks for signals and for the end of the display
 
 // What is not saved stays, where the window ends by itself.
 int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
@@ -26,7 +26,7 @@ int show_until_closed(ViewerWindow& window, const std::atomic<bool>& lost) {
                (kept.empty() ? "There were no changes to save." : kept);
     };
     try {
-        while (!stop && window.pump(kNap_s))
+        while (!stop && window.pump(kSignalNap_s))
             if (lost) throw Error("window", "the display is gone");
     } catch (const std::exception& e) {  // memory that runs out, too
         if (lost) throw Error("window", "the display is gone", recovered(""));

@@ -11,7 +11,7 @@ const Reader kReadDotSplat = [](std::span<const std::byte> file) {
     return parse_dot_splat(file, "test");
 };
 
-FileBytes one_splat(float x = 1, float scale = 0.5f) {
+FileBytes one_dot_splat(float x = 1, float scale = 0.5f) {
     FileBytes file;
     for (const float v : {x, -2.f, 3.f, scale, 1.f, 0.f}) append_value(v, file);
     for (const int b : {255, 0, 128, 51, 128, 255, 128, 128}) file.push_back(std::byte(b));
@@ -19,7 +19,7 @@ FileBytes one_splat(float x = 1, float scale = 0.5f) {
 }
 
 TEST(DotSplat, one_splat_decoded_by_hand) {
-    const SplatModel model = kReadDotSplat(one_splat());
+    const SplatModel model = kReadDotSplat(one_dot_splat());
     ASSERT_EQ(model.size(), 1u);
     EXPECT_EQ(model.position, (std::vector<float>{1, -2, 3}));
     EXPECT_NEAR(model.log_scale[0], std::log(0.5), 1e-6);
@@ -53,10 +53,10 @@ TEST(DotSplat, round_trips_within_the_stated_errors) {
 }
 
 TEST(DotSplat, splats_without_sense_are_dropped_and_counted) {
-    FileBytes file = one_splat();
+    FileBytes file = one_dot_splat();
     for (const FileBytes& other :
-         {one_splat(std::numeric_limits<float>::quiet_NaN()), one_splat(1, -1.f),
-          one_splat(1, std::numeric_limits<float>::infinity()), one_splat(7)})
+         {one_dot_splat(std::numeric_limits<float>::quiet_NaN()), one_dot_splat(1, -1.f),
+          one_dot_splat(1, std::numeric_limits<float>::infinity()), one_dot_splat(7)})
         file.insert(file.end(), other.begin(), other.end());
     size_t dropped = 0;
     const SplatModel model = parse_dot_splat(file, "test", &dropped);

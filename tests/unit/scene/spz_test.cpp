@@ -24,7 +24,7 @@ void append_bytes(const std::vector<int>& bytes, FileBytes& to) {
 }
 
 /// Version 1 to 3, one splat of degree 1, before gzip.
-FileBytes one_splat(std::uint32_t version, int flags = 0) {
+FileBytes one_spz_splat(std::uint32_t version, int flags = 0) {
     FileBytes file = old_header(version, 1, 1, 8, flags);
     if (version == 1)
         append_bytes({0x00, 0x3c, 0x00, 0xc0, 0x00, 0x42}, file);  // float16 1, -2, 3
@@ -44,7 +44,7 @@ FileBytes one_splat(std::uint32_t version, int flags = 0) {
 TEST(Spz, one_splat_of_versions_1_to_3_decoded_by_hand) {
     for (const std::uint32_t version : {1u, 2u, 3u})
         for (const bool packed : {true, false}) {
-            const FileBytes plain = one_splat(version, 1);
+            const FileBytes plain = one_spz_splat(version, 1);
             SpzFacts facts;
             const SplatModel model = parse_spz(packed ? gzip(plain) : plain, "test", &facts);
             EXPECT_EQ(facts.version, static_cast<int>(version));
@@ -143,7 +143,7 @@ TEST(Spz, harmonics_of_degree_4_are_left_out) {
 
 /// The extension record of a coordinate system, after the attributes.
 FileBytes with_axes(std::uint32_t system) {
-    FileBytes file = one_splat(3, 2);
+    FileBytes file = one_spz_splat(3, 2);
     append_value<std::uint32_t>(0x12340001, file);  // unknown: skipped
     append_value<std::uint32_t>(3, file);
     append_bytes({1, 2, 3}, file);
@@ -171,7 +171,7 @@ TEST(Spz, coordinate_systems_are_turned_to_right_down_forward) {
 }
 
 TEST(Spz, what_is_no_extension_record_is_an_error_in_version_4_alone) {
-    FileBytes file = one_splat(3, 2);
+    FileBytes file = one_spz_splat(3, 2);
     append_value<std::uint32_t>(0x12340001, file);
     append_value<std::uint32_t>(1000, file);  // of which one byte is there
     append_bytes({1}, file);
@@ -190,7 +190,7 @@ TEST(Spz, what_is_no_extension_record_is_an_error_in_version_4_alone) {
 }
 
 TEST(Spz, gzip_is_told_by_its_method_and_flags_too) {
-    FileBytes file = gzip(one_splat(2));
+    FileBytes file = gzip(one_spz_splat(2));
     EXPECT_TRUE(looks_like_spz(file));
     file[2] = std::byte{7};
     EXPECT_FALSE(looks_like_spz(file));
@@ -202,16 +202,16 @@ TEST(Spz, gzip_is_told_by_its_method_and_flags_too) {
 TEST(Spz, truncated_or_damaged_is_an_error) {
     const SplatModel model = sample_model(1, 5);
     expect_truncation_is_refused(encode_spz(model), kReadSpz);
-    expect_truncation_is_refused(gzip(one_splat(2)), kReadSpz);
-    expect_truncation_is_refused(one_splat(3), kReadSpz);
+    expect_truncation_is_refused(gzip(one_spz_splat(2)), kReadSpz);
+    expect_truncation_is_refused(one_spz_splat(3), kReadSpz);
     expect_damage_is_survived(encode_spz(model), kReadSpz, 3000);
-    expect_damage_is_survived(one_splat(1), kReadSpz, 1000);
-    expect_damage_is_survived(gzip(one_splat(3)), kReadSpz, 1000);
+    expect_damage_is_survived(one_spz_splat(1), kReadSpz, 1000);
+    expect_damage_is_survived(gzip(one_spz_splat(3)), kReadSpz, 1000);
 }
 
 TEST(Spz, a_flipped_bit_in_what_has_a_checksum_is_an_error_or_changes_nothing) {
     const SplatModel scene = random_scene({.count = 20, .sh_degree = 1}).model;
-    for (const FileBytes& whole : {gzip(one_splat(3)), encode_spz(scene)}) {
+    for (const FileBytes& whole : {gzip(one_spz_splat(3)), encode_spz(scene)}) {
         const SplatModel model = kReadSpz(whole);
         // The head of version 4 has none: its flags may change without a trace.
         const std::size_t from = whole[0] == std::byte{'N'} ? spz::kHeader : 0;
@@ -229,7 +229,7 @@ TEST(Spz, a_flipped_bit_in_what_has_a_checksum_is_an_error_or_changes_nothing) {
 }
 
 TEST(Spz, gzip_with_more_than_the_header_declares_is_an_error) {
-    FileBytes file = one_splat(3);
+    FileBytes file = one_spz_splat(3);
     EXPECT_EQ(kReadSpz(gzip(file)).size(), 1u);
     file.push_back(std::byte{0});
     EXPECT_NE(error_of([&] { kReadSpz(gzip(file)); }).find("more than the 1 splats"),
@@ -238,7 +238,7 @@ TEST(Spz, gzip_with_more_than_the_header_declares_is_an_error) {
 
 TEST(Spz, declared_counts_beyond_the_file_are_refused_before_allocating) {
     for (const std::uint32_t count : {2u, 1u << 31, 0xffffffffu}) {
-        FileBytes old = one_splat(2), streams = encode_spz(sample_model(1, 1));
+        FileBytes old = one_spz_splat(2), streams = encode_spz(sample_model(1, 1));
         set_value(count, 8, old);
         set_value(count, 8, streams);
         EXPECT_NE(error_of([&] { kReadSpz(gzip(old)); }).find("declares"), std::string::npos);
@@ -269,7 +269,7 @@ TEST(Spz, a_bomb_is_bounded_by_what_it_declares) {
 
 TEST(Spz, wrong_headers_say_why) {
     const auto error = [](size_t at, int value) {
-        FileBytes file = one_splat(2);
+        FileBytes file = one_spz_splat(2);
         file[at] = std::byte(value);
         return error_of([&] { kReadSpz(gzip(file)); });
     };
