@@ -9,8 +9,8 @@ namespace darb {
 namespace {
 
 constexpr float kArmIterations = 150;  // over the root of Schedule::speedup
-constexpr std::size_t kFewestProbedViews =
-    8;  // fewer photos leave none to set aside: the schedule holds
+// Fewer photos leave none to set aside: the schedule holds.
+constexpr std::size_t kFewestProbedViews = 8;
 constexpr std::size_t kAsideEvery = 6, kMostAside = 12;
 
 }  // namespace

@@ -11,9 +11,9 @@
 #include "engine/primitives/radix_sort.h"
 #include "engine/primitives/scan.h"
 #include "engine/raster/kernel_constants.h"
+#include "engine/raster/kernel_probe.h"
 #include "engine/raster/loss.h"
 #include "engine/reference/reference_loss.h"
-#include "shaders/shared/kernel_probe_args.h"
 
 namespace darb::check {
 
@@ -24,33 +24,11 @@ constexpr double kSlopeRounding = 2e-6;
 // Of shaders/kernels/sine.glsl, which rings take, and of the root of q before it.
 constexpr double kRingRounding = 2e-6, kRingSlopeRounding = 1e-5;
 
-struct Probe {
-    float q, opacity;
-};
-struct Answer {
-    float value, slope, reach, covariance_scale;
-};
-
-std::vector<Answer> probe(Device& device, int kernel, Footprint footprint,
-                          const std::vector<Probe>& probes, float exponent) {
-    const Pipeline pipeline(device, "kernel_probe", kernel_constants(kernel, footprint));
-    Buffer input(device, "probes", probes.size() * sizeof(Probe));
-    Buffer output(device, "answers", probes.size() * sizeof(Answer));
-    input.upload(probes);
-    Commands commands(device);
-    commands.begin();
-    const auto count = static_cast<std::uint32_t>(probes.size());
-    commands.dispatch(pipeline, gpu::KernelProbeArgs{count, exponent}, {input, output},
-                      (count + KERNEL_PROBE_GROUP - 1) / KERNEL_PROBE_GROUP);
-    commands.submit_and_wait();
-    return output.download<Answer>(probes.size());
-}
-
 // q over the support and just around its edge.
-std::vector<Probe> ramp(int kernel) {
+std::vector<KernelProbe> ramp(int kernel) {
     const double support = kernel_support(kernel);
     const double extent = std::isfinite(support) ? support : 20;
-    std::vector<Probe> probes;
+    std::vector<KernelProbe> probes;
     for (int i = 0; i < 4000; ++i) probes.push_back({static_cast<float>(extent * i / 4000), 1});
     for (const double off : {-1e-6, -1e-7, 0.0, 1e-7, 1e-6})
         probes.push_back({static_cast<float>(extent * (1 + off)), 1});
@@ -60,8 +38,8 @@ std::vector<Probe> ramp(int kernel) {
 Row value_row(Device& device, int kernel, Footprint footprint, Row& slope_row) {
     const std::string name = fmt::format("{} {}", kernel_name(kernel), footprint_name(footprint));
     const KernelCoefficients& k = kernel_coefficients(kernel, footprint, kFullDegree);
-    const std::vector<Probe> probes = ramp(kernel);
-    const std::vector<Answer> answers = probe(device, kernel, footprint, probes, 0);
+    const std::vector<KernelProbe> probes = ramp(kernel);
+    const auto answers = probe_kernel(device, kernel_constants(kernel, footprint), probes);
     const double support = std::isfinite(kernel_support(kernel)) ? kernel_support(kernel) : 1;
     std::vector<double> value, slope, got_value, got_slope;
     for (size_t i = 0; i < probes.size(); ++i) {
@@ -104,8 +82,9 @@ bool near_edge(int kernel, double q, bool jumps) {
 
 // Of a kernel with shapes, at one exponent; centre, edge and both sides of it are among the probes.
 Row shaped_row(Device& device, int kernel, Footprint footprint, double exponent, Row& slope_row) {
-    const std::vector<Probe> probes = ramp(kernel);
-    const auto answers = probe(device, kernel, footprint, probes, static_cast<float>(exponent));
+    const std::vector<KernelProbe> probes = ramp(kernel);
+    const auto answers = probe_kernel(device, kernel_constants(kernel, footprint), probes,
+                                      static_cast<float>(exponent));
     const ShapedKernel& shaped = shaped_kernel(kernel);
     const double support = kernel_support(kernel), scale = std::isfinite(support) ? support : 1;
     std::vector<double> value, slope, got_value, got_slope;

@@ -36,7 +36,7 @@ constexpr AccuracyChoice kScales[] = {{"1", 1}, {"1/2", 0.5, false}};
 constexpr AccuracySetting kSettings[kAccuracyCount] = {
     {"evaluation",
      "how w(q) is computed: polynomials of falling degree, or exp, sin and cos; auto: the "
-     "polynomial, or exp where that is as accurate and faster",
+     "polynomial, or exp where this device's is accurate and faster",
      kEvaluations,
      {3, 0, 1},
      ""},

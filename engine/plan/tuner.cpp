@@ -15,7 +15,7 @@
 #include "engine/gpu/shader_table.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/kernel_constants.h"
-#include "shaders/shared/kernel_probe_args.h"
+#include "engine/raster/kernel_probe.h"
 
 namespace darb {
 
@@ -150,24 +150,15 @@ std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTim
 }
 
 double exp_error(Device& device) {
-    std::vector<glm::vec2> probes;  // q, opacity; beyond q = 24 w is below 1e-5
-    for (int i = 0; i < 4096; ++i) probes.emplace_back(24.0f * static_cast<float>(i) / 4096, 1);
-    const auto count = static_cast<std::uint32_t>(probes.size());
-    Buffer input(device, "probes", probes.size() * sizeof(glm::vec2));
-    Buffer output(device, "answers", probes.size() * sizeof(glm::vec4));
-    input.upload(probes);
-    Commands commands(device);
+    std::vector<KernelProbe> probes;  // beyond q = 24 w is below 1e-5
+    for (int i = 0; i < 4096; ++i) probes.push_back({24.0f * static_cast<float>(i) / 4096, 1});
     double largest = 0;
     const auto add = [&](int kernel, double exponent, const std::function<double(double)>& truth) {
-        const Pipeline pipeline(device, "kernel_probe",
-                                kernel_constants(kernel, Footprint::psi, EVALUATION_BUILTIN));
-        commands.begin();
-        commands.dispatch(pipeline, gpu::KernelProbeArgs{count, static_cast<float>(exponent)},
-                          {input, output}, (count + KERNEL_PROBE_GROUP - 1) / KERNEL_PROBE_GROUP);
-        commands.submit_and_wait();
-        const std::vector<glm::vec4> answers = output.download<glm::vec4>(count);
-        for (std::size_t i = 0; i < count; ++i) {
-            const double off = std::abs(answers[i].x - truth(probes[i].x));
+        const auto answers =
+            probe_kernel(device, kernel_constants(kernel, Footprint::psi, EVALUATION_BUILTIN),
+                         probes, static_cast<float>(exponent));
+        for (std::size_t i = 0; i < probes.size(); ++i) {
+            const double off = std::abs(answers[i].value - truth(probes[i].q));
             largest = std::max(largest, std::isfinite(off) ? off : 1.0);
         }
     };

@@ -147,6 +147,10 @@ TEST(Cost, small_scene_is_measured_whole) {
         }
     }
     EXPECT_EQ(changed.size(), size_t{kAccuracyCount}) << "a setting changes no picture";
+    const std::string usual = shared_device().tuning().exp_builtin ? "builtin" : "polynomial";
+    EXPECT_TRUE(std::ranges::none_of(result.rows, [&](const CostRow& r) {
+        return r.name == "evaluation " + usual;
+    })) << "the default once more";
     EXPECT_NE(cost_table(result).find("Fastest"), std::string::npos);
     const nlohmann::json json = cost_json(result);
     EXPECT_EQ(json["rows"].size(), result.rows.size());
