@@ -9,7 +9,7 @@ usage() {
     cat <<TEXT
 usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all before includes)
   setup      install missing packages (tools/setup.sh)
-  style      include arrows, length caps, clang-format (tools/check_style.sh)
+  style      include arrows, links, clang-format (tools/check_style.sh)
   release    build with gcc, warnings are errors
   unit       tests that need no device
   sync       the quick device tests, under Vulkan synchronization validation
