@@ -10,8 +10,8 @@
 
 namespace darb {
 
-/// Returns work(). Where that runs out of memory, or cannot start a thread, throws Error naming
-/// `what`, a file or a part of the work; other exceptions stay as they are.
+/// Returns work(). Where that runs out of memory it throws NoRoom, where it cannot start a thread
+/// Error, either naming `what`, a file or a part of the work; other exceptions stay as they are.
 template <class Work>
 decltype(auto) while_doing(const std::string& what, Work&& work) {
     constexpr const char* kLess =
@@ -20,9 +20,9 @@ decltype(auto) while_doing(const std::string& what, Work&& work) {
     try {
         return work();
     } catch (const std::bad_alloc&) {
-        throw Error(what, "no memory is left", kLess);
+        throw NoRoom(what, "no memory is left", kLess);
     } catch (const std::length_error&) {  // more than any memory has
-        throw Error(what, "no memory has room for so much", kLess);
+        throw NoRoom(what, "no memory has room for so much", kLess);
     } catch (const std::system_error& e) {
         if (e.code() != std::errc::resource_unavailable_try_again) throw;
         throw Error(what, "no thread can be started: " + e.code().message(),

@@ -1,5 +1,6 @@
 // Error: bad input or a device that cannot go on. Thrown anywhere, caught once in main, which
-// prints "error: WHERE: WHAT" and "  WHAT TO DO", and exits with 2.
+// prints "error: WHERE: WHAT" and "  WHAT TO DO", and exits with 2. What is caught before that, to
+// go on in another way, is one of its kinds below.
 #pragma once
 
 #include <stdexcept>
@@ -19,6 +20,17 @@ struct Error : std::runtime_error {
     std::string where;
     std::string reason;
     std::string hint;
+};
+
+/// There is no room: memory of the device or of the host ran out, a budget of it did, or a limit of
+/// the driver. A smaller attempt may succeed, so this is what an attempt with a fallback catches.
+struct NoRoom : Error {
+    using Error::Error;
+};
+
+/// The device is gone, and nothing that uses it can succeed: no fallback may catch this.
+struct DeviceLost : Error {
+    using Error::Error;
 };
 
 /// The hint of what finds bytes that no writer of a format can have meant.

@@ -1,5 +1,7 @@
 #include "engine/core/files.h"
 
+#include "engine/core/file_parts.h"
+
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -68,8 +70,8 @@ Container read_whole(const std::filesystem::path& path, size_t most = kAll) try 
     content.resize(used);
     return content;
 } catch (const std::bad_alloc&) {
-    throw Error(path.string(), "is larger than the memory that is free",
-                "Free memory, or name a smaller file.");
+    throw NoRoom(path.string(), "is larger than the memory that is free",
+                 "Free memory, or name a smaller file.");
 }
 
 /// PATH.tmp, or PATH.1.tmp and so on where that is somebody's.
@@ -105,9 +107,14 @@ bool write_all(int file, std::span<const std::byte> bytes) {
     return true;
 }
 
-void write_to_stream(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+bool write_all(int file, FileParts parts) {
+    return std::all_of(parts.begin(), parts.end(),
+                       [&](std::span<const std::byte> part) { return write_all(file, part); });
+}
+
+void write_to_stream(const std::filesystem::path& path, FileParts parts) {
     const Descriptor file{::open(path.c_str(), O_WRONLY | O_CLOEXEC)};
-    if (file.fd < 0 || !write_all(file.fd, bytes))
+    if (file.fd < 0 || !write_all(file.fd, parts))
         throw Error(path.string(), std::string("cannot be written: ") + std::strerror(errno),
                     "Choose a file.");
 }
@@ -137,14 +144,14 @@ std::string read_text_file(const std::filesystem::path& path) {
     return read_whole<std::string>(path);
 }
 
-void write_file_atomic(const std::filesystem::path& name, std::span<const std::byte> bytes) {
+void write_file_atomic(const std::filesystem::path& name, FileParts parts) {
     std::error_code ignored;
     if (name.has_parent_path()) std::filesystem::create_directories(name.parent_path(), ignored);
     // A pipe or a device is written to; what a link points to is replaced, not the link.
     const auto kind = std::filesystem::status(name, ignored).type();
     using enum std::filesystem::file_type;
     if (kind == fifo || kind == character || kind == block || kind == socket)
-        return write_to_stream(name, bytes);
+        return write_to_stream(name, parts);
     const bool link = std::filesystem::is_symlink(name, ignored);
     const std::filesystem::path path = link ? std::filesystem::weakly_canonical(name) : name;
     const Temporary temp(path);
@@ -152,9 +159,13 @@ void write_file_atomic(const std::filesystem::path& name, std::span<const std::b
     const std::filesystem::file_status old = std::filesystem::status(path, ignored);
     if (std::filesystem::is_regular_file(old))
         ::fchmod(temp.file.fd, static_cast<mode_t>(old.permissions()));
-    if (!write_all(temp.file.fd, bytes)) fail_write(path, temp);
+    if (!write_all(temp.file.fd, parts)) fail_write(path, temp);
     if (::fsync(temp.file.fd) != 0 && errno != EINVAL && errno != EROFS) fail_write(path, temp);
     if (::rename(temp.path.c_str(), path.c_str()) != 0) fail_write(path, temp);
+}
+
+void write_file_atomic(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    write_file_atomic(path, FileParts(&bytes, 1));
 }
 
 void write_file_atomic(const std::filesystem::path& path, std::string_view text) {
