@@ -46,12 +46,12 @@ void check_limits(const Device::State& state, const std::string& name, std::uint
                   std::uint64_t charged, const std::string& what) {
     const std::uint64_t limit = state.info.max_allocation_bytes;
     if (bytes > limit)
-        throw Error(what,
-                    fmt::format("{} allows at most {} MiB a buffer", state.info.name, limit >> 20),
-                    "Use smaller images or fewer splats, or choose another device (darb devices).");
+        throw NoRoom(
+            what, fmt::format("{} allows at most {} MiB a buffer", state.info.name, limit >> 20),
+            "Use smaller images or fewer splats, or choose another device (darb devices).");
     const std::uint64_t budget = state.budget, in_use = state.allocated;
     if (budget != 0 && charged != 0 && in_use + charged > budget)
-        throw Error(
+        throw NoRoom(
             what,
             fmt::format("out of device memory: {:.1f} MiB are in use of a budget of {:.1f}",
                         static_cast<double>(in_use) / (1 << 20),
@@ -193,6 +193,7 @@ void Buffer::download(std::span<std::byte> target, std::uint64_t offset) const {
 void Device::State::copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer to,
                              std::uint64_t to_offset, std::uint64_t bytes,
                              const std::string& what) {
+    const std::lock_guard lock(copy_mutex);
     if (copy_pool == VK_NULL_HANDLE) {
         VkCommandPoolCreateInfo pool_info{};
         pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
@@ -222,7 +223,7 @@ void Device::State::copy_now(VkBuffer from, std::uint64_t from_offset, VkBuffer 
     barrier.dstAccessMask = VK_ACCESS_2_HOST_READ_BIT;
     record_barrier(copy_commands, barrier);
     check_vulkan(vkEndCommandBuffer(copy_commands), what);
-    check_vulkan(submit(copy_commands, VK_NULL_HANDLE), what);
+    check_vulkan(submit_copy(copy_commands), what);
     check_vulkan(wait_idle(), what);
 }
 

@@ -27,7 +27,7 @@ struct MemoryPiece;  // private to engine/gpu
 class Buffer {
   public:
     Buffer();
-    /// Throws Error naming the buffer, its size and the pass that it is for, where one is given,
+    /// Throws NoRoom naming the buffer, its size and the pass that it is for, where one is given,
     /// when memory or the device's limits do not allow it. A size of 0 is made 16 bytes, so that
     /// every binding is valid. Content is undefined.
     Buffer(Device& device, std::string name, std::uint64_t bytes, Memory memory = Memory::device,

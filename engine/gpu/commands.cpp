@@ -85,6 +85,7 @@ struct Commands::State {
     void bind(const Pipeline& pipeline, std::span<const std::byte> args,
               std::span<const BufferRange> buffers);
     void place_barriers();
+    void write_timestamp();
     void finish_pass();
     RecordedPass unnamed;  // what comes before the first
     RecordedPass& now() { return passes.empty() ? unnamed : passes.back(); }
@@ -188,8 +189,10 @@ void Commands::State::bind(const Pipeline& pipeline, std::span<const std::byte> 
         writes[i].descriptorCount = 1;
         writes[i].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
         writes[i].pBufferInfo = &infos[i];
+    }
+    for (std::uint32_t i = 0; i < count; ++i) {  // only once all of them are accepted
         const Pipeline::Binding& access = pipeline.bindings()[i];
-        barriers.use({range.buffer->handle(), kCompute,
+        barriers.use({buffers[i].buffer->handle(), kCompute,
                       access.reads ? VK_ACCESS_2_SHADER_STORAGE_READ_BIT : VkAccessFlags2{},
                       access.writes ? VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT : VkAccessFlags2{}});
     }
@@ -211,10 +214,17 @@ void Commands::State::place_barriers() {
     record_barrier(commands, *needed);
 }
 
+// Once a window's panels were drawn, lavapipe takes a timestamp when it next flushes its commands,
+// which may be after a dispatch that needed no barrier: the pass before would get that one's time.
+void Commands::State::write_timestamp() {
+    timestamps.write(commands);
+    if (device.is_lavapipe()) record_barrier(commands, full_barrier());
+}
+
 void Commands::State::finish_pass() {
     if (!passes.empty() && device.state().instance.debug().end_label != nullptr)
         device.state().instance.debug().end_label(commands);
-    if (timed && !passes.empty()) timestamps.write(commands);
+    if (timed && !passes.empty()) write_timestamp();
 }
 
 std::string Commands::State::all_passes() const {
@@ -252,7 +262,7 @@ void Commands::begin() {
 void Commands::pass(std::string_view name) {
     State& s = *state_;
     check_recording(s.recording);
-    if (s.timed && s.passes.empty()) s.timestamps.write(s.commands);
+    if (s.timed && s.passes.empty()) s.write_timestamp();
     s.finish_pass();
     s.passes.push_back({std::string(name)});
     const DebugUtils& debug = s.device.state().instance.debug();
@@ -349,6 +359,7 @@ void Commands::change_layout(DeviceImage& image, VkImageLayout layout) {
 }
 
 void Commands::overwrite(DeviceImage& image) {
+    check_recording(state_->recording);         // before the image forgets its layout
     image.layout_ = VK_IMAGE_LAYOUT_UNDEFINED;  // what it held is not needed
     change_layout(image, kTarget);
 }
@@ -361,6 +372,7 @@ void Commands::clear(DeviceImage& image, const std::array<float, 4>& colour) {
 
 void Commands::copy(const Buffer& from, DeviceImage& to) {
     State& s = *state_;
+    check_recording(s.recording);
     check_holds(from, to);
     s.barriers.use({from.handle(), kTransfer, VK_ACCESS_2_TRANSFER_READ_BIT, 0});
     s.place_barriers();
@@ -371,6 +383,7 @@ void Commands::copy(const Buffer& from, DeviceImage& to) {
 
 void Commands::copy(DeviceImage& from, const Buffer& to) {
     State& s = *state_;
+    check_recording(s.recording);
     check_holds(to, from);
     s.barriers.use({to.handle(), kTransfer, 0, VK_ACCESS_2_TRANSFER_WRITE_BIT});
     s.place_barriers();

@@ -99,7 +99,7 @@ class Commands {
     /// Ends the recording and gives it to the queue; host reads of Memory::host buffers are made
     /// visible. Does not wait. It begins after wait_for and ends with signal; either may be null.
     void submit(VkSemaphore wait_for = VK_NULL_HANDLE, VkSemaphore signal = VK_NULL_HANDLE);
-    /// Blocks (no spinning) until the last submit is done. Throws Error on a lost device.
+    /// Blocks (no spinning) until the last submit is done. Throws DeviceLost.
     void wait();
     void submit_and_wait() {
         submit();

@@ -10,6 +10,7 @@
 #include "engine/core/error.h"
 #include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
+#include "engine/gpu/shader_features.h"
 
 namespace darb {
 
@@ -19,59 +20,6 @@ namespace {
 constexpr const char* kPortabilitySubset = "VK_KHR_portability_subset";
 
 constexpr const char* kStatistics = VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
-
-// Features in the chain that vkCreateDevice and the query share.
-struct Features {
-    VkPhysicalDeviceFeatures2 core{};
-    VkPhysicalDeviceVulkan11Features v11{};
-    VkPhysicalDeviceVulkan12Features v12{};
-    VkPhysicalDeviceVulkan13Features v13{};
-    VkPhysicalDeviceShaderAtomicFloatFeaturesEXT atomics{};
-    VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR executable{};
-
-    explicit Features(bool with_atomics) {
-        core.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2;
-        v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
-        v12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
-        v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES;
-        atomics.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT;
-        core.pNext = &v11;
-        v11.pNext = &v12;
-        v12.pNext = &v13;
-        if (with_atomics) v13.pNext = &atomics;
-    }
-    void add_statistics() {
-        executable.sType =
-            VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR;
-        executable.pipelineExecutableInfo = VK_TRUE;
-        executable.pNext = std::exchange(core.pNext, &executable);
-    }
-    Features(const Features&) = delete;
-    Features& operator=(const Features&) = delete;
-
-    // Only what shaders may use: everything else stays off (robust access would cost time).
-    void keep_wanted_of(const Features& offered) {
-        core.features.shaderInt64 = offered.core.features.shaderInt64;
-        core.features.shaderFloat64 = offered.core.features.shaderFloat64;
-        core.features.shaderInt16 = offered.core.features.shaderInt16;
-        v11.storageBuffer16BitAccess = offered.v11.storageBuffer16BitAccess;
-        v12.storageBuffer8BitAccess = offered.v12.storageBuffer8BitAccess;
-        v12.shaderInt8 = offered.v12.shaderInt8;
-        v12.shaderFloat16 = offered.v12.shaderFloat16;
-        v12.bufferDeviceAddress = offered.v12.bufferDeviceAddress;
-        v12.vulkanMemoryModel = offered.v12.vulkanMemoryModel;
-        v12.vulkanMemoryModelDeviceScope = offered.v12.vulkanMemoryModelDeviceScope;
-        v12.scalarBlockLayout = VK_TRUE;
-        v13.maintenance4 = VK_TRUE;
-        v13.synchronization2 = VK_TRUE;
-        v13.subgroupSizeControl = VK_TRUE;
-        v13.computeFullSubgroups = VK_TRUE;
-        atomics.shaderBufferFloat32Atomics = offered.atomics.shaderBufferFloat32Atomics;
-        atomics.shaderBufferFloat32AtomicAdd = offered.atomics.shaderBufferFloat32AtomicAdd;
-        atomics.shaderSharedFloat32Atomics = offered.atomics.shaderSharedFloat32Atomics;
-        atomics.shaderSharedFloat32AtomicAdd = offered.atomics.shaderSharedFloat32AtomicAdd;
-    }
-};
 
 // Position in the list.
 std::size_t choose(const std::vector<ListedDevice>& all, const std::string& select) {
@@ -134,9 +82,8 @@ void Device::State::create_device(const DeviceOptions& options) {
     if (timestamp_bits == 0) info.timestamp_period_ns = 0;
     queue_graphics = (families[queue_family].queueFlags & VK_QUEUE_GRAPHICS_BIT) != 0;
 
-    Features offered(info.float_atomics), wanted(info.float_atomics);
-    vkGetPhysicalDeviceFeatures2(physical, &offered.core);
-    wanted.keep_wanted_of(offered);
+    DeviceFeatures wanted;
+    want_features(needs_of_all_shaders(), wanted);
     std::vector<const char*> extensions;
     for (const std::string& name : options.device_extensions) {
         if (!offers_extension(physical, name))
@@ -148,11 +95,14 @@ void Device::State::create_device(const DeviceOptions& options) {
     }
     // Must be enabled where it is offered. None of the features that it takes away is used here.
     if (offers_extension(physical, kPortabilitySubset)) extensions.push_back(kPortabilitySubset);
-    if (info.float_atomics) extensions.push_back(VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME);
     const bool statistics = compile_only && offers_extension(physical, kStatistics);
+    VkPhysicalDevicePipelineExecutablePropertiesFeaturesKHR executable_features{};
     if (statistics) {
         extensions.push_back(kStatistics);
-        wanted.add_statistics();
+        executable_features.sType =
+            VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PIPELINE_EXECUTABLE_PROPERTIES_FEATURES_KHR;
+        executable_features.pipelineExecutableInfo = VK_TRUE;
+        executable_features.pNext = std::exchange(wanted.core.pNext, &executable_features);
     }
 
     const float priority = 1;
@@ -239,8 +189,17 @@ void Device::State::set_name(VkObjectType type, std::uint64_t handle,
 
 VkResult Device::State::submit(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for,
                                VkSemaphore signal) {
-    const bool copies = commands == copy_commands && commands != VK_NULL_HANDLE;
-    if (faults.fails_submit(copies ? submits.load() : ++submits)) return VK_ERROR_DEVICE_LOST;
+    if (faults.fails_submit(++submits)) return VK_ERROR_DEVICE_LOST;
+    return give_to_queue(commands, fence, wait_for, signal);
+}
+
+VkResult Device::State::submit_copy(VkCommandBuffer commands) {
+    if (faults.fails_submit(submits.load())) return VK_ERROR_DEVICE_LOST;
+    return give_to_queue(commands, VK_NULL_HANDLE, VK_NULL_HANDLE, VK_NULL_HANDLE);
+}
+
+VkResult Device::State::give_to_queue(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for,
+                                      VkSemaphore signal) {
     if (compile_only) return VK_SUCCESS;
     VkCommandBufferSubmitInfo buffer_info{};
     buffer_info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO;
@@ -355,6 +314,10 @@ std::uint64_t Device::validation_message_count() const {
 }
 void Device::wait_idle() const {
     check_vulkan(state_->wait_idle(), state_->info.name);
+}
+VkResult Device::present(const VkPresentInfoKHR& info) const {
+    const std::lock_guard lock(state_->queue_mutex);
+    return vkQueuePresentKHR(state_->queue, &info);
 }
 
 }  // namespace darb

@@ -92,7 +92,7 @@ class Device {
     VkInstance instance() const;
     VkPhysicalDevice physical() const;
     VkDevice handle() const;
-    VkQueue queue() const;
+    VkQueue queue() const;  // under no lock: give it work by Commands::submit and present()
     std::uint32_t queue_family() const;
     bool queue_has_graphics() const;
     VkPipelineCache pipeline_cache() const;
@@ -108,7 +108,7 @@ class Device {
     std::uint64_t allocated_bytes() const;
     std::uint64_t peak_bytes() const;
     void forget_peak();  // peak_bytes counts from now on
-    /// A budget for all Buffers together; 0 = none. Exceeding it throws as out of memory does.
+    /// A budget for all Buffers together; 0 = none. Exceeding it throws NoRoom.
     void set_memory_budget(std::uint64_t bytes);
     std::uint64_t memory_budget() const;
 
@@ -121,6 +121,8 @@ class Device {
     std::uint64_t validation_message_count() const;
 
     void wait_idle() const;
+    /// vkQueuePresentKHR, in turn with what other threads give to the queue.
+    VkResult present(const VkPresentInfoKHR& info) const;
 
     struct State;  // private to engine/gpu
     State& state() const { return *state_; }
@@ -129,7 +131,8 @@ class Device {
     std::unique_ptr<State> state_;
 };
 
-/// Throws Error naming WHAT for every result but VK_SUCCESS (out of memory, device lost, ...).
+/// Throws an error that names WHAT for every result but VK_SUCCESS: NoRoom where memory ran out,
+/// DeviceLost, or Error.
 void check_vulkan(VkResult result, const std::string& what);
 
 }  // namespace darb

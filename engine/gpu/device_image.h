@@ -17,7 +17,7 @@ class DeviceImage {
   public:
     DeviceImage();
     /// Texels of 4 bytes. usage: besides copies from and to it. Its memory does not count as
-    /// Device::allocated_bytes: images are a window's, and the budget is a run's. Throws Error
+    /// Device::allocated_bytes: images are a window's, and the budget is a run's. Throws NoRoom
     /// naming the image and its size.
     DeviceImage(Device& device, const std::string& name, int width, int height, VkFormat format,
                 VkImageUsageFlags usage = 0);

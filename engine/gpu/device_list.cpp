@@ -10,6 +10,7 @@
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/gpu/device_state.h"
+#include "engine/gpu/shader_features.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/gpu/spirv_reflect.h"
 
@@ -58,30 +59,20 @@ std::string missing_part(VkPhysicalDevice device, const DeviceInfo& info) {
                            VK_API_VERSION_MINOR(info.api_version));
     if (compute_queue_family(device) < 0) return "no compute queue";
 
-    VkPhysicalDeviceVulkan13Features v13{};
-    v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES;
-    VkPhysicalDeviceVulkan12Features v12{};
-    v12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
-    v12.pNext = &v13;
-    VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &v12, {}};
-    vkGetPhysicalDeviceFeatures2(device, &features);
-    if (!v12.scalarBlockLayout) return "no scalarBlockLayout";
-    if (!v13.synchronization2 || !v13.maintenance4) return "no synchronization2 or maintenance4";
-    if (!v13.subgroupSizeControl || !v13.computeFullSubgroups) return "no subgroup size control";
-
+    DeviceFeatures offered;
+    vkGetPhysicalDeviceFeatures2(device, &offered.core);
     VkPhysicalDeviceSubgroupProperties subgroup{};
     subgroup.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES;
     VkPhysicalDeviceProperties2 properties{};
     properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
     properties.pNext = &subgroup;
     vkGetPhysicalDeviceProperties2(device, &properties);
-    constexpr VkSubgroupFeatureFlags kNeeded =
-        VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_VOTE_BIT |
-        VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT |
-        VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
-    if ((subgroup.supportedOperations & kNeeded) != kNeeded ||
-        (subgroup.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT) == 0)
-        return "subgroup operations missing";
+    const VkSubgroupFeatureFlags operations =
+        (subgroup.supportedStages & VK_SHADER_STAGE_COMPUTE_BIT) != 0 ? subgroup.supportedOperations
+                                                                      : 0;
+    if (const std::string missing = missing_feature(needs_of_all_shaders(), offered, operations);
+        !missing.empty())
+        return missing;
     if (const std::string trouble = subgroup_trouble(info); !trouble.empty()) return trouble;
     if (info.shared_memory_bytes < kMinSharedBytes) return "less than 16 KiB of shared memory";
     return buffers_trouble(info, kRendering);

@@ -43,7 +43,7 @@ class DeviceMemory {
     DeviceMemory(const DeviceMemory&) = delete;
     DeviceMemory& operator=(const DeviceMemory&) = delete;
 
-    /// For a buffer; from any thread. what: for errors. Throws Error where there is not so much.
+    /// For a buffer; from any thread. what: for errors. Throws NoRoom where there is not so much.
     MemoryPiece take(const VkMemoryRequirements& needs, Memory kind, const std::string& what);
     /// The same of an image, never from a block: those have other alignments beside buffers.
     MemoryPiece take_own(const VkMemoryRequirements& needs, Memory kind, const std::string& what);

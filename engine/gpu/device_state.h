@@ -87,14 +87,18 @@ struct Device::State {
 
     std::atomic<std::uint64_t> allocated{0}, peak{0}, budget{0}, submits{0};
 
-    /// Where staging copies run; made at the first use.
+    /// Where staging copies run, one at a time and from any thread; made at the first use.
+    std::mutex copy_mutex;
     VkCommandPool copy_pool = VK_NULL_HANDLE;
     VkCommandBuffer copy_commands = VK_NULL_HANDLE;
 
     void set_name(VkObjectType type, std::uint64_t handle, const std::string& name) const;
-    /// One submit under the mutex, with the fault injection. The semaphores may be null.
+    /// One submit under the mutex, with the fault injection, which counts it. The semaphores may
+    /// be null.
     VkResult submit(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for = VK_NULL_HANDLE,
                     VkSemaphore signal = VK_NULL_HANDLE);
+    /// The same of a staging copy, which the fault injection does not count.
+    VkResult submit_copy(VkCommandBuffer commands);
     VkResult wait_idle();
     /// The same where work was submitted since the last wait: the call alone takes 40 us on
     /// lavapipe.
@@ -104,6 +108,8 @@ struct Device::State {
                   std::uint64_t bytes, const std::string& what);
 
   private:
+    VkResult give_to_queue(VkCommandBuffer commands, VkFence fence, VkSemaphore wait_for,
+                           VkSemaphore signal);
     void create_device(const DeviceOptions& options);
     void load_statistics();
     void create_cache(const DeviceOptions& options);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <set>
 #include <utility>
 
 #include "engine/core/check.h"
@@ -34,19 +35,51 @@ const ShaderInterface& interface_of(const std::string& shader) {
     return known.emplace(shader, reflect_spirv(find_shader(shader), shader)).first->second;
 }
 
-// Without what the shader does not declare, so that pipelines that are alike are one.
+bool declares_constant(const ShaderInterface& shader, std::string_view name) {
+    return std::any_of(shader.constants.begin(), shader.constants.end(),
+                       [&](const auto& constant) { return constant.name == name; });
+}
+
+bool any_shader_declares(std::string_view name) {
+    static const std::set<std::string, std::less<>> all = [] {
+        std::set<std::string, std::less<>> names;
+        for (const ShaderBinary& shader : shader_table())
+            for (const auto& constant : interface_of(std::string(shader.name)).constants)
+                names.insert(constant.name);
+        return names;
+    }();
+    return all.contains(name);
+}
+
+std::string names_of_constants(const ShaderInterface& shader) {
+    std::string names;
+    for (const auto& constant : shader.constants)
+        if (!constant.name.empty()) names += (names.empty() ? "" : ", ") + constant.name;
+    return names.empty() ? "none" : names;
+}
+
+// Without what others of its table are for, so that pipelines that are alike are one.
 PipelineKey declared(PipelineKey key) {
-    const auto& constants = interface_of(key.shader).constants;
+    const ShaderInterface& shader = interface_of(key.shader);
     std::erase_if(key.constants, [&](const auto& given) {
-        return std::none_of(constants.begin(), constants.end(),
-                            [&](const auto& constant) { return constant.name == given.first; });
+        if (declares_constant(shader, given.first)) return false;
+        DARB_CHECK(given.second.shared,
+                   "shader {} declares no specialization constant {}; it declares {}", key.shader,
+                   given.first, names_of_constants(shader));
+        DARB_CHECK(any_shader_declares(given.first),
+                   "specialization constant {}, given to shader {} by a table for several passes, "
+                   "is declared by no shader",
+                   given.first, key.shader);
+        return true;
     });
+    for (auto& given : key.constants) given.second.shared = false;
     return key;
 }
 
-std::uint32_t bits_of(const SpecValue& value, const ShaderInterface::Constant& constant,
+std::uint32_t bits_of(const SpecValue& given, const ShaderInterface::Constant& constant,
                       std::string_view shader) {
     using Type = ShaderInterface::ScalarType;
+    const auto& value = given.value;
     const auto* integer = std::get_if<std::int32_t>(&value);
     if (constant.type == Type::floating)
         return std::bit_cast<std::uint32_t>(integer != nullptr ? static_cast<float>(*integer)
@@ -100,7 +133,7 @@ std::string given_constants(const ShaderInterface& shader, const SpecConstants& 
         const auto found = given.find(constant.name);
         if (found == given.end()) continue;
         text += fmt::format("{}{}=", text.empty() ? "" : " ", constant.name);
-        std::visit([&](auto value) { text += fmt::format("{}", value); }, found->second);
+        std::visit([&](auto value) { text += fmt::format("{}", value); }, found->second.value);
     }
     return text;
 }
@@ -194,6 +227,11 @@ void check_device_limits(const Device::State& state, std::size_t buffers,
 }
 
 }  // namespace
+
+SpecConstants for_several_passes(SpecConstants constants) {
+    for (auto& constant : constants) constant.second.shared = true;
+    return constants;
+}
 
 Pipeline::Made::Made(Device& of, const PipelineKey& key) : shader(key.shader) {
     Device::State& state = of.state();

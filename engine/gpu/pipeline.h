@@ -4,6 +4,7 @@
 #include <vulkan/vulkan.h>
 
 #include <compare>
+#include <concepts>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -17,17 +18,32 @@
 
 namespace darb {
 
-/// Name in GLSL -> value. Integers also set bool and uint constants. Names that the shader does not
-/// declare are ignored, so that one table can serve all passes; see Pipeline::declares.
-using SpecValue = std::variant<std::int32_t, float>;
+/// The value of a specialization constant. Integers also set bool and uint constants.
+struct SpecValue {
+    std::variant<std::int32_t, float> value;
+    bool shared = false;  // of a table for several passes: for_several_passes
+
+    SpecValue() = default;
+    template <class T>
+    requires std::constructible_from<std::variant<std::int32_t, float>, T> SpecValue(T of)
+        : value(of) {}  // implicit, so that tables are lists of names and values
+    auto operator<=>(const SpecValue&) const = default;
+};
+
+/// Name in GLSL -> value. A pipeline aborts on a name that its shader does not declare: misspelt,
+/// it would leave the shader's default in place without a word.
 using SpecConstants = std::map<std::string, SpecValue, std::less<>>;
+
+/// The same values for passes of which each takes those that its shader declares. A name that no
+/// shader at all declares still aborts.
+SpecConstants for_several_passes(SpecConstants constants);
 
 /// In place of a size: the driver chooses one for each shader, as many lanes as it has registers
 /// for. For a shader that computes the same with any.
 inline constexpr std::uint32_t kAnySubgroupSize = ~0u;
 
-/// All that a pipeline is made of: equal keys are one pipeline of a device. Constants that the
-/// shader does not declare make no difference.
+/// All that a pipeline is made of: equal keys are one pipeline of a device. Constants of a table
+/// for several passes that the shader does not declare make no difference.
 struct PipelineKey {
     std::string shader;
     SpecConstants constants;

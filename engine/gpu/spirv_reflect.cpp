@@ -29,6 +29,7 @@ enum Op : std::uint32_t {
     kOpSpecConstantFalse = 49,
     kOpSpecConstant = 50,
     kOpSpecConstantComposite = 51,
+    kOpFunction = 54,
     kOpVariable = 59,
     kOpDecorate = 71,
     kOpMemberDecorate = 72,
@@ -145,6 +146,7 @@ void read_instruction(std::uint32_t op, Operands operands, Module& module, Shade
     switch (op) {
         case kOpCapability:
             out.uses_subgroups = out.uses_subgroups || operands[0] == kGroupNonUniform;
+            out.capabilities.push_back(operands[0]);
             break;
         case kOpName:
             module.names[operands[0]] = text_of(operands.subspan(1));
@@ -278,6 +280,7 @@ ShaderInterface reflect_spirv(std::span<const std::uint32_t> words, std::string_
     for (size_t at = kHeaderWords; at < words.size();) {
         const std::uint32_t length = words[at] >> 16;
         DARB_CHECK(length > 0 && at + length <= words.size(), "{}: word {}", shader, at);
+        if ((words[at] & 0xffff) == kOpFunction) break;  // no interface beyond
         read_instruction(words[at] & 0xffff, words.subspan(at + 1, length - 1), module, out);
         at += length;
     }

@@ -10,20 +10,22 @@ void check_vulkan(VkResult result, const std::string& what) {
         case VK_SUCCESS:
             return;
         case VK_ERROR_OUT_OF_HOST_MEMORY:
-            throw Error(what, "out of host memory", "Close other programs or use a smaller scene.");
+            throw NoRoom(what, "out of host memory",
+                         "Close other programs or use a smaller scene.");
         case VK_ERROR_OUT_OF_DEVICE_MEMORY:
-            throw Error(what, "out of device memory",
-                        "Close other programs, use smaller images or fewer splats, or choose "
-                        "another device (darb devices).");
+            throw NoRoom(what, "out of device memory",
+                         "Close other programs, use smaller images or fewer splats, or choose "
+                         "another device (darb devices).");
         case VK_ERROR_TOO_MANY_OBJECTS:
-            throw Error(what, "more buffers than the driver allows at once",
-                        "Buffers of more than 8 MiB are an allocation each, and each photo of a "
-                        "training run is a buffer: train at a lower resolution (-r), use fewer "
-                        "photos, or choose another device (darb devices).");
+            throw NoRoom(what, "more buffers than the driver allows at once",
+                         "Buffers of more than 8 MiB are an allocation each, and each photo of a "
+                         "training run is a buffer: train at a lower resolution (-r), use fewer "
+                         "photos, or choose another device (darb devices).");
         case VK_ERROR_DEVICE_LOST:
-            throw Error(what, "the device was lost",
-                        "The driver stopped the device: a time-out, a driver fault or a device "
-                        "that was removed. See the system log; restart from the last checkpoint.");
+            throw DeviceLost(
+                what, "the device was lost",
+                "The driver stopped the device: a time-out, a driver fault or a device "
+                "that was removed. See the system log; restart from the last checkpoint.");
         case VK_ERROR_SURFACE_LOST_KHR:
             throw Error(what, "the display is gone", "Start it again on one that is there.");
         case VK_ERROR_INCOMPATIBLE_DRIVER:

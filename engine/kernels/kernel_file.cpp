@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
 #include "engine/kernels/kernel_expression.h"
 
 namespace darb {
@@ -224,15 +225,7 @@ KernelDefinition kernel_from_table(std::string_view name, const Rows& rows,
 }
 
 std::vector<KernelDefinition> parse_kernel_file(std::string_view text, const std::string& where) {
-    Json json;
-    try {
-        json = Json::parse(text);
-    } catch (const Json::exception& e) {
-        std::string what = e.what();
-        if (const std::size_t begin = what.find("] "); begin != what.npos)
-            what = what.substr(begin + 2);
-        throw Error(where, "is no JSON: " + what, kFileHelp);
-    }
+    const Json json = parse_json_text(text, where, kFileHelp);
     const std::string stem = std::filesystem::path(where).stem().string();
     if (!json.is_array()) return {one_of(json, stem, where)};
     if (json.empty() || json.size() > kMostKernelsOfFile)

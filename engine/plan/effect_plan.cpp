@@ -64,6 +64,16 @@ EffectChoice parse_effects(std::string_view text) {
     return choice;
 }
 
+std::optional<bool> effect_in_words(std::string_view text, std::string_view effect) {
+    const auto id = effect_from_name(effect);
+    return id ? parse_effects(text).changed[static_cast<std::size_t>(*id)] : std::nullopt;
+}
+
+bool words_refuse_effect(std::string_view text, std::string_view effect) {
+    const EffectChoice choice = parse_effects(text);
+    return !effect_in_words(text, effect).value_or(choice.base != EffectChoice::Base::none);
+}
+
 ProjectionEffects EffectPlan::projection() const {
     ProjectionEffects effects;
     for (const ProjectionSwitch& s : kProjectionSwitches)

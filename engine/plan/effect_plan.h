@@ -64,6 +64,10 @@ struct EffectChoice {
 };
 /// Throws Error naming the word that is no effect.
 EffectChoice parse_effects(std::string_view text);
+/// What the words say of this effect by its name: + is true, - is false; nothing where they do not.
+std::optional<bool> effect_in_words(std::string_view text, std::string_view effect);
+/// Whether the words leave this effect out, by its name or by `none`.
+bool words_refuse_effect(std::string_view text, std::string_view effect);
 
 /// What a rendering asks for beside the pictures themselves.
 struct RenderOutputs {

@@ -327,7 +327,7 @@ EffectPlan plan_rendering(const SplatModel& model, const std::vector<View>& view
     if (outputs.free_camera) {
         plan.row(EFFECT_NEAR) = {true, false, 0, 0, "the camera moves, a splat may lie beside it"};
         EffectRow& centre = plan.row(EFFECT_OFF_CENTRE);
-        if (!centre.on) centre = {true, false, 0, 0, "the camera looks past the panel"};
+        if (!centre.on) centre = {true, false, 0, 0, "a free camera may look past a panel"};
     } else {
         plan.row(EFFECT_NEAR) = near_rule(model, views, outputs.near_plane);
     }

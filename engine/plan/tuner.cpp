@@ -5,15 +5,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
+#include "engine/core/scope_guard.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/kernels/shaped_kernel.h"
+#include "engine/plan/form_times.h"
 #include "engine/raster/kernel_constants.h"
 #include "engine/raster/kernel_probe.h"
 
@@ -21,21 +24,25 @@ namespace darb {
 
 namespace {
 
-constexpr double kGain = 0.97;              // less is not worth another way
-constexpr std::chrono::seconds kEnough{2};  // frames that take so long need not be repeated
-constexpr int kFormat = 5;
+constexpr int kFormat =
+    6;  // before 6 the first form of a group was timed while the GPU still idled
 
 // A frame of a CPU must not take long, one of a GPU must not be too short to tell ways apart.
 struct Size {
     std::uint32_t splats;
     int width, height;
     double scale;  // standard deviation of a splat, of a sphere of radius 1 that fills the picture
-    int warm_up, samples;
 };
 
 Size size_for(const DeviceInfo& info) {
-    if (info.type == "cpu") return {1'500, 160, 112, 0.04, 1, 3};
-    return {200'000, 1280, 720, 0.01, 3, 7};
+    if (info.type == "cpu") return {1'500, 160, 112, 0.04};
+    return {200'000, 1280, 720, 0.01};
+}
+
+// A CPU is not slow when it idles, and its frames take long.
+TimingEffort effort_for(const DeviceInfo& info) {
+    if (info.type == "cpu") return {0, 0, 2, 3, 2};
+    return {0.6, 4, 9, 25, 1};
 }
 
 SplatModel tuning_scene(const Size& size) {
@@ -119,34 +126,50 @@ std::vector<TuningGroup> measured_groups(const DeviceInfo& info) {
     return groups;
 }
 
-// The least of the frames' times for each of several sets of passes.
-std::vector<double> measure(TuningFrame& frame, const Size& size,
-                            const std::vector<TuningGroup>& groups) {
-    for (int i = 0; i < size.warm_up; ++i) frame.run({});
-    std::vector<double> least(groups.size(), std::numeric_limits<double>::infinity());
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < size.samples; ++i) {
-        if (i > 0 && std::chrono::steady_clock::now() - start > kEnough) break;
-        const std::vector<double> ms = frame.run(groups);
-        for (std::size_t g = 0; g < groups.size(); ++g) least[g] = std::min(least[g], ms[g]);
+// A frame by one choice of a group, which has run once and so has compiled; null where the driver
+// refuses it.
+std::unique_ptr<TuningFrame> frame_by(Device& device, const std::string& group,
+                                      const std::string& choice) try {
+    device.set_tuning(with_names(usual_tuning(device.info()), {{group, choice}}));
+    auto frame = std::make_unique<TuningFrame>(device);
+    frame->run({});
+    return frame;
+} catch (const DeviceLost&) {  // every other error is a form that this device lacks
+    throw;
+} catch (const Error&) {
+    return nullptr;
+}
+
+// Of one group: what it takes by each of its choices, and the best of them.
+void measure_group(Device& device, TuningFrame& usual, const TuningGroup& group,
+                   double exp_tolerance, TuningRecord& record) {
+    std::vector<std::string> names{group.choices.front()};
+    std::vector<std::unique_ptr<TuningFrame>> others(1);
+    std::vector<bool> may_win{true};
+    for (std::size_t w = 1; w < group.choices.size(); ++w) {
+        if (group.name == "exp" && !(exp_error(device) <= exp_tolerance)) continue;
+        std::unique_ptr<TuningFrame> frame = frame_by(device, group.name, group.choices[w]);
+        if (!frame) continue;
+        names.push_back(group.choices[w]);
+        others.push_back(std::move(frame));
+        may_win.push_back(may_be_chosen(group.choices[w]));
     }
-    return least;
+    const auto start = std::chrono::steady_clock::now();
+    const TimedForms forms{
+        [&](std::size_t form) { return (form == 0 ? usual : *others[form]).run({group})[0]; },
+        [&] {
+            return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        }};
+    const FormChoice chosen = choose_form(forms, names.size(), effort_for(device.info()), may_win);
+    for (std::size_t i = 0; i < names.size(); ++i)
+        record.times.push_back({group.name, names[i], chosen.ms[i]});
+    record.choice[group.name] = names[chosen.form];
 }
 
 }  // namespace
 
-std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTime>& times) {
-    std::string best = group.choices.front();
-    double least = 0;
-    for (const TuningTime& time : times) {
-        if (time.group != group.name || time.choice == "buckets") continue;
-        const bool usual = time.choice == group.choices.front();  // the first that is measured
-        if (usual || time.ms < least) {
-            least = usual ? kGain * time.ms : time.ms;
-            best = time.choice;
-        }
-    }
-    return best;
+bool may_be_chosen(std::string_view choice) {
+    return choice != "buckets";
 }
 
 double exp_error(Device& device) {
@@ -217,31 +240,17 @@ std::vector<double> TuningFrame::run(const std::vector<TuningGroup>& groups) {
 }
 
 TuningRecord measure_tuning(Device& device, std::string_view group, double exp_tolerance) {
-    const Tuning before = device.tuning();
+    const ScopeGuard put_back([&, before = device.tuning()] {
+        device.set_tuning(before);
+        device.forget_peak();
+    });
     std::vector<TuningGroup> groups = measured_groups(device.info());
     std::erase_if(groups, [&](const TuningGroup& g) { return !group.empty() && g.name != group; });
-    const Size size = size_for(device.info());
-    const Tuning usual_ways = usual_tuning(device.info());
-    device.set_tuning(usual_ways);
-    TuningFrame usual_frame(device);  // while it lives the others share its pipelines
-    const std::vector<double> usual = measure(usual_frame, size, groups);
+    device.set_tuning(usual_tuning(device.info()));
+    TuningFrame usual(device);  // while it lives the others share its pipelines
+    usual.run({});
     TuningRecord record;
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-        record.times.push_back({groups[g].name, groups[g].choices.front(), usual[g]});
-        for (std::size_t w = 1; w < groups[g].choices.size(); ++w) {
-            try {
-                if (groups[g].name == "exp" && !(exp_error(device) <= exp_tolerance)) continue;
-                device.set_tuning(with_names(usual_ways, {{groups[g].name, groups[g].choices[w]}}));
-                TuningFrame frame(device);
-                const double ms = measure(frame, size, {groups[g]})[0];
-                record.times.push_back({groups[g].name, groups[g].choices[w], ms});
-            } catch (const Error&) {
-            }
-        }
-        record.choice[groups[g].name] = fastest_choice(groups[g], record.times);
-    }
-    device.set_tuning(before);
-    device.forget_peak();
+    for (const TuningGroup& g : groups) measure_group(device, usual, g, exp_tolerance, record);
     return record;
 }
 

@@ -21,7 +21,7 @@ namespace darb {
 
 struct TuningTime {
     std::string group, choice;
-    double ms = 0;  // of the group's passes, the least of a few frames
+    double ms = 0;  // of the group's passes, the median of some frames
 };
 
 struct TuningRecord {
@@ -51,10 +51,10 @@ class TuningFrame {
     bool has_timestamps_;
 };
 
-/// The usual choice unless another takes 3 % less. Never buckets, which hold 17 to 34 million
-/// intersections a frame in the 4 GiB that Vulkan binds at most, the other way 134 million: how
-/// many a run will need is not known here, so they are for who asks for them.
-std::string fastest_choice(const TuningGroup& group, const std::vector<TuningTime>& times);
+/// All but buckets, which hold 17 to 34 million intersections a frame in the 4 GiB that Vulkan
+/// binds at most, the other way 134 million: how many a run will need is not known here, so they
+/// are for who asks for them.
+bool may_be_chosen(std::string_view choice);
 
 /// How far w by the driver's own exp strays from the truth, for the kernels of is_exponential: the
 /// largest difference, of values of at most 1.
@@ -62,10 +62,10 @@ double exp_error(Device& device);
 
 constexpr double kExpTolerance = 3e-6;
 
-/// Each group with all others at their usual choice, and the fastest of each. One that a driver
-/// refuses is left out, and so is the driver's exp where exp_error is above the tolerance. The
-/// device's tuning and its peak of memory are afterwards as before. group: that one alone; empty:
-/// all.
+/// Each group with all others at their usual choice, and the best of each as choose_form finds it
+/// (form_times.h). One that a driver refuses is left out, and so is the driver's exp where
+/// exp_error is above the tolerance. The device's tuning and its peak of memory are afterwards as
+/// before. group: that one alone; empty: all.
 TuningRecord measure_tuning(Device& device, std::string_view group = {},
                             double exp_tolerance = kExpTolerance);
 

@@ -25,10 +25,11 @@ constexpr std::uint32_t kOffsetThreads = 256;
 
 SpecConstants constants(std::uint32_t threads, std::uint32_t items, std::uint32_t subgroups,
                         bool iota) {
-    return {{"THREADS", static_cast<std::int32_t>(threads)},
-            {"ITEMS", static_cast<std::int32_t>(items)},
-            {"SUBGROUPS", static_cast<std::int32_t>(subgroups)},
-            {"IOTA", iota ? 1 : 0}};
+    SpecConstants result = for_several_passes(  // the histograms and the ways to scatter
+        {{"SUBGROUPS", static_cast<std::int32_t>(subgroups)}, {"IOTA", iota ? 1 : 0}});
+    result["THREADS"] = static_cast<std::int32_t>(threads);
+    result["ITEMS"] = static_cast<std::int32_t>(items);
+    return result;
 }
 
 const char* histogram_name(SortScatter scatter) {
@@ -64,9 +65,9 @@ RadixSort::RadixSort(Device& device, std::uint32_t capacity, std::optional<SortS
     if (capacity == 0) throw Error("sort", "of no pairs", "Make it for at least one.");
     const std::uint64_t blocks = (std::uint64_t{capacity} + block() - 1) / block();
     if (blocks > device.info().max_groups_x)
-        throw Error("sort",
-                    fmt::format("{} pairs are more than {} allows", capacity, device.info().name),
-                    "Use smaller images or fewer splats, or choose another device (darb devices).");
+        throw NoRoom(
+            "sort", fmt::format("{} pairs are more than {} allows", capacity, device.info().name),
+            "Use smaller images or fewer splats, or choose another device (darb devices).");
     const auto [threads, items, subgroups] = shape_;
     const SpecConstants plain = constants(threads, items, subgroups, false);
     const SpecConstants iota = constants(threads, items, subgroups, true);

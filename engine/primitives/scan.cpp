@@ -73,7 +73,7 @@ Scan::Scan(Device& device, std::uint32_t capacity, const Strategy& strategy)
                       strategy.subgroup_size) {
     if (capacity == 0) throw Error("scan", "of no elements", "Make it for at least one.");
     if (capacity > max_capacity(device, strategy))
-        throw Error(
+        throw NoRoom(
             "scan",
             fmt::format("{} elements are more than {} allows", capacity, device.info().name),
             "Use smaller images or fewer splats, or choose another device (darb devices).");

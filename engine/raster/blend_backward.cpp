@@ -67,6 +67,7 @@ void BlendBackward::make_pipelines(bool segmented) {
     constants["SEGMENT"] = segmented ? static_cast<std::int32_t>(LIST_SEGMENT) : 0;
     constants["BUCKET"] = static_cast<std::int32_t>(bucket_length(*device_));
     constants["WINDOW_INTERSECTIONS"] = static_cast<std::int32_t>(window_intersections_);
+    constants = for_several_passes(std::move(constants));  // of all methods
     segmented_ = segmented;
     if (method_ == BackwardBlend::subgroup) {
         blend_ = Pipeline(*device_, "blend_backward", constants, true, subgroup);

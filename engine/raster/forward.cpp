@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_profile.h"
@@ -44,7 +45,7 @@ SpecConstants kernel_constants(const Device& device, const ForwardOptions& optio
     constants["LINEAR_VALUES"] = options.linear_values ? 1 : 0;
     constants["DIRECT_COLOUR"] = options.direct_colour ? 1 : 0;
     constants["DEPTH_SUM"] = options.depth_sum ? 1 : 0;
-    return constants;
+    return for_several_passes(std::move(constants));
 }
 
 SpecConstants projection_constants(const Device& device, const ForwardOptions& options,

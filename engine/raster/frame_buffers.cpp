@@ -101,17 +101,17 @@ BufferList<FrameImages> pixel_buffers(const ForwardOptions& options, std::uint64
             {&FrameImages::last_intersection, "last intersection", store ? pixels * 4 : 4}};
 }
 
-Error too_many(const Device& device, std::uint32_t wanted, std::uint32_t most, bool buckets) {
+NoRoom too_many(const Device& device, std::uint32_t wanted, std::uint32_t most, bool buckets) {
     const std::uint32_t without = FrameBuffers::max_intersections(device, BackwardBlend::subgroup);
     const std::string instead =
         buckets && wanted <= without
             ? fmt::format("Start again with --tune backward=subgroup, which holds {}, or lower",
                           without)
             : "Lower";
-    return Error("splat-tile intersections",
-                 fmt::format("a frame needs {}{} intersections, this device's buffers hold {}",
-                             wanted == 0xFFFFFFFFu ? "more than " : "", wanted, most),
-                 instead + " the resolution (-r) or the number of splats (--cap-max).");
+    return NoRoom("splat-tile intersections",
+                  fmt::format("a frame needs {}{} intersections, this device's buffers hold {}",
+                              wanted == 0xFFFFFFFFu ? "more than " : "", wanted, most),
+                  instead + " the resolution (-r) or the number of splats (--cap-max).");
 }
 
 }  // namespace
@@ -256,7 +256,7 @@ void FrameBuffers::grow(std::uint32_t wanted, std::uint32_t most,
         try {
             make(ample);
             return;
-        } catch (const Error&) {  // the device refuses what the budget allows
+        } catch (const NoRoom&) {  // the device refuses what the budget allows
             frame_.size.intersections = 0;
             if (frame_.size.bucket > 0) frame_.images.checkpoints = Buffer();
         }

@@ -19,7 +19,7 @@ void check_frame(const Device& device, int width, int height, const std::string&
     if (pixels <= most) return;
     // As a width, which means the same whatever -r was; less what the height is rounded up by.
     const int fitting = static_cast<int>(std::sqrt(double(most) * width / height)) - 2;
-    throw Error(
+    throw NoRoom(
         camera.empty() ? "frame" : fmt::format("camera \"{}\"", camera),
         fmt::format("a frame of {} x {} px is too large: {} holds at most {} pixels a frame", width,
                     height, device.info().name, most),

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
@@ -42,7 +43,7 @@ SpecConstants blend_constants(int kernel, Footprint footprint, int degree, float
     put("BLEND_SECOND_2", facts.second[1]);
     constants.emplace("BLENDED", 1);
     constants["KERNEL_REACH_MARGIN"] = static_cast<float>(kBuiltinMargin);
-    return constants;
+    return for_several_passes(std::move(constants));
 }
 
 }  // namespace
@@ -86,7 +87,7 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     };
     for (std::size_t i = 0; i < k.c.size(); ++i)
         constants.emplace("KERNEL_C" + std::to_string(i), static_cast<float>(k.c[i]));
-    return constants;
+    return for_several_passes(std::move(constants));
 }
 
 }  // namespace darb

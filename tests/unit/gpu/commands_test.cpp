@@ -40,6 +40,15 @@ TEST(BarrierTracker, read_after_write_waits_once_and_write_waits_for_readers) {
     EXPECT_FALSE(waits(tracker, 1, kRead, 0)) << "after clear";
 }
 
+TEST(BarrierTracker, what_was_announced_and_never_recorded_is_forgotten_too) {
+    BarrierTracker tracker;
+    tracker.use({fake_buffer(1), kCompute, 0, kWrite});
+    tracker.clear();
+    EXPECT_FALSE(waits(tracker, 2, kRead, 0));
+    EXPECT_FALSE(waits(tracker, 1, kRead, 0)) << "written by a pass that was never recorded";
+    EXPECT_FALSE(tracker.to_host().has_value());
+}
+
 TEST(BarrierTracker, one_barrier_does_for_all_that_came_before) {
     BarrierTracker tracker;
     waits(tracker, 1, 0, kWrite);
@@ -123,7 +132,7 @@ TEST(ReflectSpirv, every_shader_of_the_table_is_readable) {
 
 TEST(Pipeline, spec_constants_are_set_by_name) {
     Device device{test::device_options()};
-    const Pipeline pipeline(device, "scan_top", {{"THREADS", 64}, {"NOT_THERE", 1.5F}});
+    const Pipeline pipeline(device, "scan_top", {{"THREADS", 64}});
     EXPECT_EQ(pipeline.threads_x(), 64U);
     EXPECT_TRUE(pipeline.declares("THREADS"));
     EXPECT_FALSE(pipeline.declares("NOT_THERE"));
@@ -135,8 +144,10 @@ TEST(Pipeline, equal_ones_of_a_device_are_one_while_it_lives) {
     {
         const Pipeline same(device, "scan_top", {{"THREADS", 64}}), other(device, "scan_top");
         EXPECT_EQ(same.handle(), first.handle());
-        EXPECT_EQ(Pipeline(device, "scan_top", {{"NOT_THERE", 1}, {"THREADS", 64}}).handle(),
-                  first.handle());
+        EXPECT_EQ(Pipeline(device, "scan_top", for_several_passes({{"CHUNK", 8}, {"THREADS", 64}}))
+                      .handle(),
+                  first.handle())
+            << "CHUNK is for other passes of the table";
         EXPECT_NE(other.handle(), first.handle());
         EXPECT_EQ(live_pipelines(device).size(), 2U);
     }
@@ -169,6 +180,16 @@ TEST(PipelineDeathTest, unknown_shader_aborts_with_its_name) {
     GTEST_FLAG_SET(death_test_style, "threadsafe");
     Device device{test::device_options()};
     EXPECT_DEATH(Pipeline(device, "no_such_shader"), "no_such_shader");
+}
+
+TEST(PipelineDeathTest, a_constant_that_the_shader_does_not_declare_aborts_with_both_names) {
+    GTEST_FLAG_SET(death_test_style, "threadsafe");
+    Device device{test::device_options()};
+    EXPECT_DEATH(Pipeline(device, "scan_top", {{"THREDS", 64}}),
+                 "scan_top declares no specialization constant THREDS; it declares THREADS");
+    EXPECT_DEATH(Pipeline(device, "scan_prepare", {{"THREADS", 64}}), "it declares none");
+    EXPECT_DEATH(Pipeline(device, "scan_top", for_several_passes({{"THREADS", 64}, {"CHUNCK", 8}})),
+                 "CHUNCK, given to shader scan_top .* is declared by no shader");
 }
 
 TEST(CommandsDeathTest, wrong_buffers_or_arguments_abort) {
@@ -372,6 +393,12 @@ TEST(Commands, calls_out_of_order_and_out_of_bounds_are_errors_and_work_goes_on)
     const Buffer few(device, "few", 8);
     Commands commands(device);
     EXPECT_THROW(commands.pass("too early"), Error);
+    DeviceImage image(device, "image", 2, 2, VK_FORMAT_B8G8R8A8_UNORM);
+    DeviceImage other(device, "other", 2, 2, VK_FORMAT_B8G8R8A8_UNORM);
+    EXPECT_THROW(commands.copy(words, image), Error);
+    EXPECT_THROW(commands.copy(image, words), Error);
+    EXPECT_THROW(commands.copy(image, other, VK_FILTER_NEAREST), Error);
+    EXPECT_THROW(commands.clear(image, {0, 0, 0, 0}), Error);
     EXPECT_THROW(commands.submit(), Error);
     EXPECT_THROW(commands.fill(words, 1), Error);
     commands.begin();
@@ -380,7 +407,9 @@ TEST(Commands, calls_out_of_order_and_out_of_bounds_are_errors_and_work_goes_on)
     EXPECT_THROW(commands.copy(few, words, 12), Error);
     EXPECT_THROW(commands.copy({words, 8}, few, ~std::uint64_t{0}), Error);
     EXPECT_THROW(static_cast<void>(commands.pass_times()), Error);
+    commands.pass("fill");
     commands.fill(words, 7);
+    EXPECT_EQ(commands.recorded().back().barriers, 0U) << "of what was refused";
     commands.submit();
     EXPECT_THROW(commands.begin(), Error);
     EXPECT_THROW(static_cast<void>(commands.pass_times()), Error);

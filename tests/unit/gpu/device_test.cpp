@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "engine/core/error.h"
 #include "engine/gpu/buffer.h"
@@ -14,6 +17,7 @@
 #include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
 #include "engine/gpu/faults.h"
+#include "engine/gpu/shader_features.h"
 #include "engine/gpu/shader_table.h"
 #include "tests/support/test_device_options.h"
 
@@ -259,6 +263,39 @@ TEST(VulkanErrors, too_many_allocations_say_what_takes_them) {
     EXPECT_NE(text.find("fewer photos"), std::string::npos) << text;
 }
 
+// What a fallback may catch, and what it may not.
+TEST(VulkanErrors, have_a_kind_for_no_room_and_for_a_lost_device) {
+    for (const VkResult full :
+         {VK_ERROR_OUT_OF_DEVICE_MEMORY, VK_ERROR_OUT_OF_HOST_MEMORY, VK_ERROR_TOO_MANY_OBJECTS})
+        EXPECT_THROW(check_vulkan(full, "it"), NoRoom) << full;
+    EXPECT_THROW(check_vulkan(VK_ERROR_DEVICE_LOST, "it"), DeviceLost);
+    try {
+        check_vulkan(VK_ERROR_FEATURE_NOT_PRESENT, "it");
+        ADD_FAILURE() << "no error";
+    } catch (const NoRoom&) {
+        ADD_FAILURE() << "no room";
+    } catch (const DeviceLost&) {
+        ADD_FAILURE() << "lost";
+    } catch (const Error&) {
+    }
+}
+
+TEST(VulkanErrors, of_buffers_and_submits_have_these_kinds) {
+    DeviceOptions options = test::device_options();
+    options.faults = parse_faults("oom:pairs,allocation:1048576,lost:1");
+    Device device{options};
+    EXPECT_THROW(Buffer(device, "pairs", 64), NoRoom);
+    EXPECT_THROW(Buffer(device, "large", 2 << 20), NoRoom);
+    device.set_memory_budget(1'000);
+    EXPECT_THROW(Buffer(device, "small", 2'000), NoRoom);
+    Buffer buffer(device, "buffer", 64);
+    Commands commands(device);
+    commands.begin();
+    commands.pass("clear");
+    commands.fill(buffer, 1);
+    EXPECT_THROW(commands.submit_and_wait(), DeviceLost);
+}
+
 TEST(Faults, text_that_is_no_fault_is_an_error) {
     EXPECT_NE(error_of([] { parse_faults("oops"); }), "no error");
     EXPECT_NE(error_of([] { parse_faults("lost:0"); }), "no error");
@@ -321,6 +358,94 @@ TEST(Faults, memory_of_its_own_is_reached_by_copies) {
     buffer.upload(values);
     EXPECT_EQ(buffer.download<std::uint32_t>(values.size()), values);
     EXPECT_EQ(device.peak_bytes(), values.size() * 4);
+}
+
+// Staging copies share a pool of commands, and all threads one queue.
+TEST(Faults, threads_copy_to_memory_of_its_own_at_the_same_time) {
+    const Environment environment("discrete");
+    Device device{test::device_options()};
+    std::vector<std::thread> threads;
+    std::atomic<int> wrong{0};
+    for (std::uint32_t t = 0; t < 4; ++t)
+        threads.emplace_back([&, t] {
+            Buffer buffer(device, "buffer", 4096);
+            for (std::uint32_t round = 0; round < 100; ++round) {
+                const std::vector<std::uint32_t> values(1024, 1000 * t + round);
+                buffer.upload(values);
+                if (buffer.download<std::uint32_t>(1024) != values) ++wrong;
+            }
+        });
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(wrong, 0);
+}
+
+// A module of the header and these capabilities.
+std::vector<std::uint32_t> module_with(std::initializer_list<std::uint32_t> capabilities) {
+    std::vector<std::uint32_t> words{0x07230203, 0x10500, 0, 1, 0};
+    for (const std::uint32_t capability : capabilities)
+        words.insert(words.end(), {2u << 16 | 17, capability});
+    return words;
+}
+
+// Behind sType and pNext these structs hold VkBool32 alone.
+template <class Struct>
+int features_on(const Struct& features) {
+    constexpr std::size_t kHeader = 2 * sizeof(void*);
+    const auto* bytes = reinterpret_cast<const std::byte*>(&features);
+    int count = 0;
+    for (std::size_t at = kHeader; at + sizeof(VkBool32) <= sizeof(Struct);
+         at += sizeof(VkBool32)) {
+        VkBool32 on = VK_FALSE;
+        std::memcpy(&on, bytes + at, sizeof on);
+        count += on == VK_TRUE ? 1 : 0;
+    }
+    return count;
+}
+
+int all_features_on(const DeviceFeatures& f) {
+    return features_on(f.core) + features_on(f.v11) + features_on(f.v12) + features_on(f.v13);
+}
+
+// scalarBlockLayout, synchronization2, subgroupSizeControl and computeFullSubgroups are those of
+// the Vulkan calls; the shaders need no feature beyond them. One that begins to changes this test.
+TEST(ShaderFeatures, a_device_is_asked_for_what_the_shaders_use_and_no_more) {
+    DeviceFeatures wanted;
+    want_features(needs_of_all_shaders(), wanted);
+    EXPECT_EQ(all_features_on(wanted), 4);
+    EXPECT_TRUE(wanted.v12.scalarBlockLayout && wanted.v13.synchronization2 &&
+                wanted.v13.subgroupSizeControl && wanted.v13.computeFullSubgroups);
+    std::vector<std::uint32_t> in_use;
+    for (const ShaderNeed& need : needs_of_all_shaders()) in_use.push_back(need.capability);
+    EXPECT_EQ(in_use, (std::vector<std::uint32_t>{1, 61, 62, 63, 64, 65}))
+        << "compute shaders; subgroups with votes, arithmetic, ballots and shuffles";
+    constexpr VkSubgroupFeatureFlags kAll = 0xff;
+    EXPECT_EQ(missing_feature(needs_of_all_shaders(), wanted, kAll), "")
+        << "int64, float64 and float atomics are not asked for";
+}
+
+TEST(ShaderFeatures, a_refusal_names_the_feature_and_who_needs_it) {
+    const auto plain = module_with({1}), wide = module_with({1, 11, 4433}),
+               votes = module_with({62});
+    const std::vector<ShaderBinary> shaders{{"plain", plain}, {"wide", wide}, {"votes", votes}};
+    const std::vector<ShaderNeed> needs = shader_needs(shaders);
+    DeviceFeatures offered;
+    constexpr VkSubgroupFeatureFlags kVotes = VK_SUBGROUP_FEATURE_VOTE_BIT;
+    EXPECT_EQ(missing_feature(needs, offered, kVotes),
+              "no scalarBlockLayout, which the arguments and buffers of all shaders need");
+    want_features({}, offered);
+    EXPECT_EQ(missing_feature(needs, offered, kVotes), "no shaderInt64, which shader wide needs");
+    want_features(needs, offered);
+    EXPECT_TRUE(offered.core.features.shaderInt64 && offered.v11.storageBuffer16BitAccess);
+    EXPECT_EQ(all_features_on(offered), 6);
+    EXPECT_EQ(missing_feature(needs, offered, kVotes), "");
+    EXPECT_EQ(missing_feature(needs, offered, 0), "no subgroup votes, which shader votes needs");
+}
+
+TEST(ShaderFeaturesDeathTest, a_capability_without_a_row_aborts_with_the_shader) {
+    GTEST_FLAG_SET(death_test_style, "threadsafe");
+    const auto module = module_with({1, 4242});
+    const std::vector<ShaderBinary> shaders{{"new", module}};
+    EXPECT_DEATH(shader_needs(shaders), "shader new asks for the capability 4242");
 }
 
 TEST(PipelineCache, broken_file_is_ignored) {

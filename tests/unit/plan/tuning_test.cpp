@@ -7,10 +7,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/rng.h"
+#include "engine/plan/form_times.h"
 #include "engine/plan/tuner.h"
 #include "engine/primitives/radix_sort.h"
 #include "tests/support/scoped_variants.h"
@@ -140,17 +144,141 @@ TEST(Tuning, a_device_runs_its_defaults_until_it_is_told_otherwise) {
     EXPECT_EQ(RadixSort(device, 100).scatter(), SortScatter::ballot);
 }
 
-TEST(Tuning, the_fastest_way_is_taken_but_for_one_that_holds_few_intersections) {
-    const auto taken = [](const char* group, const std::vector<TuningTime>& times) {
-        for (const TuningGroup& g : tuning_groups(some_gpu()))
-            if (g.name == group) return fastest_choice(g, times);
-        return std::string();
+TEST(FormTimes, another_form_is_best_only_for_a_gain_beyond_the_spread) {
+    const auto best = [](std::vector<std::vector<double>> rounds_ms, std::vector<bool> may = {}) {
+        return best_form({std::move(rounds_ms)}, may);
     };
-    EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.98}}), "subgroup");
-    EXPECT_EQ(taken("scan", {{"scan", "subgroup", 1}, {"scan", "thread", 0.9}}), "thread");
-    EXPECT_EQ(taken("backward", {{"backward", "team", 1}, {"backward", "buckets", 0.1}}), "team");
-    EXPECT_EQ(taken("backward", {{"backward", "team", 1}, {"backward", "subgroup", 0.9}}),
-              "subgroup");
+    const std::vector<double> usual{1, 1, 1, 1, 1};
+    EXPECT_EQ(best({usual, {0.98, 0.98, 0.98, 0.98, 0.98}}), 0U) << "2 % are not worth a change";
+    EXPECT_EQ(best({usual, {0.9, 0.9, 0.9, 0.9, 0.9}}), 1U);
+    EXPECT_EQ(best({usual, {0.9, 0.6, 1.4, 0.7, 1.3}}), 0U) << "a spread of a third";
+    EXPECT_EQ(best({usual, {0.9, 0.9, 0.9, 0.9, 9}}), 1U) << "one that was disturbed";
+    EXPECT_EQ(best({usual, {0.9, 0.9, 0.9, 0.9, 0.9}, {0.8, 0.8, 0.8, 0.8, 0.8}}), 2U);
+    EXPECT_EQ(
+        best({usual, {0.1, 0.1, 0.1, 0.1, 0.1}, {0.9, 0.9, 0.9, 0.9, 0.9}}, {true, false, true}),
+        2U);
+    EXPECT_EQ(best({{5, 4, 3, 2, 1}, {4.5, 3.6, 2.7, 1.8, 0.9}}), 1U) << "while a clock rises";
+    EXPECT_EQ(best({{0, 0, 0}, {0, 0, 0}}), 0U) << "no clock";
+    EXPECT_FALSE(may_be_chosen("buckets"));
+    EXPECT_TRUE(may_be_chosen("subgroup"));
+}
+
+/// A GPU of which time and clock are made up: no test waits.
+class FakeGpu {
+  public:
+    explicit FakeGpu(std::vector<double> ms_at_boost) : ms_(std::move(ms_at_boost)) {}
+    double noise = 0;             // standard deviation, a share of a time
+    double slows_down_after = 0;  // seconds of work; 0: never
+
+    /// The pass takes a fifth of a frame.
+    double sample_ms(std::size_t form) {
+        const double ms =
+            ms_[form] * 1980 / clock_mhz() * std::max(0.2, 1 + noise * random_.normal());
+        now_s_ += 5 * ms / 1000;
+        busy_s_ += 5 * ms / 1000;
+        return ms;
+    }
+    void idle(double seconds) {  // a pipeline compiles
+        now_s_ += seconds;
+        busy_s_ = 0;
+    }
+    TimedForms forms() {
+        return {[this](std::size_t form) { return sample_ms(form); }, [this] { return now_s_; }};
+    }
+    FormChoice choose() {
+        idle(2);
+        return choose_form(forms(), ms_.size(), {0.6, 4, 9, 25, 1});
+    }
+    double now_s() const { return now_s_; }
+
+  private:
+    // 345 MHz where it idles, 1,980 after half a second of work; a hot one loses a third.
+    double clock_mhz() const {
+        const double risen = 345 + (1980 - 345) * std::min(1.0, busy_s_ / 0.5);
+        if (slows_down_after == 0 || busy_s_ < slows_down_after) return risen;
+        return risen * std::max(0.66, 1 - 0.3 * (busy_s_ - slows_down_after));
+    }
+    std::vector<double> ms_;
+    double now_s_ = 0, busy_s_ = 0;
+    Pcg32 random_{3, 3};
+};
+
+// What was done before: three frames to warm up, the least of seven, one form after the other.
+std::size_t best_one_after_the_other(FakeGpu& gpu, std::size_t count) {
+    gpu.idle(2);
+    std::vector<double> least(count, 1e9);
+    for (std::size_t form = 0; form < count; ++form)
+        for (int i = 0; i < 10; ++i) {
+            const double ms = gpu.sample_ms(form);
+            if (i >= 3) least[form] = std::min(least[form], ms);
+        }
+    return static_cast<std::size_t>(std::min_element(least.begin(), least.end()) - least.begin());
+}
+
+TEST(FormTimes, a_gpu_whose_clock_rises_ends_with_the_right_form) {
+    FakeGpu cold({0.43, 0.55});  // as team and subgroup
+    EXPECT_EQ(best_one_after_the_other(cold, 2), 1U) << "the fake does not mislead";
+    FakeGpu gpu({0.43, 0.55});
+    const FormChoice usual = gpu.choose();
+    EXPECT_EQ(usual.form, 0U);
+    EXPECT_NEAR(usual.ms[0], 0.43, 0.01) << "not of the boost clock";
+    EXPECT_NEAR(usual.ms[1], 0.55, 0.01);
+    EXPECT_LT(gpu.now_s(), 2 + 4 + 2) << "not bounded";
+    EXPECT_EQ(FakeGpu({0.84, 0.21}).choose().form, 1U);  // as strips and tiles
+    EXPECT_EQ(FakeGpu({0.30, 0.34, 0.25, 0.27}).choose().form, 2U);
+}
+
+TEST(FormTimes, noise_changes_no_form_and_hides_no_gain) {
+    int changed = 0, found = 0;
+    for (int i = 0; i < 40; ++i) {
+        FakeGpu equal({0.5, 0.5, 0.5, 0.5}), better({0.5, 0.4});
+        equal.idle(0.01 * i);
+        for (FakeGpu* gpu : {&equal, &better}) {
+            gpu->noise = 0.1;
+            for (int skipped = 0; skipped < i; ++skipped) gpu->sample_ms(0);  // other numbers
+        }
+        changed += equal.choose().form != 0 ? 1 : 0;
+        found += better.choose().form == 1 ? 1 : 0;
+    }
+    EXPECT_LE(changed, 1) << "of 40";
+    EXPECT_GE(found, 39) << "of 40";
+    EXPECT_EQ(FakeGpu({0.5, 0.5, 0.5}).choose().form, 0U) << "equal without noise";
+}
+
+TEST(FormTimes, a_gpu_that_becomes_hot_ends_with_the_right_form) {
+    for (const double after : {0.3, 0.7, 1.0, 1.5}) {
+        FakeGpu same({0.5, 0.5}), better({0.5, 0.45}), worse({0.5, 0.55});
+        for (FakeGpu* gpu : {&same, &better, &worse}) gpu->slows_down_after = after;
+        EXPECT_EQ(same.choose().form, 0U) << after;
+        EXPECT_EQ(better.choose().form, 1U) << after;
+        EXPECT_EQ(worse.choose().form, 0U) << after;
+    }
+}
+
+TEST(FormTimes, rounds_and_warm_up_are_bounded) {
+    int taken = 0;
+    double now = 0;
+    const TimedForms slow{[&](std::size_t) {
+                              ++taken;
+                              now += 3;
+                              return 3000.0;
+                          },
+                          [&] { return now; }};
+    const std::array<std::size_t, 2> both{0, 1};
+    EXPECT_EQ(time_rounds(slow, both, {0, 0, 2, 9, 2}).rounds_ms[1].size(), 2U);
+    EXPECT_EQ(taken, 4);
+    EXPECT_TRUE(warm_up(slow, {0, 0, 2, 9, 2}));
+    EXPECT_EQ(taken, 4) << "no warm-up was asked for";
+    double ms = 1;
+    now = 0;
+    const TimedForms unsteady{[&](std::size_t) {
+                                  ms *= 1.02;
+                                  now += 0.05;
+                                  return ms;
+                              },
+                              [&] { return now; }};
+    EXPECT_FALSE(warm_up(unsteady, {0.6, 4, 2, 9, 2}));
+    EXPECT_LT(now, 4.3);
 }
 
 TEST(Tuning, who_goes_on_with_a_run_that_knew_no_choice_of_exp_takes_polynomials) {
@@ -222,6 +350,7 @@ TEST_F(Tuner, a_record_that_was_cut_or_changed_is_none) {
         write_file_atomic(file, other.replace(at, from.size(), to));
         return !read_tuning(some_gpu(), folder_);
     };
+    EXPECT_TRUE(changed("\"format\": 6", "\"format\": 5")) << "measured while the GPU idled";
     EXPECT_TRUE(changed("blend=256x1", "blend=255x1"));
     EXPECT_TRUE(changed("\"shaders\": \"", "\"shaders\": \"0"));
     EXPECT_TRUE(changed("\"times\": [", "\"times\": [7,"));
