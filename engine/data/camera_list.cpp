@@ -2,11 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <glm/gtc/constants.hpp>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
+#include "engine/core/text.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/pose.h"
 
@@ -73,16 +77,117 @@ View parse_view(const json& record, std::string where) {
     return view;
 }
 
+constexpr const char* kExportPath =
+    "Export the path again from nerfstudio's viewer, with its perspective camera.";
+
+/// 16 or 12 numbers row by row, or 3 to 4 rows of 4.
+void read_path_pose(const json& frame, const std::string& where, Camera& camera) {
+    const auto matrix = frame.find("camera_to_world");
+    if (matrix == frame.end() || !matrix->is_array())
+        throw Error(where, "has no camera_to_world", kExportPath);
+    std::vector<double> numbers;
+    const auto take = [&](const json& value) {
+        // JSON has no NaN; writers put null in its place.
+        numbers.push_back(value.is_number() ? value.get<double>() : std::nan(""));
+    };
+    for (const json& row : *matrix)
+        if (row.is_array())
+            for (const json& value : row) take(value);
+        else
+            take(row);
+    if (numbers.size() != 16 && numbers.size() != 12)
+        throw Error(where,
+                    fmt::format("camera_to_world has {} numbers, not 16 or 12", numbers.size()),
+                    kExportPath);
+    glm::dmat3 axes;  // y up and z back, as OpenGL has them
+    for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+            axes[c][r] = (c == 0 ? 1 : -1) * numbers[static_cast<std::size_t>(4 * r + c)];
+    const glm::dvec3 centre(numbers[3], numbers[7], numbers[11]);
+    remove_scale(axes);
+    camera.rotation = glm::transpose(checked_rotation(axes, where));
+    check_position(centre, where);
+    camera.translation = -(camera.rotation * centre);
+}
+
+View parse_path_frame(const json& frame, int width, int height, const std::string& where) {
+    if (!frame.is_object()) throw Error(where, "is not an object", kExportPath);
+    const double fov = number(frame, "fov", where);
+    if (!(fov > 0 && fov < 180))
+        throw Error(where, fmt::format("its fov of {} is not between 0 and 180 degrees", fov),
+                    kExportPath);
+    View view;
+    Camera& camera = view.camera;
+    camera.width = width;
+    camera.height = height;
+    camera.fy = 0.5 * height / std::tan(0.5 * fov * glm::pi<double>() / 180);
+    camera.fx = camera.fy;
+    camera.cx = 0.5 * width;
+    camera.cy = 0.5 * height;
+    view.lens.model = "PINHOLE";
+    view.lens.parameters = {camera.fx, camera.fy, camera.cx, camera.cy};
+    view.lens.width = width;
+    view.lens.height = height;
+    check_lens(view.lens, where);
+    read_path_pose(frame, where, camera);
+    return view;
+}
+
+/// Frames a second: as the file says, or by its length.
+double fps_of(const json& root, std::size_t frames, const std::string& where) {
+    const auto given = [&](const char* key) { return root.contains(key) && !root[key].is_null(); };
+    const double fps = given("fps") ? number(root, "fps", where)
+                       : given("seconds")
+                           ? static_cast<double>(frames) / number(root, "seconds", where)
+                           : NerfstudioPath{}.fps;
+    if (fps > 0 && fps <= 1000) return fps;
+    throw Error(where, fmt::format("has {} frames a second", fps), kExportPath);
+}
+
+NerfstudioPath read_nerfstudio_path(const json& root, const std::string& where) {
+    const std::string type = root.contains("camera_type") && root["camera_type"].is_string()
+                                 ? lower(root["camera_type"].get<std::string>())
+                                 : "perspective";
+    if (type != "perspective")
+        throw Error(where,
+                    fmt::format("its camera_type is {}, and pictures are drawn in perspective",
+                                printable(type)),
+                    kExportPath);
+    const json& frames = root["camera_path"];
+    if (!frames.is_array() || frames.empty())
+        throw Error(where, "its list camera_path is empty", kExportPath);
+    NerfstudioPath path;
+    const int width = size_px(root, "render_width", where),
+              height = size_px(root, "render_height", where);
+    path.fps = fps_of(root, frames.size(), where);
+    std::size_t other_aspect = 0;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const std::string record = fmt::format("{}, frame {} of {}", where, i + 1, frames.size());
+        path.views.push_back(parse_path_frame(frames[i], width, height, record));
+        path.views.back().name = fmt::format("frame_{:05}", i);
+        const json aspect = frames[i].value("aspect", json());
+        other_aspect += aspect.is_number() && std::abs(aspect.get<double>() * height - width) > 1;
+    }
+    if (other_aspect > 0)
+        path.notes.push_back(fmt::format(
+            "{} of {} frames of {} have another aspect than its size, {}x{}, which is drawn.",
+            other_aspect, frames.size(), where, width, height));
+    if (root.contains("crop") && !root["crop"].is_null())
+        path.notes.push_back(where + " has a crop, which is not applied.");
+    return path;
+}
+
 }  // namespace
 
+std::optional<NerfstudioPath> parse_nerfstudio_path(std::string_view text,
+                                                    const std::string& where) {
+    const json root = json::parse(text, nullptr, false);
+    if (!root.is_object() || !root.contains("camera_path")) return std::nullopt;
+    return read_nerfstudio_path(root, where);
+}
+
 std::vector<View> parse_camera_list(std::string_view text, const std::string& where) {
-    json list;
-    try {
-        list = json::parse(text);
-    } catch (const json::exception& error) {
-        throw Error(where, fmt::format("is no valid JSON: {}", error.what()),
-                    "Correct or export the file again.");
-    }
+    const json list = parse_json_text(text, where, "Correct or export the file again.");
     if (!list.is_array() || list.empty())
         throw Error(where, "holds no list of cameras", "A cameras.json of 3DGS is needed.");
     std::vector<View> views;
@@ -130,12 +235,22 @@ std::vector<View> load_cameras(const std::filesystem::path& path, const DatasetO
         const std::size_t first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
         if (first != std::string::npos && text[first] == '[')
             return parse_camera_list(text, list.string());
+        if (std::optional<NerfstudioPath> nerfstudio = parse_nerfstudio_path(text, list.string())) {
+            if (notes) *notes = std::move(nerfstudio->notes);
+            return std::move(nerfstudio->views);
+        }
     }
     DatasetOptions without_photos = options;
     without_photos.require_photos = false;
     Dataset dataset = load_dataset(path, without_photos);
     if (notes) *notes = std::move(dataset.notes);
     return std::move(dataset.views);
+}
+
+std::vector<Camera> cameras_of(const std::vector<View>& views) {
+    std::vector<Camera> cameras;
+    for (const View& view : views) cameras.push_back(view.camera);
+    return cameras;
 }
 
 }  // namespace darb

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,10 +15,22 @@ namespace darb {
 /// point is off the centre, cx and cy; rotation: rows of camera to world. Views have no photo.
 /// Throws Error naming the record.
 std::vector<View> parse_camera_list(std::string_view json, const std::string& where);
+/// A camera_path.json as nerfstudio's viewer exports it: a camera of each frame, named frame_00000
+/// and so on.
+struct NerfstudioPath {
+    std::vector<View> views;
+    double fps = 24;                 // frames a second
+    std::vector<std::string> notes;  // what of it is not followed, a sentence each
+};
+/// None where the text is JSON of something else, or none. Throws Error naming the frame.
+std::optional<NerfstudioPath> parse_nerfstudio_path(std::string_view json,
+                                                    const std::string& where);
 std::string format_camera_list(const std::vector<View>& views);
 
 /// Through write_file_atomic.
 void write_camera_list(const std::filesystem::path& path, const std::vector<View>& views);
+
+std::vector<Camera> cameras_of(const std::vector<View>& views);
 
 /// path: a data set folder, a folder with cameras.json, a transforms.json or a cameras.json. Photos
 /// are not required. notes: those of the data set.

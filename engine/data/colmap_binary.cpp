@@ -18,6 +18,19 @@ constexpr std::size_t kObservationBytes = 8 + 8 + 8;
 constexpr std::size_t kPointBytes = 8 + 3 * 8 + 3 + 8 + 8;
 constexpr std::size_t kTrackBytes = 4 + 4;
 
+constexpr std::size_t kRigBytes = 4 + 4, kFrameBytes = 4 + 4 + 7 * 8 + 4;
+constexpr std::int32_t kCameraSensor = 0;
+
+ColmapPose read_colmap_pose(ByteReader& reader) {
+    ColmapPose pose;
+    glm::dvec4 wxyz;
+    for (int k = 0; k < 4; ++k) wxyz[k] = reader.read<double>();
+    for (int k = 0; k < 3; ++k) pose.translation[k] = reader.read<double>();
+    pose.rotation = rotation_from_quaternion(wxyz, reader.where());
+    check_position(pose.translation, reader.where());
+    return pose;
+}
+
 int read_size(ByteReader& reader) {
     const auto size = reader.read<std::uint64_t>();
     return size > 0x7fffffff ? 0 : static_cast<int>(size);  // 0 is refused by check_lens
@@ -112,6 +125,52 @@ PointCloud parse_colmap_points(std::span<const std::byte> file, const std::strin
         points.colour.insert(points.colour.end(), colour, colour + 3);
     }
     return points;
+}
+
+ColmapRigs parse_colmap_rigs(std::span<const std::byte> file, const std::string& where) {
+    ByteReader reader(file, where);
+    const std::size_t count = reader.read_count(kRigBytes, "rigs");
+    ColmapRigs rigs;
+    for (std::size_t i = 0; i < count; ++i) {
+        reader.set_record(fmt::format("rig {} of {}", i + 1, count));
+        auto& rig = rigs[reader.read<std::uint32_t>()];
+        const auto sensors = reader.read<std::uint32_t>();
+        for (std::uint32_t s = 0; s < sensors; ++s) {
+            const auto type = reader.read<std::int32_t>();
+            const auto id = reader.read<std::uint32_t>();
+            // The first is the reference: the rig's own frame.
+            std::optional<ColmapPose> pose;
+            if (s == 0)
+                pose = ColmapPose();
+            else if (reader.read<std::uint8_t>() != 0)
+                pose = read_colmap_pose(reader);
+            if (type == kCameraSensor) rig[id] = pose;
+        }
+    }
+    return rigs;
+}
+
+std::vector<ColmapFrame> parse_colmap_frames(std::span<const std::byte> file,
+                                             const std::string& where) {
+    ByteReader reader(file, where);
+    const std::size_t count = reader.read_count(kFrameBytes, "frames");
+    std::vector<ColmapFrame> frames;
+    for (std::size_t i = 0; i < count; ++i) {
+        reader.set_record(fmt::format("frame {} of {}", i + 1, count));
+        ColmapFrame frame;
+        frame.id = reader.read<std::uint32_t>();
+        frame.rig = reader.read<std::uint32_t>();
+        frame.pose = read_colmap_pose(reader);
+        const auto data = reader.read<std::uint32_t>();
+        for (std::uint32_t d = 0; d < data; ++d) {
+            const auto type = reader.read<std::int32_t>();
+            const auto camera = reader.read<std::uint32_t>();
+            const auto image = reader.read<std::uint64_t>();
+            if (type == kCameraSensor) frame.images[image] = camera;
+        }
+        frames.push_back(std::move(frame));
+    }
+    return frames;
 }
 
 }  // namespace darb

@@ -1,6 +1,7 @@
 // A COLMAP model folder: picks binary or text, reads all three files, checks that they fit.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -57,15 +58,105 @@ void read_points(const std::filesystem::path& folder, ColmapModel& model) {
     if (has_own) locate_tracks(observations, model);
     if (!std::filesystem::is_regular_file(ply)) return;
     std::size_t dropped = 0;
-    PointCloud points = read_point_cloud_ply(ply, dropped);
+    std::vector<std::string> notes;
+    PointCloud points = read_point_cloud_ply(ply, dropped, &notes);
     const std::size_t own = model.points.size() + model.dropped_points;
     if (points.size() + dropped == own) return;
     if (has_own)
-        model.points_note = fmt::format("{} was read, {} points, in place of the {} of {}.",
-                                        ply.string(), points.size() + dropped, own,
-                                        (has_binary ? binary : text).filename().string());
+        notes.push_back(fmt::format("{} was read, {} points, in place of the {} of {}.",
+                                    ply.string(), points.size() + dropped, own,
+                                    (has_binary ? binary : text).filename().string()));
+    model.notes.insert(model.notes.end(), notes.begin(), notes.end());
     model.points = std::move(points);
     model.dropped_points = dropped;
+}
+
+}  // namespace
+
+namespace {
+
+/// Whether two poses are one, but for what a text file rounds off.
+bool same_pose(const ColmapPose& a, const ColmapPose& b) {
+    constexpr double kRounding = 1e-5;
+    double apart = 0;
+    for (int c = 0; c < 3; ++c)
+        apart = std::max(apart, glm::distance(a.rotation[c], b.rotation[c]));
+    return apart < kRounding && glm::distance(a.translation, b.translation) <
+                                    kRounding * (1 + glm::length(a.translation));
+}
+
+std::string centre_of(const ColmapPose& pose) {
+    const glm::dvec3 c = -(glm::transpose(pose.rotation) * pose.translation);
+    return fmt::format("{:.4g}, {:.4g}, {:.4g}", c.x + 0.0, c.y + 0.0, c.z + 0.0);  // no -0
+}
+
+/// Gives images the poses of their frames and rigs, which COLMAP takes for the truth, too.
+void pose_by_rigs(const ColmapRigs& rigs, const std::vector<ColmapFrame>& frames,
+                  const std::filesystem::path& listing, ColmapModel& model) {
+    std::map<std::uint64_t, const ColmapFrame*> frame_of;
+    for (const ColmapFrame& frame : frames)
+        for (const auto& [image, camera] : frame.images) frame_of[image] = &frame;
+    std::size_t changed = 0, unknown = 0;
+    std::string example, first_unknown;
+    for (ColmapImage& image : model.images) {
+        const std::string where =
+            fmt::format("{}, image {} ({})", listing.string(), image.id, image.name);
+        const auto at = frame_of.find(image.id);
+        if (at == frame_of.end()) {
+            if (unknown++ == 0) first_unknown = image.name;
+            continue;
+        }
+        const ColmapFrame& frame = *at->second;
+        const std::uint32_t camera = frame.images.at(image.id);
+        if (camera != image.camera_id)
+            throw Error(where,
+                        fmt::format("is of camera {}, but of camera {} in frame {}",
+                                    image.camera_id, camera, frame.id),
+                        "The files belong to different models: copy all of one model.");
+        const auto rig = rigs.find(frame.rig);
+        if (rig == rigs.end() || !rig->second.contains(camera))
+            throw Error(where,
+                        fmt::format("its frame {} is of rig {}, which has no camera {}", frame.id,
+                                    frame.rig, camera),
+                        "The files belong to different models: copy all of one model.");
+        const std::optional<ColmapPose>& sensor = rig->second.at(camera);
+        if (!sensor) continue;  // not calibrated: the image's own pose is all there is
+        const ColmapPose own{image.rotation, image.translation},
+            composed{sensor->rotation * frame.pose.rotation,
+                     sensor->rotation * frame.pose.translation + sensor->translation};
+        if (same_pose(own, composed)) continue;
+        if (changed++ == 0)
+            example =
+                fmt::format("{} at {}, not at {}", image.name, centre_of(composed), centre_of(own));
+        image.rotation = composed.rotation;
+        image.translation = composed.translation;
+    }
+    if (changed > 0)
+        model.notes.push_back(
+            fmt::format("Warning: {} of {} poses in {} are not those of its frames and rigs, which "
+                        "were used, as "
+                        "COLMAP does: {}. If the images are right, remove rigs and frames.",
+                        changed, model.images.size(), listing.string(), example));
+    if (unknown > 0)
+        model.notes.push_back(fmt::format(
+            "Warning: {} of {} images of {} are in no frame, the first being {}: their own poses "
+            "were used.",
+            unknown, model.images.size(), listing.string(), first_unknown));
+}
+
+void read_rigs(const std::filesystem::path& folder, ColmapModel& model) {
+    const char* extension = model.binary ? ".bin" : ".txt";
+    const auto rigs = folder / (std::string("rigs") + extension),
+               frames = folder / (std::string("frames") + extension),
+               images = folder / (std::string("images") + extension);
+    if (!std::filesystem::is_regular_file(rigs) || !std::filesystem::is_regular_file(frames))
+        return;
+    const auto poses = model.binary
+                           ? parse_colmap_frames(read_file(frames), frames.string())
+                           : parse_colmap_frames_text(read_text_file(frames), frames.string());
+    pose_by_rigs(model.binary ? parse_colmap_rigs(read_file(rigs), rigs.string())
+                              : parse_colmap_rigs_text(read_text_file(rigs), rigs.string()),
+                 poses, images, model);
 }
 
 }  // namespace
@@ -111,6 +202,7 @@ ColmapModel read_colmap(const std::filesystem::path& folder) {
                         fmt::format("its camera id {} is not in {}", image.camera_id,
                                     cameras.filename().string()),
                         "The files belong to different models: copy all of one model.");
+    read_rigs(folder, model);
     read_points(folder, model);
     return model;
 }

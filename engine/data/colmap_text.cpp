@@ -126,7 +126,56 @@ void read_observations(Lines& lines, ColmapImage& image) {
                 "The file is cut off or damaged: copy or export it again.");
 }
 
+ColmapPose pose_of_line(Lines& lines) {
+    ColmapPose pose;
+    glm::dvec4 wxyz;
+    for (int k = 0; k < 4; ++k) wxyz[k] = lines.number<double>("quaternion");
+    for (int k = 0; k < 3; ++k) pose.translation[k] = lines.number<double>("translation");
+    pose.rotation = rotation_from_quaternion(wxyz, lines.where());
+    check_position(pose.translation, lines.where());
+    return pose;
+}
+
 }  // namespace
+
+ColmapRigs parse_colmap_rigs_text(std::string_view file, const std::string& where) {
+    ColmapRigs rigs;
+    for (Lines lines(file, where); lines.next_record();) {
+        auto& rig = rigs[lines.number<std::uint32_t>("rig id")];
+        const auto sensors = lines.number<std::uint32_t>("number of sensors");
+        for (std::uint32_t s = 0; s < sensors; ++s) {
+            const std::string_view type = lines.word("the sensor's type");
+            const auto id = lines.number<std::uint32_t>("sensor id");
+            // The first is the reference: the rig's own frame.
+            std::optional<ColmapPose> pose;
+            if (s == 0)
+                pose = ColmapPose();
+            else if (lines.number<int>("whether there is a pose") != 0)
+                pose = pose_of_line(lines);
+            if (type == "CAMERA") rig[id] = pose;
+        }
+    }
+    return rigs;
+}
+
+std::vector<ColmapFrame> parse_colmap_frames_text(std::string_view file, const std::string& where) {
+    std::vector<ColmapFrame> frames;
+    for (Lines lines(file, where); lines.next_record();) {
+        ColmapFrame frame;
+        frame.id = lines.number<std::uint32_t>("frame id");
+        frame.rig = lines.number<std::uint32_t>("rig id");
+        frame.pose = pose_of_line(lines);
+        const auto data = lines.number<std::uint32_t>("number of images");
+        for (std::uint32_t d = 0; d < data; ++d) {
+            const std::string_view type = lines.word("the sensor's type");
+            const auto camera = lines.number<std::uint32_t>("sensor id");
+            const auto image = lines.number<std::uint64_t>("image id");
+            if (type == "CAMERA") frame.images[image] = camera;
+        }
+        frames.push_back(std::move(frame));
+    }
+    return frames;
+}
 
 ColmapCameras parse_colmap_cameras_text(std::string_view file, const std::string& where) {
     ColmapCameras cameras;

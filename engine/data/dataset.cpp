@@ -90,6 +90,67 @@ std::string what_it_adds(const Dataset& transforms, const Dataset& model) {
                       : "";
 }
 
+// What two sources say of the cameras of the same photos, as far as the frame and the unit of their
+// worlds play no part: focal lengths, turns from one photo to the next, and the ratios of the ways
+// between them. A sentence's part, empty where they agree.
+std::string disagreement(const Dataset& model, const Dataset& transforms) {
+    constexpr double kFocal = 0.02, kTurn = 0.02, kWay = 0.05, kMostOdd = 0.1;
+    std::map<fs::path, const View*> others;
+    for (const View& view : transforms.views)
+        others[fs::absolute(view.photo).lexically_normal()] = &view;
+    std::vector<std::pair<const View*, const View*>> shared;
+    for (const View& view : model.views)
+        if (const auto at = others.find(fs::absolute(view.photo).lexically_normal());
+            at != others.end())
+            shared.emplace_back(&view, at->second);
+    for (const auto& [a, b] : shared) {
+        const double one = a->lens.parameters.at(0) / a->lens.width,
+                     two = b->lens.parameters.at(0) / b->lens.width;
+        if (std::abs(one / two - 1) > kFocal)
+            return fmt::format(
+                "the focal length of {} is {:.3f} of its width in {}, and {:.3f} in {}", a->name,
+                one, model.source, two, transforms.source);
+    }
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i + 1 < shared.size(); ++i) {
+        const auto& [a, b] = shared[i];
+        const auto& [c, d] = shared[i + 1];
+        const glm::dmat3 one = c->camera.rotation * glm::transpose(a->camera.rotation),
+                         two = d->camera.rotation * glm::transpose(b->camera.rotation);
+        for (int k = 0; k < 3; ++k)
+            if (glm::distance(one[k], two[k]) > kTurn)
+                return fmt::format("the turn from {} to {} is another in {} than in {}", a->name,
+                                   c->name, model.source, transforms.source);
+        const double way = glm::distance(a->camera.centre(), c->camera.centre());
+        if (way > 0) ratios.push_back(glm::distance(b->camera.centre(), d->camera.centre()) / way);
+    }
+    if (ratios.size() < 3) return {};
+    std::vector<double> sorted = ratios;
+    std::sort(sorted.begin(), sorted.end());
+    const double usual = sorted[sorted.size() / 2];
+    const auto odd = std::ranges::count_if(
+        ratios, [&](double ratio) { return !(std::abs(ratio / usual - 1) <= kWay); });
+    if (static_cast<double>(odd) <= kMostOdd * static_cast<double>(ratios.size())) return {};
+    return fmt::format(
+        "{} of {} ways from a camera to the next have another length in {} than in {}", odd,
+        ratios.size(), model.source, transforms.source);
+}
+
+void note_transforms_beside(const fs::path& path, const fs::path& model,
+                            const DatasetOptions& options, Dataset& dataset) {
+    std::string differs;
+    try {
+        differs = disagreement(dataset, load_transforms(path, options));
+    } catch (const Error&) {  // not to be read, and not asked for
+    }
+    dataset.notes.push_back(
+        differs.empty()
+            ? fmt::format("{} was read; name the transforms file itself to use that.",
+                          model.string())
+            : fmt::format("Warning: {}. {} was read; name the transforms file itself to use that.",
+                          differs, model.string()));
+}
+
 // The model that nerfstudio leaves below its transforms.json, which names the photos as COLMAP saw
 // them. Which of the two it is depends on the photos alone, so that cameras without photos
 // (require_photos false) are those that were trained on.
@@ -98,6 +159,8 @@ Dataset load_nerfstudio(const fs::path& path, const fs::path& model, DatasetOpti
     std::optional<Dataset> transforms;
     try {
         transforms = load_transforms(path, options);
+    } catch (const NoRoom&) {  // which says nothing of the files
+        throw;
     } catch (const Error&) {  // then it is the model, or nothing
     }
     std::string reason;
@@ -105,6 +168,8 @@ Dataset load_nerfstudio(const fs::path& path, const fs::path& model, DatasetOpti
         Dataset dataset = load_model(path, model, options);
         if (transforms) reason = what_it_adds(*transforms, dataset);
         if (reason.empty()) return dataset;
+    } catch (const NoRoom&) {
+        throw;
     } catch (const Error& error) {
         reason = fmt::format("{} {}", error.where, error.reason);
     }
@@ -147,8 +212,7 @@ Dataset load_source(const fs::path& path, DatasetOptions& options) {
         Dataset dataset = transforms && model == nerfstudio ? load_nerfstudio(path, model, options)
                                                             : load_model(path, model, options);
         if (transforms && dataset.source.starts_with("COLMAP"))
-            dataset.notes.push_back(fmt::format(
-                "{} was read; name the transforms file itself to use that.", model.string()));
+            note_transforms_beside(path, model, options, dataset);
         return dataset;
     }
     if (transforms) return load_transforms(path, options);
@@ -240,15 +304,19 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& asked) try {
     dataset.options = options;
     std::stable_sort(dataset.views.begin(), dataset.views.end(),
                      [](const View& a, const View& b) { return a.name < b.name; });
+    leave_out_far_cameras(dataset);
     index_tracks(dataset);
-    if (options.hold_out) mark_held_out(dataset.views, options.held_out);
+    if (options.hold_out)
+        if (std::string note = mark_held_out(dataset.views, options.held_out); !note.empty())
+            dataset.notes.push_back(std::move(note));
     fit_views(dataset, options);
     note_odd_cameras(dataset);
+    note_coarse_points(dataset);
     if (options.require_photos) find_depth_scale(dataset);
     return dataset;
 } catch (const std::bad_alloc&) {
-    throw Error(path.string(), "does not fit into the memory that is left",
-                "Free memory, or use a smaller data set.");
+    throw NoRoom(path.string(), "does not fit into the memory that is left",
+                 "Free memory, or use a smaller data set.");
 }
 
 std::vector<View> held_out_views(const std::vector<View>& views) {

@@ -31,11 +31,13 @@ struct View {
                                   // stored or as its EXIF turns it, at any size
     std::filesystem::path depth;  // measured, empty where there is none; see engine/data/depths.h
     double depth_unit = 0;        // metres a step of its values; 0: as the type of the file says
-    Camera camera;                // of the photo as load_photo returns it
-    LensModel lens;               // of the file on disk, turned by orientation; see load_photo
-    bool is_test = false;         // held out
-    bool in_arc = false;          // of the arc of HoldOut, is_test as well
-    int orientation = 1;          // EXIF number that load_photo applies, 1 = as stored
+    bool depth_unit_of_integers = false;  // depth_unit is that of integers, not of floats
+    double crop_radius = 0;  // px of the lens; what is farther from the middle is left out; 0: no
+    Camera camera;           // of the photo as load_photo returns it
+    LensModel lens;          // of the file on disk, turned by orientation; see load_photo
+    bool is_test = false;    // held out
+    bool in_arc = false;     // of the arc of HoldOut, is_test as well
+    int orientation = 1;     // EXIF number that load_photo applies, 1 = as stored
     std::uint32_t source_id = 0;  // COLMAP's image id
 };
 
@@ -129,6 +131,12 @@ bool photos_reach(const std::vector<View>& views, double scale);
 /// reads the first, where all of them or one take more than that.
 std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads = 0,
                                  std::uint64_t memory = 0);
+
+/// What of the photos to train on teaches nothing or less than it seems, a sentence each: photos
+/// that are transparent or masked everywhere, black, or the same as others, and one photo alone.
+/// photos: of dataset.views, as load_photos returns them. Throws Error where every one of them is
+/// transparent or masked everywhere.
+std::vector<std::string> photo_doubts(const Dataset& dataset, const std::vector<ImageU8>& photos);
 
 /// How much of the photos' opaque part is detail: of eight training photos, evenly picked, or all
 /// of fewer, at the size of their views. Throws Error as load_photo.

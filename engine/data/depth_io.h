@@ -1,4 +1,4 @@
-// Depth images as files: 16-bit grey PNG, and to read .npy as well.
+// Depth images as files: 16-bit grey PNG, and to read .npy and TIFF as well.
 #pragma once
 
 #include <cstddef>
@@ -23,8 +23,9 @@ constexpr double kMillimetre = 0.001;  // m
 
 /// Measured depths [H][W], metres along the optical axis; 0 where nothing was measured, as where
 /// the file has 0, NaN, infinity or less than 0. unit: metres a step; 0: what the type says, 0.001
-/// of 16-bit grey PNG and of .npy of uint16 and int32, 1 of .npy of float32 and float64. Throws
-/// Error naming the file where it is of another type, or has no measured depth.
-ImageF read_depth(const std::filesystem::path& path, double unit = 0);
+/// of integers, which are 16-bit grey PNG and some .npy and TIFF, 1 of .npy and TIFF of floats.
+/// of_integers: the unit is that of integers, and floats are metres in any case. Throws Error
+/// naming the file where it is of another type, or has no measured depth.
+ImageF read_depth(const std::filesystem::path& path, double unit = 0, bool of_integers = false);
 
 }  // namespace darb

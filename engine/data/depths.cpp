@@ -27,6 +27,7 @@ namespace {
 constexpr float kOneSurface = 0.05f;        // neighbours within it are of one surface
 constexpr std::size_t kViewsForScale = 20;  // that are read
 constexpr std::size_t kLeastPoints = 20;
+constexpr double kOfTheSameScene = 0.2;  // most spread of points over depths, as a share
 
 /// A name's stems: with and without its extension, with and without images/.
 std::vector<fs::path> depth_stems(const std::string& name) {
@@ -35,12 +36,70 @@ std::vector<fs::path> depth_stems(const std::string& name) {
             without_picture_extension(fs::path(name))};
 }
 
+constexpr const char* kDepthTails[] = {".png", ".PNG", ".npy", ".tif", ".TIF", ".tiff", ".TIFF"};
+
+bool is_depth_name(const fs::path& path) {
+    return is_photo_name(path) || has_extension(path, ".npy") || has_extension(path, ".tif") ||
+           has_extension(path, ".tiff");
+}
+
+fs::path with_depth_tail(const std::string& stem) {
+    for (const char* tail : kDepthTails)
+        if (const fs::path found = stem + tail; fs::is_regular_file(found)) return found;
+    return {};
+}
+
 fs::path find_depth(const fs::path& depths, const std::string& name) {
     for (const fs::path& stem : depth_stems(name))
-        for (const char* tail : {".png", ".PNG", ".npy"})
-            if (const fs::path found = depths / (stem.string() + tail); fs::is_regular_file(found))
+        for (const char* word : {"", "_depth", ".depth"})
+            if (fs::path found = with_depth_tail((depths / stem).string() + word); !found.empty())
                 return found;
     return {};
+}
+
+/// FOLDER/depths or FOLDER/depth, in whatever case; empty where there is neither.
+fs::path depths_folder(const fs::path& folder) {
+    for (const char* name : {"depths", "depth"})
+        if (fs::is_directory(folder / name)) return folder / name;
+    for (const fs::path& other : folders_of(folder)) {
+        const std::string name = lower_case(other.filename().string());
+        if (name == "depths" || name == "depth") return other;
+    }
+    return {};
+}
+
+/// NAME_depth.png and the like beside the photos. Returns how many.
+std::size_t find_depths_beside_photos(Dataset& dataset) {
+    std::size_t found = 0;
+    for (View& view : dataset.views) {
+        const fs::path stem = without_picture_extension(view.photo);
+        for (const std::string& name : {stem.string(), view.photo.string()})
+            for (const char* word : {"_depth", ".depth"})
+                if (view.depth.empty() && !name.empty()) view.depth = with_depth_tail(name + word);
+        found += view.depth.empty() ? 0 : 1;
+    }
+    return found;
+}
+
+/// Files of photos' names that are of a kind that is not read.
+void note_unread_depths(const fs::path& depths, Dataset& dataset) {
+    std::set<std::string> wanted;
+    for (const View& view : dataset.views)
+        if (view.depth.empty())
+            for (const fs::path& stem : depth_stems(view.name)) wanted.insert(stem.string());
+    std::size_t count = 0;
+    fs::path first;
+    for (const auto& entry : fs::recursive_directory_iterator(depths)) {
+        fs::path stem = entry.path().lexically_relative(depths);
+        if (!entry.is_regular_file() || !wanted.contains(stem.replace_extension().string()))
+            continue;
+        if (count++ == 0 || entry.path() < first) first = entry.path();
+    }
+    if (count > 0)
+        dataset.notes.push_back(fmt::format(
+            "Warning: not read: {} in {}, the first being {}. Depths are 16-bit grey PNG, TIFF or "
+            ".npy.",
+            counted(count, "file"), depths.string(), first.filename().string()));
 }
 
 /// COLMAP may have left photos out, which leaves their depths without a view.
@@ -51,12 +110,17 @@ void check_depths(const fs::path& depths, const fs::path& images, const Dataset&
     for (const auto& entry : fs::recursive_directory_iterator(depths)) {
         const fs::path& file = entry.path();
         if (!entry.is_regular_file() || file.filename().string().starts_with('.')) continue;
-        if (!is_photo_name(file) && !has_extension(file, ".npy")) continue;
+        if (!is_depth_name(file)) continue;
         fs::path stem = fs::relative(file, depths).replace_extension();
+        for (const std::string_view word : {"_depth", ".depth"})
+            if (const std::string name = stem.string();
+                name.ends_with(word) && !known.contains(stem))
+                stem = name.substr(0, name.size() - word.size());
         if (known.contains(stem) || !find_photo(images, stem.string()).empty()) continue;
-        throw Error(file.string(), "is the depth of no photo",
-                    fmt::format("Name it as its photo in {}, with .png or .npy, or remove it.",
-                                images.string()));
+        throw Error(
+            file.string(), "is the depth of no photo",
+            fmt::format("Name it as its photo in {}, with .png, .tif or .npy, or remove it.",
+                        images.string()));
     }
 }
 
@@ -136,22 +200,44 @@ std::vector<double> ratios_of(const Dataset& dataset, std::size_t v) {
 
 void add_depths(const fs::path& folder, const fs::path& images, const DatasetOptions& options,
                 Dataset& dataset) {
-    fs::path depths = folder / "depths";
-    if (!fs::is_directory(depths)) depths = folder / "depth";
-    if (!fs::is_directory(depths)) return;
+    const fs::path depths = depths_folder(folder);
+    if (const fs::path scales = folder / "sparse/0/depth_params.json";
+        !depths.empty() && fs::exists(scales)) {
+        dataset.notes.push_back(
+            fmt::format("{} is left out: {} says that its depths are inverse ones that a network "
+                        "estimated, as 3DGS takes them, and darb reads measured depths.",
+                        depths.string(), scales.string()));
+        return;
+    }
     std::size_t with = 0;
+    if (depths.empty()) {
+        with = find_depths_beside_photos(dataset);
+        if (with > 0)
+            dataset.notes.push_back(
+                fmt::format("Depths were found beside the photos: {} of {} photos have none.",
+                            dataset.views.size() - with, dataset.views.size()));
+        else if (const std::string unused = unused_folders({folder}, {"depth"});
+                 !unused.empty() && options.require_photos)
+            dataset.notes.push_back(fmt::format(
+                "Not used: {}. If these are measured depths, name their folder depths and the "
+                "files as the photos, with .png, .tif or .npy.",
+                unused));
+        return;
+    }
     for (View& view : dataset.views) {
         view.depth = find_depth(depths, view.name);
         with += view.depth.empty() ? 0 : 1;
     }
     if (options.require_photos) check_depths(depths, images, dataset);
+    note_unread_depths(depths, dataset);
     if (with > 0 && with < dataset.views.size())
         dataset.notes.push_back(fmt::format("{}: {} of {} photos have none.", depths.string(),
                                             dataset.views.size() - with, dataset.views.size()));
 }
 
 ImageF load_depth(const View& view) {
-    const Depths file(turned(read_depth(view.depth, view.depth_unit), view));
+    const Depths file(
+        turned(read_depth(view.depth, view.depth_unit, view.depth_unit_of_integers), view));
     const Camera& camera = view.camera;
     const glm::dvec2 photo(view.lens.width, view.lens.height),
         size(file.image().width, file.image().height), own(camera.width, camera.height);
@@ -180,7 +266,7 @@ void find_depth_scale(Dataset& dataset) {
     std::vector<std::size_t> views;
     for (std::size_t v = 0; v < dataset.views.size(); ++v)
         if (!dataset.views[v].depth.empty()) views.push_back(v);
-    dataset.depth_scale = dataset.options.depth_scale.value_or(1);
+    if (dataset.options.depth_scale) dataset.depth_scale = *dataset.options.depth_scale;
     if (views.empty() || dataset.options.depth_scale || dataset.points.seen_by.empty()) return;
     std::vector<double> ratios;
     const std::size_t count = std::min(views.size(), kViewsForScale);
@@ -195,11 +281,14 @@ void find_depth_scale(Dataset& dataset) {
                                 ratios.size()),
                     "Say how many world units a metre is with --depth-scale.");
     dataset.depth_scale = nearest_rank(ratios, 0.5);
-    const double spread = nearest_rank(ratios, 0.75) - nearest_rank(ratios, 0.25);
+    const double spread =
+        (nearest_rank(ratios, 0.75) - nearest_rank(ratios, 0.25)) / dataset.depth_scale;
     dataset.notes.push_back(fmt::format(
-        "A metre of the measured depths is {:.4g} world units, by {} points (the middle half of "
-        "them within {:.1f} %); --depth-scale says otherwise.",
-        dataset.depth_scale, ratios.size(), 100 * spread / dataset.depth_scale));
+        "{}A metre of the measured depths is {:.4g} world units, by {} points (the middle half of "
+        "them within {:.1f} %); --depth-scale says otherwise{}.",
+        spread > kOfTheSameScene ? "Warning: the depths do not fit the points. " : "",
+        dataset.depth_scale, ratios.size(), 100 * spread,
+        spread > kOfTheSameScene ? ", as --depth-scale 1 where the cameras are in metres" : ""));
 }
 
 }  // namespace darb

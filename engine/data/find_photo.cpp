@@ -1,6 +1,10 @@
 // Where a photo lies that a source names: names come from other systems, folders of smaller photos
 // hold other formats, and formats that are not read were converted.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cctype>
+#include <set>
 
 #include "engine/data/image_io.h"
 #include "engine/data/source.h"
@@ -43,6 +47,58 @@ std::string scaled_images(const fs::path& folder) {
             first = name;
     }
     return first;
+}
+
+fs::path find_by_end(const fs::path& folder, const std::string& name) {
+    std::string rest = with_slashes(name);
+    for (std::size_t slash = rest.find('/'); slash != std::string::npos; slash = rest.find('/')) {
+        rest.erase(0, slash + 1);
+        if (rest.empty() || rest.starts_with("..")) continue;
+        if (fs::path found = with_any_extension(folder / rest); !found.empty()) return found;
+    }
+    return {};
+}
+
+std::string lower_case(std::string text) {
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+}
+
+std::vector<fs::path> folders_of(const fs::path& parent) {
+    std::vector<fs::path> folders;
+    std::error_code none;  // no such folder: no entries
+    for (const fs::directory_entry& entry : fs::directory_iterator(parent, none))
+        if (entry.is_directory(none) && !entry.path().filename().string().starts_with('.'))
+            folders.push_back(entry.path());
+    std::sort(folders.begin(), folders.end());
+    return folders;
+}
+
+std::string unused_folders(const std::vector<fs::path>& parents,
+                           std::initializer_list<std::string_view> words) {
+    std::set<fs::path> seen;
+    std::string list;
+    for (const fs::path& parent : parents)
+        for (const fs::path& folder : folders_of(parent)) {
+            const std::string name = lower_case(folder.filename().string());
+            if (std::ranges::none_of(words, [&](std::string_view word) {
+                    return name.find(word) != std::string::npos;
+                }))
+                continue;
+            std::error_code none;
+            std::size_t files = 0;
+            fs::path first;
+            for (const auto& entry : fs::recursive_directory_iterator(folder, none)) {
+                if (!entry.is_regular_file(none)) continue;
+                if (files++ == 0 || entry.path() < first) first = entry.path();
+            }
+            if (files == 0 || !seen.insert(fs::absolute(folder).lexically_normal()).second)
+                continue;
+            list += fmt::format("{}{} ({}, the first being {})", list.empty() ? "" : "; ",
+                                folder.string(), counted(files, "file"),
+                                first.lexically_relative(folder).string());
+        }
+    return list;
 }
 
 fs::path find_photo(const fs::path& folder, const std::string& name) {

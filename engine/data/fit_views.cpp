@@ -26,6 +26,8 @@ struct Tally {
     std::string resize_example;
     std::size_t unfit = 0;  // photos that cannot be used, where only cameras are wanted
     std::string unfit_example;
+    std::size_t other_focal = 0;  // cameras whose focal length is not what EXIF says
+    std::string focal_example;
 };
 
 bool same_aspect(const LensModel& lens, int width, int height) {
@@ -42,13 +44,31 @@ int choose_orientation(const ImageInfo& info, const LensModel& lens) {
     return same_aspect(lens, info.width, info.height) ? 1 : info.orientation;
 }
 
+/// EXIF's focal length against the camera's. Crops and digital zoom change it, so only what is far
+/// off is told; a fisheye's says little.
+void compare_focal(const ImageInfo& info, const View& view, Tally& tally) {
+    constexpr double kFilmDiagonal = 43.27, kMost = 1.6;  // mm
+    if (info.focal_35mm <= 0 || view.lens.parameters.empty() || view.lens.width < 1 ||
+        view.lens.model.find("FISHEYE") != std::string::npos)
+        return;
+    const double said = info.focal_35mm / kFilmDiagonal * std::hypot(info.width, info.height) *
+                        view.lens.width / (view.orientation >= 5 ? info.height : info.width);
+    const double ratio = view.lens.parameters[0] / said;
+    if (ratio < kMost && ratio > 1 / kMost) return;
+    if (tally.other_focal++ == 0)
+        tally.focal_example =
+            fmt::format("{} with {:.0f} px, where its EXIF's {} mm (on 35 mm film) are {:.0f} px",
+                        view.name, view.lens.parameters[0], info.focal_35mm, said);
+}
+
 void fit_lens(View& view, Tally& tally) {
     const ImageInfo info = read_image_info(view.photo);
     const bool own_alpha = info.channels == 2 || info.channels == 4;
     tally.own_alpha |= own_alpha;
-    tally.masked |= !view.mask.empty();
+    tally.masked |= !view.mask.empty() || view.crop_radius > 0;
     if (view.orientation == 1) view.orientation = choose_orientation(info, view.lens);
     if (view.orientation != info.orientation) ++tally.unturned;
+    compare_focal(info, view, tally);
     const bool swap = view.orientation >= 5;
     const int width = swap ? info.height : info.width, height = swap ? info.width : info.height;
     if (width == view.lens.width && height == view.lens.height) return;
@@ -62,6 +82,7 @@ void fit_lens(View& view, Tally& tally) {
         tally.resize_example =
             fmt::format("{} is {} x {} px where its camera declares {} x {}", view.name, width,
                         height, view.lens.width, view.lens.height);
+    view.crop_radius *= static_cast<double>(width) / view.lens.width;
     view.lens = scale_lens(view.lens, width, height);
 }
 
@@ -114,6 +135,11 @@ void add_notes(const Tally& tally, const DatasetOptions& options, Dataset& datas
         dataset.notes.push_back(fmt::format("The intrinsics of {} were scaled to the photos: {}.",
                                             counted(tally.resized, "camera"),
                                             tally.resize_example));
+    if (tally.other_focal > 0)
+        dataset.notes.push_back(fmt::format(
+            "Warning: focal lengths are far from what the photos' EXIF says: {}, as {}. The "
+            "cameras' are used.",
+            counted(tally.other_focal, "camera"), tally.focal_example));
     if (tally.unfit > 0)
         dataset.notes.push_back(
             fmt::format("Kept at the size that is declared: {}, as its photo cannot be used: {}.",

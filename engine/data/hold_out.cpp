@@ -1,12 +1,17 @@
 #include "engine/data/hold_out.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
 #include <glm/glm.hpp>
+#include <map>
 #include <numeric>
+#include <utility>
 
 #include "engine/core/error.h"
 #include "engine/data/dataset.h"
@@ -126,8 +131,109 @@ std::vector<std::size_t> way_round(const std::vector<View>& views) {
     return order;
 }
 
-void mark_held_out(std::vector<View>& views, const HoldOut& hold_out) {
+namespace {
+
+/// FNV-1a of at most so many bytes of a file; 0 where it cannot be read.
+std::uint64_t hash_of_file(const std::filesystem::path& path, std::uint64_t most) {
+    std::ifstream file(path, std::ios::binary);
+    std::uint64_t hash = 0xcbf29ce484222325ULL;
+    std::vector<char> part(1 << 16);
+    while (most > 0 && file) {
+        file.read(part.data(), std::streamsize(std::min<std::uint64_t>(most, part.size())));
+        for (std::streamsize i = 0; i < file.gcount(); ++i)
+            hash = (hash ^ static_cast<unsigned char>(part[std::size_t(i)])) * 0x100000001b3ULL;
+        most -= std::uint64_t(file.gcount());
+    }
+    return file.bad() ? 0 : hash;
+}
+
+// Groups that have more than one member, split by a key of their members.
+template <typename Key>
+std::vector<std::vector<std::size_t>> split(const std::vector<std::vector<std::size_t>>& groups,
+                                            const Key& key_of) {
+    std::vector<std::vector<std::size_t>> parts;
+    for (const std::vector<std::size_t>& group : groups) {
+        std::map<std::uint64_t, std::vector<std::size_t>> by_key;
+        for (const std::size_t i : group) by_key[key_of(i)].push_back(i);
+        for (auto& [key, part] : by_key)
+            if (part.size() > 1) parts.push_back(std::move(part));
+    }
+    return parts;
+}
+
+// Names of the first photos that several views have, for people.
+std::string some_names(const std::vector<View>& views, const std::vector<std::size_t>& first) {
+    constexpr int kNamed = 3;
+    std::string list;
+    int named = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        if (first[i] == i) continue;
+        if (named++ == kNamed) return list + ", ...";
+        list += fmt::format("{}{} repeats {}", list.empty() ? "" : ", ", views[i].name,
+                            views[first[i]].name);
+    }
+    return list;
+}
+
+/// Brings the views of a photo to the side of the test where one of them is there.
+std::string keep_together(std::vector<View>& views, const std::vector<std::size_t>& first) {
+    std::vector<View> moved = views;
+    for (const bool spread : {false, true})  // first to the first view of a photo, then from it
+        for (std::size_t i = 0; i < moved.size(); ++i) {
+            View& to = moved[spread ? i : first[i]];
+            const View& from = moved[spread ? first[i] : i];
+            to.in_arc = to.in_arc || from.in_arc;
+            to.is_test = to.is_test || from.is_test;
+        }
+    std::size_t repeats = 0, held_out = 0;
+    for (std::size_t i = 0; i < moved.size(); ++i)
+        if (first[i] != i) ++repeats, held_out += moved[i].is_test ? 1 : 0;
+    if (repeats == 0) return {};
+    const std::string found =
+        fmt::format("{} the photo of another view ({}).",
+                    repeats == 1 ? "1 view repeats" : fmt::format("{} views repeat", repeats),
+                    some_names(views, first));
+    if (std::ranges::all_of(moved, &View::is_test) && !std::ranges::all_of(views, &View::is_test))
+        return found +
+               " Every photo that is trained on is held out as well, so what is measured on the "
+               "held-out views is no measure of new views.";
+    views = std::move(moved);
+    return fmt::format(
+        "{} Views of one photo stay on one side: {} of the repeats are held out, {} trained on.",
+        found, held_out, repeats - held_out);
+}
+
+}  // namespace
+
+std::vector<std::size_t> first_of_photo(const std::vector<View>& views) {
+    constexpr std::uint64_t kHead = 1 << 16;  // bytes that tell nearly all files apart
+    std::vector<std::size_t> first(views.size());
+    std::iota(first.begin(), first.end(), std::size_t{0});
+    std::map<std::pair<dev_t, ino_t>, std::size_t> files;
+    std::map<std::uint64_t, std::vector<std::size_t>> by_size;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        struct stat info {};
+        if (::stat(views[i].photo.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) continue;
+        const auto [known, is_new] = files.try_emplace({info.st_dev, info.st_ino}, i);
+        if (is_new)
+            by_size[std::uint64_t(info.st_size)].push_back(i);
+        else
+            first[i] = known->second;
+    }
+    std::vector<std::vector<std::size_t>> groups;
+    for (auto& [size, group] : by_size)
+        if (size > 0) groups.push_back(std::move(group));
+    for (const std::uint64_t most : {kHead, ~std::uint64_t{0}})
+        groups = split(groups, [&](std::size_t i) { return hash_of_file(views[i].photo, most); });
+    for (const std::vector<std::size_t>& group : groups)
+        for (const std::size_t i : group) first[i] = group.front();
+    for (std::size_t& i : first) i = first[i];  // another name of a copy
+    return first;
+}
+
+std::string mark_held_out(std::vector<View>& views, const HoldOut& hold_out) {
     const bool own_test = std::ranges::any_of(views, &View::is_test);
+    const std::vector<std::size_t> photo = first_of_photo(views);
     if (hold_out.arc > 0 && views.size() > 1) {
         const std::vector<std::size_t> order = way_round(views);
         const std::size_t count = std::clamp<std::size_t>(
@@ -137,10 +243,15 @@ void mark_held_out(std::vector<View>& views, const HoldOut& hold_out) {
         for (std::size_t i = first; i < first + count; ++i)
             views[order[i]].is_test = views[order[i]].in_arc = true;
     }
-    if (own_test || hold_out.every == 0) return;
+    if (own_test || hold_out.every == 0) return keep_together(views, photo);
     std::size_t place = 0;
-    for (View& view : views)
-        if (!view.in_arc && place++ % std::size_t(hold_out.every) == 0) view.is_test = true;
+    std::vector<bool> in_arc(views.size(), false);
+    for (std::size_t i = 0; i < views.size(); ++i)
+        if (views[i].in_arc) in_arc[photo[i]] = true;
+    for (std::size_t i = 0; i < views.size(); ++i)
+        if (photo[i] == i && !in_arc[i] && place++ % std::size_t(hold_out.every) == 0)
+            views[i].is_test = true;
+    return keep_together(views, photo);
 }
 
 }  // namespace darb

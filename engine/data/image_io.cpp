@@ -90,12 +90,14 @@ ImageInfo read_image_info(const std::filesystem::path& path) {
         head = read_file(path);
         found = photo_head(head, head.size(), path.string());
     }
-    return {found.width, found.height, found.channels, exif_orientation(head)};
+    return {found.width, found.height, found.channels, exif_orientation(head),
+            exif_focal_35mm(head)};
 }
 
 ImageInfo parse_image_info(std::span<const std::byte> file, const std::string& where) {
     const PhotoHead found = photo_head(file, file.size(), where);
-    return {found.width, found.height, found.channels, exif_orientation(file)};
+    return {found.width, found.height, found.channels, exif_orientation(file),
+            exif_focal_35mm(file)};
 }
 
 ImageU8 decode_image(std::span<const std::byte> file, const std::string& where, int orientation) {

@@ -17,6 +17,7 @@ struct ImageInfo {
     int height = 0;       // px, as stored
     int channels = 0;     // 1 to 4, as stored
     int orientation = 1;  // EXIF, 1 to 8
+    int focal_35mm = 0;   // EXIF, mm on 35 mm film; 0: not there
 };
 
 /// Whether the name ends as those of the pictures do that are read here: .png, .jpg, .jpeg.

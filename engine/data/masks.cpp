@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
@@ -31,6 +33,62 @@ fs::path find_mask(const fs::path& masks, const std::string& name) {
     return {};
 }
 
+/// What is left of a file's name, in lower case, without extensions of pictures and "mask".
+std::string bare_name(const fs::path& path) {
+    std::string name = lower_case(path.filename().string());
+    for (bool more = true; more;) {
+        const std::size_t before = name.size();
+        name = without_picture_extension(name).string();
+        for (const std::string_view tail : {".mask", "_mask", "-mask", " mask"})
+            if (name.size() > tail.size() && name.ends_with(tail))
+                name.erase(name.size() - tail.size());
+        for (const std::string_view head : {"mask_", "mask-"})
+            if (name.size() > head.size() && name.starts_with(head)) name.erase(0, head.size());
+        more = name.size() < before;
+    }
+    return name;
+}
+
+/// The folders of a name: what may differ is that one of two has none.
+bool folders_agree(const fs::path& a, const fs::path& b) {
+    const std::string one = lower_case(a.parent_path().generic_string()),
+                      two = lower_case(b.parent_path().generic_string());
+    return one.empty() || two.empty() || one == two || one.ends_with("/" + two) ||
+           two.ends_with("/" + one);
+}
+
+/// Masks of views that have none yet, by their bare names, where there is no doubt.
+void find_masks_by_bare_name(const fs::path& masks, Dataset& dataset) {
+    std::multimap<std::string, fs::path> files;
+    std::error_code none;
+    for (const auto& entry : fs::recursive_directory_iterator(masks, none))
+        if (is_photo_name(entry.path()) || is_foreign_picture_name(entry.path()))
+            files.emplace(bare_name(entry.path()), entry.path().lexically_relative(masks));
+    std::map<std::string, std::size_t> photos;
+    for (const View& view : dataset.views) ++photos[bare_name(view.name)];
+    for (View& view : dataset.views) {
+        const std::string name = bare_name(view.name);
+        const auto [first, end] = files.equal_range(name);
+        if (!view.mask.empty() || photos[name] != 1 || first == end || std::next(first) != end)
+            continue;
+        if (folders_agree(without_images(view.name), first->second))
+            view.mask = masks / first->second;
+    }
+}
+
+/// NAME_mask.png and the like beside the photos. Returns how many.
+std::size_t find_masks_beside_photos(Dataset& dataset) {
+    std::size_t found = 0;
+    for (View& view : dataset.views) {
+        const fs::path stem = without_picture_extension(view.photo);
+        for (const std::string& name : {stem.string(), view.photo.string()})
+            for (const char* tail : {"_mask.png", ".mask.png", "-mask.png"})
+                if (view.mask.empty() && !name.empty()) view.mask = find_photo("", name + tail);
+        found += view.mask.empty() ? 0 : 1;
+    }
+    return found;
+}
+
 }  // namespace
 
 std::string without_images(const std::string& name) {
@@ -40,18 +98,34 @@ std::string without_images(const std::string& name) {
 fs::path masks_folder(const fs::path& folder) {
     for (const char* name : {"masks", "mask"})
         if (holds_pictures(folder / name)) return folder / name;
+    for (const fs::path& other : folders_of(folder)) {
+        const std::string name = lower_case(other.filename().string());
+        if ((name == "masks" || name == "mask") && holds_pictures(other)) return other;
+    }
     return {};
 }
 
 void add_masks(const fs::path& folder, const DatasetOptions& options, Dataset& dataset) {
     const fs::path masks = masks_folder(folder);
-    if (masks.empty()) return;
-    std::size_t without = 0;
-    for (View& view : dataset.views) {
-        view.mask = find_mask(masks, view.name);
-        without += view.mask.empty() ? 1 : 0;
-    }
     const std::size_t count = dataset.views.size();
+    if (masks.empty()) {
+        const std::size_t beside = find_masks_beside_photos(dataset);
+        if (beside > 0)
+            dataset.notes.push_back(
+                fmt::format("Masks were found beside the photos: {} of {} photos have none.",
+                            count - beside, count));
+        else if (const std::string unused = unused_folders({folder}, {"mask", "segment"});
+                 !unused.empty() && options.require_photos)
+            dataset.notes.push_back(fmt::format(
+                "Warning: not used: {}. If these are masks, black where pixels are to be left out, "
+                "name their folder masks and the files as the photos.",
+                unused));
+        return;
+    }
+    std::size_t without = 0;
+    for (View& view : dataset.views) view.mask = find_mask(masks, view.name);
+    find_masks_by_bare_name(masks, dataset);
+    for (const View& view : dataset.views) without += view.mask.empty() ? 1 : 0;
     if (without == count && options.require_photos) {
         const std::string name = without_images(dataset.views[0].name);
         throw Error(masks.string(), fmt::format("holds the masks of none of the {} photos", count),

@@ -8,13 +8,17 @@
 
 namespace darb {
 
-/// FOLDER/masks or, where it holds no pictures, FOLDER/mask; empty where neither does.
+/// FOLDER/masks or, where it holds no pictures, FOLDER/mask, in whatever case; empty where neither
+/// does.
 std::filesystem::path masks_folder(const std::filesystem::path& folder);
 
 /// Gives every view its mask in masks_folder(folder), with a note where some have none: of the
 /// photo's name, a leading "images/" left out or not, with the extension of a picture in place of
-/// the photo's or added to it, after ".mask" or not. Throws Error where no view has one and photos
-/// are asked for.
+/// the photo's or added to it, after ".mask" or not; else the one file whose name is the photo's
+/// but for case, folders that one of them lacks, a second extension and "mask". Where there is no
+/// such folder, NAME_mask.png and the like beside the photos. Where neither is, a note names
+/// folders that may have been meant. Throws Error where a folder has none of a view and photos are
+/// asked for.
 void add_masks(const std::filesystem::path& folder, const DatasetOptions& options,
                Dataset& dataset);
 

@@ -8,6 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/scene/ply_table.h"
+#include "engine/scene/quantise.h"
 
 namespace darb {
 
@@ -34,10 +35,11 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const std::str
 }
 
 PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeader& header,
-                                 const std::string& where, std::size_t& dropped) {
+                                 const std::string& where, std::size_t& dropped,
+                                 std::vector<std::string>* notes) {
     const PlyElement* vertex = header.find("vertex");
     if (!vertex) throw Error(where, "has no element vertex", "A point cloud is needed.");
-    int position[3], colour[3];
+    int position[3], colour[3], dc[3];
     for (int i = 0; i < 3; ++i) {
         position[i] = vertex->find(std::string(1, "xyz"[i]));
         if (position[i] < 0)
@@ -48,7 +50,15 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
                                               {"blue", "b", "diffuse_blue"}};
         colour[i] = std::max(
             {vertex->find(kNames[i][0]), vertex->find(kNames[i][1]), vertex->find(kNames[i][2])});
+        dc[i] = vertex->find(fmt::format("f_dc_{}", i));
     }
+    const bool uncoloured = colour[0] < 0 && colour[1] < 0 && colour[2] < 0;
+    const bool is_scene = uncoloured && dc[0] >= 0 && dc[1] >= 0 && dc[2] >= 0;
+    if (notes && is_scene)
+        notes->push_back(
+            fmt::format("{} is a splat scene: its points have the colours of its f_dc.", where));
+    if (notes && uncoloured && !is_scene && vertex->count > 0)
+        notes->push_back(fmt::format("{} has no colours: its points are grey.", where));
     // What a value is multiplied by, to 0 .. 255; floats follow when the largest is known.
     const auto type_of = [&](int i) {
         return vertex->properties[static_cast<std::size_t>(colour[i])].type;
@@ -73,7 +83,9 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
         }
         for (int i = 0; i < 3; ++i) {
             points.position.push_back(values[position[i]]);
-            const double value = colour[i] < 0 ? kMidGrey : values[colour[i]] * factor[i];
+            const double value = is_scene        ? 255 * colour_of_dc(values[dc[i]])
+                                 : colour[i] < 0 ? kMidGrey
+                                                 : values[colour[i]] * factor[i];
             points.colour.push_back(colour_byte(value));
             if (!floats) continue;
             raw.push_back(static_cast<float>(value));
@@ -88,8 +100,11 @@ PointCloud parse_point_cloud_ply(std::span<const std::byte> file, const PlyHeade
     return points;
 }
 
-PointCloud read_point_cloud_ply(const std::filesystem::path& path, std::size_t& dropped) {
-    return parse_point_cloud_ply(read_file(path), path.string(), dropped);
+PointCloud read_point_cloud_ply(const std::filesystem::path& path, std::size_t& dropped,
+                                std::vector<std::string>* notes) {
+    const std::vector<std::byte> file = read_file(path);
+    return parse_point_cloud_ply(file, parse_ply_header(file, path.string()), path.string(),
+                                 dropped, notes);
 }
 
 }  // namespace darb

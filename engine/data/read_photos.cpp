@@ -75,15 +75,23 @@ void check_memory(const std::vector<View>& views, std::uint64_t free) {
     for (const View& view : views) {
         all += bytes_loaded(view);
         if (bytes_while_loading(view) <= free) continue;
-        throw Error(view.photo.string(),
-                    fmt::format("takes {} MB of memory while it is read, {} MB are free",
-                                bytes_while_loading(view) >> 20, free >> 20),
-                    "Free memory, or make the photo smaller.");
+        throw NoRoom(view.photo.string(),
+                     fmt::format("takes {} MB of memory while it is read, {} MB are free",
+                                 bytes_while_loading(view) >> 20, free >> 20),
+                     "Free memory, or make the photo smaller.");
     }
     if (all > free)
-        throw Error(fmt::format("{} photos", views.size()),
-                    fmt::format("take {} MB of memory, {} MB are free", all >> 20, free >> 20),
-                    "Load them smaller with -r 2, 4 or 8, or free memory.");
+        throw NoRoom(fmt::format("{} photos", views.size()),
+                     fmt::format("take {} MB of memory, {} MB are free", all >> 20, free >> 20),
+                     "Load them smaller with -r 2, 4 or 8, or free memory.");
+}
+
+/// Alpha 0 where a pixel is farther than `radius` px from the middle.
+void crop_to_circle(ImageU8& rgba, double radius) {
+    for (int y = 0; y < rgba.height; ++y)
+        for (int x = 0; x < rgba.width; ++x)
+            if (std::hypot(x + 0.5 - 0.5 * rgba.width, y + 0.5 - 0.5 * rgba.height) > radius)
+                rgba.data[(static_cast<std::size_t>(y) * rgba.width + x) * 4 + 3] = 0;
 }
 
 ImageU8 decode_photo(const View& view) {
@@ -95,6 +103,7 @@ ImageU8 decode_photo(const View& view) {
                     "Leave the photos alone while they are in use.");
     if (!view.mask.empty())
         apply_mask(photo, turn_with_photo(read_image(view.mask, 1), view, view.mask, "masks"));
+    if (view.crop_radius > 0) crop_to_circle(photo, view.crop_radius);
     if (view.lens.distorted() && !view.camera.lens.active) {
         const Camera full = undistorted_frame(view.lens, view.photo.string()).camera;
         photo = undistort(photo, view.lens, full);
@@ -126,10 +135,10 @@ ImageU8 turn_with_photo(ImageU8 image, const View& view, const std::filesystem::
 ImageU8 load_photo(const View& view) try {
     return decode_photo(view);
 } catch (const std::bad_alloc&) {
-    throw Error(view.photo.string(),
-                fmt::format("does not fit into the memory that is left: {} x {} px",
-                            view.lens.width, view.lens.height),
-                "Free memory, or make the photo smaller.");
+    throw NoRoom(view.photo.string(),
+                 fmt::format("does not fit into the memory that is left: {} x {} px",
+                             view.lens.width, view.lens.height),
+                 "Free memory, or make the photo smaller.");
 }
 
 std::vector<ImageU8> load_photos(const std::vector<View>& views, int threads,

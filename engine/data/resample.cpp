@@ -68,23 +68,63 @@ ImageU8 to_rgba(ImageU8 image) {
     return rgba;
 }
 
+namespace {
+
+/// What a mask says of its pixels, 0 to 255. It is in the colour, 0 and 1 standing for 0 and 255.
+/// Where the alpha channel varies it is there; in both where the colour is black and white as well.
+class MaskValues {
+  public:
+    explicit MaskValues(const ImageU8& mask)
+        : mask_(mask), channels_(static_cast<std::size_t>(mask.channels)) {
+        int least = 255, most = 0, clear = 255, opaque = 0;
+        for (std::size_t i = 0; i + channels_ <= mask.data.size(); i += channels_) {
+            const std::uint8_t* at = &mask.data[i];
+            least = std::min<int>(least, at[0]);
+            most = std::max<int>(most, at[0]);
+            if (channels_ != 4) continue;
+            clear = std::min<int>(clear, at[3]);
+            opaque = std::max<int>(opaque, at[3]);
+        }
+        scale_ = most == 1 ? 255 : 1;
+        by_alpha_ = clear < opaque;
+        by_colour_ = !by_alpha_ || (least < most && is_black_and_white());
+    }
+
+    int at(std::size_t pixel) const {
+        const std::uint8_t* at = &mask_.data[pixel * channels_];
+        const int colour = by_colour_ ? scale_ * at[0] : 255;
+        return by_alpha_ ? (colour * at[3] + 127) / 255 : colour;
+    }
+
+  private:
+    bool is_black_and_white() const {
+        constexpr int kNear = 8;
+        for (std::size_t i = 0; i < mask_.data.size(); i += channels_)
+            for (std::size_t c = 0; c < 3; ++c)
+                if (mask_.data[i + c] > kNear && mask_.data[i + c] < 255 - kNear) return false;
+        return true;
+    }
+
+    const ImageU8& mask_;
+    std::size_t channels_;
+    int scale_ = 1;
+    bool by_alpha_ = false, by_colour_ = true;
+};
+
+}  // namespace
+
 void apply_mask(ImageU8& rgba, const ImageU8& mask) {
     if (rgba.channels != 4 || mask.width <= 0 || mask.height <= 0)
         throw Error("mask",
                     fmt::format("{}x{} px for a photo of {} channels", mask.width, mask.height,
                                 rgba.channels),
                     "Use RGBA photos and masks that are not empty.");
-    const auto channels = static_cast<std::size_t>(mask.channels);
-    int largest = 0;
-    for (std::size_t i = 0; i < mask.data.size(); i += channels)
-        largest = std::max<int>(largest, mask.data[i]);
-    const int scale = largest == 1 ? 255 : 1;
+    const MaskValues values(mask);
     for (int y = 0; y < rgba.height; ++y) {
         const auto v = static_cast<std::size_t>((y + 0.5) * mask.height / rgba.height);
         for (int x = 0; x < rgba.width; ++x) {
             const auto u = static_cast<std::size_t>((x + 0.5) * mask.width / rgba.width);
-            const int value =
-                scale * mask.data[(v * static_cast<std::size_t>(mask.width) + u) * channels];
+            const int value = values.at(v * static_cast<std::size_t>(mask.width) + u);
             std::uint8_t& alpha = rgba.data[(static_cast<std::size_t>(y) * rgba.width + x) * 4 + 3];
             alpha = static_cast<std::uint8_t>((alpha * value + 127) / 255);
         }

@@ -9,8 +9,9 @@ namespace darb {
 /// 1, 3 or 4 channels to 4; alpha 255 where there was none.
 ImageU8 to_rgba(ImageU8 image);
 
-/// Multiplies alpha by the mask's first channel / 255 (by 0 or 1 where its largest value is 1). A
-/// mask of another size is sampled at the nearest pixel. Colour where alpha becomes 0 stays.
+/// Multiplies alpha by the mask's first channel / 255 (by 0 or 1 where its largest value is 1); by
+/// its alpha where that varies, and by both where its colours are black and white. A mask of
+/// another size is sampled at the nearest pixel. Colour where alpha becomes 0 stays.
 void apply_mask(ImageU8& rgba, const ImageU8& mask);
 
 /// Mean over each target pixel's area, in premultiplied alpha, rounded to nearest. Sizes may be

@@ -1,16 +1,27 @@
 #include "engine/data/run_colmap.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <deque>
+#include <fstream>
 #include <map>
-#include <memory>
+#include <optional>
+#include <system_error>
+#include <thread>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/data/colmap.h"
 
 namespace darb {
@@ -19,8 +30,11 @@ namespace fs = std::filesystem;
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr std::size_t kKeptLines = 8;  // shown when a command fails
-constexpr std::size_t kMapper = 2;     // of colmap_commands
+constexpr int kTick_ms = 500;          // between two looks at the stop, and two reports
+constexpr const char* kOptionsFile = "options.txt";
 
 std::string joined(const auto& lines) {
     std::string text;
@@ -35,39 +49,136 @@ constexpr const char* kMotionHint =
     "The camera must move between photos, around the scene; they need 60 % overlap, texture, and "
     "no blur.";
 
-void run_command(const std::string& command, const std::function<void(std::string_view)>& progress,
-                 const char* hint = kPhotosHint) {
-    const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
-    std::unique_ptr<std::FILE, decltype(close)> pipe(::popen((command + " 2>&1").c_str(), "r"),
-                                                     close);
-    if (!pipe) throw Error("colmap", "cannot be started", "Free memory or processes.");
-    std::deque<std::string> last;
-    char buffer[4096];
-    std::string line;
-    while (std::fgets(buffer, sizeof buffer, pipe.get())) {
-        line += buffer;
-        if (!line.ends_with('\n') && !std::feof(pipe.get())) continue;
-        while (line.ends_with('\n') || line.ends_with('\r')) line.pop_back();
-        if (progress && !line.empty()) progress(line);
-        if (!line.empty()) last.push_back(line);
-        if (last.size() > kKeptLines) last.pop_front();
-        line.clear();
+// For people, and for their shell.
+std::string shell_text(const ColmapCommand& command) {
+    std::string text = "QT_QPA_PLATFORM=offscreen";
+    for (const std::string& word : command) {
+        const bool plain = std::ranges::all_of(word, [](char c) {
+            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                   c == '_' || c == '-' || c == '.';
+        });
+        text += " " + (plain && !word.empty() ? word : shell_quoted(word));
     }
-    const int status = ::pclose(pipe.release());
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-        throw Error("colmap",
-                    fmt::format("failed:\n    {}\n  It printed last:{}", command, joined(last)),
-                    hint);
+    return text;
 }
 
-/// What a command prints, whatever becomes of it.
-std::string output_of(const std::string& command) {
-    std::string text;
-    const auto collect = [&](std::string_view line) { text += std::string(line) + "\n"; };
-    try {
-        run_command("QT_QPA_PLATFORM=offscreen " + command, collect);
-    } catch (const Error&) {  // some versions call their help a failure
+/// A program that runs, with its output in a pipe. It ends when this process does, however that
+/// ends, and is ended with this object.
+class ColmapProcess {
+  public:
+    explicit ColmapProcess(const ColmapCommand& command);
+    ~ColmapProcess() {
+        if (pid_ > 0) end();
+        if (output_ >= 0) ::close(output_);
     }
+    ColmapProcess(const ColmapProcess&) = delete;
+    ColmapProcess& operator=(const ColmapProcess&) = delete;
+    int output() const { return output_; }
+    /// Its exit status as waitpid() has it.
+    int wait() {
+        int status = -1;
+        while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+        }
+        pid_ = -1;
+        return status;
+    }
+
+  private:
+    void end();
+    pid_t pid_ = -1;
+    int output_ = -1;
+};
+
+ColmapProcess::ColmapProcess(const ColmapCommand& command) {
+    std::vector<std::string> words = command, settings;
+    for (char** at = environ; *at != nullptr; ++at)
+        if (!std::string_view(*at).starts_with("QT_QPA_PLATFORM=")) settings.emplace_back(*at);
+    settings.emplace_back("QT_QPA_PLATFORM=offscreen");
+    std::vector<char*> argv, envp;
+    for (std::string& word : words) argv.push_back(word.data());
+    for (std::string& setting : settings) envp.push_back(setting.data());
+    argv.push_back(nullptr);
+    envp.push_back(nullptr);
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0)
+        throw Error("colmap", "cannot be started", "Free memory or processes.");
+    const pid_t parent = ::getpid();
+    pid_ = ::fork();
+    if (pid_ == 0) {  // only what a signal handler may do: there may be other threads
+        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+        if (::getppid() != parent) ::_exit(127);
+        const int nothing = ::open("/dev/null", O_RDONLY);
+        ::dup2(nothing, STDIN_FILENO);
+        ::dup2(ends[1], STDOUT_FILENO);
+        ::dup2(ends[1], STDERR_FILENO);
+        ::execvpe(argv[0], argv.data(), envp.data());
+        ::_exit(127);
+    }
+    ::close(ends[1]);
+    output_ = ends[0];
+    if (pid_ < 0) throw Error("colmap", "cannot be started", "Free memory or processes.");
+}
+
+void ColmapProcess::end() {
+    constexpr int kPatience = 20, kPause_ms = 100;  // 2 s to end by itself
+    ::kill(pid_, SIGTERM);
+    for (int i = 0; i < kPatience; ++i) {
+        if (::waitpid(pid_, nullptr, WNOHANG) != 0) {
+            pid_ = -1;
+            return;
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(kPause_ms));
+    }
+    ::kill(pid_, SIGKILL);
+    wait();
+}
+
+bool is_stopped(const std::atomic<bool>* stop) {
+    return stop != nullptr && stop->load();
+}
+
+/// Passes on each line, and with whole = false what is there of one that is not ended; on_tick
+/// twice a second. The exit status. Throws ColmapStopped.
+int run_process(const ColmapCommand& command, const std::atomic<bool>* stop,
+                const std::function<void(std::string_view line, bool whole)>& on_line,
+                const std::function<void()>& on_tick) {
+    ColmapProcess process(command);
+    std::string rest;
+    char part[4096];
+    for (;;) {
+        if (is_stopped(stop)) throw ColmapStopped{};
+        pollfd ready{process.output(), POLLIN, 0};
+        const int count = ::poll(&ready, 1, kTick_ms);
+        if (on_tick) on_tick();
+        if (count == 0 || (count < 0 && errno == EINTR)) continue;
+        const ssize_t bytes = ::read(process.output(), part, sizeof part);
+        if (bytes < 0 && errno == EINTR) continue;
+        if (bytes <= 0) break;
+        rest.append(part, static_cast<std::size_t>(bytes));
+        std::size_t begin = 0;
+        for (std::size_t end; (end = rest.find_first_of("\r\n", begin)) != std::string::npos;
+             begin = end + 1)
+            if (end > begin) on_line(std::string_view(rest).substr(begin, end - begin), true);
+        rest.erase(0, begin);
+        if (!rest.empty()) on_line(rest, false);
+    }
+    if (!rest.empty()) on_line(rest, true);
+    const int status = process.wait();
+    // A Ctrl-C of the terminal reaches colmap, too, and maybe sooner than this process.
+    for (int i = 0; i < 5 && WIFSIGNALED(status) && stop != nullptr && !is_stopped(stop); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    if (is_stopped(stop)) throw ColmapStopped{};
+    return status;
+}
+
+/// What a command prints, whatever becomes of it: some versions call their help a failure.
+std::string colmap_output_of(const ColmapCommand& command, const std::atomic<bool>* stop) {
+    std::string text;
+    run_process(command, stop,
+                [&](std::string_view line, bool whole) {
+                    if (whole) text += std::string(line) + "\n";
+                },
+                {});
     return text;
 }
 
@@ -78,6 +189,112 @@ std::map<std::string, std::size_t> models_below(const fs::path& sparse) {
         if (is_colmap_model(entry.path()))
             models[entry.path().filename().string()] = count_colmap_images(entry.path());
     return models;
+}
+
+std::size_t photos_of_largest(const fs::path& sparse) {
+    const std::string model = largest_colmap_model(sparse);
+    return model.empty() ? 0 : std::max<std::size_t>(1, count_colmap_images(sparse / model));
+}
+
+bool lists(const std::string& help, const std::string& option) {
+    const std::string word = "--" + option;
+    for (std::size_t at = 0; (at = help.find(word, at)) != std::string::npos; ++at) {
+        const std::size_t end = at + word.size();
+        if (end == help.size() || help[end] == ' ' || help[end] == '\n') return true;
+    }
+    return false;
+}
+
+// The first of these names that the version knows; none: the option is left out.
+void add_option(ColmapCommand& command, const std::string& help,
+                std::initializer_list<const char*> names, const std::string& value) {
+    for (const char* name : names) {
+        if (!lists(help, name)) continue;
+        command.push_back(std::string("--") + name);
+        command.push_back(value);
+        return;
+    }
+}
+
+// Small enough that there is something to tell while they are matched, and that little is lost
+// where it is ended: a block is saved as a whole. Large enough to keep the cores busy.
+std::size_t block_size(std::size_t photos) {
+    const double cores = std::max(1u, std::thread::hardware_concurrency());
+    const auto busy = static_cast<std::size_t>(std::ceil(std::sqrt(8 * cores)));
+    return std::clamp<std::size_t>(std::max((photos + 4) / 5, busy), 2, 50);
+}
+
+bool matches_neighbours(const ColmapRun& run) {
+    return run.sequential || (run.effort == ColmapEffort::quick && run.quick_sequential);
+}
+
+ColmapCommand extractor(const ColmapRun& run, const ColmapPaths& paths, const ColmapHelp& help) {
+    const std::string part = help.has_new_names() ? "Feature" : "Sift";
+    // OPENCV: phones and consumer cameras; the undistorter turns it into a pinhole.
+    ColmapCommand command{"colmap",
+                          "feature_extractor",
+                          "--database_path",
+                          paths.database.string(),
+                          "--image_path",
+                          run.photos.string(),
+                          "--ImageReader.single_camera",
+                          run.single_camera ? "1" : "0",
+                          "--ImageReader.camera_model",
+                          "OPENCV",
+                          "--" + part + "Extraction.use_gpu",
+                          "0"};
+    if (!run.masks.empty())
+        command.insert(command.end(), {"--ImageReader.mask_path", run.masks.string()});
+    const auto add = [&](std::initializer_list<const char*> names, const char* value) {
+        add_option(command, help.extractor, names, value);
+    };
+    if (run.effort == ColmapEffort::quick) {
+        add({"FeatureExtraction.max_image_size", "SiftExtraction.max_image_size"}, "1000");
+        add({"SiftExtraction.max_num_features"}, "2048");
+    } else if (run.effort == ColmapEffort::thorough) {
+        add({"SiftExtraction.max_num_features"}, "16384");
+        add({"SiftExtraction.peak_threshold"}, "0.002");
+    }
+    return command;
+}
+
+ColmapCommand matcher(const ColmapRun& run, const ColmapPaths& paths, const ColmapHelp& help) {
+    const std::string part = help.has_new_names() ? "Feature" : "Sift";
+    const bool neighbours = matches_neighbours(run), hard = run.effort == ColmapEffort::thorough;
+    ColmapCommand command{"colmap",
+                          neighbours ? "sequential_matcher" : "exhaustive_matcher",
+                          "--database_path",
+                          paths.database.string(),
+                          "--" + part + "Matching.use_gpu",
+                          "0"};
+    const auto add = [&](std::initializer_list<const char*> names, const std::string& value) {
+        add_option(command, help.matcher, names, value);
+    };
+    if (!neighbours && run.count > 0)
+        add({"ExhaustiveMatching.block_size"}, std::to_string(block_size(run.count)));
+    if (!hard) return command;
+    if (neighbours) add({"SequentialMatching.overlap"}, "20");
+    add({"FeatureMatching.guided_matching", "SiftMatching.guided_matching"}, "1");
+    add({"SiftMatching.max_ratio"}, "0.85");
+    add({"TwoViewGeometry.min_num_inliers", "SiftMatching.min_num_inliers"}, "10");
+    return command;
+}
+
+ColmapCommand mapper(const ColmapRun& run, const ColmapPaths& paths, const ColmapHelp& help) {
+    ColmapCommand command{"colmap",          "mapper",
+                          "--database_path", paths.database.string(),
+                          "--image_path",    run.photos.string(),
+                          "--output_path",   paths.models.string()};
+    if (run.effort != ColmapEffort::thorough) return command;
+    const auto add = [&](const char* name, const char* value) {
+        add_option(command, help.mapper, {name}, value);
+    };
+    add("Mapper.min_num_matches", "10");
+    add("Mapper.init_min_num_inliers", "50");
+    add("Mapper.init_min_tri_angle", "8");
+    add("Mapper.abs_pose_min_num_inliers", "15");
+    add("Mapper.abs_pose_min_inlier_ratio", "0.15");
+    return command;
 }
 
 }  // namespace
@@ -108,75 +325,290 @@ bool is_installed(const std::string& program) {
            0;
 }
 
-bool has_new_names(std::string_view help) {
-    return help.find("FeatureExtraction.use_gpu") != std::string_view::npos;
+bool ColmapHelp::has_new_names() const {
+    return lists(extractor, "FeatureExtraction.use_gpu");
 }
 
-std::vector<std::string> colmap_commands(const ColmapRun& run) {
-    const std::string colmap = "QT_QPA_PLATFORM=offscreen colmap ";
-    const std::string database = shell_quoted(run.workspace / "database.db");
-    const std::string photos = shell_quoted(run.photos);
-    const std::string masks =
-        run.masks.empty() ? "" : " --ImageReader.mask_path " + shell_quoted(run.masks);
-    const char* part = run.new_names ? "Feature" : "Sift";
-    // OPENCV: phones and consumer cameras; the undistorter turns it into a pinhole.
-    return {
-        fmt::format("{}feature_extractor --database_path {} --image_path {} "
-                    "--ImageReader.single_camera {} --ImageReader.camera_model OPENCV "
-                    "--{}Extraction.use_gpu 0{}",
-                    colmap, database, photos, run.single_camera ? 1 : 0, part, masks),
-        fmt::format("{}{}_matcher --database_path {} --{}Matching.use_gpu 0", colmap,
-                    run.sequential ? "sequential" : "exhaustive", database, part),
-        fmt::format("{}mapper --database_path {} --image_path {} --output_path {}", colmap,
-                    database, photos, shell_quoted(run.workspace / "sparse")),
-        fmt::format("{}image_undistorter --image_path {} --input_path {} --output_path {} "
-                    "--output_type COLMAP --max_image_size {}",
-                    colmap, photos, shell_quoted(run.workspace / "sparse" / run.model),
-                    shell_quoted(run.workspace / "dense"), run.max_image_size),
-    };
+ColmapPaths plain_paths(const ColmapRun& run) {
+    return {run.workspace / "database.db", run.workspace / "sparse", run.workspace / "sparse" / "0",
+            run.workspace / "dense"};
+}
+
+std::vector<ColmapCommand> colmap_commands(const ColmapRun& run, const ColmapPaths& paths,
+                                           const ColmapHelp& help) {
+    return {extractor(run, paths, help),
+            matcher(run, paths, help),
+            mapper(run, paths, help),
+            {"colmap", "image_undistorter", "--image_path", run.photos.string(), "--input_path",
+             paths.model.string(), "--output_path", paths.dense.string(), "--output_type", "COLMAP",
+             "--max_image_size", std::to_string(run.max_image_size)}};
 }
 
 namespace {
 
-std::string chosen_model(const ColmapRun& run,
-                         const std::function<void(std::string_view)>& progress) {
-    const fs::path sparse = run.workspace / "sparse";
-    const std::string model = largest_colmap_model(sparse);
-    if (model.empty())
-        throw Error(run.photos.string(), "colmap found no common view of the photos", kMotionHint);
-    if (const std::size_t count = models_below(sparse).size(); count > 1 && progress)
-        progress(fmt::format("{} models: {}, of {} photos, is the largest and is used", count,
-                             (sparse / model).string(), count_colmap_images(sparse / model)));
-    return model;
+constexpr const char* effort_name(ColmapEffort effort) {
+    return effort == ColmapEffort::quick      ? "quick"
+           : effort == ColmapEffort::thorough ? "thorough"
+                                              : "usual";
+}
+
+/// One call of run_colmap.
+class ColmapRunner {
+  public:
+    ColmapRunner(const ColmapRun& run, const ColmapReports& reports)
+        : run_(run), reports_(reports) {}
+    fs::path data_set();
+
+  private:
+    struct Attempt {
+        fs::path folder;
+        ColmapEffort effort;
+        std::size_t found;  // photos of the largest model
+    };
+    void note(const std::string& text) const {
+        if (reports_.note) reports_.note(text);
+    }
+    void ask_for_help();
+    /// Throws Error where the command fails, unless it may.
+    void step(ColmapStep step, const ColmapCommand& command, bool may_fail = false);
+    Attempt attempt(std::size_t number, ColmapEffort effort);
+    void find_cameras();
+    void keep(const Attempt& best) const;
+    void tell_next(std::size_t found, ColmapEffort next) const;
+    void tell_models() const;
+    void undistort();
+
+    ColmapRun run_;
+    const ColmapReports& reports_;
+    ColmapHelp help_;
+    std::size_t photos_ = 0, features_ = 0;  // features: of most photos; 0: not known
+    std::string failure_;                    // of the last mapper
+};
+
+void remove_folder(const fs::path& path) {
+    std::error_code failure;
+    fs::remove_all(path, failure);
+    if (failure)
+        throw Error(path.string(), "cannot be removed: " + failure.message(), "Remove it by hand.");
+}
+
+void make_folder(const fs::path& path) {
+    std::error_code failure;
+    fs::create_directories(path, failure);
+    if (failure)
+        throw Error(path.string(), "cannot be made: " + failure.message(),
+                    "Choose another workspace folder.");
+}
+
+void move_over(const fs::path& from, const fs::path& to) {
+    std::error_code failure;
+    if (!fs::exists(from)) return;
+    remove_folder(to);
+    fs::rename(from, to, failure);
+    if (failure)
+        throw Error(to.string(), "cannot be made: " + failure.message(), "Remove what is there.");
+}
+
+void ColmapRunner::ask_for_help() {
+    if (!help_.extractor.empty()) return;
+    const auto ask = [&](const char* command) {
+        return colmap_output_of({"colmap", command, "-h"}, run_.stop);
+    };
+    help_.extractor = ask("feature_extractor") + "\n";  // not empty: asked
+    help_.matcher = ask(matches_neighbours(run_) ? "sequential_matcher" : "exhaustive_matcher");
+    if (run_.effort == ColmapEffort::thorough) help_.mapper = ask("mapper");
+}
+
+void ColmapRunner::step(ColmapStep step, const ColmapCommand& command, bool may_fail) {
+    const std::size_t number = static_cast<std::size_t>(step) + 1;
+    const bool all_pairs = command[1] == "exhaustive_matcher";
+    ColmapOutput output(step, photos_, all_pairs ? photos_ * (photos_ - 1) / 2 : 0);
+    note(fmt::format("[{}/{}] {}", number, kColmapSteps, shell_text(command)));
+    std::ofstream log(run_.workspace / "colmap.log", std::ios::app);
+    log << shell_text(command) << "\n";
+    std::deque<std::string> last;
+    const Clock::time_point start = Clock::now();
+    Clock::time_point told = start;
+    const auto since_start = [&] {
+        return std::chrono::duration<double>(Clock::now() - start).count();
+    };
+    double seconds_at_change = 0;
+    const auto tell = [&] {
+        told = Clock::now();
+        if (!reports_.progress) return;
+        const double left =
+            colmap_seconds_left(step, seconds_at_change, output.done(), output.total());
+        // Between two changes it counts down; what takes longer than told is not known any more.
+        const double now = since_start(), rest = left + seconds_at_change - now;
+        reports_.progress(number, output, now, rest > 0 ? rest : -1);
+    };
+    const auto on_line = [&](std::string_view line, bool whole) {
+        if (whole) {
+            log << line << "\n" << std::flush;
+            last.emplace_back(line);
+            if (last.size() > kKeptLines) last.pop_front();
+            if (reports_.line) reports_.line(line);
+        } else if (step != ColmapStep::match) {
+            return;
+        }
+        if (!output.read(line)) return;
+        seconds_at_change = since_start();
+        tell();
+    };
+    const auto on_tick = [&] {
+        if (Clock::now() - told >= std::chrono::seconds(1)) tell();
+    };
+    const int status = run_process(command, run_.stop, on_line, on_tick);
+    if (step == ColmapStep::extract) {
+        if (photos_ == 0) photos_ = output.total();
+        std::vector<std::size_t> counts = output.features();
+        const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
+        std::nth_element(counts.begin(), middle, counts.end());
+        if (!counts.empty()) features_ = *middle;
+    }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+    const std::string failure =
+        fmt::format("failed:\n    {}\n  It printed last:{}", shell_text(command), joined(last));
+    if (!may_fail || !WIFEXITED(status))
+        throw Error("colmap", failure, step == ColmapStep::map ? kMotionHint : kPhotosHint);
+    failure_ = failure;
+}
+
+ColmapRunner::Attempt ColmapRunner::attempt(std::size_t number, ColmapEffort effort) {
+    run_.effort = effort;
+    help_.extractor.clear();
+    ask_for_help();
+    const fs::path folder = run_.workspace / fmt::format("attempt_{}", number),
+                   unfinished = folder / "sparse.unfinished", sparse = folder / "sparse";
+    const std::vector<ColmapCommand> commands =
+        colmap_commands(run_, {folder / "database.db", unfinished, {}, {}}, help_);
+    // The block size says nothing about the result, and follows the machine.
+    std::string options = std::string(effort_name(effort)) + "\n";
+    for (const ColmapStep i : {ColmapStep::extract, ColmapStep::match, ColmapStep::map})
+        for (std::size_t w = 1; w < commands[std::size_t(i)].size(); ++w) {
+            const std::string& word = commands[std::size_t(i)][w];
+            if (word.find('/') == std::string::npos) options += word + "\n";
+        }
+    const fs::path options_file = folder / kOptionsFile;
+    if (!fs::exists(options_file) || read_text_file(options_file) != options) {
+        remove_folder(folder);  // of other options
+        write_file_atomic(options_file, options);
+    }
+    if (!fs::exists(sparse)) {
+        step(ColmapStep::extract, commands[0]);
+        step(ColmapStep::match, commands[1]);
+        remove_folder(unfinished);
+        make_folder(unfinished);
+        step(ColmapStep::map, commands[2], true);
+        move_over(unfinished, sparse);
+    }
+    return {folder, effort, photos_of_largest(sparse)};
+}
+
+void ColmapRunner::tell_next(std::size_t found, ColmapEffort next) const {
+    const std::string features =
+        features_ == 0
+            ? ""
+            : fmt::format(" Half of the photos have fewer than {} features.", features_ + 1);
+    const char* way = next == ColmapEffort::usual ? "with the usual number of features, and "
+                                                  : "with more and fainter features, ";
+    note(fmt::format(
+        "COLMAP found the cameras of {} of {} photos.{} It tries again {}comparing {}.", found,
+        photos_, features, way, run_.sequential ? "more neighbours" : "all pairs"));
+}
+
+void ColmapRunner::find_cameras() {
+    std::vector<ColmapEffort> efforts{ColmapEffort::thorough};
+    if (run_.effort != ColmapEffort::thorough) efforts.insert(efforts.begin(), ColmapEffort::usual);
+    if (run_.effort == ColmapEffort::quick) efforts.insert(efforts.begin(), ColmapEffort::quick);
+    std::optional<Attempt> best;
+    for (std::size_t i = 0; i < efforts.size(); ++i) {
+        const Attempt now = attempt(i + 1, efforts[i]);
+        if (i > 0)
+            note(fmt::format("Try {} found {}, {} is kept.", i + 1, now.found,
+                             now.found > best->found ? "which" : "the one before"));
+        if (!best || now.found > best->found) best = now;
+        const bool enough =
+            photos_ > 0 ? double(best->found) >= kEnoughPhotos * double(photos_) : best->found > 0;
+        if (enough) break;
+        if (i + 1 < efforts.size()) tell_next(best->found, efforts[i + 1]);
+    }
+    if (best->found == 0)
+        throw failure_.empty()
+            ? Error(run_.photos.string(), "colmap found no common view of the photos", kMotionHint)
+            : Error("colmap", failure_, kMotionHint);
+    keep(*best);
+}
+
+// sparse is moved last: where it is there, all is.
+void ColmapRunner::keep(const Attempt& best) const {
+    for (const char* part : {"database.db", kOptionsFile, "sparse"})
+        move_over(best.folder / part, run_.workspace / part);
+}
+
+void ColmapRunner::tell_models() const {
+    const fs::path sparse = run_.workspace / "sparse";
+    std::string rest;
+    std::size_t others = 0;
+    for (const auto& [name, count] : models_below(sparse)) {
+        if (name == largest_colmap_model(sparse)) continue;
+        rest += fmt::format("{}{} of {}", rest.empty() ? "" : ", ", name, count);
+        ++others;
+    }
+    if (others > 0)
+        note(fmt::format(
+            "{} models: {}, of {} photos, is the largest and is used. The others ({}) do not "
+            "hang together with it.",
+            others + 1, (sparse / largest_colmap_model(sparse)).string(), photos_of_largest(sparse),
+            rest));
+}
+
+void ColmapRunner::undistort() {
+    const fs::path dense = run_.workspace / "dense",
+                   unfinished = run_.workspace / "dense.unfinished",
+                   sparse = run_.workspace / "sparse";
+    remove_folder(unfinished);
+    const std::vector<ColmapCommand> commands =
+        colmap_commands(run_, {{}, {}, sparse / largest_colmap_model(sparse), unfinished});
+    step(ColmapStep::undistort, commands[3]);
+    move_over(unfinished, dense);
+}
+
+fs::path ColmapRunner::data_set() {
+    if (!fs::is_directory(run_.photos))
+        throw Error(run_.photos.string(), "is no folder of photos", "Check the path.");
+    if (!is_installed("colmap")) {
+        std::vector<std::string> commands;
+        for (const ColmapCommand& command : colmap_commands(run_, plain_paths(run_)))
+            commands.push_back(shell_text(command));
+        throw Error(
+            run_.photos.string(), "holds photos without cameras, and colmap is not installed",
+            fmt::format("Install it (apt install colmap), or run elsewhere:\n    mkdir -p {}{}",
+                        shell_quoted(run_.workspace / "sparse"), joined(commands)));
+    }
+    make_folder(run_.workspace);
+    photos_ = run_.count;
+    if (largest_colmap_model(run_.workspace / "sparse").empty()) find_cameras();
+    std::error_code none;
+    for (const fs::directory_entry& entry : fs::directory_iterator(run_.workspace, none))
+        if (entry.path().filename().string().starts_with("attempt_")) remove_folder(entry.path());
+    tell_models();
+    undistort();
+    return run_.workspace / "dense";
 }
 
 }  // namespace
 
-fs::path run_colmap(const ColmapRun& asked, const std::function<void(std::string_view)>& progress) {
-    ColmapRun run = asked;
-    if (!fs::is_directory(run.photos))
-        throw Error(run.photos.string(), "is no folder of photos", "Check the path.");
-    std::vector<std::string> commands = colmap_commands(run);
-    if (!is_installed("colmap"))
-        throw Error(
-            run.photos.string(), "holds photos without cameras, and colmap is not installed",
-            fmt::format("Install it (apt install colmap), or run elsewhere:\n    mkdir -p {}{}",
-                        shell_quoted(run.workspace / "sparse"), joined(commands)));
-    std::error_code failure;
-    fs::create_directories(run.workspace / "sparse", failure);
-    if (failure)
-        throw Error(run.workspace.string(), "cannot be made: " + failure.message(),
-                    "Choose another workspace folder.");
-    run.new_names = has_new_names(output_of("colmap feature_extractor -h"));
-    commands = colmap_commands(run);
-    for (std::size_t i = 0; i < commands.size(); ++i) {
-        if (progress) progress(fmt::format("[{}/{}] {}", i + 1, commands.size(), commands[i]));
-        run_command(commands[i], progress, i == kMapper ? kMotionHint : kPhotosHint);
-        if (i != kMapper) continue;
-        run.model = chosen_model(run, progress);
-        commands = colmap_commands(run);
-    }
-    return run.workspace / "dense";
+ColmapEffort effort_of_colmap(const fs::path& workspace) {
+    if (!fs::exists(workspace / kOptionsFile)) return ColmapEffort::usual;
+    const std::string text = read_text_file(workspace / kOptionsFile);
+    for (const ColmapEffort effort : {ColmapEffort::quick, ColmapEffort::thorough})
+        if (text.starts_with(std::string(effort_name(effort)) + "\n")) return effort;
+    return ColmapEffort::usual;
+}
+
+fs::path run_colmap(const ColmapRun& run, const ColmapReports& reports) {
+    return ColmapRunner(run, reports).data_set();
 }
 
 }  // namespace darb

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <filesystem>
+#include <initializer_list>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/data/dataset.h"
 
@@ -30,8 +32,17 @@ Dataset load_transforms(const std::filesystem::path& path, const DatasetOptions&
 /// sizes.
 void fit_views(Dataset& dataset, const DatasetOptions& options);
 
+/// Leaves out views whose camera stands so far outside of the place of the others that it sees the
+/// scene as a dot or not at all, with a warning that names them: they ruin the scale of everything
+/// that follows the cameras (rates, sizes, near and far), and training on them costs quality, too.
+/// Where only cameras are wanted there is the warning alone. Before views are fitted and tracks are
+/// indexed; needs dataset.options.
+void leave_out_far_cameras(Dataset& dataset);
+
 /// Notes on cameras that see none of the points, and on intrinsics beyond reason.
 void note_odd_cameras(Dataset& dataset);
+/// A note where points are float32 numbers that lie far from 0, and coarse there.
+void note_coarse_points(Dataset& dataset);
 
 /// An image made of the photo's pixels (a mask, depths; `kind`), turned as load_photo turns the
 /// photo: it may be of the stored pixels or of the photo as viewers show it, and its shape tells
@@ -56,6 +67,20 @@ std::string with_slashes(std::string name);
 /// extensions in place of its own (or added, where it is no picture's); so, too, where it is of a
 /// format that is not read, the file of another extension being one. Empty where there is none.
 std::filesystem::path find_photo(const std::filesystem::path& folder, const std::string& name);
+
+/// As find_photo, by the end of the name, as much of it as is there: names may be those of another
+/// machine (C:\\photos\\a.png, /home/me/photos/a.png) or repeat the folder (images/a.png).
+std::filesystem::path find_by_end(const std::filesystem::path& folder, const std::string& name);
+
+std::string lower_case(std::string text);
+
+/// The folders in it, by name, without hidden ones.
+std::vector<std::filesystem::path> folders_of(const std::filesystem::path& parent);
+
+/// A list, for a note, of folders with files whose names contain one of the words, in lower case:
+/// what may have been meant for masks or depths. Empty where there is none.
+std::string unused_folders(const std::vector<std::filesystem::path>& parents,
+                           std::initializer_list<std::string_view> words);
 
 /// The usual folder of photos, as it begins their names in transforms.json.
 constexpr std::string_view kImages = "images/";

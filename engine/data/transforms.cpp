@@ -6,9 +6,14 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
 
 #include "engine/core/error.h"
+#include "engine/core/json_text.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/pose.h"
 
@@ -53,6 +58,41 @@ bool read_bool(const json& object, const char* key, const std::string& where, bo
     throw Error(where, fmt::format("{} is neither true or false nor a number", key), kCorrectEntry);
 }
 
+/// instant-ngp's x_fov and y_fov, degrees, which outrank its other keys there.
+void read_fields_of_view(const json& object, const std::string& where, TransformsIntrinsics& to) {
+    constexpr double kRadian = 0.017453292519943295;
+    std::optional<double> x, y;
+    read_number(object, "x_fov", where, x);
+    read_number(object, "y_fov", where, y);
+    for (const std::optional<double>& fov : {x, y})
+        if (fov && !(*fov > 0 && *fov < 180))
+            throw Error(where, fmt::format("a field of view is {} degrees", *fov),
+                        "Give x_fov and y_fov in degrees, or fl_x and fl_y in pixels.");
+    if (x) {
+        to.fl_x.reset();
+        to.camera_angle_x = *x * kRadian;
+    }
+    if (y) {
+        to.fl_y.reset();
+        to.camera_angle_y = *y * kRadian;
+    }
+}
+
+/// nerfstudio's list: k1, k2, k3, k4, p1, p2.
+void read_distortion_list(const json& object, const std::string& where, TransformsIntrinsics& to) {
+    const auto list = object.find("distortion_params");
+    if (list == object.end() || list->is_null()) return;
+    if (!list->is_array() || list->size() != 6)
+        throw Error(where, "distortion_params does not hold k1, k2, k3, k4, p1 and p2",
+                    "Give k1 to k4, p1 and p2 as keys of their own.");
+    double values[6];
+    for (std::size_t i = 0; i < 6; ++i)
+        values[i] = to_number((*list)[i], "distortion_params", where);
+    std::copy_n(values, 4, to.k.begin());
+    to.p1 = values[4];
+    to.p2 = values[5];
+}
+
 /// Keys that are absent leave what is there: the file's values are the frames' defaults.
 void read_intrinsics(const json& object, const std::string& where, TransformsIntrinsics& to) {
     // A frame's own focal length or angle outranks the file's.
@@ -60,7 +100,7 @@ void read_intrinsics(const json& object, const std::string& where, TransformsInt
         const auto at = object.find(key);
         return at != object.end() && !at->is_null();
     };
-    if (own("fl_x") || own("camera_angle_x")) {
+    if (own("fl_x") || own("camera_angle_x") || own("x_fov")) {
         to.fl_x.reset();
         to.fl_y.reset();
         to.camera_angle_x.reset();
@@ -74,6 +114,8 @@ void read_intrinsics(const json& object, const std::string& where, TransformsInt
     read_number(object, "cy", where, to.cy);
     read_number(object, "camera_angle_x", where, to.camera_angle_x);
     read_number(object, "camera_angle_y", where, to.camera_angle_y);
+    read_fields_of_view(object, where, to);
+    read_distortion_list(object, where, to);
     constexpr const char* kNames[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
     for (std::size_t i = 0; i < 6; ++i) {
         std::optional<double> value;
@@ -87,53 +129,95 @@ void read_intrinsics(const json& object, const std::string& where, TransformsInt
     to.p2 = p2.value_or(to.p2);
     if (std::string model = read_string(object, "camera_model", where); !model.empty())
         to.camera_model = std::move(model);
-    to.is_fisheye = read_bool(object, "is_fisheye", where, to.is_fisheye);
+    if (own("is_fisheye")) to.is_fisheye = read_bool(object, "is_fisheye", where, false);
+    std::optional<double> radius;
+    read_number(object, "fisheye_crop_radius", where, radius);
+    to.crop_radius = radius.value_or(to.crop_radius);
 }
 
-/// Returns whether the rotation had a scale.
-bool read_pose(const json& object, const std::string& where, TransformsFrame& frame) {
-    const auto matrix = object.find("transform_matrix");
-    if (matrix == object.end() || !matrix->is_array() || matrix->size() < 3)
-        throw Error(where, "has no transform_matrix of 4 x 4 or 3 x 4 numbers", kCorrectEntry);
-    glm::dmat3 camera_to_world;
+struct CameraToWorld {
+    glm::dmat3 axes;
     glm::dvec3 centre;
+};
+
+CameraToWorld read_matrix(const json& object, const char* key, const std::string& where) {
+    const auto matrix = object.find(key);
+    if (matrix == object.end() || !matrix->is_array() || matrix->size() < 3)
+        throw Error(where, fmt::format("has no {} of 4 x 4 or 3 x 4 numbers", key), kCorrectEntry);
+    CameraToWorld pose;
     for (int r = 0; r < 3; ++r) {
         const json& row = (*matrix)[static_cast<std::size_t>(r)];
         if (!row.is_array() || row.size() != 4)
-            throw Error(where, "a row of transform_matrix does not hold 4 numbers", kCorrectEntry);
+            throw Error(where, fmt::format("a row of {} does not hold 4 numbers", key),
+                        kCorrectEntry);
         for (int c = 0; c < 4; ++c) {
             // JSON has no NaN; writers put null or a string in its place.
             const json& value = row[static_cast<std::size_t>(c)];
             const double number = value.is_number() ? value.get<double>() : std::nan("");
             if (c < 3)
-                camera_to_world[c][r] = number;
+                pose.axes[c][r] = number;
             else
-                centre[r] = number;
+                pose.centre[r] = number;
         }
     }
-    camera_to_world[1] = -camera_to_world[1];
-    camera_to_world[2] = -camera_to_world[2];
-    const bool scaled = remove_scale(camera_to_world);
-    frame.rotation = glm::transpose(checked_rotation(camera_to_world, where));
-    check_position(centre, where);
-    frame.translation = -(frame.rotation * centre);
-    return scaled;
+    return pose;
 }
 
-json parse_json(std::string_view text, const std::string& where) {
-    try {
-        return json::parse(text);
-    } catch (const json::exception& error) {
-        throw Error(where, fmt::format("is no valid JSON: {}", error.what()),
-                    "Correct or export the file again.");
+/// What is told of all frames together.
+struct PoseTally {
+    std::size_t scaled = 0, halfway = 0, moving = 0;
+    bool mitsuba = false;  // the file's camera axes: x to the left, y up, z forwards
+};
+
+/// The pose of the file's frame, its axes those of COLMAP.
+CameraToWorld read_camera_to_world(const json& object, const char* key, const std::string& where,
+                                   PoseTally& tally) {
+    CameraToWorld pose = read_matrix(object, key, where);
+    pose.axes[1] = -pose.axes[1];
+    pose.axes[tally.mitsuba ? 0 : 2] = -pose.axes[tally.mitsuba ? 0 : 2];
+    tally.scaled += remove_scale(pose.axes) ? 1 : 0;
+    pose.axes = checked_rotation(pose.axes, where);
+    check_position(pose.centre, where);
+    return pose;
+}
+
+/// transform_matrix or, where only the poses at the start and the end of an exposure are there, the
+/// one halfway.
+void read_pose(const json& object, const std::string& where, PoseTally& tally,
+               TransformsFrame& frame) {
+    constexpr const char *kStart = "transform_matrix_start", *kEnd = "transform_matrix_end";
+    constexpr double kStill = 1e-9;
+    const bool has_ends = object.contains(kStart) && object.contains(kEnd);
+    CameraToWorld pose;
+    if (object.contains("transform_matrix") || !has_ends) {
+        pose = read_camera_to_world(object, "transform_matrix", where, tally);
+    } else {
+        pose = read_camera_to_world(object, kStart, where, tally);
+        const CameraToWorld end = read_camera_to_world(object, kEnd, where, tally);
+        double apart = glm::distance(pose.centre, end.centre);
+        for (int c = 0; c < 3; ++c) apart += glm::distance(pose.axes[c], end.axes[c]);
+        const glm::dquat a = glm::quat_cast(pose.axes), b = glm::quat_cast(end.axes);
+        if (apart > kStill) pose.axes = glm::mat3_cast(glm::slerp(a, b, 0.5));
+        pose.centre = 0.5 * (pose.centre + end.centre);
+        ++tally.halfway;
+        tally.moving += apart > kStill ? 1 : 0;
     }
+    frame.rotation = glm::transpose(pose.axes);
+    frame.translation = -(frame.rotation * pose.centre);
 }
 
 /// COLMAP's name of a nerfstudio or instant-ngp camera.
 std::string model_name(const TransformsIntrinsics& in, const std::string& where) {
     std::string name = in.camera_model;
     std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
-    if (name == "OPENCV_FISHEYE" || name == "FISHEYE" || (name.empty() && in.is_fisheye))
+    const bool fisheye = name.ends_with("FISHEYE");
+    if (!name.empty() && in.is_fisheye && *in.is_fisheye != fisheye)
+        throw Error(where,
+                    fmt::format("camera_model is {}, but is_fisheye is {}", in.camera_model,
+                                *in.is_fisheye),
+                    "Remove the one that is wrong.");
+    if (name == "OPENCV_FISHEYE" || name == "FISHEYE" || name == "RADIAL_FISHEYE" ||
+        name == "SIMPLE_RADIAL_FISHEYE" || (name.empty() && in.is_fisheye.value_or(false)))
         return "OPENCV_FISHEYE";
     constexpr std::string_view kPerspective[] = {"",        "OPENCV",        "FULL_OPENCV",
                                                  "RADIAL",  "SIMPLE_RADIAL", "PERSPECTIVE",
@@ -151,13 +235,308 @@ std::string model_name(const TransformsIntrinsics& in, const std::string& where)
                 "Use perspective or fisheye photos (OPENCV, OPENCV_FISHEYE, PINHOLE).");
 }
 
+/// Keys that are read, and keys that change nothing here: bounding boxes and frames of other
+/// programs, what the writer did already, names, times of day.
+constexpr std::string_view kReadKeys[] = {"frames",
+                                          "w",
+                                          "h",
+                                          "fl_x",
+                                          "fl_y",
+                                          "cx",
+                                          "cy",
+                                          "camera_angle_x",
+                                          "camera_angle_y",
+                                          "x_fov",
+                                          "y_fov",
+                                          "k1",
+                                          "k2",
+                                          "k3",
+                                          "k4",
+                                          "k5",
+                                          "k6",
+                                          "p1",
+                                          "p2",
+                                          "distortion_params",
+                                          "camera_model",
+                                          "is_fisheye",
+                                          "fisheye_crop_radius",
+                                          "ply_file_path",
+                                          "depth_unit_scale_factor",
+                                          "integer_depth_scale",
+                                          "enable_depth_loading",
+                                          "applied_scale",
+                                          "train_filenames",
+                                          "val_filenames",
+                                          "test_filenames",
+                                          "from_mitsuba",
+                                          "file_path",
+                                          "mask_path",
+                                          "depth_file_path",
+                                          "depth_path",
+                                          "transform_matrix",
+                                          "transform_matrix_start",
+                                          "transform_matrix_end",
+                                          "time"};
+constexpr std::string_view kHarmlessKeys[] = {"aabb",
+                                              "aabb_scale",
+                                              "render_aabb",
+                                              "scale",
+                                              "offset",
+                                              "up",
+                                              "from_na",
+                                              "rotation",
+                                              "orientation_override",
+                                              "auto_scale_poses_override",
+                                              "applied_transform",
+                                              "colmap_im_id",
+                                              "sharpness",
+                                              "timestamp",
+                                              "id",
+                                              "name",
+                                              "names"};
+
+struct MeaningfulKey {
+    std::string_view key, instead;
+};
+/// Keys that are known and not read, and what is done in place of what they say.
+constexpr MeaningfulKey kUnreadKeys[] = {
+    {"rolling_shutter", "each photo is taken for exposed at one moment"},
+    {"motionblur_amount", "each photo is taken for exposed at one moment"},
+    {"white_transparent", "white pixels are trained as white"},
+    {"black_transparent", "black pixels are trained as black"},
+    {"mask_color", "pixels of that colour are trained as they are"},
+    {"fix_premult", "colours are taken as not multiplied by alpha"},
+    {"enable_ray_loading", "rays follow from the camera's lens alone"},
+    {"light", "the light is taken for the same in all photos"},
+    {"driver_parameters", "the light is taken for the same in all photos"},
+    {"skew", "pixels are taken for upright"},
+    {"s1", "the distortion is read without it"},
+    {"s2", "the distortion is read without it"},
+    {"s3", "the distortion is read without it"},
+    {"s4", "the distortion is read without it"},
+    {"p3", "the distortion is read without it"},
+    {"p4", "the distortion is read without it"}};
+/// Lenses that a pinhole with distortion cannot stand in for.
+constexpr std::string_view kOtherLenses[] = {"ftheta_p0", "latlong", "equirectangular",
+                                             "is_equirectangular", "lens_latlong"};
+
+/// Whether a value says something: not false, 0, null or empty.
+bool says_something(const json& value) {
+    if (value.is_boolean()) return value.get<bool>();
+    if (value.is_number()) return value.get<double>() != 0;
+    if (value.is_array())
+        return std::ranges::any_of(value, [](const json& v) { return says_something(v); });
+    return !value.is_null() && !(value.is_string() && value.get<std::string>().empty());
+}
+
+/// In lower case, without what joins words.
+std::string letters_of(std::string_view key) {
+    std::string letters;
+    for (const char c : key)
+        if (std::isalnum(static_cast<unsigned char>(c)))
+            letters += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return letters;
+}
+
+/// Letters to add, drop or change that make one word of the other (Levenshtein).
+std::size_t edits_between(const std::string& a, const std::string& b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        std::size_t diagonal = std::exchange(row[0], i + 1);
+        for (std::size_t j = 0; j < b.size(); ++j) {
+            const std::size_t change = diagonal + (a[i] == b[j] ? 0 : 1);
+            diagonal = row[j + 1];
+            row[j + 1] = std::min({change, row[j] + 1, diagonal + 1});
+        }
+    }
+    return row[b.size()];
+}
+
+/// The key that is read and that this one may have been meant for; empty where there is none.
+std::string_view near_miss_of(std::string_view key) {
+    const std::string letters = letters_of(key);
+    for (const std::string_view known : kReadKeys) {
+        const std::string other = letters_of(known);
+        const std::size_t allowed = other.size() < 5 ? 0 : other.size() < 9 ? 1 : 2;
+        if (edits_between(letters, other) <= allowed) return known;
+    }
+    return {};
+}
+
+/// Whether an unknown key speaks of what a data set is made of.
+bool sounds_meaningful(std::string_view key) {
+    constexpr std::string_view kWords[] = {"mask", "depth",   "alpha", "distort",   "shutter",
+                                           "fov",  "fisheye", "focal", "intrinsic", "extrinsic"};
+    const std::string letters = letters_of(key);
+    return std::ranges::any_of(
+        kWords, [&](std::string_view word) { return letters.find(word) != std::string::npos; });
+}
+
+/// Collects the keys of the file and its frames that are not read though they may matter.
+class UnreadKeys {
+  public:
+    void look_at(const json& object, const std::string& where) {
+        for (const auto& [key, value] : object.items()) {
+            const std::string_view name = key;
+            if (std::ranges::find(kReadKeys, name) != std::end(kReadKeys) ||
+                std::ranges::find(kHarmlessKeys, name) != std::end(kHarmlessKeys) ||
+                !says_something(value))
+                continue;
+            if (std::ranges::find(kOtherLenses, name) != std::end(kOtherLenses))
+                throw Error(where, fmt::format("{} declares a lens that is not read", key),
+                            "Make perspective or fisheye photos of it (OPENCV, OPENCV_FISHEYE, "
+                            "PINHOLE).");
+            add(key);
+        }
+    }
+
+    /// A sentence, or nothing.
+    std::string note(const std::string& where) const {
+        std::string list;
+        for (const auto& [key, why] : found_)
+            list += (list.empty() ? "" : ", ") + key + (why.empty() ? "" : " (" + why + ")");
+        if (list.empty()) return {};
+        return fmt::format("Warning: {} has keys that are not read but may matter: {}.", where,
+                           list);
+    }
+
+  private:
+    void add(const std::string& key) {
+        for (const MeaningfulKey& known : kUnreadKeys)
+            if (known.key == key) {
+                found_[key] = known.instead;
+                return;
+            }
+        if (const std::string_view meant = near_miss_of(key); !meant.empty())
+            found_[key] = fmt::format("is {} meant?", meant);
+        else if (sounds_meaningful(key))
+            found_[key] = "";
+    }
+
+    std::map<std::string, std::string> found_;
+};
+
+/// Metres a step of the depths, as either dialect says it.
+void read_depth_unit(const json& root, const std::string& where, TransformsFile& file) {
+    constexpr const char *kAll = "depth_unit_scale_factor", *kIntegers = "integer_depth_scale";
+    std::optional<double> all, integers;
+    read_number(root, kAll, where, all);
+    read_number(root, kIntegers, where, integers);
+    if (integers && !(*integers > 0)) integers.reset();  // instant-ngp's word for none
+    if (all && integers && *all != *integers)
+        throw Error(where,
+                    fmt::format("{} is {:g}, but {} is {:g}", kAll, *all, kIntegers, *integers),
+                    "Remove the one that is wrong: both are the metres of a step.");
+    if (all && !(*all > 0 && *all < 1e6))
+        throw Error(where, fmt::format("{} is {}", kAll, *all),
+                    "Give the metres of a step, as 0.001.");
+    if (integers && *integers >= 1)
+        throw Error(where, fmt::format("{} is {:g}, as many metres a step", kIntegers, *integers),
+                    fmt::format("Give the metres of a step: {:g}, if that many steps are a metre.",
+                                1 / *integers));
+    file.unit_of_integers = integers && !all;
+    file.depth_unit = all ? *all : integers.value_or(0);
+    file.read_depths = read_bool(root, "enable_depth_loading", where, true);
+    std::optional<double> scale;
+    read_number(root, "applied_scale", where, scale);
+    if (scale && !(*scale > 0 && std::isfinite(*scale)))
+        throw Error(where, fmt::format("applied_scale is {}", *scale),
+                    "Give what poses were multiplied by, or remove it.");
+    file.applied_scale = scale.value_or(1);
+}
+
+void read_split(const json& root, TransformsFile& file) {
+    const auto read = [&](const char* key, std::vector<std::string>& to) {
+        const auto list = root.find(key);
+        if (!to.empty() || list == root.end() || !list->is_array()) return;
+        for (const json& name : *list)
+            if (name.is_string()) to.push_back(name.get<std::string>());
+    };
+    read("train_filenames", file.train_filenames);
+    read("test_filenames", file.test_filenames);
+    read("val_filenames", file.test_filenames);
+}
+
+/// The depth of a frame by either of its names.
+std::string read_depth_path(const json& frame, const std::string& where) {
+    const std::string nerfstudio = read_string(frame, "depth_file_path", where);
+    const std::string ngp = read_string(frame, "depth_path", where);
+    if (!nerfstudio.empty() && !ngp.empty() && nerfstudio != ngp)
+        throw Error(where,
+                    fmt::format("depth_file_path is {}, but depth_path is {}", nerfstudio, ngp),
+                    "Remove the one that is wrong.");
+    return nerfstudio.empty() ? ngp : nerfstudio;
+}
+
+/// Frames whose focal length in pixels and whose angle differ by more than rounding.
+bool angles_disagree(const TransformsIntrinsics& in) {
+    constexpr double kMost = 0.02;
+    const auto off = [](std::optional<double> focal, std::optional<double> angle,
+                        std::optional<double> size) {
+        if (!focal || !angle || !size || !(*angle > 0)) return false;
+        return !(std::abs(0.5 * *size / std::tan(0.5 * *angle) / *focal - 1) <= kMost);
+    };
+    return off(in.fl_x, in.camera_angle_x, in.w) || off(in.fl_y, in.camera_angle_y, in.h);
+}
+
+/// What is told of the frames together.
+struct FrameTally {
+    PoseTally poses;
+    std::set<double> times;
+    std::size_t odd_angles = 0;
+};
+
+TransformsFrame read_frame(const json& object, const TransformsIntrinsics& defaults,
+                           std::string record, FrameTally& tally) {
+    if (!object.is_object()) throw Error(record, "is not an object", kCorrectEntry);
+    TransformsFrame frame;
+    frame.file_path = read_string(object, "file_path", record);
+    if (frame.file_path.empty()) throw Error(record, "has no file_path", kCorrectEntry);
+    record += fmt::format(" ({})", frame.file_path);
+    frame.mask_path = read_string(object, "mask_path", record);
+    frame.depth_path = read_depth_path(object, record);
+    frame.intrinsics = defaults;
+    read_intrinsics(object, record, frame.intrinsics);
+    read_pose(object, record, tally.poses, frame);
+    if (const auto time = object.find("time"); time != object.end() && time->is_number())
+        tally.times.insert(time->get<double>());
+    tally.odd_angles += angles_disagree(frame.intrinsics) ? 1 : 0;
+    return frame;
+}
+
+void note_frames(const FrameTally& tally, const std::string& where, TransformsFile& file) {
+    const std::size_t count = file.frames.size();
+    if (tally.times.size() > 1)
+        file.notes.push_back(
+            fmt::format("Warning: the frames of {} have {} different times: photos of a scene that "
+                        "moves are taken for photos of one moment.",
+                        where, tally.times.size()));
+    if (tally.poses.halfway > 0)
+        file.notes.push_back(fmt::format(
+            "{} of {} frames have no transform_matrix, but a start and an end: the pose is the one "
+            "halfway, and {} of them move.",
+            tally.poses.halfway, count, tally.poses.moving));
+    if (tally.odd_angles > 0)
+        file.notes.push_back(fmt::format(
+            "Warning: in {} of {} frames of {} fl_x or fl_y is not what camera_angle_x or "
+            "camera_angle_y says; the focal lengths in pixels were used.",
+            tally.odd_angles, count, where));
+}
+
 }  // namespace
 
 TransformsFile parse_transforms(std::string_view text, const std::string& where) {
-    const json root = parse_json(text, where);
+    const json root = parse_json_text(text, where, "Correct or export the file again.");
     if (root.is_array() && !root.empty() && root[0].is_object() && root[0].contains("shots"))
         throw Error(where, "is a reconstruction of OpenSfM, which is not read",
                     "Export it for COLMAP (opensfm export_colmap) and name that folder.");
+    for (const char* key : {"camera_path", "key_frames"})
+        if (root.is_object() && root.contains(key) && !root.contains("frames"))
+            throw Error(where, "is a camera path, not a data set",
+                        key == std::string_view("camera_path")
+                            ? "Render along it: darb render SCENE --path or --cameras FILE."
+                            : "Render along it: darb render SCENE --path FILE.");
     if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array())
         throw Error(where, "has no list named frames",
                     root.is_array()
@@ -167,33 +546,21 @@ TransformsFile parse_transforms(std::string_view text, const std::string& where)
     TransformsIntrinsics defaults;
     read_intrinsics(root, where, defaults);
     file.ply_file_path = read_string(root, "ply_file_path", where);
-    std::optional<double> unit;
-    read_number(root, "depth_unit_scale_factor", where, unit);
-    file.depth_unit = unit.value_or(0);
-    if (unit && !(*unit > 0 && *unit < 1e6))
-        throw Error(where, fmt::format("depth_unit_scale_factor is {}", *unit),
-                    "Give the metres of a step, as 0.001.");
-    for (const char* key : {"test_filenames", "val_filenames"}) {
-        const auto test = root.find(key);
-        if (!file.test_filenames.empty() || test == root.end() || !test->is_array()) continue;
-        for (const json& name : *test)
-            if (name.is_string()) file.test_filenames.push_back(name.get<std::string>());
-    }
+    read_depth_unit(root, where, file);
+    read_split(root, file);
+    FrameTally tally;
+    tally.poses.mitsuba = read_bool(root, "from_mitsuba", where, false);
+    UnreadKeys unread;
+    unread.look_at(root, where);
     const json& frames = root["frames"];
     for (std::size_t i = 0; i < frames.size(); ++i) {
-        TransformsFrame frame;
-        std::string record = fmt::format("{}, frame {} of {}", where, i + 1, frames.size());
-        if (!frames[i].is_object()) throw Error(record, "is not an object", kCorrectEntry);
-        frame.file_path = read_string(frames[i], "file_path", record);
-        if (frame.file_path.empty()) throw Error(record, "has no file_path", kCorrectEntry);
-        record += fmt::format(" ({})", frame.file_path);
-        frame.mask_path = read_string(frames[i], "mask_path", record);
-        frame.depth_path = read_string(frames[i], "depth_file_path", record);
-        frame.intrinsics = defaults;
-        read_intrinsics(frames[i], record, frame.intrinsics);
-        file.scaled_poses += read_pose(frames[i], record, frame) ? 1 : 0;
-        file.frames.push_back(std::move(frame));
+        const std::string record = fmt::format("{}, frame {} of {}", where, i + 1, frames.size());
+        file.frames.push_back(read_frame(frames[i], defaults, record, tally));
+        unread.look_at(frames[i], record);
     }
+    file.scaled_poses = tally.poses.scaled;
+    if (std::string note = unread.note(where); !note.empty()) file.notes.push_back(std::move(note));
+    note_frames(tally, where, file);
     return file;
 }
 

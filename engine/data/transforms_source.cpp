@@ -1,6 +1,7 @@
 // transforms.json as a data set: photos, masks, the point cloud and the test files.
 #include <fmt/format.h>
 
+#include <map>
 #include <set>
 
 #include "engine/core/error.h"
@@ -63,17 +64,18 @@ void set_lens(const TransformsFrame& frame, const fs::path& listing, const Datas
     view.lens = lens_from_transforms(frame.intrinsics, width, height, where);
 }
 
-void set_depth(const TransformsFrame& frame, double unit, const fs::path& file,
+void set_depth(const TransformsFrame& frame, const TransformsFile& declared, const fs::path& file,
                const DatasetOptions& options, View& view) {
-    view.depth_unit = unit;
-    if (frame.depth_path.empty()) return;
+    view.depth_unit = declared.depth_unit;
+    view.depth_unit_of_integers = declared.unit_of_integers;
+    if (frame.depth_path.empty() || !declared.read_depths) return;
     view.depth = file.parent_path() / frame.depth_path;
     if (!fs::is_regular_file(view.depth))
         view.depth = file.parent_path() / with_slashes(frame.depth_path);
     if (options.require_photos && !fs::is_regular_file(view.depth))
         throw Error(fmt::format("{} ({})", file.string(), frame.file_path),
                     fmt::format("its depth {} is missing", view.depth.string()),
-                    "Put the depth back or remove depth_file_path.");
+                    "Put the depth back, or remove its name from the frame.");
 }
 
 struct Skipped {
@@ -87,8 +89,67 @@ struct Declared {
     std::string ply;
     bool masks = false;  // of some frame
     bool depths = false;
+    bool no_depths = false;  // they are not to be read
     std::size_t scaled_poses = 0;
+    std::map<fs::path, std::string> by_end;  // photos found by the end of these names
+    std::size_t of_no_split = 0;             // frames that the split leaves out
+    std::size_t unknown_names = 0;           // of the split, which no frame has
 };
+
+/// By the end of its name, beside the file or in its folder of images.
+fs::path find_frame_by_end(const fs::path& root, const std::string& name, Declared& declared) {
+    fs::path photo = find_by_end(root, name);
+    if (photo.empty()) photo = find_by_end(root / kImages, "/" + name);
+    if (photo.empty()) return {};
+    if (!declared.by_end.emplace(photo, name).second)
+        throw Error(fmt::format("{} ({})", root.string(), name),
+                    fmt::format("is not there, and by the end of its name it is {}, the photo of "
+                                "{} as well",
+                                photo.string(), declared.by_end.at(photo)),
+                    "Put the photos where file_path says, relative to the file.");
+    return photo;
+}
+
+std::set<std::string> names_of_split(const std::vector<std::string>& listed,
+                                     const TransformsFile& file, Declared& declared) {
+    std::set<std::string> frames, names;
+    for (const TransformsFrame& frame : file.frames) frames.insert(plain_name(frame.file_path));
+    for (const std::string& name : listed) {
+        names.insert(plain_name(name));
+        declared.unknown_names += frames.contains(plain_name(name)) ? 0 : 1;
+    }
+    return names;
+}
+
+/// What the split and the poses of the files were found to be.
+void note_declared(const Declared& declared, Dataset& dataset) {
+    if (declared.scaled_poses > 0)
+        dataset.notes.push_back(fmt::format("The scale of the rotation was removed: {}.",
+                                            counted(declared.scaled_poses, "pose")));
+    if (!declared.by_end.empty())
+        dataset.notes.push_back(fmt::format("Found by the end of their names: {}, as {} for {}.",
+                                            counted(declared.by_end.size(), "photo"),
+                                            declared.by_end.begin()->first.string(),
+                                            declared.by_end.begin()->second));
+    if (declared.of_no_split > 0)
+        dataset.notes.push_back(
+            fmt::format("Left out: {} that train_filenames does not list, nor the test set.",
+                        counted(declared.of_no_split, "frame")));
+    if (declared.unknown_names > 0)
+        dataset.notes.push_back(
+            fmt::format("Warning: the split lists {} that are no frame's file_path.",
+                        counted(declared.unknown_names, "name")));
+    if (declared.no_depths)
+        dataset.notes.push_back(
+            "Depths were not read, as enable_depth_loading is false in the file.");
+    const auto cropped =
+        std::ranges::find_if(dataset.views, [](const View& view) { return view.crop_radius > 0; });
+    if (cropped != dataset.views.end())
+        dataset.notes.push_back(
+            fmt::format("Pixels more than {:g} px from the middle of a photo are left out, as "
+                        "fisheye_crop_radius says.",
+                        cropped->crop_radius));
+}
 
 void add_frames(const fs::path& listing, bool is_test, const DatasetOptions& options,
                 Dataset& dataset, Skipped& skipped, Declared& declared) {
@@ -96,8 +157,11 @@ void add_frames(const fs::path& listing, bool is_test, const DatasetOptions& opt
     if (declared.ply.empty()) declared.ply = file.ply_file_path;
     declared.scaled_poses += file.scaled_poses;
     const fs::path root = listing.parent_path();
-    std::set<std::string> test_names;
-    for (const std::string& name : file.test_filenames) test_names.insert(plain_name(name));
+    const std::set<std::string> test_names = names_of_split(file.test_filenames, file, declared),
+                                train_names = names_of_split(file.train_filenames, file, declared);
+    dataset.depth_scale = file.applied_scale;
+    declared.no_depths |= !file.read_depths;
+    dataset.notes.insert(dataset.notes.end(), file.notes.begin(), file.notes.end());
     for (const TransformsFrame& frame : file.frames) {
         View view;
         view.name = plain_name(frame.file_path);
@@ -109,6 +173,7 @@ void add_frames(const fs::path& listing, bool is_test, const DatasetOptions& opt
         view.photo = find_photo(root, name);
         if (view.photo.empty() && name == view.name)  // backslashes that are part of a name
             view.photo = find_photo(root, frame.file_path);
+        if (view.photo.empty()) view.photo = find_frame_by_end(root, name, declared);
         if (view.photo.empty()) {
             if (options.require_photos) {
                 check_is_file(wanted);  // what is there is of another kind
@@ -124,11 +189,18 @@ void add_frames(const fs::path& listing, bool is_test, const DatasetOptions& opt
             throw Error(fmt::format("{} ({})", listing.string(), frame.file_path),
                         fmt::format("its mask {} is missing", view.mask.string()),
                         "Put the mask back or remove mask_path.");
-        set_depth(frame, file.depth_unit, listing, options, view);
+        set_depth(frame, file, listing, options, view);
         set_lens(frame, listing, options, view);
+        view.crop_radius = frame.intrinsics.crop_radius;
         view.camera.rotation = frame.rotation;
         view.camera.translation = frame.translation;
         view.is_test = is_test || test_names.contains(view.name);
+        if (!train_names.empty() && !view.is_test && !train_names.contains(view.name)) {
+            ++declared.of_no_split;
+            continue;
+        }
+        if (declared.by_end.contains(view.photo))
+            view.name = view.photo.lexically_relative(root).generic_string();
         dataset.views.push_back(std::move(view));
     }
 }
@@ -144,7 +216,7 @@ void add_points(const fs::path& root, const std::string& ply, const DatasetOptio
         return;
     }
     std::size_t dropped = 0;
-    dataset.points = read_point_cloud_ply(path, dropped);
+    dataset.points = read_point_cloud_ply(path, dropped, &dataset.notes);
     if (ply.empty())
         dataset.notes.push_back(fmt::format("{} with the sparse points was read: {}.",
                                             path.filename().string(),
@@ -201,11 +273,9 @@ Dataset load_transforms(const fs::path& path, const DatasetOptions& options) {
             fmt::format("--images {} has no effect: no file_path in {} begins with images/. Use "
                         "-r to scale.",
                         options.images_folder, listing.filename().string()));
-    if (declared.scaled_poses > 0)
-        dataset.notes.push_back(fmt::format("The scale of the rotation was removed: {}.",
-                                            counted(declared.scaled_poses, "pose")));
+    note_declared(declared, dataset);
     if (!declared.masks) add_masks(dataset.root, options, dataset);
-    if (!declared.depths) {
+    if (!declared.depths && !declared.no_depths) {
         const fs::path& photo = dataset.views[0].photo;  // in images/ or in the like of it
         add_depths(dataset.root, photo.parent_path(), options, dataset);
     }

@@ -97,7 +97,34 @@ std::string selection(const std::vector<std::size_t>& pictures) {
                 hint);
 }
 
+// Of the ffmpeg that is installed.
+std::string every_picture() {
+    const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
+    std::unique_ptr<std::FILE, decltype(close)> pipe(
+        ::popen("ffmpeg -hide_banner -h long 2>/dev/null", "r"), close);
+    std::string help;
+    char part[4096];
+    while (pipe && std::fgets(part, sizeof part, pipe.get())) help += part;
+    return every_picture_option(help);
+}
+
 }  // namespace
+
+std::string picture_pattern(const fs::path& folder, const std::string& name) {
+    std::string pattern;
+    for (const char c : fs::absolute(folder).string())
+        pattern += c == '%' ? "%%" : std::string(1, c);
+    return pattern + (pattern.ends_with('/') ? "" : "/") + name;
+}
+
+std::string every_picture_option(std::string_view help) {
+    // At the beginning of a line: that of -vsync may tell one to use -fps_mode.
+    const auto lists = [&](const std::string& option) {
+        return help.starts_with(option) || help.find("\n" + option) != std::string_view::npos;
+    };
+    const bool old_alone = lists("-vsync") && !lists("-fps_mode");
+    return old_alone ? "-vsync passthrough" : "-fps_mode passthrough";
+}
 
 bool is_video_name(const fs::path& path) {
     const std::string extension = lower(path.extension().string());
@@ -126,8 +153,9 @@ std::vector<double> video_sharpness(const fs::path& video) {
     const LogFile log;
     const std::string command = fmt::format(
         "ffmpeg -nostdin -v error -i {} -map 0:v:0 -vf scale={}:{},format=gray "
-        "-vsync passthrough -f rawvideo -{}",
-        shell_quoted(fs::absolute(video)), kProbeWidth, kProbeHeight, log.redirection());
+        "{} -f rawvideo -{}",
+        shell_quoted(fs::absolute(video)), kProbeWidth, kProbeHeight, every_picture(),
+        log.redirection());
     const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
     std::unique_ptr<std::FILE, decltype(close)> pipe(::popen(command.c_str(), "r"), close);
     if (!pipe) throw Error("ffmpeg", "cannot be started", "Free memory or processes.");
@@ -164,10 +192,9 @@ void write_video_frames(const fs::path& video, const std::vector<std::size_t>& p
                     "Choose another output folder with -o.");
     const LogFile log;
     const std::string command = fmt::format(
-        "ffmpeg -nostdin -v error -y -i {} -map 0:v:0 -vf \"select='{}'\" -vsync passthrough "
-        "-q:v 2 {}{}",
-        shell_quoted(fs::absolute(video)), selection(pictures),
-        shell_quoted(fs::absolute(folder) / "frame_%05d.jpg"), log.redirection());
+        "ffmpeg -nostdin -v error -y -i {} -map 0:v:0 -vf \"select='{}'\" {} -q:v 2 {}{}",
+        shell_quoted(fs::absolute(video)), selection(pictures), every_picture(),
+        shell_quoted(picture_pattern(folder, "frame_%05d.jpg")), log.redirection());
     std::FILE* pipe = ::popen(command.c_str(), "r");
     const int status = pipe == nullptr ? -1 : ::pclose(pipe);
     if (status == -1 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) ffmpeg_failed(video, log);

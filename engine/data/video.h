@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace darb {
@@ -30,6 +31,15 @@ std::vector<std::size_t> sharpest_of_intervals(const std::vector<double>& sharpn
 void write_video_frames(const std::filesystem::path& video,
                         const std::vector<std::size_t>& pictures,
                         const std::filesystem::path& folder);
+
+/// FOLDER/NAME as ffmpeg takes it for the pictures of a sequence, where NAME has the %05d: from the
+/// root, so that no name reads as an option or a protocol, and with the folder's own percent signs
+/// written twice.
+std::string picture_pattern(const std::filesystem::path& folder, const std::string& name);
+
+/// The option by which this ffmpeg leaves out and repeats no picture, as its help (-h long) has it:
+/// -fps_mode since 5.1, -vsync before that and up to 8.
+std::string every_picture_option(std::string_view help);
 
 /// Variance of the Laplacian (4 neighbours) of a grey picture. Source: Pech-Pacheco et al.,
 /// Diatom autofocusing in brightfield microscopy, 2000.

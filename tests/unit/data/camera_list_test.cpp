@@ -32,6 +32,83 @@ TEST(CameraList, position_is_the_centre_and_rows_are_camera_to_world) {
     EXPECT_EQ(camera.fy, 50);
 }
 
+constexpr const char* kNerfstudio =
+    R"({"camera_type": "perspective", "render_height": 120, "render_width": 160, "fps": 24,
+        "seconds": 1, "crop": null, "keyframes": [], "camera_path": [
+        {"camera_to_world": [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1], "fov": 90, "aspect": 1.3333},
+        {"camera_to_world": [[0,-1,0,5], [1,0,0,6], [0,0,1,7]], "fov": 60, "aspect": 2}]})";
+
+TEST(CameraList, a_camera_path_of_nerfstudio_has_a_camera_a_frame) {
+    const auto path = test_folder() / "camera_path.json";
+    write_file_atomic(path, std::string(kNerfstudio));
+    std::vector<std::string> notes;
+    const std::vector<View> views = load_cameras(path, {}, &notes);
+    ASSERT_EQ(views.size(), 2u);
+    EXPECT_EQ(views[1].name, "frame_00001");
+    const Camera& camera = views[0].camera;
+    EXPECT_EQ(camera.width, 160);
+    EXPECT_EQ(camera.height, 120);
+    EXPECT_NEAR(camera.fy, 60, 1e-9);  // 90 degrees from top to bottom
+    EXPECT_NEAR(camera.fx, 60, 1e-9);
+    EXPECT_NEAR(glm::length(camera.centre() - glm::dvec3(5, 6, 7)), 0, 1e-12);
+    // It looks along -z, and +y of the world is up.
+    EXPECT_NEAR(glm::length(camera.rotation * glm::dvec3(0, 0, -1) - glm::dvec3(0, 0, 1)), 0,
+                1e-12);
+    EXPECT_NEAR(glm::length(camera.rotation * glm::dvec3(0, 1, 0) - glm::dvec3(0, -1, 0)), 0,
+                1e-12);
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("1 of 2 frames"), std::string::npos) << notes[0];
+    EXPECT_EQ(parse_nerfstudio_path(kNerfstudio, "p")->fps, 24);
+    EXPECT_FALSE(parse_nerfstudio_path(kOne, "p"));
+}
+
+TEST(CameraList, camera_paths_that_cannot_be_drawn_say_why) {
+    const auto error = [](const std::string& from, const std::string& to) {
+        try {
+            parse_nerfstudio_path(replaced(kNerfstudio, from, to), "p.json");
+        } catch (const Error& e) {
+            EXPECT_EQ(std::string(e.what()).find("json.exception"), std::string::npos) << e.what();
+            EXPECT_EQ(e.where.find("p.json"), 0u) << e.where;
+            EXPECT_FALSE(e.hint.empty());
+            return e.where + ": " + e.reason;
+        }
+        return std::string("no error");
+    };
+    for (const char* type : {"fisheye", "equirectangular", "omnidirectional"})
+        EXPECT_NE(error("perspective", type).find(type), std::string::npos);
+    EXPECT_NE(error("\"fov\": 60", "\"fov\": 180").find("frame 2 of 2"), std::string::npos);
+    EXPECT_NE(error("\"fov\": 60,", "").find("fov"), std::string::npos);
+    EXPECT_NE(error("0,0,0,1]", "0,0]").find("14 numbers"), std::string::npos);
+    EXPECT_NE(error("[1,0,0,5", "[null,0,0,5").find("frame 1 of 2"), std::string::npos);
+    EXPECT_NE(error("\"render_width\": 160", "\"render_width\": 0").find("render_width"),
+              std::string::npos);
+    EXPECT_NE(error("\"fps\": 24", "\"fps\": -1").find("frames a second"), std::string::npos);
+}
+
+TEST(CameraList, other_json_is_refused_by_line_and_column_in_words_of_its_own) {
+    const auto error = [](const std::string& text) {
+        try {
+            parse_camera_list(text, "c.json");
+        } catch (const Error& e) {
+            const std::string what = e.what();
+            EXPECT_EQ(what.find("json.exception"), std::string::npos) << what;
+            EXPECT_EQ(what.find("parse"), std::string::npos) << what;
+            return what;
+        }
+        return std::string("no error");
+    };
+    EXPECT_NE(error("").find("c.json: is empty"), std::string::npos);
+    EXPECT_NE(error("[{\"id\": 0,\n \"fx\": NaN}]").find("line 2, column 8, at 'NaN}]', as JSON"),
+              std::string::npos)
+        << error("[{\"id\": 0,\n \"fx\": NaN}]");
+    EXPECT_NE(error("[{\"id\": 0,\n").find("ends in line 2 before it is complete"),
+              std::string::npos)
+        << error("[{\"id\": 0,\n");
+    EXPECT_NE(error("[{'id': 0}]").find("line 1, column 3, at ''id'"), std::string::npos)
+        << error("[{'id': 0}]");
+    EXPECT_NE(error("\xff\xfe[").find("UTF-16"), std::string::npos);
+}
+
 TEST(CameraList, written_list_reads_back) {
     std::vector<View> views = parse_camera_list(kOne, "cameras.json");
     views[0].camera.cx = 17.25;

@@ -7,9 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <sstream>
 
 #include "engine/core/files.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/colmap_write.h"
+#include "engine/data/depth_io.h"
 #include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/point_cloud_ply.h"
@@ -240,6 +243,260 @@ TEST(ColmapProject, photos_are_found_by_backslashes_and_other_extensions) {
     EXPECT_EQ(dataset.views.at(0).mask, folder / "masks/left/a.png");
 }
 
+// Names of another machine, names that repeat the folder, and photos that lie with the model.
+TEST(ColmapProject, photos_are_found_by_the_end_of_their_names_with_a_note) {
+    const Camera camera{.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
+    const auto set_of = [&](const std::vector<std::string>& names,
+                            const std::vector<std::string>& photos) {
+        const auto folder = test_folder();
+        std::vector<View> views(names.size());
+        for (std::size_t i = 0; i < names.size(); ++i) {
+            views[i].name = names[i];
+            views[i].camera = camera;
+        }
+        write_colmap_binary(folder / "sparse/0", views, {});
+        for (const std::string& photo : photos) write_png(folder / photo, ImageU8(8, 6, 3));
+        return folder;
+    };
+    for (const char* prefix :
+         {"C:\\Users\\me\\photos\\", "/home/me/photos/", "images/", "./", "\\\\server\\share\\"}) {
+        const std::string head = prefix;
+        const auto folder =
+            set_of({head + "a.png", head + "b.JPG"}, {"images/a.png", "images/b.jpg"});
+        write_png(folder / "masks/a.png", ImageU8(8, 6, 1));
+        const Dataset dataset = load_dataset(folder);
+        ASSERT_EQ(dataset.views.size(), 2u);
+        EXPECT_EQ(dataset.views[0].photo.lexically_normal(), folder / "images/a.png") << prefix;
+        EXPECT_EQ(dataset.views[1].photo.lexically_normal(), folder / "images/b.jpg");
+        EXPECT_EQ(dataset.views[0].mask.lexically_normal(), folder / "masks/a.png");
+        if (head == "./") continue;
+        EXPECT_EQ(dataset.views[0].name, "a.png") << "outputs get no absolute names";
+        EXPECT_TRUE(std::ranges::any_of(dataset.notes, [&](const std::string& note) {
+            return note.find("2 photos, as " + head + "a.png is a.png") != std::string::npos;
+        })) << prefix;
+    }
+    const auto deep =
+        set_of({"/x/left/a.png", "/x/right/a.png"}, {"images/left/a.png", "images/right/a.png"});
+    EXPECT_EQ(load_dataset(deep).views.at(1).photo, deep / "images/right/a.png");
+    const auto one = set_of({"left/a.png", "right/a.png"}, {"images/a.png"});
+    EXPECT_NE(error_of([&] { load_dataset(one); }).find("the photo of left/a.png as well"),
+              std::string::npos);
+    for (const char* place : {"a.png", "sparse/0/a.png", "sparse/a.png"}) {
+        const auto flat = set_of({"a.png"}, {place});
+        EXPECT_EQ(load_dataset(flat).views.at(0).photo, flat / place);
+    }
+}
+
+// Each remedy that an error of a data set names, done as it says.
+TEST(ColmapProject, remedies_that_errors_name_work_as_typed) {
+    const auto after = [](const std::string& text, const std::string& head) {
+        const std::size_t begin = text.find(head);
+        EXPECT_NE(begin, std::string::npos) << head << " in " << text;
+        if (begin == std::string::npos) return std::string();
+        const std::size_t from = begin + head.size();
+        std::string word = text.substr(from, text.find_first_of(" ,\n", from) - from);
+        if (word.ends_with('.')) word.pop_back();
+        return word;
+    };
+    auto folder = write_project(camera_file(), image_file(), point_file());
+    DatasetOptions options;
+    for (const char* other : {"images_4", "photos", "RAW"}) {  // another folder of the photos
+        std::filesystem::rename(folder / "images", folder / other);
+        const std::string error = error_of([&] { load_dataset(folder); });
+        options.images_folder = after(error, "--images ");
+        EXPECT_EQ(load_dataset(folder, options).views.at(0).photo, folder / other / "a.png");
+        std::filesystem::rename(folder / other, folder / "images");
+    }
+    std::filesystem::create_directories(folder / "photos");  // one that is there, without photos
+    std::filesystem::rename(folder / "images/a.png", folder / "photos/a.png");
+    options.images_folder = after(error_of([&] { load_dataset(folder); }), "--images ");
+    EXPECT_EQ(load_dataset(folder, options).views.at(0).photo, folder / "photos/a.png");
+    options.images_folder = "images_2";
+    std::filesystem::rename(folder / "photos/a.png", folder / "images/a.png");
+    options.images_folder = after(error_of([&] { load_dataset(folder, options); }), "--images ");
+    EXPECT_EQ(options.images_folder, "images") << "a smaller size that is not there";
+    options.resolution = 2;
+    EXPECT_EQ(load_dataset(folder, options).views.at(0).camera.width, 4);
+
+    folder = write_project(camera_file(), image_file(), point_file());
+    write_png(folder / "masks/first.png", ImageU8(8, 6, 1));
+    std::string error = error_of([&] { load_dataset(folder); });
+    std::filesystem::rename(folder / "masks/first.png",
+                            folder / "masks" / after(error, "photos, as "));
+    EXPECT_EQ(load_dataset(folder).views.at(0).mask, folder / "masks/a.png");
+
+    ImageF depth(8, 6, 1);
+    std::fill(depth.data.begin(), depth.data.end(), 1.0f);
+    write_depth_png(folder / "depths/first.png", depth, kMillimetre);
+    error = error_of([&] { load_dataset(folder); });
+    EXPECT_NE(error.find("Name it as its photo in " + (folder / "images").string() + ", with .png"),
+              std::string::npos);
+    std::filesystem::rename(folder / "depths/first.png", folder / "depths/a.png");
+    error = error_of([&] { load_dataset(folder); });  // one track does not tell the scale
+    EXPECT_NE(error.find("--depth-scale"), std::string::npos) << error;
+    options = {};
+    options.depth_scale = 1;
+    EXPECT_EQ(load_dataset(folder, options).depth_scale, 1);
+
+    folder = write_project(camera_file(), image_file(), point_file());
+    write_camera_list(folder / "list.json", load_dataset(folder).views);
+    error = error_of([&] { load_dataset(folder / "list.json"); });
+    EXPECT_NE(error.find("use it with --cameras"), std::string::npos) << error;
+    EXPECT_EQ(load_cameras(folder / "list.json").size(), 1u);
+    for (const auto& [key, value] :
+         {std::pair<std::string, std::string>{"depth_unit_scale_factor", "0"},
+          {"integer_depth_scale", "1000"},
+          {"x_fov", "200"}}) {
+        const auto text = [&](const std::string& number) {
+            return "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"" + key + "\": " + number +
+                   ", \"frames\": [{\"file_path\": \"images/a.png\", \"transform_matrix\": "
+                   "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}";
+        };
+        write_file_atomic(folder / "t.json", text(value));
+        error = error_of([&] { load_dataset(folder / "t.json"); });
+        const std::string told = key == "integer_depth_scale"       ? after(error, "step: ")
+                                 : key == "depth_unit_scale_factor" ? after(error, "step, as ")
+                                                                    : "60";
+        write_file_atomic(folder / "t.json", text(told));
+        EXPECT_EQ(load_dataset(folder / "t.json").views.size(), 1u) << told;
+    }
+}
+
+// COLMAP 3.12 and later: a rig of two cameras, the second half a unit to the right of the first.
+TEST(ColmapProject, frames_and_rigs_say_the_poses_as_in_colmap) {
+    const auto folder = test_folder();
+    const auto write = [&](bool binary, const std::string& second, bool with_pose) {
+        std::filesystem::remove_all(folder / "sparse");
+        for (const char* name : {"a.png", "b.png"})
+            write_png(folder / "images" / name, ImageU8(8, 6, 3));
+        const auto model = folder / "sparse/0";
+        if (!binary) {
+            write_file_atomic(model / "cameras.txt",
+                              "1 PINHOLE 8 6 20 20 4 3\n2 PINHOLE 8 6 20 20 4 3\n");
+            write_file_atomic(model / "images.txt",
+                              "1 1 0 0 0 0 0 3 1 a.png\n\n2 " + second + " 2 b.png\n\n");
+            write_file_atomic(model / "rigs.txt", std::string("# rigs\n7 2 CAMERA 1 CAMERA 2 ") +
+                                                      (with_pose ? "1 0 1 0 0 -0.5 0 0" : "0") +
+                                                      "\n");
+            write_file_atomic(model / "frames.txt",
+                              std::string("9 7 1 0 0 0 0 0 3 2 CAMERA 1 1 CAMERA 2 2\n"));
+            return;
+        }
+        Bytes cameras, images, rigs, frames;
+        cameras.put<std::uint64_t>(2);
+        for (const std::uint32_t id : {1, 2}) {
+            cameras.put(id).put<std::int32_t>(1).put<std::uint64_t>(8).put<std::uint64_t>(6);
+            cameras.put(20.0).put(20.0).put(4.0).put(3.0);
+        }
+        images.put<std::uint64_t>(2);
+        for (const std::uint32_t id : {1, 2}) {
+            images.put(id);
+            std::istringstream numbers(id == 1 ? "1 0 0 0 0 0 3" : second);
+            for (double number; numbers >> number;) images.put(number);
+            images.put(id).text(id == 1 ? "a.png" : "b.png").put('\0').put<std::uint64_t>(0);
+        }
+        rigs.put<std::uint64_t>(1).put<std::uint32_t>(7).put<std::uint32_t>(2);
+        rigs.put<std::int32_t>(0).put<std::uint32_t>(1).put<std::int32_t>(0).put<std::uint32_t>(2);
+        rigs.put<std::uint8_t>(with_pose ? 1 : 0);
+        if (with_pose)
+            for (const double number : {0.0, 1.0, 0.0, 0.0, -0.5, 0.0, 0.0}) rigs.put(number);
+        frames.put<std::uint64_t>(1).put<std::uint32_t>(9).put<std::uint32_t>(7);
+        for (const double number : {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0}) frames.put(number);
+        frames.put<std::uint32_t>(2);
+        for (const std::uint32_t id : {1, 2})
+            frames.put<std::int32_t>(0).put(id).put<std::uint64_t>(id);
+        write_file_atomic(model / "cameras.bin", cameras.data);
+        write_file_atomic(model / "images.bin", images.data);
+        write_file_atomic(model / "rigs.bin", rigs.data);
+        write_file_atomic(model / "frames.bin", frames.data);
+        for (const auto& [bytes, rig] : {std::pair{rigs.data, true}, std::pair{frames.data, false}})
+            for (std::size_t length = 0; length < bytes.size(); ++length) {
+                const auto part = std::span(bytes).first(length);
+                EXPECT_FALSE(error_of([&] {
+                                 if (rig)
+                                     parse_colmap_rigs(part, "rigs.bin");
+                                 else
+                                     parse_colmap_frames(part, "frames.bin");
+                             }).empty());
+            }
+    };
+    const std::string right = "0 1 0 0 -0.5 0 -3", other = "1 0 0 0 9 0 3";
+    for (const bool binary : {false, true}) {
+        write(binary, right, true);
+        Dataset dataset = load_dataset(folder);
+        EXPECT_TRUE(dataset.notes.empty()) << dataset.notes.at(0);
+        EXPECT_EQ(dataset.views.at(1).camera.translation, glm::dvec3(-0.5, 0, -3));
+        write(binary, other, true);
+        dataset = load_dataset(folder);
+        EXPECT_NEAR(glm::length(dataset.views.at(1).camera.translation - glm::dvec3(-0.5, 0, -3)),
+                    0, 1e-12);
+        EXPECT_NEAR(dataset.views.at(1).camera.rotation[1][1], -1, 1e-12);
+        ASSERT_EQ(dataset.notes.size(), 1u);
+        for (const char* part : {"1 of 2 poses", "b.png at 0.5, 0, -3, not at -9, 0, -3"})
+            EXPECT_NE(dataset.notes[0].find(part), std::string::npos) << dataset.notes[0];
+        write(binary, other, false);
+        dataset = load_dataset(folder);
+        EXPECT_TRUE(dataset.notes.empty()) << "the rig does not know";
+        EXPECT_EQ(dataset.views.at(1).camera.translation, glm::dvec3(9, 0, 3));
+    }
+    write(false, right, true);
+    write_file_atomic(folder / "sparse/0/frames.txt",
+                      std::string("9 7 1 0 0 0 0 0 3 2 CAMERA 1 1 CAMERA 1 2\n"));
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("is of camera 2, but of camera 1"),
+              std::string::npos);
+    write_file_atomic(folder / "sparse/0/frames.txt",
+                      std::string("9 8 1 0 0 0 0 0 3 2 CAMERA 1 1 CAMERA 2 2\n"));
+    EXPECT_NE(error_of([&] { load_dataset(folder); }).find("rig 8"), std::string::npos);
+}
+
+TEST(ColmapProject, cameras_of_a_transforms_file_beside_it_are_compared) {
+    const auto folder = test_folder();
+    std::vector<View> views(5);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].name = std::to_string(i) + ".png";
+        views[i].camera = {.width = 8, .height = 6, .fx = 20, .fy = 20, .cx = 4, .cy = 3};
+        views[i].camera.rotation = rotation_from_quaternion({1, 0.1 * double(i), 0, 0}, "test");
+        views[i].camera.translation = {double(i * i), 1, 0};
+        write_png(folder / "images" / views[i].name, ImageU8(8, 6, 3));
+    }
+    write_colmap_binary(folder / "sparse/0", views, {});
+    // The same cameras, the world turned, scaled by 2 and moved.
+    const auto note = [&](double focal, std::size_t odd, bool turned) {
+        std::string frames;
+        for (std::size_t i = 0; i < views.size(); ++i) {
+            const glm::dmat3 world = rotation_from_quaternion({1, 0.5, 0.2, 0.3}, "test");
+            glm::dmat3 axes = world * glm::transpose(views[i].camera.rotation);
+            glm::dvec3 at = 2.0 * (world * views[i].camera.centre()) + glm::dvec3(5, 6, 7);
+            if (i == 2 && turned) axes = axes * rotation_from_quaternion({1, 0, 0.2, 0}, "test");
+            if (i == odd) at *= 3.0;
+            axes[1] = -axes[1];
+            axes[2] = -axes[2];
+            frames += std::string(i == 0 ? "" : ",") + "{\"file_path\": \"images/" + views[i].name +
+                      "\", \"transform_matrix\": [";
+            for (int r = 0; r < 3; ++r) {
+                std::ostringstream row;
+                row.precision(17);
+                row << (r == 0 ? "[" : ",[") << axes[0][r] << "," << axes[1][r] << "," << axes[2][r]
+                    << "," << at[r] << "]";
+                frames += row.str();
+            }
+            frames += "]}";
+        }
+        write_file_atomic(folder / "transforms.json", "{\"fl_x\": " + std::to_string(focal) +
+                                                          ", \"frames\": [" + frames + "]}");
+        const Dataset dataset = load_dataset(folder);
+        EXPECT_EQ(dataset.source, "COLMAP binary");
+        EXPECT_EQ(dataset.notes.size(), 1u);
+        EXPECT_NE(dataset.notes.at(0).find("name the transforms file itself"), std::string::npos);
+        return dataset.notes.at(0);
+    };
+    EXPECT_EQ(note(20, 9, false).find("Warning"), std::string::npos);
+    EXPECT_NE(note(24, 9, false).find("2.500 of its width in COLMAP binary, and 3.000"),
+              std::string::npos);
+    EXPECT_NE(note(20, 9, true).find("the turn from 1.png to 2.png"), std::string::npos);
+    EXPECT_NE(note(20, 0, false).find("1 of 4 ways"), std::string::npos);
+}
+
 TEST(ColmapProject, photos_that_were_converted_are_found) {
     const auto folder = test_folder();
     std::vector<View> views(1);
@@ -320,9 +577,53 @@ TEST(ColmapProject, a_ply_of_other_points_outranks_those_of_the_model) {
     const Dataset replaced = load_dataset(folder);
     EXPECT_EQ(replaced.points.size(), 3u);
     EXPECT_TRUE(replaced.points.seen_by.empty());
-    ASSERT_EQ(replaced.notes.size(), 1u);
-    EXPECT_NE(replaced.notes[0].find("points3D.ply was read, 3 points"), std::string::npos)
-        << replaced.notes[0];
+    ASSERT_EQ(replaced.notes.size(), 2u);
+    EXPECT_NE(replaced.notes[0].find("has no colours"), std::string::npos) << replaced.notes[0];
+    EXPECT_NE(replaced.notes[1].find("points3D.ply was read, 3 points"), std::string::npos)
+        << replaced.notes[1];
+}
+
+TEST(PointCloudPly, a_splat_scene_has_the_colours_of_its_f_dc) {
+    std::string text = "ply\nformat ascii 1.0\nelement vertex 3\n";
+    for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"})
+        text += "property float " + std::string(name) + "\n";
+    text += "end_header\n0 0 0 0 0 0 1\n0 0 1 1.7725 -1.7725 9 1\n0 1 0 nan 0 0 1\n";
+    std::size_t dropped = 0;
+    std::vector<std::string> notes;
+    const auto file = std::as_bytes(std::span(text.data(), text.size()));
+    const PointCloud points =
+        parse_point_cloud_ply(file, parse_ply_header(file, "p"), "p", dropped, &notes);
+    using Colours = std::vector<std::uint8_t>;
+    EXPECT_EQ(points.colour, (Colours{128, 128, 128, 255, 0, 255, 128, 128, 128}));
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_NE(notes[0].find("f_dc"), std::string::npos);
+}
+
+TEST(PointCloudPly, points_that_float32_rounded_are_noted) {
+    const auto notes_at = [](double far, bool doubles) {
+        const auto folder = write_project(camera_file(), image_file(), point_file());
+        std::string text = "ply\nformat ascii 1.0\nelement vertex 1000\n";
+        for (const char* name :
+             {"double x", "double y", "double z", "uchar red", "uchar green", "uchar blue"})
+            text += "property " + std::string(name) + "\n";
+        text += "end_header\n";
+        for (int i = 0; i < 1000; ++i) {
+            const double x = far + 0.1 * (i % 10) + 0.01, y = 0.1 * (i / 10 % 10),
+                         z = 0.1 * (i / 100);
+            text += doubles ? fmt::format("{} {} {} 1 2 3\n", x, y, z)
+                            : fmt::format("{} {} {} 1 2 3\n", static_cast<float>(x),
+                                          static_cast<float>(y), static_cast<float>(z));
+        }
+        write_file_atomic(folder / "sparse/0/points3D.ply", text);
+        std::string notes;
+        for (const std::string& note : load_dataset(folder).notes) notes += note + "\n";
+        return notes;
+    };
+    EXPECT_NE(notes_at(4e6, false).find("steps of 0.25, as float32"), std::string::npos)
+        << notes_at(4e6, false);
+    EXPECT_EQ(notes_at(4e6, true).find("as float32"), std::string::npos);
+    EXPECT_EQ(notes_at(0, false).find("as float32"), std::string::npos);
+    EXPECT_EQ(notes_at(2000, false).find("as float32"), std::string::npos);
 }
 
 TEST(PointCloudPly, colours_of_floats_are_up_to_1_or_up_to_255) {
@@ -351,7 +652,9 @@ TEST(ColmapProject, hold_out_takes_every_eighth_by_name) {
         views[i].name = "v" + std::to_string(100 + (i * 5) % 17) + ".png";
         views[i].camera.width = views[i].camera.height = 4;
         views[i].camera.fx = views[i].camera.fy = 4;
-        write_png(folder / "images" / views[i].name, ImageU8(4, 4, 3));
+        ImageU8 photo(4, 4, 3);
+        photo.data[0] = static_cast<std::uint8_t>(i);  // equal photos would count as one
+        write_png(folder / "images" / views[i].name, photo);
     }
     write_colmap_binary(folder / "sparse" / "0", views, {});
     DatasetOptions options;

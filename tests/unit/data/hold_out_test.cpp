@@ -6,8 +6,12 @@
 #include <cmath>
 #include <set>
 
+#include <filesystem>
+
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/data/dataset.h"
+#include "tests/unit/data/data_files.h"
 
 namespace darb {
 namespace {
@@ -117,6 +121,68 @@ TEST(HoldOut, few_views_leave_one_to_train_on) {
     EXPECT_FALSE(one[0].is_test);
     mark_held_out(two, {0, 2});
     EXPECT_NE(two[0].is_test, two[1].is_test);
+}
+
+// Views with photos in a folder: text[i] is what the photo of view i holds.
+std::vector<View> with_photos(std::vector<View> views, const std::vector<std::string>& text) {
+    const auto folder = test_folder();
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].photo = folder / (views[i].name + ".jpg");
+        write_file_atomic(views[i].photo, text[i]);
+    }
+    return views;
+}
+
+std::vector<std::string> distinct(int count) {
+    std::vector<std::string> text;
+    for (int i = 0; i < count; ++i) text.push_back(std::to_string(10'000 + i));
+    return text;
+}
+
+TEST(HoldOut, views_of_one_photo_are_on_one_side) {
+    const std::vector<View> views = with_photos(ring(20), distinct(20));
+    std::vector<View> plain = views;
+    EXPECT_EQ(mark_held_out(plain, {}), "");
+    // A name twice, a copy under another name, a hard link; files of equal size that differ.
+    std::vector<View> repeated = views;
+    repeated[3].photo = repeated[0].photo;
+    std::filesystem::copy_file(views[0].photo, views[12].photo,
+                               std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::remove(views[19].photo);
+    std::filesystem::create_hard_link(views[1].photo, views[19].photo);
+    const std::vector<std::size_t> first = first_of_photo(repeated);
+    for (std::size_t i = 0; i < first.size(); ++i)
+        EXPECT_EQ(first[i], i == 3 || i == 12 ? 0 : i == 19 ? 1 : i) << i;
+    const std::string note = mark_held_out(repeated, {});
+    EXPECT_NE(note.find("3 views repeat"), std::string::npos) << note;
+    EXPECT_NE(note.find("1003 repeats 1000"), std::string::npos) << note;
+    EXPECT_NE(note.find("2 of the repeats are held out, 1 trained on"), std::string::npos) << note;
+    // Every eighth photo: 0, 9 and 18 of the rows, as row 3 is no photo of its own and 12 neither.
+    for (std::size_t i = 0; i < repeated.size(); ++i)
+        EXPECT_EQ(repeated[i].is_test, i == 0 || i == 3 || i == 12 || i == 9 || i == 18) << i;
+}
+
+TEST(HoldOut, repeats_follow_an_arc_and_the_sources_own_views) {
+    std::vector<View> views = with_photos(ring(20), distinct(20));
+    for (std::size_t i = 0; i < 20; ++i)  // the photo on the other side of the ring
+        if (i % 2 == 1) views[i].photo = views[(i + 10) % 20].photo;
+    std::vector<View> arc = views, own = views, all = with_photos(ring(4), {"a", "b", "a", "b"});
+    mark_held_out(arc, {8, 4});
+    mark_held_out(own, {});
+    own = views;
+    own[1].is_test = true;
+    mark_held_out(own, {});
+    const std::vector<std::size_t> first = first_of_photo(views);
+    for (std::size_t i = 0; i < 20; ++i) {
+        EXPECT_EQ(arc[i].is_test, arc[first[i]].is_test) << i;
+        EXPECT_EQ(arc[i].in_arc, arc[first[i]].in_arc) << i;
+        EXPECT_EQ(own[i].is_test, first[i] == first[1]) << i;
+    }
+    // A test list that repeats the training photos stays, or nothing would be left to train on.
+    all[0].is_test = all[1].is_test = true;
+    const std::string note = mark_held_out(all, {});
+    EXPECT_NE(note.find("no measure of new views"), std::string::npos) << note;
+    EXPECT_FALSE(all[2].is_test || all[3].is_test);
 }
 
 }  // namespace

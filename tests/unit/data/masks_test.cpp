@@ -74,6 +74,37 @@ TEST_P(Masks, of_which_none_is_a_photos_are_an_error_that_names_the_form) {
     EXPECT_NO_THROW(load_cameras(set)) << "cameras need no masks";
 }
 
+TEST_P(Masks, of_near_names_are_found_where_there_is_no_doubt) {
+    for (const char* name :
+         {"Masks/left/a.png", "MASK/left/a.JPG.png", "masks/left/a_mask.png",
+          "masks/left/a.png.png", "masks/left/A.jpg.PNG", "masks/a.png", "masks/left/mask_a.png",
+          "masks/cam/left/a.png", "images/left/a_mask.png", "images/left/a.JPG.mask.png",
+          "images/left/a-mask.jpg"}) {
+        const fs::path set = write_masked_set(GetParam());
+        write_png(set / name, ImageU8(8, 6, 1));
+        const Dataset dataset = load_dataset(set);
+        const bool first = dataset.views.at(0).name.ends_with("a.JPG");
+        EXPECT_EQ(dataset.views.at(first ? 0 : 1).mask, set / name);
+        EXPECT_TRUE(dataset.views.at(first ? 1 : 0).mask.empty()) << name;
+    }
+    const fs::path set = write_masked_set(GetParam());
+    write_png(set / "masks/right/a.png", ImageU8(8, 6, 1));
+    EXPECT_NE(error_of([&] { load_dataset(set); }).find("of none of the 2"), std::string::npos)
+        << "another camera's";
+}
+
+TEST_P(Masks, in_folders_that_may_have_been_meant_are_noted) {
+    for (const char* name : {"segmentation/b.png", "dynamic_mask/b.png", "masks_2/b.npy"}) {
+        const fs::path set = write_masked_set(GetParam());
+        write_png(set / name, ImageU8(8, 6, 1));
+        const Dataset dataset = load_dataset(set);
+        EXPECT_FALSE(dataset.alpha_is_mask);
+        ASSERT_EQ(dataset.notes.size(), 1u) << name;
+        EXPECT_NE(dataset.notes[0].find(fs::path(name).parent_path().string()), std::string::npos)
+            << dataset.notes[0];
+    }
+}
+
 TEST(MasksOfTransforms, that_frames_name_are_all_there_are) {
     const fs::path set = write_masked_set(false);
     std::string text = read_text_file(set / "transforms.json");

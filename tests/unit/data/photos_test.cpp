@@ -1,4 +1,5 @@
 // From files to pixels: formats, EXIF, masks, scaling, many at once.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <stb/stb_image_write.h>
 #include <zlib.h>
@@ -110,6 +111,78 @@ TEST(Exif, damaged_or_absent_data_means_upright) {
         for (int k = 0; k < 3; ++k) damaged[rng.below(80)] = std::byte(rng.below(256));
         const int found = exif_orientation(damaged);
         EXPECT_TRUE(found >= 1 && found <= 8);
+    }
+}
+
+// A JPEG's head: IFD0 with the place of the Exif directory, that with the place of a time.
+std::vector<std::byte> with_time(const std::string& time, bool little) {
+    Bytes exif;
+    exif.text("Exif").put('\0').put('\0').text(little ? "II" : "MM");
+    const auto put = [&](std::uint32_t value, int size) {
+        for (int i = 0; i < size; ++i)
+            exif.put(static_cast<std::uint8_t>(value >> 8 * (little ? i : size - 1 - i)));
+    };
+    put(42, 2), put(8, 4), put(1, 2);
+    put(0x8769, 2), put(4, 2), put(1, 4), put(26, 4), put(0, 4);
+    put(1, 2);
+    put(0x9003, 2), put(2, 2), put(static_cast<std::uint32_t>(time.size() + 1), 4), put(44, 4);
+    put(0, 4);
+    exif.text(time).put('\0');
+    const auto length = exif.data.size() + 2;
+    std::vector<std::byte> file = {std::byte{0xff},        std::byte{0xd8},
+                                   std::byte{0xff},        std::byte{0xe1},
+                                   std::byte(length >> 8), std::byte(length & 255)};
+    file.insert(file.end(), exif.data.begin(), exif.data.end());
+    return file;
+}
+
+TEST(Photos, exif_says_when_a_photo_was_taken) {
+    const std::string time = "2024:05:31 18:02:11";
+    for (const bool little : {false, true}) {
+        const std::vector<std::byte> file = with_time(time, little);
+        EXPECT_EQ(exif_time(file), time);
+        for (std::size_t length = 0; length + 1 < file.size(); ++length)
+            EXPECT_EQ(exif_time(std::span(file).first(length)), "") << length;
+    }
+    EXPECT_EQ(exif_time(with_time("yesterday, 18:02:11", true)), "");
+    EXPECT_EQ(exif_time(jpeg(quarters())), "");
+}
+
+/// The focal length on 35 mm film that a photo's EXIF says.
+std::vector<std::byte> with_focal_length(std::vector<std::byte> file, int mm) {
+    Bytes exif;
+    exif.text("Exif").put('\0').put('\0').text("II").put<std::uint16_t>(42);
+    exif.put<std::uint32_t>(8).put<std::uint16_t>(1);
+    exif.put<std::uint16_t>(0x8769).put<std::uint16_t>(4).put<std::uint32_t>(1);
+    exif.put<std::uint32_t>(26).put<std::uint32_t>(0).put<std::uint16_t>(1);
+    exif.put<std::uint16_t>(0xa405).put<std::uint16_t>(3).put<std::uint32_t>(1);
+    exif.put(static_cast<std::uint32_t>(mm)).put<std::uint32_t>(0);
+    const auto length = exif.data.size() + 2;
+    std::vector<std::byte> segment = {std::byte{0xff}, std::byte{0xe1}, std::byte(length >> 8),
+                                      std::byte(length & 255)};
+    segment.insert(segment.end(), exif.data.begin(), exif.data.end());
+    file.insert(file.begin() + 2, segment.begin(), segment.end());
+    return file;
+}
+
+TEST(Exif, a_focal_length_far_from_that_of_the_camera_is_noted) {
+    const auto file = with_focal_length(jpeg(quarters()), 43);  // 17.8 px of 16 x 8
+    EXPECT_EQ(exif_focal_35mm(file), 43);
+    for (std::size_t length = 0; length < 80; ++length) {
+        const int found = exif_focal_35mm(std::span(file).first(length));
+        EXPECT_TRUE(found == 0 || found == 43) << length;
+    }
+    const auto folder = test_folder();
+    write_file_atomic(folder / "images/a.jpg", file);
+    std::vector<View> views(1);
+    views[0].name = "a.jpg";
+    for (const double focal : {18.0, 26.0, 40.0, 8.0}) {
+        views[0].camera = {.width = 16, .height = 8, .fx = focal, .fy = focal, .cx = 8, .cy = 4};
+        write_colmap_binary(folder / "sparse/0", views, {});
+        const Dataset dataset = load_dataset(folder);
+        EXPECT_EQ(dataset.notes.size(), focal == 40 || focal == 8 ? 1u : 0u) << focal;
+        for (const std::string& note : dataset.notes)
+            EXPECT_NE(note.find("43 mm (on 35 mm film) are 18 px"), std::string::npos) << note;
     }
 }
 
@@ -277,6 +350,21 @@ TEST(Mask, of_another_size_and_of_zeros_and_ones) {
         for (int x = 0; x < 4; ++x) EXPECT_EQ(image.at(x, y, 3), x < 2 ? 0 : 255);
 }
 
+TEST(Mask, is_in_the_alpha_channel_where_that_varies) {
+    const auto alpha_of = [](const std::vector<std::uint8_t>& pixels) {
+        ImageU8 image = to_rgba(ImageU8(2, 1, 1)), mask(2, 1, 4);
+        mask.data = pixels;
+        apply_mask(image, mask);
+        return std::pair<int, int>(image.data[3], image.data[7]);
+    };
+    using Two = std::pair<int, int>;
+    EXPECT_EQ(alpha_of({255, 255, 255, 0, 255, 255, 255, 255}), Two(0, 255)) << "white";
+    EXPECT_EQ(alpha_of({0, 0, 0, 0, 0, 0, 0, 255}), Two(0, 255)) << "black";
+    EXPECT_EQ(alpha_of({10, 90, 30, 0, 40, 200, 0, 200}), Two(0, 200)) << "cut out of the photo";
+    EXPECT_EQ(alpha_of({0, 0, 0, 255, 255, 255, 255, 255}), Two(0, 255)) << "opaque";
+    EXPECT_EQ(alpha_of({0, 0, 0, 255, 255, 255, 255, 100}), Two(0, 100)) << "both";
+}
+
 /// Opaque but for one quarter, which is ignored.
 ImageU8 mask_without(int width, int height, bool lower) {
     ImageU8 mask(width, height, 1);
@@ -403,6 +491,56 @@ TEST(Photos, what_holds_no_cameras_is_told_with_the_way_to_them) {
     has(says("photos"), "but pictures");
     has(says("film"), "clip.mp4' -o OUT");
     has(says("hidden"), "holds no cameras: neither");
+}
+
+ImageU8 rgba(std::uint8_t grey, std::uint8_t alpha, std::uint8_t corner = 0) {
+    ImageU8 image(8, 8, 4);
+    for (std::size_t at = 0; at < image.data.size(); ++at)
+        image.data[at] = at % 4 == 3 ? alpha : grey;
+    if (corner > 0) image.data[0] = corner;
+    return image;
+}
+
+std::vector<std::string> doubts_of(const std::vector<ImageU8>& photos) {
+    Dataset dataset;
+    dataset.root = "set";
+    for (std::size_t i = 0; i < photos.size(); ++i) {
+        dataset.views.emplace_back();
+        dataset.views.back().name = fmt::format("p{}.png", i);
+        dataset.views.back().photo = "set/" + dataset.views.back().name;
+    }
+    return photo_doubts(dataset, photos);
+}
+
+TEST(PhotoDoubts, photos_that_teach_something_have_none) {
+    EXPECT_TRUE(doubts_of({rgba(9, 255), rgba(9, 255, 200), rgba(0, 255, 90)}).empty());
+}
+
+TEST(PhotoDoubts, photos_that_are_transparent_everywhere_are_named) {
+    const auto some = doubts_of({rgba(9, 255), rgba(50, 0), rgba(70, 255)});
+    ASSERT_EQ(some.size(), 1u);
+    EXPECT_NE(some[0].find("1 of 3"), std::string::npos) << some[0];
+    EXPECT_NE(some[0].find("p1.png"), std::string::npos) << some[0];
+    try {
+        doubts_of({rgba(9, 0), rgba(50, 0)});
+        FAIL() << "taken";
+    } catch (const Error& e) {
+        EXPECT_NE(std::string(e.what()).find("transparent everywhere, as set/p0.png"),
+                  std::string::npos)
+            << e.what();
+        EXPECT_NE(e.hint.find("--effects=-alpha"), std::string::npos);
+    }
+}
+
+TEST(PhotoDoubts, black_and_repeated_photos_and_one_alone_are_named) {
+    const auto all = doubts_of({rgba(0, 255), rgba(50, 255), rgba(50, 255), rgba(7, 255)});
+    ASSERT_EQ(all.size(), 2u);
+    EXPECT_NE(all[0].find("1 of 4 photos are black everywhere: p0.png"), std::string::npos);
+    EXPECT_NE(all[1].find("2 of 4 photos have the same pixels"), std::string::npos) << all[1];
+    EXPECT_NE(all[1].find("p1.png, p2.png"), std::string::npos) << all[1];
+    const auto alone = doubts_of({rgba(50, 255, 9)});
+    ASSERT_EQ(alone.size(), 1u);
+    EXPECT_NE(alone[0].find("p0.png"), std::string::npos) << alone[0];
 }
 
 }  // namespace

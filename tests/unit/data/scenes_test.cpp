@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "engine/data/dataset.h"
+#include "engine/data/depths.h"
 #include "tests/unit/data/data_files.h"
 
 namespace darb {
@@ -139,6 +140,55 @@ TEST(RealScenes, folder_scaled_by_divisor_and_width) {
     EXPECT_TRUE(std::any_of(wide.notes.begin(), wide.notes.end(), [](const std::string& note) {
         return note.starts_with("-r 20000 is wider than");
     }));
+}
+
+/// A data set that was read wrong, and one of the same photos that is right.
+struct FaultCase {
+    const char *set, *right;
+    bool depths;
+};
+
+class ImportCase : public testing::TestWithParam<FaultCase> {};
+
+INSTANTIATE_TEST_SUITE_P(
+    Cases, ImportCase,
+    testing::Values(FaultCase{"absolute_names/c_abs", "outlier_camera/t_ply", false},
+                    FaultCase{"absolute_names/c_absu", "outlier_camera/t_ply", false},
+                    FaultCase{"photos_in_root/c_flatimg", "outlier_camera/t_ply", false},
+                    FaultCase{"photos_in_root/c_prefix", "outlier_camera/t_ply", false},
+                    FaultCase{"mask_in_alpha/k_rgba2", "mask_in_alpha/k_same", false},
+                    FaultCase{"masks_not_found/k_Masks", "mask_in_alpha/k_same", false},
+                    FaultCase{"outlier_camera/t_plyfar", "outlier_camera/t_no3", false},
+                    FaultCase{"tiff_depth/x_tif", "ngp_depth_scale/x_tmm", true},
+                    FaultCase{"ngp_depth_scale/x_tngp", "ngp_depth_scale/x_tmm", true}),
+    [](const auto& test) {
+        std::string name = test.param.set;
+        std::replace(name.begin(), name.end(), '/', '_');
+        return name;
+    });
+
+// Photos, masks, depths and poses are those of the set that is right, so its pictures are, too.
+TEST_P(ImportCase, is_read_as_the_one_that_is_right) {
+    const auto cases = test_data() / "cases";
+    const FaultCase set = GetParam();
+    DARB_NEED_DATA(cases / set.set);
+    DARB_NEED_DATA(cases / set.right);
+    const Dataset read = load_dataset(cases / set.set), right = load_dataset(cases / set.right);
+    ASSERT_EQ(read.views.size(), right.views.size());
+    for (std::size_t v = 0; v < read.views.size(); ++v) {
+        const View &a = read.views[v], &b = right.views[v];
+        EXPECT_EQ(a.photo.filename(), b.photo.filename());
+        EXPECT_NEAR(glm::distance(a.camera.centre(), b.camera.centre()), 0, 1e-6);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(glm::distance(a.camera.rotation[c], b.camera.rotation[c]), 0, 1e-6);
+        EXPECT_EQ(a.camera.fx, b.camera.fx);
+        EXPECT_EQ(load_photo(a).data, load_photo(b).data) << a.name;
+        if (!set.depths) continue;
+        const ImageF one = load_depth(a), two = load_depth(b);
+        for (std::size_t p = 0; p < one.data.size(); ++p)
+            ASSERT_NEAR(one.data[p], two.data[p], 0.0011) << a.name << " " << p;
+    }
+    EXPECT_NEAR(scene_extent(read), scene_extent(right), 1e-6);
 }
 
 }  // namespace

@@ -155,6 +155,100 @@ TEST(Transforms, val_filenames_are_the_test_set_where_there_is_no_other) {
     EXPECT_EQ(names(R"("test_filenames": ["c"], )" + val), std::vector<std::string>{"c"});
 }
 
+/// The notes of a file, in one.
+std::string notes_of(const std::string& head, const std::string& frames) {
+    std::string all;
+    for (const std::string& note : parse_transforms(file(head, frames), "t.json").notes)
+        all += note + "\n";
+    return all;
+}
+
+TEST(Transforms, keys_that_are_not_read_but_matter_are_named_and_harmless_ones_are_not) {
+    const std::string harmless =
+        R"("aabb_scale": 16, "scale": 0.5, "offset": [0.5, 0.5, 0.5], "orientation_override": "up",
+           "applied_transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]], "rolling_shutter": [0, 0, 0, 0],
+           "white_transparent": false, "skew": 0, )";
+    EXPECT_EQ(notes_of(harmless, frame("a", R"("sharpness": 50, "colmap_im_id": 3, )")), "");
+    for (const char* key : {R"("rolling_shutter": [0, 0, 0, 0.02], )", R"("mask_color": "red", )",
+                            R"("enable_ray_loading": true, )", R"("s1": 0.01, )",
+                            R"("depth_max": 5, )", R"("alpha_path": "x", )"}) {
+        const std::string name = std::string(key).substr(1, std::string(key).find('"', 1) - 1);
+        EXPECT_NE(notes_of(key, frame("a")).find(name), std::string::npos) << key;
+        EXPECT_NE(notes_of("", frame("a") + "," + frame("b", key)).find(name), std::string::npos);
+    }
+    for (const auto& [key, meant] : std::vector<std::pair<std::string, std::string>>{
+             {"maskPath", "mask_path"},
+             {"mask_pth", "mask_path"},
+             {"FL_X", "fl_x"},
+             {"depth_filepath", "depth_file_path"},
+             {"camera-model", "camera_model"},
+             {"integer_depth_scales", "integer_depth_scale"}}) {
+        const std::string note = notes_of("", frame("a", "\"" + key + "\": \"x\", "));
+        EXPECT_NE(note.find(key + " (is " + meant + " meant?)"), std::string::npos) << note;
+    }
+    for (const char* lens : {R"("ftheta_p0": 1, )", R"("latlong": true, )"})
+        EXPECT_NE(parse_error(file(lens, frame("a"))).find("lens that is not read"),
+                  std::string::npos);
+    EXPECT_NE(notes_of("", frame("a", R"("time": 0.1, )") + "," + frame("b", R"("time": 0.2, )"))
+                  .find("2 different times"),
+              std::string::npos);
+    EXPECT_EQ(notes_of("", frame("a", R"("time": 0.1, )") + "," + frame("b", R"("time": 0.1, )")),
+              "");
+}
+
+TEST(Transforms, keys_of_other_dialects_are_read) {
+    EXPECT_NEAR(lens_of(R"("x_fov": 90, )").parameters[0], 40, 1e-12);
+    EXPECT_NEAR(lens_of(R"("fl_x": 50, )", R"("x_fov": 90, )").parameters[1], 40, 1e-12);
+    EXPECT_NEAR(lens_of(R"("x_fov": 90, "y_fov": 90, )").parameters[1], 30, 1e-12);
+    EXPECT_EQ(lens_of(R"("fl_x": 50, "distortion_params": [1, 2, 0, 0, 5, 6], )").parameters,
+              (std::vector<double>{50, 50, 40, 30, 1, 2, 5, 6}));
+    EXPECT_EQ(lens_of(R"("fl_x": 50, "k1": 1, "camera_model": "SIMPLE_RADIAL_FISHEYE", )").model,
+              "OPENCV_FISHEYE");
+    // Mitsuba's camera looks along +z with x to the left: half a turn about y of OpenGL's.
+    const std::string turned =
+        R"({"file_path": "a", "transform_matrix": [[-1,0,0,1],[0,1,0,2],[0,0,-1,3]]})";
+    const auto mitsuba = parse_transforms(file(R"("from_mitsuba": true, )", turned), "t.json");
+    const auto opengl = parse_transforms(file("", frame("a")), "t.json");
+    for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(glm::length(mitsuba.frames[0].rotation[c] - opengl.frames[0].rotation[c]), 0,
+                    1e-12);
+    // The start and the end of an exposure: halfway.
+    const std::string exposed =
+        R"({"file_path": "a", "transform_matrix_start": [[1,0,0,1],[0,1,0,2],[0,0,1,3]],
+            "transform_matrix_end": [[0,-1,0,3],[1,0,0,2],[0,0,1,3]]})";
+    const TransformsFile halfway = parse_transforms(file("", exposed), "t.json");
+    const glm::dmat3 to_world = glm::transpose(halfway.frames[0].rotation);
+    EXPECT_NEAR(glm::length(to_world[0] - glm::dvec3(1, 1, 0) / std::sqrt(2.0)), 0, 1e-12);
+    EXPECT_NEAR(glm::length(-(to_world * halfway.frames[0].translation) - glm::dvec3(2, 2, 3)), 0,
+                1e-12);
+    ASSERT_EQ(halfway.notes.size(), 1u);
+    EXPECT_NE(halfway.notes[0].find("1 of them move"), std::string::npos) << halfway.notes[0];
+}
+
+TEST(Transforms, two_keys_for_one_fact_are_compared) {
+    const auto refused = [](const std::string& error) {
+        EXPECT_NE(error.find("but"), std::string::npos) << error;
+        EXPECT_NE(error.find("Remove the one that is wrong"), std::string::npos) << error;
+    };
+    refused(parse_error(
+        file(R"("depth_unit_scale_factor": 0.001, "integer_depth_scale": 0.0001, )", frame("a"))));
+    refused(parse_error(
+        file("", frame("a", R"("depth_path": "x.png", "depth_file_path": "y.png", )"))));
+    const std::string focal = R"("fl_x": 50, )";
+    refused(
+        error_of([&] { lens_of(focal + R"("is_fisheye": true, "camera_model": "OPENCV", )"); }));
+    refused(error_of(
+        [&] { lens_of(focal + R"("is_fisheye": false, "camera_model": "OPENCV_FISHEYE", )"); }));
+    EXPECT_EQ(lens_of(focal + R"("is_fisheye": false, "camera_model": "OPENCV", )").model,
+              "PINHOLE");
+    const std::string steps = parse_error(file(R"("integer_depth_scale": 1000, )", frame("a")));
+    EXPECT_NE(steps.find("0.001"), std::string::npos) << steps;
+    const std::string size = R"("w": 80, "h": 60, "fl_x": 40, )";
+    EXPECT_EQ(notes_of(size + R"("camera_angle_x": 1.5707963, )", frame("a")), "");
+    EXPECT_NE(notes_of(size + R"("camera_angle_x": 0.8, )", frame("a")).find("camera_angle_x"),
+              std::string::npos);
+}
+
 TEST(Transforms, every_error_comes_with_a_remedy) {
     for (const std::string& text :
          {file(R"("fl_x": "50 px", )", frame("a")), file(R"("camera_model": 5, )", frame("a")),
@@ -243,6 +337,39 @@ TEST(TransformsSource, nerfstudio_folder_with_masks_points_and_split) {
     std::filesystem::remove_all(folder / "images");
     EXPECT_NE(error_of([&] { load_dataset(folder); }).find("none of its 3 photos"),
               std::string::npos);
+}
+
+TEST(TransformsSource, frames_that_the_split_leaves_out_are_left_out_with_a_note) {
+    const auto folder = test_folder();
+    for (const char* name : {"images/a.png", "images/b.png", "images/c.png"})
+        write_png(folder / name, ImageU8(8, 6, 3));
+    write_file_atomic(
+        folder / "transforms.json",
+        file(R"("fl_x": 10, "train_filenames": ["images/a.png"],
+                              "test_filenames": ["images/b.png", "c.png"], )",
+             frame("images/a.png") + "," + frame("images/b.png") + "," + frame("images/c.png")));
+    const Dataset dataset = load_dataset(folder);
+    ASSERT_EQ(dataset.views.size(), 2u);
+    EXPECT_FALSE(dataset.views[0].is_test);
+    EXPECT_TRUE(dataset.views[1].is_test);
+    ASSERT_EQ(dataset.notes.size(), 2u);
+    EXPECT_NE(dataset.notes[0].find("1 frame that"), std::string::npos) << dataset.notes[0];
+    EXPECT_NE(dataset.notes[1].find("1 name that"), std::string::npos) << dataset.notes[1];
+}
+
+TEST(TransformsSource, pixels_beyond_a_fisheyes_circle_are_left_out) {
+    const auto folder = test_folder();
+    write_png(folder / "images/a.png", ImageU8(16, 12, 3));
+    write_file_atomic(folder / "transforms.json",
+                      file(R"("w": 32, "h": 24, "fl_x": 10, "fisheye_crop_radius": 10, )",
+                           frame("images/a.png")));
+    const Dataset dataset = load_dataset(folder);
+    EXPECT_TRUE(dataset.alpha_is_mask);
+    const ImageU8 photo = load_photo(dataset.views[0]);
+    int opaque = 0;
+    for (std::size_t i = 3; i < photo.data.size(); i += 4) opaque += photo.data[i] == 255 ? 1 : 0;
+    EXPECT_NEAR(opaque, 3.14159 * 5 * 5, 6) << "half the size, half the radius";
+    EXPECT_NE(dataset.notes.at(0).find("fisheye_crop_radius"), std::string::npos);
 }
 
 TEST(TransformsSource, names_of_the_split_are_compared_without_dots_and_backslashes) {
@@ -351,8 +478,8 @@ TEST(TransformsSource, points_lie_under_the_names_that_other_programs_give_them)
                                       "property float y\nproperty float z\nend_header\n1 2 3\n"));
         const Dataset dataset = load_dataset(folder);
         EXPECT_EQ(dataset.points.size(), 1u) << name;
-        ASSERT_EQ(dataset.notes.size(), 1u);
-        EXPECT_NE(dataset.notes[0].find(name), std::string::npos) << dataset.notes[0];
+        ASSERT_EQ(dataset.notes.size(), 2u);  // and that the points have no colours
+        EXPECT_NE((dataset.notes[0] + dataset.notes[1]).find(name), std::string::npos);
     }
 }
 
