@@ -8,6 +8,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/text.h"
+#include "engine/data/camera_list.h"
 #include "engine/kernels/second_moment.h"
 #include "engine/publish/page_files.h"
 #include "engine/publish/page_shaders.h"
@@ -16,7 +17,7 @@
 #include "engine/raster/kernel_constants.h"
 #include "engine/report/html.h"
 #include "engine/scene/inflate.h"
-#include "engine/scene/orbit_cameras.h"
+#include "engine/scene/subject.h"
 
 namespace darb {
 
@@ -75,7 +76,7 @@ Json shaders_of(const SplatModel& model) {
     return shaders;
 }
 
-Json camera_json(const View& view, const glm::dvec3& origin) {
+Json camera_json(const View& view, const Subject& subject, const SplatModel& model) {
     const Camera& c = view.camera;
     const glm::dmat3 rows = glm::transpose(c.rotation);
     return {{"name", printable(view.name)},
@@ -85,36 +86,14 @@ Json camera_json(const View& view, const glm::dvec3& origin) {
             {"fy", c.fy},
             {"cx", c.cx},
             {"cy", c.cy},
-            {"eye", json_of(c.centre() - origin)},
-            {"axes", {json_of(rows[0]), json_of(rows[1]), json_of(rows[2])}}};
-}
-
-glm::dvec3 up_of(const std::vector<View>& views) {
-    glm::dvec3 up(0);
-    for (const View& view : views) up -= glm::transpose(view.camera.rotation)[1];
-    return glm::length(up) > 1e-3 * static_cast<double>(views.size()) ? glm::normalize(up)
-                                                                      : glm::dvec3(0, -1, 0);
-}
-
-/// Where the axes of the cameras come nearest to each other; the ball's centre where they are all
-/// but parallel.
-glm::dvec3 focus_of(const std::vector<View>& views, const glm::dvec3& origin,
-                    const SceneBall& ball) {
-    glm::dmat3 sum(0);
-    glm::dvec3 right(0);
-    for (const View& view : views) {
-        const glm::dvec3 axis = glm::transpose(view.camera.rotation)[2];
-        const glm::dmat3 across = glm::dmat3(1) - glm::outerProduct(axis, axis);
-        sum += across;
-        right += across * (view.camera.centre() - origin);
-    }
-    const double n = static_cast<double>(views.size());
-    return glm::determinant(sum) > 1e-3 * n * n * n ? glm::inverse(sum) * right : ball.centre;
+            {"eye", json_of(c.centre() - model.origin)},
+            {"axes", {json_of(rows[0]), json_of(rows[1]), json_of(rows[2])}},
+            {"pivot", pivot_depth(subject, model, c)}};
 }
 
 Json scene_json(const PageDocument& document, const SplatModel& model, const PageSplats& packed,
                 std::size_t payload_bytes) {
-    const SceneBall ball = opaque_ball(model);
+    const Subject subject = subject_of(model, cameras_of(document.views));
     Json columns = Json::array();
     for (const PageColumn& c : packed.columns) {
         Json column = {{"attribute", attribute_name(c.attribute)},
@@ -127,7 +106,7 @@ Json scene_json(const PageDocument& document, const SplatModel& model, const Pag
         columns.push_back(column);
     }
     Json cameras = Json::array();
-    for (const View& view : document.views) cameras.push_back(camera_json(view, model.origin));
+    for (const View& view : document.views) cameras.push_back(camera_json(view, subject, model));
     return {{"count", packed.count},
             {"degree", packed.sh_degree},
             {"exact", packed.columns.front().exact},
@@ -138,9 +117,9 @@ Json scene_json(const PageDocument& document, const SplatModel& model, const Pag
             {"cameras", cameras},
             {"start", document.start},
             {"poster", document.start},
-            {"focus", json_of(focus_of(document.views, model.origin, ball))},
-            {"radius", ball.radius},
-            {"up", json_of(up_of(document.views))},
+            {"focus", json_of(subject.centre - model.origin)},
+            {"radius", subject.radius},
+            {"up", json_of(document.up)},
             {"background", json_of(glm::dvec3(document.background))},
             {"facts", document.facts},
             {"near", NEAR_DEFAULT},

@@ -14,6 +14,7 @@ struct PageDocument {
     std::string title, facts;
     std::vector<View> views;  // at least one
     std::size_t start = 0;    // of views
+    glm::dvec3 up{0, -1, 0};  // world
     glm::vec3 background{0.0f};
     std::vector<std::byte> poster;  // JPEG of views[start]
 };

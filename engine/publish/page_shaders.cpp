@@ -19,8 +19,9 @@ constexpr std::string_view kPreamble =
     "#define precise\n";  // which GLSL ES 3.00 does not know
 
 std::string constant_text(const SpecValue& value) {
-    if (const auto* integer = std::get_if<std::int32_t>(&value)) return fmt::format("{}", *integer);
-    std::string text = fmt::format("{:.9g}", std::get<float>(value));
+    if (const auto* integer = std::get_if<std::int32_t>(&value.value))
+        return fmt::format("{}", *integer);
+    std::string text = fmt::format("{:.9g}", std::get<float>(value.value));
     if (text.find_first_of(".e") == std::string::npos) text += ".0";
     return text;
 }

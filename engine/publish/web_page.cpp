@@ -8,30 +8,31 @@
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/compare_view.h"
 #include "engine/data/image_io.h"
-#include "engine/data/metrics.h"
 #include "engine/publish/page_document.h"
 #include "engine/publish/page_splats.h"
 #include "engine/render/renderer.h"
 #include "engine/report/html.h"
-#include "engine/scene/merge_splats.h"
 #include "engine/scene/orbit_cameras.h"
 #include "engine/scene/splat_shapes.h"
+#include "engine/scene/subject.h"
+#include "engine/scene/upright.h"
 
 namespace darb {
 
 namespace {
 
-constexpr std::size_t kMeasuredViews = 8;
-constexpr int kMeasuredWidth = 800, kPosterWidth = 800, kPosterQuality = 75;  // px, px, of 100
-constexpr int kOrbitViews = 8, kOrbitWidth = 960, kOrbitHeight = 720;         // px
-constexpr double kEqualDb = 100;
+constexpr int kPosterWidth = 800, kPosterQuality = 75;                 // px, of 100
+constexpr int kOrbitViews = 8, kOrbitWidth = 960, kOrbitHeight = 720;  // px
 
-std::vector<View> bookmarks_of(const WebPageOptions& options, const SplatModel& model) {
+std::vector<View> bookmarks_of(const WebPageOptions& options, const SplatModel& model,
+                               const glm::dvec3& up) {
     std::vector<View> views = options.views;
     if (views.empty())
-        for (const Camera& camera : orbit_cameras(model, kOrbitViews, kOrbitWidth, kOrbitHeight)) {
+        for (const Camera& camera :
+             orbit_cameras(dense_bounds(model), kOrbitViews, kOrbitWidth, kOrbitHeight, up)) {
             views.emplace_back().camera = camera;
             views.back().name = fmt::format("View {}", views.size());
         }
@@ -61,76 +62,6 @@ Camera at_most(const Camera& camera, int width) {
                    std::max(1, static_cast<int>(std::lround(camera.height * share))));
 }
 
-/// Pictures of a model, and how near those of other splats come to them.
-class Measure {
-  public:
-    Measure(Device& device, const SplatModel& model, const std::vector<View>& views,
-            const glm::vec3& background)
-        : device_(device), background_(background) {
-        const std::size_t count = std::min(kMeasuredViews, views.size());
-        Renderer renderer(device, model);
-        for (std::size_t i = 0; i < count; ++i) {
-            const View& view = views[i * views.size() / count];
-            names_.push_back(view.name);
-            cameras_.push_back(at_most(view.camera, kMeasuredWidth));
-            truths_.push_back(renderer.render(cameras_.back(), background));
-        }
-    }
-
-    void compare(const SplatModel& splats, WebPageFacts& facts) const {
-        Renderer renderer(device_, splats);
-        facts.views = cameras_.size();
-        facts.mean_db = 0;
-        facts.worst_db = 2 * kEqualDb;
-        for (std::size_t i = 0; i < cameras_.size(); ++i) {
-            const double db =
-                std::min(psnr(renderer.render(cameras_[i], background_), truths_[i]), kEqualDb);
-            facts.mean_db += db / static_cast<double>(cameras_.size());
-            if (db >= facts.worst_db) continue;
-            facts.worst_db = db;
-            facts.worst_view = names_[i];
-        }
-    }
-
-  private:
-    Device& device_;
-    glm::vec3 background_;
-    std::vector<std::string> names_;
-    std::vector<Camera> cameras_;
-    std::vector<ImageF> truths_;
-};
-
-/// The coarsest that is good enough, at best exact.
-PageSplats fitting_splats(const SplatModel& model, bool exact, const Measure& measure,
-                          WebPageFacts& facts) {
-    for (facts.level = exact ? kPageLevels : 0;; ++facts.level) {
-        const PagePrecision precision = page_precision(facts.level, model.kernel);
-        PageSplats packed = pack_page_splats(model, precision);
-        if (packed.count == 0)
-            throw Error("web page", "the scene has no splat that is drawn",
-                        "Choose another scene, or another part of it.");
-        facts.splats = packed.count;
-        facts.exact = precision.exact;
-        measure.compare(unpack_page_splats(packed, model), facts);
-        if (precision.exact || facts.worst_db >= kPageWorstDb) return packed;
-    }
-}
-
-/// Splats whose page is likely to be no larger, fewer than there are.
-std::size_t count_that_fits(std::size_t splats, const std::string& page, std::uint64_t most) {
-    const std::size_t head = page.find(kFirstPart);
-    const double share = (static_cast<double>(most) - static_cast<double>(head)) /
-                         static_cast<double>(page.size() - head);
-    const double count = std::floor(0.98 * share * static_cast<double>(splats));
-    if (count < 1)
-        throw Error("--max-size",
-                    fmt::format("{} bytes hold no splats: renderer, cameras and "
-                                "picture take {}",
-                                most, head),
-                    "Give more.");
-    return static_cast<std::size_t>(count);
-}
-
 std::string facts_text(const SplatModel& model, const WebPageFacts& facts) {
     std::string kernel(kernel_name(model.kernel));
     std::ranges::replace(kernel, '_', ' ');
@@ -138,14 +69,60 @@ std::string facts_text(const SplatModel& model, const WebPageFacts& facts) {
         "{} splats, kernel {} ({}), harmonics of degree {}. {} Made with darb {}.",
         format_number(static_cast<double>(facts.splats)), kernel, footprint_name(model.footprint),
         model.sh_degree,
-        facts.merged_from > 0
-            ? fmt::format("Merged from {}: {:.1f} dB from the source at worst.",
-                          format_number(static_cast<double>(facts.merged_from)), facts.worst_db)
-        : facts.exact ? std::string("Values as in the file.")
+        facts.merged_from > 0 ? fmt::format("Merged from {}: {:.1f} dB from the source at worst.",
+                                            format_number(static_cast<double>(facts.merged_from)),
+                                            facts.loss.worst_db)
+        : facts.exact         ? std::string("Values as in the file.")
                       : fmt::format("Values are rounded: {:.1f} dB from the source at worst.",
-                                    facts.worst_db),
+                                    facts.loss.worst_db),
         DARB_VERSION);
 }
+
+/// The page of the splats that were packed last.
+class FittedPage : public PictureOutput {
+  public:
+    FittedPage(Device& device, const SplatModel& source, PageDocument& document)
+        : device_(device), source_(source), document_(document) {}
+
+    SplatModel pack(const SplatModel& splats, int level) override {
+        const PagePrecision precision = page_precision(level, source_.kernel);
+        packed_ = pack_page_splats(splats, precision);
+        if (packed_.count == 0)
+            throw Error("web page", "the scene has no splat that is drawn",
+                        "Choose another scene, or another part of it.");
+        facts_.splats = packed_.count;
+        facts_.exact = precision.exact;
+        return unpack_page_splats(packed_, splats);
+    }
+
+    std::size_t finish(const PictureFit& fit) override {
+        facts_.merged_from = fit.merged_from;
+        facts_.level = fit.level;
+        facts_.loss = fit.loss;
+        const SplatModel shown = unpack_page_splats(packed_, source_);
+        Renderer renderer(device_, shown);
+        const Camera camera = at_most(document_.views[document_.start].camera, kPosterWidth);
+        document_.poster =
+            encode_jpeg(to_8bit(renderer.render(camera, document_.background)), kPosterQuality);
+        document_.facts = facts_text(source_, facts_);
+        page_ = page_document(document_, shown, packed_);
+        facts_.bytes = page_.size();
+        return page_.size();
+    }
+
+    std::size_t fixed_bytes() const override { return page_.find(kFirstPart); }
+
+    std::string take_page() { return std::move(page_); }
+    const WebPageFacts& facts() const { return facts_; }
+
+  private:
+    Device& device_;
+    const SplatModel& source_;
+    PageDocument& document_;
+    PageSplats packed_;
+    std::string page_;
+    WebPageFacts facts_;
+};
 
 }  // namespace
 
@@ -161,35 +138,22 @@ std::string make_web_page(Device& device, const SplatModel& model, const WebPage
     PageDocument document;
     document.title = options.title;
     document.background = options.background;
-    document.views = bookmarks_of(options, model);
+    document.up = options.up ? *options.up
+                  : options.views.empty()
+                      ? guess_up(model)
+                      : up_of_cameras(cameras_of(options.views)).value_or(glm::dvec3(0, -1, 0));
+    document.views = bookmarks_of(options, model, document.up);
     document.start = start_of(options.start, document.views);
-    WebPageFacts found;
-    const Measure measure(device, model, document.views, options.background);
-    PageSplats packed = fitting_splats(model, options.exact, measure, found);
-    const auto finish = [&] {
-        const SplatModel shown = unpack_page_splats(packed, model);
-        Renderer renderer(device, shown);
-        const Camera camera = at_most(document.views[document.start].camera, kPosterWidth);
-        document.poster =
-            encode_jpeg(to_8bit(renderer.render(camera, options.background)), kPosterQuality);
-        document.facts = facts_text(model, found);
-        return page_document(document, shown, packed);
-    };
-    std::string page = finish();
-    SplatModel kept;
-    while (options.max_bytes > 0 && page.size() > options.max_bytes) {
-        const SplatModel& from = kept.size() > 0 ? kept : model;
-        kept = merge_splats(from, count_that_fits(from.size(), page, options.max_bytes));
-        packed = pack_page_splats(kept, page_precision(found.level, model.kernel));
-        found.splats = packed.count;
-        found.merged_from = model.size();
-        measure.compare(unpack_page_splats(packed, kept), found);
-        page = finish();
+    const PictureMeasure measure(device, model, document.views, options.background,
+                                 options.progress);
+    FittedPage page(device, model, document);
+    fit_pictures(model, &measure,
+                 {kPageLevels + 1, options.exact ? kPageLevels : 0, options.max_bytes}, page);
+    if (facts) {
+        *facts = page.facts();
+        facts->script_bytes = page_script_bytes();
     }
-    found.bytes = page.size();
-    found.script_bytes = page_script_bytes();
-    if (facts) *facts = found;
-    return page;
+    return page.take_page();
 }
 
 std::string web_page_text(const WebPageFacts& facts) {
@@ -198,11 +162,8 @@ std::string web_page_text(const WebPageFacts& facts) {
                     : fmt::format("values rounded at level {} of {}", facts.level, kPageLevels - 1);
     const std::string merged =
         facts.merged_from > 0 ? fmt::format(" merged from {}", facts.merged_from) : "";
-    return fmt::format(
-        "{} splats{}, {} bytes, {}: {:.2f} dB mean over {} views, {:.2f} dB at worst "
-        "({})",
-        facts.splats, merged, facts.bytes, splats, facts.mean_db, facts.views, facts.worst_db,
-        printable(facts.worst_view));
+    return fmt::format("{} splats{}, {} bytes, {}: {}", facts.splats, merged, facts.bytes, splats,
+                       loss_text(facts.loss));
 }
 
 }  // namespace darb

@@ -4,26 +4,27 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
+#include "engine/publish/fit_pictures.h"
 #include "engine/scene/splat_model.h"
 
 namespace darb {
 
 struct WebPageOptions {
     std::string title;
-    std::vector<View> views;  // bookmarks, as pinholes; none: eight around the scene
-    std::string start;        // name or number, from 1, of the first camera; empty: 1
+    std::vector<View> views;       // bookmarks, as pinholes; none: eight around the scene
+    std::string start;             // name or number, from 1, of the first camera; empty: 1
+    std::optional<glm::dvec3> up;  // world; nothing: as the views are held, else a guess
     glm::vec3 background{0.0f};
-    bool exact = false;           // float32; else the coarsest precision that comes to kPageWorstDb
+    bool exact = false;           // float32; else the coarsest precision that comes to kEnoughDb
     std::uint64_t max_bytes = 0;  // of the file; splats are merged to fit. 0: as it comes
+    PictureMeasure::Progress progress = {};  // of the pictures that decide; may be empty
 };
-
-/// What the worst view measured must come to for a precision to be taken.
-constexpr double kPageWorstDb = 50;
 
 struct WebPageFacts {
     std::size_t splats = 0;        // in the page; those that are never drawn are left out
@@ -32,10 +33,7 @@ struct WebPageFacts {
     std::size_t script_bytes = 0;  // of script and shaders
     int level = 0;                 // of page_precision
     bool exact = false;
-    std::size_t views = 0;  // measured, of the bookmarks
-    double mean_db = 0,
-           worst_db = 0;  // the page's splats against the model's, drawn by darb; equal: 100
-    std::string worst_view;
+    PictureLoss loss;  // the page's splats against the model's, drawn by darb from bookmarks
 };
 
 /// The document. Renders on the device to measure and for the picture that shows while it loads.

@@ -35,9 +35,13 @@ struct Clusters {
     std::vector<std::uint32_t> label;  // [N]
 };
 
-/// rows: [N][dims], finite; 1 <= k. The same rows give the same clusters, where assign does.
+/// Called with the share that is done, rising to 1.
+using ClusterProgress = std::function<void(double)>;
+
+/// rows: [N][dims], finite; 1 <= k. The same rows give the same clusters, where assign does. With
+/// as many centres as rows, each row is one.
 Clusters cluster_rows(const std::vector<float>& rows, std::size_t dims, std::size_t k,
-                      const AssignRows& assign = assign_rows);
+                      const AssignRows& assign = assign_rows, const ClusterProgress& progress = {});
 
 /// 256 numbers, ascending.
 using Codebook256 = std::array<float, 256>;

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "engine/core/error.h"
+#include "engine/core/quantile.h"
 #include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply_comments.h"
@@ -77,6 +78,19 @@ double unit_of(std::uint32_t bits, int shift, int width) {
 
 std::array<double, 3> unpack_11_10_11(std::uint32_t bits) {
     return {unit_of(bits, 21, 11), unit_of(bits, 11, 10), unit_of(bits, 0, 11)};
+}
+
+/// Between two positions of a chunk, by the median of all.
+double usual_step(const std::vector<Chunk>& chunks) {
+    constexpr std::array<double, 3> kSteps{2047, 1023, 2047};
+    std::vector<double> steps;
+    for (const Chunk& chunk : chunks) {
+        double step = 0;
+        for (std::size_t i = 0; i < 3; ++i)
+            step = std::max(step, (double{chunk.high[i]} - double{chunk.low[i]}) / kSteps[i]);
+        if (std::isfinite(step)) steps.push_back(step);
+    }
+    return steps.empty() ? 0 : nearest_rank(steps, 0.5);
 }
 
 void unpack_splat(const std::array<std::uint32_t, 4>& packed, const Chunk& chunk, std::size_t at,
@@ -269,6 +283,7 @@ SplatModel parse_compressed_ply(std::span<const std::byte> file, const PlyHeader
     if (!behind.empty()) said.notes.push_back(behind);
     settle_shapes(model, said.notes);
     said.dropped = drop_non_finite(model);
+    said.position_step = usual_step(chunks);
     if (facts) *facts = std::move(said);
     return model;
 }

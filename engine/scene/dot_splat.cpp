@@ -11,6 +11,7 @@
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_format.h"
 #include "engine/scene/splat_shapes.h"
+#include "engine/scene/stored_units.h"
 #include "shaders/shared/limits.h"
 
 namespace darb {
@@ -28,18 +29,27 @@ std::array<float, 4> rotation_of_record(std::span<const std::byte> record) {
     return q;
 }
 
-void store_record(std::span<const std::byte> record, std::size_t at, SplatModel& model) {
+void store_record(std::span<const std::byte> record, std::size_t at, bool logarithms,
+                  SplatModel& model) {
     for (std::size_t i = 0; i < 3; ++i) {
         model.position[3 * at + i] = load_le<float>(record, 4 * i);
         const auto scale = load_le<float>(record, 12 + 4 * i);  // the logarithm of < 0 is NaN
-        model.log_scale[3 * at + i] =
-            scale == 0 ? -static_cast<float>(LOG_SCALE_LIMIT) : std::log(scale);
+        model.log_scale[3 * at + i] = logarithms   ? scale
+                                      : scale == 0 ? -static_cast<float>(LOG_SCALE_LIMIT)
+                                                   : std::log(scale);
         model.sh_dc[3 * at + i] =
             static_cast<float>(dc_of_colour(static_cast<double>(record[24 + i]) / 255));
     }
     model.opacity_logit[at] = logit_of_byte(static_cast<std::uint8_t>(record[27]));
     const std::array<float, 4> q = rotation_of_record(record);
     std::copy(q.begin(), q.end(), &model.rotation[4 * at]);
+}
+
+bool has_negative_scales(std::span<const std::byte> file) {
+    for (std::size_t at = 0; at + kRecord <= file.size(); at += kRecord)
+        for (std::size_t k = 0; k < 3; ++k)
+            if (load_le<float>(file, at + 12 + 4 * k) < 0) return true;
+    return false;
 }
 
 }  // namespace
@@ -62,7 +72,7 @@ bool looks_like_dot_splat(std::span<const std::byte> file) {
 }
 
 SplatModel parse_dot_splat(std::span<const std::byte> file, const std::string& where,
-                           std::size_t* dropped) {
+                           std::size_t* dropped, bool logarithms) {
     if (file.size() % kRecord != 0)
         throw Error(
             where,
@@ -73,7 +83,7 @@ SplatModel parse_dot_splat(std::span<const std::byte> file, const std::string& w
     SplatModel model;
     model.resize(file.size() / kRecord);
     for (std::size_t i = 0; i < model.size(); ++i)
-        store_record(file.subspan(i * kRecord, kRecord), i, model);
+        store_record(file.subspan(i * kRecord, kRecord), i, logarithms, model);
     const std::size_t gone = drop_non_finite(model);
     if (dropped) *dropped = gone;
     return model;
@@ -113,7 +123,12 @@ const SplatFormatRow& dot_splat_format() {
             },
         .parse =
             [](const SplatSource& source, SplatFile& file) {
-                return parse_dot_splat(source.bytes, source.where, &file.dropped);
+                const bool logarithms = source.units.scales == StoredScales::logarithms;
+                SplatModel model =
+                    parse_dot_splat(source.bytes, source.where, &file.dropped, logarithms);
+                if (file.dropped > 0 && has_negative_scales(source.bytes))
+                    file.notes.emplace_back(kScalesBelow0);
+                return model;
             },
         .encode = [](const SplatModel& model, const std::string&,
                      const EncodeOptions&) { return EncodedSplats{encode_dot_splat(model)}; },

@@ -19,9 +19,9 @@ bool looks_like_dot_splat(std::span<const std::byte> file);
 
 /// Splats with NaN, infinity or a negative scale are dropped, *dropped is their count. Scale 0
 /// becomes the smallest that is told apart from it. Throws Error where 32 does not divide the
-/// length.
+/// length. logarithms: its scales are those of the lengths, as the user says.
 SplatModel parse_dot_splat(std::span<const std::byte> file, const std::string& where,
-                           std::size_t* dropped = nullptr);
+                           std::size_t* dropped = nullptr, bool logarithms = false);
 
 /// Positions and scales are exact to float32; the error of opacity and of a colour within [0, 1]
 /// is at most 1/510, of a quaternion's component 1/128 and its normalisation. Harmonics of higher

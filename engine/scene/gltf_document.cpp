@@ -5,6 +5,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
 #include "engine/core/text.h"
 #include "engine/scene/gltf.h"
 #include "engine/scene/quantise.h"
@@ -27,7 +28,11 @@ json parse_text(GltfBytes text, const std::string& where) {
                         kCopyAgain);
         return true;
     };
-    return json::parse(begin, begin + text.size(), limit);
+    try {
+        return json::parse(begin, begin + text.size(), limit);
+    } catch (const json::parse_error& error) {
+        throw Error(where, json_fault({begin, text.size()}, error), kCopyAgain);
+    }
 }
 
 struct GlbParts {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "engine/core/error.h"
+#include "engine/core/json_text.h"
 #include "engine/core/text.h"
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
@@ -286,17 +287,29 @@ void read_scales(GltfScene& scene, const json& attributes, SplatModel& model) {
         value = limit_infinite_log_scale(static_cast<float>(std::log(double{value})));
 }
 
+/// 0 to 1, as the extension has them; other programs write logits, which lie outside of that.
+void read_opacities(GltfScene& scene, const json& attributes, SplatModel& model) {
+    const Accessor opacity = needed(scene, attributes, gltf::kOpacity, 1, kFloats | kUnsignedUnits);
+    fill(scene, opacity, gltf::kOpacity, 1, model.opacity_logit, kAsItIs);
+    constexpr float kRounding = 0.02f;
+    if (std::ranges::any_of(model.opacity_logit,
+                            [](float v) { return v < -kRounding || v > 1 + kRounding; })) {
+        scene.note("opacities lie outside of 0 to 1: read as logits, as 3DGS has them");
+        return;
+    }
+    for (float& value : model.opacity_logit) {
+        const double in = std::clamp(double{value}, 0.0, 1.0);
+        value = limit_infinite_logit(static_cast<float>(std::log(in) - std::log1p(-in)));
+    }
+}
+
 void read_fallback(GltfScene& scene, const json& attributes, SplatModel& model) {
     read_scales(scene, attributes, model);
     const Accessor turn = needed(scene, attributes, gltf::kRotation, 4, kFloats | kSignedUnits);
     fill(scene, turn, gltf::kRotation, 4, model.rotation, kAsItIs);
     for (std::size_t i = 0; i < model.rotation.size(); i += 4)  // x y z w
         std::rotate(&model.rotation[i], &model.rotation[i + 3], &model.rotation[i] + 4);
-    const Accessor opacity = needed(scene, attributes, gltf::kOpacity, 1, kFloats | kUnsignedUnits);
-    fill(scene, opacity, gltf::kOpacity, 1, model.opacity_logit, [](double alpha) {
-        const double in = std::clamp(alpha, 0.0, 1.0);
-        return double{limit_infinite_logit(static_cast<float>(std::log(in) - std::log1p(-in)))};
-    });
+    read_opacities(scene, attributes, model);
 }
 
 void read_exact(const GltfScene& scene, const json& radial, SplatModel& model) {
@@ -445,7 +458,7 @@ SplatModel load_gltf(const SplatSource& source, SplatFile& file) try {
     file.dropped = drop_non_finite(model);
     return model;
 } catch (const json::exception& error) {
-    throw Error(source.where, error.what(), kCopyAgain);
+    throw Error(source.where, json_reason(error), kCopyAgain);
 } catch (const std::out_of_range& error) {
     throw Error(source.where, std::string("names what is not there: ") + error.what(), kCopyAgain);
 }

@@ -63,6 +63,8 @@ struct KsplatFile {
     int number = 0;  // of the level
     double least_harmonic = -1.5, most_harmonic = 1.5;
     std::vector<KsplatSection> sections;
+    bool logarithms = false;  // as the user says of its scales
+    bool scales_below_0 = false;
 
     std::uint32_t word(std::size_t at) const { return load_le<std::uint32_t>(bytes, at); }
     std::uint16_t half(std::size_t at) const { return load_le<std::uint16_t>(bytes, at); }
@@ -160,7 +162,7 @@ void read_harmonics_at(const KsplatFile& file, std::size_t at, int degree, float
     }
 }
 
-void read_splat(const KsplatFile& file, const KsplatSection& section, std::size_t at,
+void read_splat(KsplatFile& file, const KsplatSection& section, std::size_t at,
                 const std::array<float, 3>& centre, std::size_t i, SplatModel& model) {
     const KsplatLevel& level = file.level;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -170,7 +172,9 @@ void read_splat(const KsplatFile& file, const KsplatSection& section, std::size_
                 : static_cast<float>((file.half(at + 2 * k) - section.range) * section.step +
                                      double{centre[k]});
         const float scale = file.number_at(at + 3 * level.centre + k * level.scale, level.scale);
-        model.log_scale[3 * i + k] = limit_infinite_log_scale(std::log(scale));
+        model.log_scale[3 * i + k] =
+            file.logarithms ? scale : limit_infinite_log_scale(std::log(scale));
+        file.scales_below_0 |= scale < 0;
     }
     at += 3 * level.centre + 3 * level.scale;
     for (std::size_t k = 0; k < 4; ++k, at += level.rotation)
@@ -188,6 +192,7 @@ SplatModel load_ksplat(const SplatSource& source, SplatFile& facts) {
     KsplatFile file{source.bytes, source.where, {}, 0, -1.5, 1.5, {}};
     if (const std::optional<std::string> reason = read_layout(file))
         throw Error(source.where, *reason, kCopyAgain);
+    file.logarithms = source.units.scales == StoredScales::logarithms;
     facts.details = fmt::format("compression level {}", file.number);
     SplatModel model;
     for (const KsplatSection& section : file.sections)
@@ -209,6 +214,7 @@ SplatModel load_ksplat(const SplatSource& source, SplatFile& facts) {
         }
     }
     facts.dropped = drop_non_finite(model);
+    if (file.scales_below_0 && !file.logarithms) facts.notes.emplace_back(kScalesBelow0);
     return model;
 }
 

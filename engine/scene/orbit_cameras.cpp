@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "engine/core/check.h"
+#include "engine/scene/upright.h"
 
 namespace darb {
 
@@ -31,9 +32,9 @@ double weighted_quantile(std::vector<Weighted> values, double share) {
 }
 
 /// Rows: right, down, forward.
-glm::dmat3 look_at(const glm::dvec3& from, const glm::dvec3& to) {
+glm::dmat3 look_at(const glm::dvec3& from, const glm::dvec3& to, const glm::dvec3& up) {
     const glm::dvec3 forward = glm::normalize(to - from);
-    const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), forward));
+    const glm::dvec3 right = glm::normalize(glm::cross(-up, forward));
     return glm::transpose(glm::dmat3(right, glm::cross(forward, right), forward));
 }
 
@@ -61,21 +62,28 @@ SceneBall opaque_ball(const SplatModel& model) {
 
 std::vector<Camera> orbit_cameras(const SplatModel& model, int count, int width, int height) {
     const SceneBall ball = opaque_ball(model);
+    return orbit_cameras(Bounds{ball.centre + model.origin, ball.radius}, count, width, height,
+                         {0, -1, 0});
+}
+
+std::vector<Camera> orbit_cameras(const Bounds& ball, int count, int width, int height,
+                                  const glm::dvec3& up) {
     const double distance = ball.radius / std::sin(kFieldOfView * 0.5 * height / width);
+    const glm::dvec3 front = usual_front(up), across = glm::cross(up, front);
     std::vector<Camera> cameras;
     for (int v = 0; v < count; ++v) {
         const double turn = 2 * std::numbers::pi * v / count;
-        const glm::dvec3 side(std::sin(turn), 0, -std::cos(turn));
-        const glm::dvec3 eye = ball.centre + distance * (std::cos(kElevation) * side +
-                                                         glm::dvec3(0, -std::sin(kElevation), 0));
+        const glm::dvec3 side = std::sin(turn) * across + std::cos(turn) * front;
+        const glm::dvec3 eye =
+            ball.centre + distance * (std::cos(kElevation) * side + std::sin(kElevation) * up);
         Camera camera;
         camera.width = width;
         camera.height = height;
         camera.fx = camera.fy = 0.5 * width / std::tan(0.5 * kFieldOfView);
         camera.cx = 0.5 * width;
         camera.cy = 0.5 * height;
-        camera.rotation = look_at(eye, ball.centre);
-        camera.translation = -(camera.rotation * (eye + model.origin));
+        camera.rotation = look_at(eye, ball.centre, up);
+        camera.translation = -(camera.rotation * eye);
         cameras.push_back(camera);
     }
     return cameras;

@@ -5,6 +5,7 @@
 
 #include "engine/scene/camera.h"
 #include "engine/scene/splat_model.h"
+#include "engine/scene/subject.h"
 
 namespace darb {
 
@@ -19,5 +20,8 @@ SceneBall opaque_ball(const SplatModel& model);
 /// `count` cameras on a circle that look slightly down (y is down) at that ball, far enough for it
 /// to be in the picture. For models with at least one splat.
 std::vector<Camera> orbit_cameras(const SplatModel& model, int count, int width, int height);
+/// The same around a ball, looking down from `up`, of unit length; the first from usual_front(up).
+std::vector<Camera> orbit_cameras(const Bounds& ball, int count, int width, int height,
+                                  const glm::dvec3& up);
 
 }  // namespace darb

@@ -100,6 +100,18 @@ std::string encoding_of(const PlyHeader& header) {
     return header.format == PlyFormat::big_endian ? "binary, big-endian" : "binary, little-endian";
 }
 
+// What these programs write is in logarithms and logits, and reading it takes them for that.
+void refuse_units(const PlyHeader& header, const SplatSource& source) {
+    const PlyElement* vertex = header.find("vertex");
+    const bool changed =
+        source.units.scales != StoredScales{} || source.units.opacities != StoredOpacities{};
+    if (!vertex || !changed || (vertex->find("filter_3D") < 0 && vertex->find("sh0_0") < 0)) return;
+    throw Error(source.where,
+                "is a scene of Mip-Splatting or Deformable Beta Splatting, whose scales are "
+                "logarithms and whose opacities are logits",
+                "Leave out --scales and --opacities.");
+}
+
 // Compressed PLY too.
 SplatModel load_ply(const SplatSource& source, SplatFile& file) {
     const PlyHeader header = parse_ply_header(source.bytes, source.where);
@@ -112,11 +124,13 @@ SplatModel load_ply(const SplatSource& source, SplatFile& file) {
                     "is a point cloud: its vertices have no opacity, scale and rotation",
                     "darb train starts from it where it lies beside the cameras; a viewer shows it "
                     "as points.");
+    refuse_units(header, source);
     PlyFacts facts;
     SplatModel model = parse_ply(source.bytes, header, source.where, &facts, source.progress);
     file.dropped = facts.dropped;
     file.notes = facts.notes;
     file.up = facts.up;
+    file.position_step = facts.position_step;
     return model;
 }
 
@@ -237,10 +251,7 @@ const SplatFormatRow& ply_format() {
     static const SplatFormatRow row{
         .name = "PLY",
         .endings = {".ply"},
-        .recognise =
-            [](const SplatSource& source) {
-                return starts_with(source.bytes, "ply\n") || starts_with(source.bytes, "ply\r");
-            },
+        .recognise = [](const SplatSource& source) { return looks_like_ply(source.bytes); },
         .parse = load_ply,
         .encode = [](const SplatModel& model, const std::string&,
                      const EncodeOptions&) { return EncodedSplats{encode_ply(model)}; },

@@ -19,6 +19,7 @@ struct PlyFacts {
     std::size_t dropped = 0;         // splats with NaN or infinity
     std::vector<std::string> notes;  // what was left out or is not as in 3DGS, a sentence each
     std::string up;                  // as --up takes it, where a comment names it; else empty
+    double position_step = 0;        // compressed PLY: of half of its chunks, world
 };
 
 /// Reads by property name: any order, any type, SH degree 0 to 4 (of which the last band is left

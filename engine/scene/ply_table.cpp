@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "engine/core/error.h"
+#include "engine/core/text.h"
 
 namespace darb {
 
@@ -18,7 +19,10 @@ static_assert(std::endian::native == std::endian::little);
 namespace {
 
 constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
-constexpr std::size_t kProgressRows = 1 << 16;  // between two reports
+constexpr std::size_t kMostShown = 40;                  // bytes of a word
+constexpr std::size_t kMostFirstLine = 100;             // bytes
+constexpr std::string_view kUtf8Mark = "\xef\xbb\xbf";  // of text, before it begins
+constexpr std::size_t kProgressRows = 1 << 16;          // between two reports
 std::size_t type_size(PlyType type) {
     switch (type) {
         case PlyType::int8:
@@ -175,6 +179,7 @@ class RowReader {
         : file_(file), at_(header.data_begin), format_(header.format), where_(where) {}
 
     void read(const PlyElement& element, std::size_t row, double* values) {
+        const std::size_t begin = format_ == PlyFormat::ascii ? next_text() : at_;
         for (const PlyProperty& property : element.properties) {
             *values = next(element, row, property.is_list ? property.count_type : property.type);
             if (property.is_list) {
@@ -183,6 +188,7 @@ class RowReader {
             }
             ++values;
         }
+        check_line(element, row, begin);
     }
 
     std::size_t at() const { return at_; }
@@ -214,12 +220,77 @@ class RowReader {
         if (text[at_] == '+') ++at_;
         double value = 0;
         const auto [end, error] = std::from_chars(text + at_, text + file_.size(), value);
-        if (error == std::errc::invalid_argument) fail(element, row, "not a number");
+        if (error == std::errc::invalid_argument) fail_at_word(element, row);
         if (error == std::errc::result_out_of_range)  // too small: about 0; too large: infinite
             value = std::strtod(std::string(text + at_, end).c_str(), nullptr);
         at_ = static_cast<std::size_t>(end - text);
-        if (at_ < file_.size() && !is_space(text[at_])) fail(element, row, "not a number");
+        if (at_ < file_.size() && !is_space(text[at_])) fail_at_word(element, row);
         return value;
+    }
+
+    /// The word around at_ is no number: which line it is in, and what it looks like.
+    [[noreturn]] void fail_at_word(const PlyElement& element, std::size_t row) const {
+        const std::string_view text(reinterpret_cast<const char*>(file_.data()), file_.size());
+        constexpr const char* kBlanks = " \t\r\n";
+        const std::size_t before = text.find_last_of(kBlanks, at_ > 0 ? at_ - 1 : 0);
+        const std::size_t begin = before == std::string_view::npos ? 0 : before + 1;
+        const std::string_view word =
+            text.substr(begin, std::min(text.find_first_of(kBlanks, at_), text.size()) - begin);
+        const auto commas = std::count(word.begin(), word.end(), ',');
+        const std::string place = fmt::format(
+            "line {}, row {} of {} of element {}: '{}'",
+            1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at_), '\n'),
+            row, element.count, element.name, printable(word.substr(0, kMostShown)));
+        if (commas == 1 && word.find('.') == std::string_view::npos && word.back() != ',')
+            throw Error(where_, place + " has a decimal comma",
+                        "Export it with decimal points, or replace the commas behind the header: "
+                        "sed '/^end_header/,$ s/,/./g' IN.ply > OUT.ply");
+        if (commas > 0)
+            throw Error(where_, place + " has commas between numbers",
+                        "Export it with blanks between them, or replace the commas behind the "
+                        "header: sed '/^end_header/,$ s/,/ /g' IN.ply > OUT.ply");
+        throw Error(where_, place + " is not a number", kCopyAgain);
+    }
+
+    /// Whether nothing but blanks stands before the end of the line (or of the file).
+    bool at_line_end() const {
+        const char* text = reinterpret_cast<const char*>(file_.data());
+        std::size_t at = at_;
+        while (at < file_.size() && (text[at] == ' ' || text[at] == '\t')) ++at;
+        return at == file_.size() || text[at] == '\n' || text[at] == '\r';
+    }
+    std::size_t next_text() const {
+        const char* text = reinterpret_cast<const char*>(file_.data());
+        std::size_t at = at_;
+        while (at < file_.size() && std::strchr(" \t\r\n", text[at]) && text[at] != 0) ++at;
+        return at;
+    }
+
+    /// A row of another length than the header says would shift all behind it. Where the first row
+    /// is a line, all have to be. A file that breaks its lines elsewhere, between rows, is read
+    /// word by word.
+    void check_line(const PlyElement& element, std::size_t row, std::size_t begin) {
+        if (format_ != PlyFormat::ascii) return;
+        const std::string_view all(reinterpret_cast<const char*>(file_.data()), file_.size());
+        const bool whole =
+            all.substr(begin, at_ - begin).find_first_of("\r\n") == std::string_view::npos;
+        const bool is_line = whole && at_line_end();
+        const std::string_view line =
+            all.substr(begin, std::min(all.find_first_of("\r\n", begin), all.size()) - begin);
+        if (row == 0) {
+            rows_are_lines_ = is_line;
+            const std::size_t columns = element.properties.size();
+            if (at_line_end() || (whole && split_words(line).size() % columns == 0)) return;
+        }
+        if (is_line || (row > 0 && !rows_are_lines_)) return;
+        const auto before = all.begin() + static_cast<std::ptrdiff_t>(begin);
+        throw Error(
+            where_,
+            fmt::format("line {}, row {} of {} of element {}: has {} values, and the header "
+                        "declares {} properties",
+                        1 + std::count(all.begin(), before, '\n'), row, element.count, element.name,
+                        split_words(line).size(), element.properties.size()),
+            "Correct the header or the line, or export the file again.");
     }
 
     void skip_list(const PlyElement& element, std::size_t row, const PlyProperty& property,
@@ -237,6 +308,7 @@ class RowReader {
     }
 
     std::span<const std::byte> file_;
+    bool rows_are_lines_ = false;
     std::size_t at_;
     PlyFormat format_;
     const std::string& where_;
@@ -256,15 +328,29 @@ const PlyElement* PlyHeader::find(std::string_view element) const {
     return nullptr;
 }
 
+bool looks_like_ply(std::span<const std::byte> file) {
+    std::string_view text(reinterpret_cast<const char*>(file.data()),
+                          std::min(file.size(), kMostFirstLine));
+    if (text.starts_with(kUtf8Mark)) text.remove_prefix(kUtf8Mark.size());
+    if (!text.starts_with("ply")) return false;
+    const std::size_t end = text.find_first_not_of(" \t", 3);
+    return end != std::string_view::npos && (text[end] == '\n' || text[end] == '\r');
+}
+
 PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& where) {
     const std::string_view text(reinterpret_cast<const char*>(file.data()),
                                 std::min(file.size(), kMaxHeaderBytes));
-    if (!text.starts_with("ply\n") && !text.starts_with("ply\r"))
+    if (!looks_like_ply(file))
         throw Error(where, "is no PLY file: it does not begin with 'ply'", "Check the path.");
+    // Files of old programs end lines with a carriage return alone.
+    const std::size_t first = text.find_first_of("\r\n");
+    const bool returns =
+        text.substr(first).size() > 1 && text[first] == '\r' && text[first + 1] != '\n';
+    const char line_end = returns ? '\r' : '\n';
     PlyHeader header;
     bool has_format = false;
-    for (std::size_t begin = text.find('\n') + 1;;) {
-        const std::size_t end = text.find('\n', begin);
+    for (std::size_t begin = text.find(line_end) + 1;;) {
+        const std::size_t end = text.find(line_end, begin);
         if (begin == 0 || end == std::string_view::npos)
             throw Error(where, "the header has no end_header line", kCopyAgain);
         std::string_view line = text.substr(begin, end - begin);

@@ -38,6 +38,9 @@ struct PlyHeader {
     const PlyElement* find(std::string_view element) const;
 };
 
+/// Whether the bytes begin as a PLY: its first line is "ply", with blanks and a mark of UTF-8
+/// allowed around it.
+bool looks_like_ply(std::span<const std::byte> file);
 /// Throws Error(where, ...) when the header is malformed.
 PlyHeader parse_ply_header(std::span<const std::byte> file, const std::string& where);
 

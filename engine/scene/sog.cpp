@@ -9,6 +9,8 @@
 #include <numbers>
 
 #include "engine/core/error.h"
+#include "engine/core/json_text.h"
+#include "engine/core/quantile.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
@@ -35,6 +37,7 @@ struct Scene {
     std::size_t count = 0;
     SplatModel model;
     std::vector<std::string> notes;
+    double position_step = 0;
 
     std::string file_name(const char* group, std::size_t i) const {
         return meta.at(group).at("files").at(i).get<std::string>();
@@ -69,6 +72,20 @@ struct Scene {
     }
 };
 
+/// Between two positions, at the median of each axis: 1/65,535 of the range of sign(x) ln(1 + |x|).
+double step_of(const json& meta, const std::vector<double>& positions) {
+    double step = 0;
+    std::vector<double> places(positions.size() / 3);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (std::size_t i = 0; i < places.size(); ++i)
+            places[i] = std::abs(positions[3 * i + axis]);
+        const double range = meta.at("means").at("maxs").at(axis).get<double>() -
+                             meta.at("means").at("mins").at(axis).get<double>();
+        step = std::max(step, (1 + nearest_rank(places, 0.5)) * std::abs(range) / 65535);
+    }
+    return step;
+}
+
 void read_means(Scene& scene) {
     const SogImage low = scene.picture("means", 0), high = scene.picture("means", 1);
     std::vector<double> positions(3 * scene.count);
@@ -86,6 +103,7 @@ void read_means(Scene& scene) {
                     kCopyAgain);
         }
     }
+    scene.position_step = step_of(scene.meta, positions);
     set_positions(positions, scene.model);
 }
 
@@ -195,7 +213,7 @@ SplatModel decode(const json& meta, const SogPart& part, const std::string& wher
     if (facts) {
         const json asset = meta.value("asset", json::object());
         *facts = {2, asset.is_object() ? asset.value("generator", "") : "", dropped,
-                  std::move(scene.notes)};
+                  std::move(scene.notes), scene.position_step};
     }
     return std::move(scene.model);
 }
@@ -205,9 +223,10 @@ SplatModel parse_parts(const SogPart& part, const std::string& where, std::size_
     const std::vector<std::byte> text = part("meta.json");
     try {
         const auto* begin = reinterpret_cast<const char*>(text.data());
-        return decode(json::parse(begin, begin + text.size()), part, where, stored, facts);
+        return decode(parse_json_text({begin, text.size()}, where + ", meta.json", kCopyAgain),
+                      part, where, stored, facts);
     } catch (const json::exception& error) {
-        throw Error(where + ", meta.json", error.what(), kCopyAgain);
+        throw Error(where + ", meta.json", json_reason(error), kCopyAgain);
     }
 }
 
@@ -227,6 +246,7 @@ SplatModel load_sog(const SplatSource& source, SplatFile& file) {
     file.version = facts.version;
     file.dropped = facts.dropped;
     file.notes = facts.notes;
+    file.position_step = facts.position_step;
     file.details += facts.generator.empty() ? "" : ", by " + facts.generator;
     if (zip) return model;
     file.bytes = 0;

@@ -24,6 +24,7 @@ struct SogFacts {
     std::string generator;           // as the file says; empty where it does not
     std::size_t dropped = 0;         // splats with NaN or infinity
     std::vector<std::string> notes;  // what was not as the format says, a sentence each
+    double position_step = 0;        // world, where half of the splats are
 };
 
 /// Begins like a zip.
@@ -45,7 +46,7 @@ EncodedSplats encode_sog(const SplatModel& model, const std::string& where,
                          const EncodeOptions& options);
 /// Without the Morton order: file is meta.json, its pictures are beside it.
 EncodedSplats encode_sog_parts(const SplatModel& model, const std::string& where,
-                               const AssignRows& assign);
+                               const EncodeOptions& options);
 
 /// One level of a streamed SOG scene, 0 the finest, by its lod-meta.json; without splats where it
 /// has no such level. Throws Error as load_splats.

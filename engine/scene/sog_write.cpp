@@ -158,10 +158,12 @@ std::size_t palette_size(std::size_t splats) {
     return std::min(steps * kPaletteStep, splats);
 }
 
-void write_harmonics(const SplatModel& model, const AssignRows& assign, json& meta,
+void write_harmonics(const SplatModel& model, const EncodeOptions& options, json& meta,
                      std::vector<Plane>& planes) {
     const auto dims = static_cast<std::size_t>(model.rest_count());
-    const Clusters clusters = cluster_rows(model.sh_rest, dims, palette_size(model.size()), assign);
+    const AssignRows assign = options.assign_rows ? options.assign_rows : assign_rows;
+    const Clusters clusters =
+        cluster_rows(model.sh_rest, dims, palette_size(model.size()), assign, options.progress);
     const std::size_t entries = clusters.centres.size() / dims, pixels = dims / 3;
     const Codebook256 book = codebook_of(clusters.centres);
     Plane palette = plane_of("shN_centroids.webp", kRowEntries * pixels,
@@ -188,7 +190,7 @@ void write_harmonics(const SplatModel& model, const AssignRows& assign, json& me
 }  // namespace
 
 EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where,
-                               const AssignRows& assign) {
+                               const EncodeOptions& options) {
     check_splat_shapes(scene);
     if (scene.size() == 0)
         throw Error(where, "SOG has no place for a scene without splats", "Write a PLY.");
@@ -206,7 +208,7 @@ EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where
     write_means(model, meta, planes);
     write_quats(model, meta, planes);
     write_scales_and_colours(model, meta, planes);
-    if (model.sh_degree > 0) write_harmonics(model, assign ? assign : assign_rows, meta, planes);
+    if (model.sh_degree > 0) write_harmonics(model, options, meta, planes);
     std::vector<std::future<std::vector<std::byte>>> pictures;
     for (const Plane& plane : planes)
         pictures.push_back(std::async(std::launch::async, [&plane, &where] {
@@ -223,7 +225,7 @@ EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where
 
 EncodedSplats encode_sog(const SplatModel& model, const std::string& where,
                          const EncodeOptions& options) {
-    EncodedSplats parts = encode_sog_parts(model, where, options.assign_rows);
+    EncodedSplats parts = encode_sog_parts(model, where, options);
     if (lower(where).ends_with("meta.json")) return parts;
     parts.beside.emplace(parts.beside.begin(), "meta.json", std::move(parts.file));
     return {make_sog_zip(parts.beside, where)};

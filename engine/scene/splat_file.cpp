@@ -11,6 +11,7 @@
 #include "engine/core/text.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_format.h"
 
 namespace darb {
@@ -65,6 +66,18 @@ void check_shape_has_a_place(const SplatFormatRow& row, const SplatModel& model,
                 "Write .ply, or the nearest Gaussians: darb convert --kernel gaussian.");
 }
 
+/// What the user says of the values, and what they look like.
+void settle_units(const StoredUnits& units, const std::string& where, SplatFile& facts,
+                  SplatModel& model) {
+    const bool by_channel =
+        facts.format == SplatFormat::ply || facts.format == SplatFormat::compressed_ply;
+    apply_stored_units(units, by_channel, where, model);
+    for (std::string& doubt : unit_doubts(model, by_channel))
+        facts.notes.push_back(std::move(doubt));
+    if (std::string doubt = position_doubt(model, facts.position_step); !doubt.empty())
+        facts.notes.push_back(std::move(doubt));
+}
+
 std::vector<std::string> missing_places(const SplatFormatRow& row, const SplatModel& model) {
     std::vector<std::string> losses;
     if (!(row.keeps & kKeepsKernel) && model.kernel != KERNEL_GAUSSIAN)
@@ -109,16 +122,25 @@ bool names_scene_folder(const fs::path& path) {
 
 SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& where, SplatFile* file,
                         const ReadProgress& progress, const fs::path& folder,
-                        const ReadPoints& read_points) {
+                        const ReadPoints& read_points, const StoredUnits& units) {
     SplatFile unused;
     SplatFile& facts = file ? *file : unused;
     facts.bytes = bytes.size();
-    const SplatSource source{bytes, where, folder, progress, read_points};
+    bool are_points = false;
+    ReadPoints reader;
+    if (read_points)
+        reader = [&](const PlyHeader& header) {
+            are_points = true;
+            return read_points(header);
+        };
+    const SplatSource source{bytes, where, folder, progress, reader, units};
     for (const SplatFormat format : kSplatFormats) {
         const SplatFormatRow& row = row_of(format);
         if (!row.recognise || !row.recognise(source)) continue;
         facts.format = format;
-        return row.parse(source, facts);
+        SplatModel model = row.parse(source, facts);
+        if (!are_points) settle_units(units, where, facts, model);
+        return model;
     }
     std::vector<std::string> names;
     for (const SplatFormat format : kSplatFormats) names.push_back(row_of(format).name);
@@ -126,17 +148,17 @@ SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& whe
                 "Check the path, or export the scene in one of these formats.");
 }
 
-SplatModel load_splats(const fs::path& path, SplatFile* file) try {
+SplatModel load_splats(const fs::path& path, SplatFile* file, const StoredUnits& units) try {
     SplatFile unused;
     SplatFile& facts = file ? *file : unused;
     facts = {};
     const std::optional<fs::path> inside = scene_file_in(path);
     const fs::path& scene = inside ? *inside : path;
     const fs::path folder = scene.has_parent_path() ? scene.parent_path() : fs::path(".");
-    return parse_splats(read_file(scene), scene.string(), &facts, {}, folder);
+    return parse_splats(read_file(scene), scene.string(), &facts, {}, folder, {}, units);
 } catch (const std::bad_alloc&) {
-    throw Error(path.string(), "does not fit into the memory that is left",
-                "Free memory, or prune the scene first.");
+    throw NoRoom(path.string(), "does not fit into the memory that is left",
+                 "Free memory, or prune the scene first.");
 }
 
 const std::vector<std::string>& endings_of(SplatFormat format) {
@@ -169,6 +191,31 @@ std::optional<SplatFormat> format_to_write(const fs::path& path) {
 std::string stem_to_write(const fs::path& path) {
     const std::string name = path.filename().string();
     return name.substr(0, name.size() - asked_for(path).ending);
+}
+
+fs::path run_of_scene(const fs::path& file) {
+    std::error_code none;
+    const fs::path whole = fs::absolute(file, none).lexically_normal();
+    const fs::path iteration = whole.parent_path(), clouds = iteration.parent_path();
+    const bool is_run = whole.filename() == "point_cloud.ply" &&
+                        iteration.filename().string().starts_with("iteration_") &&
+                        clouds.filename() == "point_cloud";
+    return is_run ? clouds.parent_path() : fs::path();
+}
+
+std::string scene_name(const fs::path& path, bool with_ending) {
+    std::error_code none;
+    fs::path whole = fs::absolute(path, none).lexically_normal();
+    if (!whole.has_filename()) whole = whole.parent_path();  // a folder with its slash
+    if (names_scene_folder(whole)) whole = whole.parent_path();
+    const fs::path run = run_of_scene(whole);
+    if (!run.empty()) whole = run;
+    std::string name = whole.filename().string();
+    if (!with_ending && run.empty() && !fs::is_directory(whole, none)) {
+        name = stem_to_write(whole);
+        if (name == whole.filename().string()) name = whole.stem().string();
+    }
+    return name.empty() || name == "/" ? "Scene" : name;
 }
 
 bool names_scene(const fs::path& path) {
@@ -216,6 +263,11 @@ std::size_t drop_unwritable(SplatFormat format, SplatModel& model) {
     const std::size_t dropped = drop_non_finite(model);
     if (row_of(format).keeps & kKeepsUnturned) return dropped;
     return dropped + keep_splats([&](std::size_t i) { return has_rotation(model, i); }, model);
+}
+
+int precisions_of(SplatFormat format, const SplatModel& model) {
+    const SplatFormatRow& row = row_of(format);
+    return row.precisions ? row.precisions(model) : 1;
 }
 
 std::size_t EncodedSplats::bytes() const {

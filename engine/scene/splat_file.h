@@ -17,6 +17,7 @@
 #include "engine/scene/ply_table.h"
 #include "engine/scene/splat_format_list.h"
 #include "engine/scene/splat_model.h"
+#include "engine/scene/stored_units.h"
 
 namespace darb {
 
@@ -31,14 +32,17 @@ struct SplatFile {
     std::uint64_t bytes = 0;         // on disk, all files of a folder
     std::size_t dropped = 0;         // splats with NaN or infinity
     std::string up;                  // as --up takes it, where the file says it; else empty
+    double position_step = 0;        // world units between two positions; 0: those of float32
     std::vector<std::string> notes;  // what was left out or set right, a sentence each
 };
 
 /// path: a file of any of the formats, a folder that is a scene (scene_file_in), or the file it is
 /// known by. The content decides; the name counts for .splat, which has nothing to know it by, and
 /// for files of a folder. Throws Error naming file, place, reason and remedy; of a point cloud it
-/// says that it is one.
-SplatModel load_splats(const std::filesystem::path& path, SplatFile* file = nullptr);
+/// says that it is one. units: what the user says of how its values are stored. The notes say where
+/// they look as if they were stored otherwise than in a scene of 3DGS (stored_units.h).
+SplatModel load_splats(const std::filesystem::path& path, SplatFile* file = nullptr,
+                       const StoredUnits& units = {});
 /// The same from memory. A name that ends in .splat is believed. folder: where files are that this
 /// one names; empty: such a file is refused. progress: as read_ply_rows takes it; of PLY and
 /// compressed PLY alone, the others are small or quick. read_points: what becomes of a point cloud,
@@ -47,7 +51,7 @@ using ReadPoints = std::function<SplatModel(const PlyHeader&)>;
 SplatModel parse_splats(std::span<const std::byte> bytes, const std::string& where,
                         SplatFile* file = nullptr, const ReadProgress& progress = {},
                         const std::filesystem::path& folder = {},
-                        const ReadPoints& read_points = {});
+                        const ReadPoints& read_points = {}, const StoredUnits& units = {});
 
 /// The file that makes a folder a scene, as the meta.json of SOG; nothing where there is none.
 std::optional<std::filesystem::path> scene_file_in(const std::filesystem::path& folder);
@@ -84,9 +88,14 @@ struct EncodedSplats {
 /// Choices of the formats that have some.
 struct EncodeOptions {
     int spz_version = 4;              // 3 or 4
+    int precision = -1;               // of precisions_of, 0 is the coarsest; -1: the finest
     AssignRows assign_rows;           // SOG's palette of harmonics; null: on the host
     std::vector<SplatModel> coarser;  // streamed SOG: levels after the scene itself; empty: merged
+    ClusterProgress progress;         // of what takes long, SOG's palettes; may be empty
 };
+/// How many precisions the writer of a format can choose from for this scene; 1: there is no
+/// choice.
+int precisions_of(SplatFormat format, const SplatModel& model);
 /// After drop_unwritable. `where` stands for the file name in errors. Throws Error where the format
 /// is not written.
 EncodedSplats encode_scene(SplatFormat format, const SplatModel& model,

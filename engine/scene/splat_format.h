@@ -19,6 +19,7 @@ struct SplatSource {
     std::filesystem::path folder;  // of files beside it; empty: there are none to be read
     ReadProgress progress;         // may be empty
     ReadPoints read_points = {};   // of a PLY that is a point cloud; may be empty
+    StoredUnits units = {};        // that parse_splats applies to what is read
 };
 
 /// What a format has a place for beyond Gaussians with their harmonics; bits.
@@ -48,6 +49,8 @@ struct SplatFormatRow {
     unsigned keeps = 0;  // SplatFeature
     /// What lies beyond its ranges, a sentence each; null: nothing does. Throws as encode does.
     std::vector<std::string> (*cuts)(const SplatModel&, const std::string& where) = nullptr;
+    /// How many EncodeOptions::precision counts; null: one.
+    int (*precisions)(const SplatModel&) = nullptr;
 };
 
 #define DARB_SPLAT_FORMAT(name) const SplatFormatRow& name##_format();

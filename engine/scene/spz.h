@@ -28,6 +28,7 @@ struct SpzFacts {
     int version = 0;
     int sh_degree = 0;  // as stored; harmonics of degree 4 are left out of the model
     int extensions = 0;
+    double position_step = 0;     // world units; 0: those of float16
     bool extensions_cut = false;  // versions 1 to 3: what follows the attributes is no record
 };
 
@@ -36,14 +37,23 @@ struct SpzFacts {
 SplatModel parse_spz(std::span<const std::byte> file, const std::string& where,
                      SpzFacts* facts = nullptr);
 
+/// What of a harmonic's byte a writer keeps is its own choice: fewer steps deflate better. 0 is the
+/// coarsest precision, that of the reference writer, 5 bits for degree 1 and 4 bits above; each has
+/// half the steps of the one before, and the last keeps all 8 bits.
+constexpr int kSpzPrecisions = 5;
+struct SpzSteps {
+    int degree_1 = 1, higher = 1;  // of a harmonic's byte, which is 128 a unit
+};
+SpzSteps spz_steps(int precision);
+
 /// version: 3, one gzip stream, which more programs read, or 4. The error of a position is at most
 /// 2^-(b+1) with b = 12 fractional bits, more for scenes under 32 across, fewer for those above
 /// 2048; of a log scale 1/32 within [-10, 5.9]; of opacity 1/510; of dc 1/76.5 within
-/// [-3.33, 3.33]; of a quaternion's component 7e-4; of a harmonic 1/32 (degree 1) or 1/16 within
+/// [-3.33, 3.33]; of a quaternion's component 7e-4; of a harmonic half of spz_steps / 128 within
 /// [-1, 1]. Keeps the render mode; kernel and footprint have no place. Throws Error(where, ...)
 /// where positions do not fit 24 bits.
 std::vector<std::byte> encode_spz(const SplatModel& model, const std::string& where = "scene",
-                                  int version = 4);
+                                  int version = 4, int precision = kSpzPrecisions - 1);
 /// What lies outside these ranges, and the step of positions where it is more than 2^-12; a
 /// sentence each. Throws as encode_spz does.
 std::vector<std::string> spz_losses(const SplatModel& model, const std::string& where = "scene");

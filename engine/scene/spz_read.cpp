@@ -269,6 +269,7 @@ SplatModel load_spz(const SplatSource& source, SplatFile& file) {
     SpzFacts facts;
     SplatModel model = parse_spz(source.bytes, source.where, &facts);
     file.version = facts.version;
+    file.position_step = facts.position_step;
     if (facts.sh_degree > model.sh_degree)
         file.notes.push_back(fmt::format("harmonics of degree {} were left out", facts.sh_degree));
     if (facts.extensions_cut)
@@ -294,6 +295,8 @@ SplatModel parse_spz(Bytes file, const std::string& where, SpzFacts* facts) {
     SpzFacts found;
     found.version = static_cast<int>(content.header.version);
     found.sh_degree = content.header.degree;
+    if (content.header.version > 1)
+        found.position_step = std::ldexp(1.0, -content.header.fractional_bits);
     std::uint32_t system = kRightUpBack;
     if (content.header.flags & spz::kFlagExtensions)
         system = read_extensions(content.extensions, found.version, where, found);
@@ -311,11 +314,15 @@ const SplatFormatRow& spz_format() {
         .parse = load_spz,
         .encode =
             [](const SplatModel& model, const std::string& where, const EncodeOptions& options) {
-                return EncodedSplats{encode_spz(model, where, options.spz_version)};
+                return EncodedSplats{
+                    encode_spz(model, where, options.spz_version,
+                               options.precision < 0 ? kSpzPrecisions - 1 : options.precision)};
             },
         // Positions are steps of their own, of which spz_losses says the size.
         .keeps = kKeepsRenderMode | kKeepsHarmonics | kKeepsDoublePositions,
-        .cuts = spz_losses};
+        .cuts = spz_losses,
+        .precisions =
+            [](const SplatModel& model) { return model.sh_degree > 0 ? kSpzPrecisions : 1; }};
     return row;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
@@ -19,17 +20,16 @@ namespace {
 
 using Stream = std::vector<std::byte>;
 
-constexpr int kUsualBits = 12;     // fractional; 0.24 mm where the unit is a metre
-constexpr int kLeastSteps = 17;    // 2^17 of them across the largest coordinate, where they fit
-constexpr int kSteps = 23;         // 24 bits with sign
-constexpr int kStepOfDegree1 = 8;  // of a harmonic's byte; what the reference writer keeps
-constexpr int kStepOfHigher = 16;
+constexpr int kUsualBits = 12;   // fractional; 0.24 mm where the unit is a metre
+constexpr int kLeastSteps = 17;  // 2^17 of them across the largest coordinate, where they fit
+constexpr int kSteps = 23;       // 24 bits with sign
+constexpr int kCoarsestOfDegree1 = 8, kCoarsestOfHigher = 16;  // of the reference writer
 
 // Where bytes end, and half a step of each, which is rounding.
 constexpr double kLeastLogScale = -10, kMostLogScale = 255 / 16.0 - 10, kHalfLogScale = 1 / 32.0;
 constexpr double kMostDc = 0.5 / spz::kColourScale, kHalfDc = kMostDc / 255;
 constexpr double kLeastHarmonic = -1, kMostHarmonic = 127 / 128.0;
-constexpr double kHalfHarmonic = kStepOfDegree1 / 256.0;
+constexpr double kHalfHarmonic = kCoarsestOfDegree1 / 256.0;
 
 const glm::dmat3 kToRightUpBack(1, 0, 0, 0, -1, 0, 0, 0, -1);
 
@@ -73,7 +73,7 @@ std::uint8_t pack_harmonic(float value, int step) {
     return nearest_byte(std::round((value + 1.0) * 128 / step) * step);
 }
 
-std::array<Stream, 6> pack(const SplatModel& model, int fractional_bits) {
+std::array<Stream, 6> pack(const SplatModel& model, int fractional_bits, const SpzSteps& keep) {
     std::array<Stream, 6> streams;
     const auto rest = static_cast<std::size_t>(model.rest_count());
     for (std::size_t i = 0; i < model.size(); ++i) {
@@ -91,8 +91,8 @@ std::array<Stream, 6> pack(const SplatModel& model, int fractional_bits) {
             streams[3].push_back(std::byte{nearest_byte((model.log_scale[at] + 10) * 16)});
         }
         for (std::size_t c = 0; c < rest; ++c)
-            streams[5].push_back(std::byte{pack_harmonic(model.sh_rest[i * rest + c],
-                                                         c < 9 ? kStepOfDegree1 : kStepOfHigher)});
+            streams[5].push_back(std::byte{
+                pack_harmonic(model.sh_rest[i * rest + c], c < 9 ? keep.degree_1 : keep.higher)});
     }
     return streams;
 }
@@ -129,14 +129,21 @@ std::vector<std::string> spz_losses(const SplatModel& model, const std::string& 
     return losses;
 }
 
-std::vector<std::byte> encode_spz(const SplatModel& scene, const std::string& where, int version) {
+SpzSteps spz_steps(int precision) {
+    DARB_CHECK(precision >= 0 && precision < kSpzPrecisions, "precision {}", precision);
+    return {std::max(1, kCoarsestOfDegree1 >> precision),
+            std::max(1, kCoarsestOfHigher >> precision)};
+}
+
+std::vector<std::byte> encode_spz(const SplatModel& scene, const std::string& where, int version,
+                                  int precision) {
     check_splat_shapes(scene);
     if (version != 3 && version != 4)
         throw Error(where, fmt::format("SPZ version {} is not written", version), "Use 3 or 4.");
     SplatModel model = scene;
     transform_splats({1, kToRightUpBack, glm::dvec3(0.0)}, model);
     const int fractional_bits = choose_fractional_bits(model, where);
-    const std::array<Stream, 6> streams = pack(model, fractional_bits);
+    const std::array<Stream, 6> streams = pack(model, fractional_bits, spz_steps(precision));
     const auto filled = std::ranges::count_if(streams, [](const Stream& s) { return !s.empty(); });
     Stream file;
     append(spz::kMagic, 4, file);

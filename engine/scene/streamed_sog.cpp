@@ -14,6 +14,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
 #include "engine/core/text.h"
 #include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
@@ -181,8 +182,14 @@ SplatModel load_level(const SplatSource& source, SplatFile& file,
     if (levels > 1 && !wanted)
         file.notes.push_back("the finest level is read, coarser ones are left out");
     return model;
+} catch (const json::parse_error& error) {
+    throw Error(
+        source.where,
+        json_fault({reinterpret_cast<const char*>(source.bytes.data()), source.bytes.size()},
+                   error),
+        kCopyAgain);
 } catch (const json::exception& error) {
-    throw Error(source.where, error.what(), kCopyAgain);
+    throw Error(source.where, json_reason(error), kCopyAgain);
 }
 
 SplatModel load_streamed(const SplatSource& source, SplatFile& file) {
@@ -197,6 +204,7 @@ struct LodWriter {
     std::vector<std::vector<std::uint32_t>> filling;  // splats of each level's last file, in order
     std::vector<std::size_t> files;                   // of each level
     std::vector<std::size_t> counts;
+    std::size_t written = 0, all = 0;  // splats of all levels
     json filenames = json::array();
     EncodedSplats encoded;
 };
@@ -229,9 +237,17 @@ std::string chunk_name(std::size_t level, std::size_t file) {
 void end_file(LodWriter& writer, std::size_t level) {
     if (writer.filling[level].empty()) return;
     const std::string name = chunk_name(level, writer.files[level]++);
+    EncodeOptions options = writer.options;
+    const auto before = static_cast<double>(writer.written), all = static_cast<double>(writer.all),
+               size = static_cast<double>(writer.filling[level].size());
+    if (options.progress)
+        options.progress = [&](double share) {
+            writer.options.progress((before + share * size) / all);
+        };
+    writer.written += writer.filling[level].size();
     EncodedSplats parts =
         encode_sog_parts(pick_splats(*writer.levels[level], writer.filling[level]),
-                         writer.where + ", " + name, writer.options.assign_rows);
+                         writer.where + ", " + name, options);
     const std::string folder = name.substr(0, name.find('/') + 1);
     writer.encoded.beside.emplace_back(name, std::move(parts.file));
     for (auto& [part, bytes] : parts.beside)
@@ -321,6 +337,7 @@ EncodedSplats encode_streamed(const SplatModel& model, const std::string& where,
     for (std::size_t level = 0; level < levels; ++level) {
         all[level].resize(writer.levels[level]->size());
         std::iota(all[level].begin(), all[level].end(), 0u);
+        writer.all += all[level].size();
     }
     json tree = node_of(writer, std::move(all));
     for (std::size_t level = 0; level < levels; ++level) end_file(writer, level);

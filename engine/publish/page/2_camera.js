@@ -33,12 +33,6 @@ function inWindow(camera, width, height) {
     cx: (camera.cx - camera.width / 2) * scale + width / 2, cy: (camera.cy - camera.height / 2) * scale + height / 2};
 }
 
-// Where a camera's axis comes nearest to the middle of the scene; what orbiting turns about.
-function focusOf(camera) {
-  const ahead = dot(add(scene.focus, camera.eye, -1), camera.axes[2]);
-  return ahead > scene.near ? ahead : scene.radius;
-}
-
 function between(a, b, t) {
   const q = copyCamera(b), mix = (x, y) => x + (y - x) * t;
   q.eye = a.eye.map((x, i) => mix(x, b.eye[i]));

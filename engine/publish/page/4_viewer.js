@@ -14,7 +14,7 @@ class Viewer {
     this.worker.onerror = event => say("Sorting failed: " + event.message);
     this.number = 0;
     this.camera = copyCamera(scene.cameras[scene.start]);
-    this.distance = focusOf(this.camera);
+    this.distance = this.camera.pivot;  // what orbiting turns about is so far ahead
     this.step = this.pace = this.frames = 0;
     this.flying = false;
     this.moved = -1e9;
@@ -50,7 +50,7 @@ class Viewer {
 
   jumpTo(camera, smoothly) {
     const from = this.camera, start = performance.now();
-    this.distance = focusOf(camera);
+    this.distance = camera.pivot;
     this.flight = smoothly && !matchMedia("(prefers-reduced-motion: reduce)").matches && (now => {
       const t = Math.min(1, (now - start) / 500);
       this.camera = t < 1 ? between(from, camera, t * t * (3 - 2 * t)) : copyCamera(camera);

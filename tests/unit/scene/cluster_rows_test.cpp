@@ -107,6 +107,31 @@ TEST(ClusterRows, leaves_lose_little_against_plain_k_means) {
     EXPECT_LT(ours, 1.25 * plain);
 }
 
+// As a small scene has it: more centres than half of the rows. The work has to stay below that of
+// a scene of many rows.
+TEST(ClusterRows, many_centres_of_few_rows_are_near_and_cheap) {
+    const std::vector<float> rows = sample_rows(9000);
+    double work = 0;
+    const AssignRows counting = [&](const auto& r, size_t dims, const auto& centres,
+                                    const std::vector<ClusterBatch>& batches, auto& labels) {
+        for (const ClusterBatch& batch : batches)
+            work += double{1} * batch.rows * batch.centres / (9000.0 * 9000.0);
+        assign_rows(r, dims, centres, batches, labels);
+    };
+    std::vector<double> shares;
+    const Clusters clusters =
+        cluster_rows(rows, kDims, 5000, counting, [&](double share) { shares.push_back(share); });
+    EXPECT_LE(clusters.centres.size() / kDims, 5000u);
+    EXPECT_LT(work, 1) << "products of all rows with all";
+    const double ours = error_of_clusters(rows, clusters),
+                 plain = error_of_clusters(rows, plain_k_means(rows, 5000));
+    RecordProperty("share_of_plain", std::to_string(ours / plain));
+    EXPECT_LT(ours, 1.25 * plain);
+    ASSERT_FALSE(shares.empty());
+    EXPECT_TRUE(std::ranges::is_sorted(shares));
+    EXPECT_EQ(shares.back(), 1);
+}
+
 TEST(ClusterRows, the_same_rows_give_the_same_clusters) {
     const std::vector<float> rows = sample_rows(9000);
     const Clusters a = cluster_rows(rows, kDims, 300), b = cluster_rows(rows, kDims, 300);

@@ -297,6 +297,57 @@ TEST(Ply, malformed_headers_are_errors_that_say_why) {
     EXPECT_NE(error_of_text(text).find("SplatKernel"), std::string::npos);
 }
 
+TEST(Ply, blanks_marks_tabs_and_line_ends_of_other_programs_are_tolerated) {
+    const std::string file = ascii_file("2", kAsciiRow + kAsciiRow);
+    const auto expect_read = [&](const std::string& text) {
+        SplatFile facts;
+        const SplatModel model = parse_splats(bytes_of(text), "t", &facts);
+        EXPECT_EQ(model.position, (std::vector<float>{1, 2, 3, 1, 2, 3})) << text.substr(0, 20);
+        EXPECT_TRUE(facts.notes.empty());
+    };
+    const auto replaced = [&](const std::string& from, const std::string& to) {
+        std::string text = file;
+        for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+            text.replace(at, from.size(), to);
+        return text;
+    };
+    expect_read(replaced("\n", "  \n"));
+    expect_read(replaced("\n", " \t \r\n"));
+    expect_read(replaced("\n", "\r"));  // without a line feed, as on old Macs
+    expect_read(replaced(" ", "\t"));
+    expect_read("\xef\xbb\xbf" + file);
+    expect_read(replaced("format ascii 1.0", "format ascii 1.0 written by hand"));
+    expect_read(replaced(" .1", "\n.1"));  // rows of two lines
+    expect_read(file.substr(0, file.size() - 1));
+}
+
+TEST(Ply, numbers_with_commas_are_refused_with_the_line_and_what_to_do) {
+    std::string row = kAsciiRow;
+    std::replace(row.begin(), row.end(), '.', ',');
+    const std::string decimal = error_of_text(ascii_file("2", kAsciiRow + "0" + row.substr(1)));
+    EXPECT_NE(decimal.find("line 20, row 1 of 2"), std::string::npos) << decimal;
+    EXPECT_NE(decimal.find("',1' has a decimal comma"), std::string::npos) << decimal;
+    EXPECT_NE(decimal.find("sed "), std::string::npos) << decimal;
+    row = kAsciiRow;
+    std::replace(row.begin(), row.end(), ' ', ',');
+    const std::string between = error_of_text(ascii_file("1", row));
+    EXPECT_NE(between.find("has commas between numbers"), std::string::npos) << between;
+}
+
+TEST(Ply, a_line_of_another_length_than_the_header_says_is_refused) {
+    const std::string longer = "9 " + kAsciiRow, shorter = kAsciiRow.substr(2);
+    for (const std::string& rows : {longer + longer, kAsciiRow + longer + kAsciiRow,
+                                    kAsciiRow + shorter + kAsciiRow, shorter + longer}) {
+        const auto count = std::count(rows.begin(), rows.end(), '\n');
+        const std::string error = error_of_text(ascii_file(std::to_string(count), rows));
+        EXPECT_NE(error.find("values, and the header declares 14 properties"), std::string::npos)
+            << error;
+        EXPECT_NE(error.find(rows.starts_with(kAsciiRow) ? "line 20, row 1" : "line 19, row 0"),
+                  std::string::npos)
+            << error;
+    }
+}
+
 TEST(Ply, map_coordinates_keep_millimetres) {
     std::string text =
         ascii_file("2", "450000.001" + kAsciiRow.substr(1) + "450010.002" + kAsciiRow.substr(1));

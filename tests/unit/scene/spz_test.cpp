@@ -75,11 +75,16 @@ TEST(Spz, one_splat_of_versions_1_to_3_decoded_by_hand) {
         }
 }
 
+// Each precision of each degree, in both versions.
 TEST(Spz, every_degree_round_trips_within_the_stated_errors) {
-    for (int degree = 0; degree <= 3; ++degree) {
+    for (int at = 0; at < 4 * kSpzPrecisions; ++at) {
+        const int degree = at % 4, precision = at / 4;
+        const SpzSteps steps = spz_steps(precision);
         SplatModel model = sample_model(degree, 400);
         model.antialias = degree == 2;
-        const FileBytes file = encode_spz(model);
+        const FileBytes file = encode_spz(model, "scene", 4, precision);
+        EXPECT_TRUE(
+            same_splats(kReadSpz(encode_spz(model, "scene", 3, precision)), kReadSpz(file)));
         SpzFacts facts;
         const SplatModel read = parse_spz(file, "test", &facts);
         EXPECT_EQ(facts.version, 4);
@@ -98,14 +103,33 @@ TEST(Spz, every_degree_round_trips_within_the_stated_errors) {
             EXPECT_GT(same_rotation(read, i, model, i), 1 - 3e-6);
             for (size_t c = 0; c < rest; ++c)
                 EXPECT_NEAR(read.sh_rest[rest * i + c], model.sh_rest[rest * i + c],
-                            c < 9 ? 1.001 / 32 : 1.001 / 16);
+                            1.001 / 256 * (c < 9 ? steps.degree_1 : steps.higher));
         }
-        const SplatModel again = kReadSpz(encode_spz(read));
+        const SplatModel again = kReadSpz(encode_spz(read, "scene", 4, precision));
         EXPECT_EQ(again.position, read.position);
         EXPECT_EQ(again.log_scale, read.log_scale);
         EXPECT_EQ(again.sh_rest, read.sh_rest);
         EXPECT_EQ(again.sh_dc, read.sh_dc);
         EXPECT_EQ(again.opacity_logit, read.opacity_logit);
+    }
+}
+
+TEST(Spz, a_finer_precision_is_nearer_and_larger) {
+    const SplatModel model = sample_model(3, 2000);
+    EXPECT_EQ(encode_spz(model), encode_spz(model, "scene", 4, kSpzPrecisions - 1));
+    EXPECT_EQ(spz_steps(kSpzPrecisions - 1).higher, 1) << "all bits";
+    std::size_t bytes = 0;
+    double error = 1e9;
+    for (int precision = 0; precision < kSpzPrecisions; ++precision) {
+        const FileBytes file = encode_spz(model, "scene", 4, precision);
+        const SplatModel read = kReadSpz(file);
+        double sum = 0;
+        for (size_t i = 0; i < read.sh_rest.size(); ++i)
+            sum += std::abs(double{read.sh_rest[i]} - model.sh_rest[i]);
+        EXPECT_LT(sum, 0.6 * error) << precision;
+        EXPECT_GT(file.size(), bytes) << precision;
+        error = sum;
+        bytes = file.size();
     }
 }
 
