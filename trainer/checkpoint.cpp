@@ -11,7 +11,9 @@
 
 #include "engine/core/doing.h"
 #include "engine/core/error.h"
+#include "engine/core/file_parts.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
 #include "engine/kernels/kernel_file.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/raster/gpu_splats.h"
@@ -47,8 +49,8 @@ void for_each_array(State& state, Visit visit) {
     for (auto& values : state.mean) visit(values);
 }
 
-std::uint32_t checksum(std::span<const std::byte> bytes) {
-    uLong crc = crc32(0, nullptr, 0);
+std::uint32_t checksum(std::span<const std::byte> bytes, std::uint32_t before = 0) {
+    uLong crc = before;  // of nothing it is 0
     while (!bytes.empty()) {
         const size_t part = std::min<size_t>(bytes.size(), 1u << 30);
         crc = crc32(crc, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(part));
@@ -163,31 +165,50 @@ void size_arrays(Checkpoint& c, std::uint64_t splats) {
         c.state.mean.emplace_back(attribute_values(c.state.model, a).size());
 }
 
+// A checkpoint's file as its head and the arrays of the state, which stay where they are: beside a
+// large state there is no room for another one.
+struct FileOf {
+    explicit FileOf(const Checkpoint& checkpoint) {
+        const std::string header =
+            header_of(checkpoint).dump(-1, ' ', false, Json::error_handler_t::replace);
+        const std::uint64_t header_bytes = header.size();
+        head.resize(kHeadBytes + header.size());
+        std::memcpy(head.data(), kMagic, sizeof kMagic);
+        std::memcpy(head.data() + 8, &kVersion, 4);
+        std::memcpy(head.data() + kSizeAt, &header_bytes, 8);
+        std::memcpy(head.data() + kHeadBytes, header.data(), header.size());
+        parts.emplace_back(head);
+        std::uint32_t crc = checksum(std::span(head).subspan(kSizeAt));
+        for_each_array(checkpoint.state, [&](const std::vector<float>& values) {
+            parts.push_back(std::as_bytes(std::span(values)));
+            crc = checksum(parts.back(), crc);
+        });
+        std::memcpy(head.data() + kCrcAt, &crc, 4);
+    }
+    FileOf(const FileOf&) = delete;
+    FileOf& operator=(const FileOf&) = delete;
+
+    std::vector<std::byte> head;
+    std::vector<std::span<const std::byte>> parts;
+};
+
 }  // namespace
 
 std::vector<std::byte> checkpoint_bytes(const Checkpoint& checkpoint) {
-    std::vector<std::byte> payload;
-    for_each_array(checkpoint.state, [&](const std::vector<float>& values) {
-        const auto bytes = std::as_bytes(std::span(values));
-        payload.insert(payload.end(), bytes.begin(), bytes.end());
-    });
-    const std::string header =
-        header_of(checkpoint).dump(-1, ' ', false, Json::error_handler_t::replace);
-    const std::uint64_t header_bytes = header.size();
-    std::vector<std::byte> file(kHeadBytes + header.size() + payload.size());
-    std::memcpy(file.data(), kMagic, sizeof kMagic);
-    std::memcpy(file.data() + 8, &kVersion, 4);
-    std::memcpy(file.data() + kSizeAt, &header_bytes, 8);
-    std::memcpy(file.data() + kHeadBytes, header.data(), header.size());
-    if (!payload.empty())
-        std::memcpy(file.data() + kHeadBytes + header.size(), payload.data(), payload.size());
-    const std::uint32_t crc = checksum(std::span(file).subspan(kSizeAt));
-    std::memcpy(file.data() + kCrcAt, &crc, 4);
-    return file;
+    const FileOf file(checkpoint);
+    std::size_t size = 0;
+    for (const auto& part : file.parts) size += part.size();
+    std::vector<std::byte> bytes;
+    bytes.reserve(size);
+    for (const auto& part : file.parts) bytes.insert(bytes.end(), part.begin(), part.end());
+    return bytes;
 }
 
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
-    while_doing(path.string(), [&] { write_file_atomic(path, checkpoint_bytes(checkpoint)); });
+    while_doing(path.string(), [&] {
+        const FileOf file(checkpoint);
+        write_file_atomic(path, FileParts(file.parts));
+    });
 }
 
 Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& where) {
@@ -222,7 +243,7 @@ Checkpoint parse_checkpoint(std::span<const std::byte> file, const std::string& 
             cameras > kMaxSplats || (rest != 0 && rest != rest_floats * splats))
             throw fail("the header's sizes make no sense");
     } catch (const Json::exception& e) {
-        throw fail(std::string("the header cannot be read: ") + e.what());
+        throw fail("its header " + json_reason(e));
     }
     const std::span<const std::byte> payload = file.subspan(kHeadBytes + header_bytes);
     const std::uint64_t floats =

@@ -63,10 +63,11 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
     return photos;
 }
 
-RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const RunOptions& run, const std::atomic<bool>* stop,
-                           std::vector<ImageU8> photos) {
+TrainResult follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                            const RunOptions& run, const std::atomic<bool>* stop,
+                            std::vector<ImageU8> photos) {
     photos = photos_of_run(dataset, options, std::move(photos));
+    photo_doubts(dataset, photos);  // throws; the first rank says them
     const std::string fingerprint = dataset_fingerprint(dataset, photos);
     const std::optional<Checkpoint> checkpoint = checkpoint_of(device, run);
     Trainer trainer(device, dataset, photos, first_model(dataset, options, checkpoint), options,
@@ -81,7 +82,7 @@ RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOp
     while (trainer.iteration() < options.iterations &&
            !is_to_stop(trainer, run.ranks, stop && stop->load()))
         while_doing(fmt::format("iteration {}", trainer.iteration() + 1), [&] { trainer.step(); });
-    RunSummary summary;
+    TrainResult summary;
     summary.iteration = trainer.iteration();
     summary.interrupted = trainer.iteration() < options.iterations;
     return summary;

@@ -31,8 +31,8 @@ void check_ranks(const Device& device, const TrainOptions& options, const RankGr
 bool is_to_stop(Trainer& trainer, const RankGroup& ranks, bool stop);
 
 /// run_training() of another rank than the first.
-RunSummary follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                           const RunOptions& run, const std::atomic<bool>* stop,
-                           std::vector<ImageU8> photos);
+TrainResult follow_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                            const RunOptions& run, const std::atomic<bool>* stop,
+                            std::vector<ImageU8> photos);
 
 }  // namespace darb

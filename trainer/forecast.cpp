@@ -6,6 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
+#include "engine/core/scope_guard.h"
 #include "engine/raster/gpu_splats.h"
 #include "trainer/initial_model.h"
 #include "trainer/resolution_ramp.h"
@@ -387,17 +388,14 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
               strategy_row(options.strategy).prunes_random_start;
     f.demand.averages = schedule.averages();
     fit_size(scratch, options, f.splats, 0, f);
-    const Tuning tuning = scratch.tuning();
-    if (f.demand.streams) {  // so do the few photos that are measured
-        Tuning as_run = tuning;
-        as_run.photos = PhotoPlace::streamed;
-        scratch.set_tuning(as_run);
-    }
     if (measure && f.demand.photo_pixels > 0) try {
+            Tuning as_run = scratch.tuning();
+            const ScopeGuard restore([&, before = as_run] { scratch.set_tuning(before); });
+            if (f.demand.streams) as_run.photos = PhotoPlace::streamed;  // as those of the run
+            scratch.set_tuning(as_run);
             measure_both(scratch, dataset, start, options, f);
-        } catch (const Error&) {  // no room for it: the run will say so itself, if it has none
+        } catch (const NoRoom&) {  // the run will say so itself, if it has none
         }
-    scratch.set_tuning(tuning);
     find_peak(scratch, options, photos, f);
     return f;
 }

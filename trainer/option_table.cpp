@@ -184,6 +184,45 @@ void set_option(const OptionRow& row, const std::string& text, TrainOptions& opt
         row.member);
 }
 
+Json member_json(const OptionRow& row, const TrainOptions& options) {
+    Json json;
+    std::visit(
+        [&](auto member) {
+            using Member = decltype(member);
+            if constexpr (!std::is_same_v<Member, std::monostate>) {
+                if constexpr (std::is_arithmetic_v<typename MemberOf<Member>::Field>)
+                    json = options.*member;
+                else if (options.*member)
+                    json = *(options.*member);
+            }
+        },
+        row.member);
+    return json;
+}
+
+void set_member(const OptionRow& row, const Json& value, TrainOptions& options) {
+    const std::string text = value.is_boolean() ? (value.get<bool>() ? "on" : "off") : value.dump();
+    const bool is_switch = std::holds_alternative<bool TrainOptions::*>(row.member);
+    if (!value.is_null()) {
+        if (!(is_switch ? value.is_boolean() : value.is_number()))
+            throw Error(option_name(row) + " " + text, "is of another type",
+                        fmt::format("It takes {}.", limits_text(row)));
+        return set_option(row, text, options);
+    }
+    std::visit(
+        [&](auto member) {
+            using Member = decltype(member);
+            if constexpr (!std::is_same_v<Member, std::monostate>) {
+                if constexpr (std::is_arithmetic_v<typename MemberOf<Member>::Field>)
+                    throw Error(option_name(row), "has no value",
+                                fmt::format("It takes {}.", limits_text(row)));
+                else
+                    (options.*member).reset();
+            }
+        },
+        row.member);
+}
+
 void use_3dgs_schedule(TrainOptions& options) {
     for (const OptionRow& row : option_rows()) {
         if (!row.in_3dgs) continue;

@@ -33,6 +33,7 @@ inline constexpr const char *kRun = "Run", *kScene = "Scene", *kPhotos = "Photos
 struct OptionRow {
     const char* flags = "";    // with commas, dashes and all; "": presets and plans alone set it
     const char* setting = "";  // JSON pointer into the settings; "": not there, nothing to repeat
+    const char* name = "";     // in a saved request, where neither flag nor setting names it
     OptionMember member = {};
     const char* group = option_group::kRun;
     const char* help = "";
@@ -64,6 +65,12 @@ std::string limits_text(const OptionRow& row);
 /// Takes over a value as it was typed. Throws Error with the flag, the value, the reason and what
 /// it takes: no number, one that is not finite or not whole where it must be, or out of limits.
 void set_option(const OptionRow& row, const std::string& text, TrainOptions& options);
+
+/// A row's member as it was asked for, for a saved request: null where it is absent, as where the
+/// row has no member. set_member takes it back; it throws Error for a value of another type or out
+/// of limits.
+nlohmann::json member_json(const OptionRow& row, const TrainOptions& options);
+void set_member(const OptionRow& row, const nlohmann::json& value, TrainOptions& options);
 
 /// Every option that changes the result, resolved, as one JSON object.
 nlohmann::json settings_json(const TrainOptions& options);

@@ -138,7 +138,7 @@ void TrainingPhotos::set_divisor(int divisor) {
     ResolutionRamp ramp(*device_);
     try {
         make_smaller(ramp, divisor);
-    } catch (const Error&) {
+    } catch (const NoRoom&) {
         make_whole();
         room_for_smaller_ = false;
     }

@@ -11,6 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/memory.h"
+#include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/run_events.h"
 #include "engine/plan/tuning_names.h"
@@ -44,6 +45,13 @@ DeviceRates rates_of(Device& device) {
     return rates;
 }
 
+// Said once, by the first of several ranks, which all have the same photos.
+std::vector<ImageU8> with_doubts(const Dataset& dataset, std::vector<ImageU8> photos) {
+    for (const std::string& doubt : photo_doubts(dataset, photos))
+        say("warning: {}: {}\n", dataset.root.string(), doubt);
+    return photos;
+}
+
 // One run: the loop and what it writes. The stopwatch counts training alone.
 class Run {
   public:
@@ -53,7 +61,7 @@ class Run {
           dataset_(dataset),
           options_(options),
           run_(run),
-          photos_(photos_of_run(dataset, options, std::move(photos))),
+          photos_(with_doubts(dataset, photos_of_run(dataset, options, std::move(photos)))),
           fingerprint_(dataset_fingerprint(dataset, photos_)),
           rates_(rates_of(device)),
           tuning_(result_tuning(device)),
@@ -72,7 +80,7 @@ class Run {
         give_back_freed_memory();
     }
 
-    RunSummary execute(const std::atomic<bool>* stop);
+    TrainResult execute(const std::atomic<bool>* stop);
 
   private:
     void resume();
@@ -91,7 +99,7 @@ class Run {
     void after_step(int begin);
     void save_what_is_there(bool failed);
     bool is_finished() const;
-    RunSummary finished();
+    TrainResult finished();
     std::string other_way() const;
     void report_troubles();
     void report_resolution();
@@ -120,7 +128,7 @@ class Run {
     Trainer trainer_;
     RunLog log_;
     Progress progress_;
-    RunSummary summary_;
+    TrainResult summary_;
     IterationResult latest_;
     size_t told_probes_ = 0;
     std::uint32_t told_by_memory_ = 0,
@@ -247,7 +255,7 @@ bool Run::is_finished() const {
 }
 
 // Nothing is left to do but a report that could not be written then.
-RunSummary Run::finished() {
+TrainResult Run::finished() {
     progress_.note("the run is finished: nothing is left to do");
     if (run_.report && !std::filesystem::exists(run_.output / "report.html"))
         summary_.report = log_.report_again();
@@ -268,10 +276,10 @@ void Run::begin() {
     }
     write_cameras();
     write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
-    if (!run_.command.empty()) write_file_atomic(run_.output / "command.json", run_.command);
+    if (!run_.request.empty()) write_file_atomic(run_.output / "request.json", run_.request);
 }
 
-RunSummary Run::execute(const std::atomic<bool>* stop) {
+TrainResult Run::execute(const std::atomic<bool>* stop) {
     trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
     begin();
     if (!run_.resume_from.empty() && is_finished()) return finished();
@@ -400,7 +408,7 @@ void Run::report_resolution() {
 
 void Run::report_memory() {
     if (trainer_.mean_left_out() && !std::exchange(told_no_mean_, true)) {
-        progress_.note(
+        progress_.warn(
             "no device memory is left for the mean of the last iterations: the run ends without; "
             "with --average-from 1 rates fall instead");
         log_.mean_left_out(trainer_.iteration());
@@ -445,14 +453,14 @@ void Run::report_cameras() {
 
 void Run::report_troubles() {
     if (const std::uint64_t bad = trainer_.counters().bad_gradients; bad > 0)
-        progress_.note(fmt::format("{} gradients of splats were not finite and were skipped", bad));
+        progress_.warn(fmt::format("{} gradients of splats were not finite and were skipped", bad));
 }
 
 }  // namespace
 
-RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                        const RunOptions& run, const std::atomic<bool>* stop,
-                        std::vector<ImageU8> photos) {
+TrainResult run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                         const RunOptions& run, const std::atomic<bool>* stop,
+                         std::vector<ImageU8> photos) {
     for (const View& view : dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
     if (run.ranks.several() && !run.ranks.all->is_first())

@@ -47,7 +47,7 @@ struct RunOptions {
     /// no training time.
     std::function<double(const LiveStep&)> on_step;
     std::optional<PaceForecast> pace;  // for the time that is left, and for the log
-    std::string command;               // of command.json, for --resume; may be empty
+    std::string request;               // of request.json, for --resume; may be empty
     std::string effects;               // the plan in a line, for the log
     std::string effects_json;          // the same as JSON, for metrics.json; may be empty
     RankGroup ranks;                   // that train together; the first one writes and talks
@@ -75,7 +75,7 @@ struct Evaluation {
     std::optional<DepthError> depth;  // means over the views that have one
 };
 
-struct RunSummary {
+struct TrainResult {
     std::vector<Evaluation> evaluations;
     int iteration = 0;
     bool interrupted = false;
@@ -104,8 +104,8 @@ std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& o
 /// saved once more as far as they can be. The caller holds the RunLock of the folder.
 /// photos: already loaded, in the order of the views; else empty. Once training photos are where
 /// steps read them, the run keeps the others alone.
-RunSummary run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
-                        const RunOptions& run, const std::atomic<bool>* stop = nullptr,
-                        std::vector<ImageU8> photos = {});
+TrainResult run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                         const RunOptions& run, const std::atomic<bool>* stop = nullptr,
+                         std::vector<ImageU8> photos = {});
 
 }  // namespace darb

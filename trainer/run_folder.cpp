@@ -28,10 +28,10 @@ constexpr const char* kOtherFolder = "Name another output folder with -o.";
 constexpr const char* kHolder = "process ";
 constexpr const char* kNobody = "another process";
 constexpr size_t kLongestHolder = 512;  // bytes of the lock file that are shown
-constexpr std::array<std::string_view, 13> kRunNames{
-    "checkpoint.darb", "metrics.json", "exposure.json", "report.html", "run.jsonl",
-    "cameras.json",    "cfg_args",     "command.json",  "point_cloud", "held_out",
-    "scene.html",      "dense_start",  "blocks"};
+constexpr std::array<std::string_view, 14> kRunNames{
+    "checkpoint.darb", "metrics.json", "exposure.json", "report.html",  "run.jsonl",
+    "cameras.json",    "cfg_args",     "command.json",  "request.json", "point_cloud",
+    "held_out",        "scene.html",   "dense_start",   "blocks"};
 
 bool is_numbered(const std::string& name, std::string_view before, std::string_view behind) {
     if (name.size() <= before.size() + behind.size() || !name.starts_with(before) ||

@@ -288,7 +288,7 @@ void add_events(const std::vector<Json>& events, ReportData& data) {
                              "; loss and PSNR of the training photos jump where these change.");
 }
 
-ReportData RunLog::report_data(const RunSummary& summary) const {
+ReportData RunLog::report_data(const TrainResult& summary) const {
     ReportData data;
     data.title = std::filesystem::path(start_.value("dataset", "")).filename().string();
     data.device = start_.value("device", "") + ", " + start_.value("driver", "");
@@ -355,7 +355,7 @@ std::uint32_t stopped_by(const std::vector<Json>& events, const char* limit) {
 
 }  // namespace
 
-std::filesystem::path RunLog::finish(const RunSummary& summary, const Trainer& trainer,
+std::filesystem::path RunLog::finish(const TrainResult& summary, const Trainer& trainer,
                                      const Device& device, bool with_report) {
     const TrainCounters& c = trainer.counters();
     Json passes = Json::array();
@@ -439,7 +439,7 @@ std::filesystem::path RunLog::report_again() {
     start_ = metrics.value("start", Json::object());
     rates_.bytes_per_s = number(start_, "copy_bytes_per_s");
     rates_.fma_per_s = number(start_, "fma_per_s");
-    RunSummary summary;
+    TrainResult summary;
     summary.passes = passes_of(metrics);
     if (const Json list = metrics.value("evaluations", Json::array()); !list.empty())
         summary.pictures = pictures_of(list.back(), folder_ / "held_out");

@@ -59,7 +59,7 @@ class RunLog {
     /// The passes of the run so far, in their order.
     std::vector<ReportPass> passes(const Trainer& trainer) const;
     /// metrics.json and, with_report, report.html; returns the path of the report, if any.
-    std::filesystem::path finish(const RunSummary& summary, const Trainer& trainer,
+    std::filesystem::path finish(const TrainResult& summary, const Trainer& trainer,
                                  const Device& device, bool with_report);
     /// report.html of a run that has ended, from run.jsonl, metrics.json and held_out/; returns its
     /// path.
@@ -71,7 +71,7 @@ class RunLog {
     void open();
     void write(const nlohmann::json& event);
     std::string shared_text(const std::string& text) const;  // without the folders of this machine
-    ReportData report_data(const RunSummary& summary) const;
+    ReportData report_data(const TrainResult& summary) const;
 
     std::filesystem::path folder_, root_;  // of the run and of its data set
     std::vector<nlohmann::json> events_;

@@ -83,7 +83,7 @@ void check_start_memory(const Device& device, const Dataset& dataset, const Trai
     const bool too_many_points = needed > double(left) && points > splats;
     if (fit >= splats && !too_many_points) return;
     const std::string option = random ? "--random-points" : "--cap-max";
-    throw Error(
+    throw NoRoom(
         random ? fmt::format("--random-points {}", points)
                : fmt::format("{}: {} points", dataset.root.string(), splats),
         fmt::format("the start alone takes {} of device memory and {} of host memory; the device "

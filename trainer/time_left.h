@@ -1,4 +1,8 @@
-// What is left of a run: the pace that was measured, on through the growth that is forecast.
+// What is left of a run: the pace that was measured, on through as much of the forecast growth as
+// the run shows it to have. In tests/unit/trainer/time_left_test.cpp the estimate at 24, 50 and 75
+// % of a run is within 1.5 times of the truth where the forecast is right, where the growth does
+// not come, and where the machine gets busy or free after a fifth; on recorded runs it is
+// within 1.6.
 #pragma once
 
 #include <cstdint>
@@ -35,18 +39,29 @@ class TimeLeft {
     double seconds() const;
 
   private:
+    // Sums of measured and of modelled amounts, in which what is long ago fades.
+    struct Faded {
+        double half_life = 1;  // iterations
+        double measured = 0, modelled = 0;
+        void add(double new_measured, double new_modelled, int iterations);
+        double ratio() const { return measured / modelled; }
+    };
+
+    double pace() const;
+    double growth() const;
     double model_ms(int iteration, double splats) const;
     double later_splats(int iteration) const;
 
     int iterations_, probe_at_ = 0, probe_iterations_ = 0;  // 0: there is no probe
     bool has_target_ = false;                               // the strategy's end is known
+    double limit_ = 0;                                      // of the splats
     PaceForecast pace_;
     std::vector<double> counts_;  // [iteration] splats, as forecast
     std::vector<double> ramp_;    // [iteration] share of the time on whole photos
     int iteration_ = 0;
     double last_s_ = 0, splats_ = 0;
-    // Sums of measured and forecast time, in which what is long ago fades.
-    double measured_ms_ = 0, modelled_ms_ = 0;
+    Faded steady_, quick_;  // of the time
+    Faded grown_;           // of the splats that were added, expected ones as the model
     bool any_ = false;
 };
 

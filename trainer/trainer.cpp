@@ -8,6 +8,7 @@
 #include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
+#include "engine/core/scope_guard.h"
 #include "trainer/batch_step.h"
 #include "trainer/checkpoint.h"
 
@@ -178,11 +179,13 @@ std::optional<CameraMoves> Trainer::camera_moves() const {
 }
 
 void Trainer::open_step() {
-    const std::optional<DensityResult> round = control_density();
+    if (controlled_ != iteration_) round_ = control_density();
+    controlled_ = iteration_;  // a probe that fails is tried again, the round before it is not
     update_smoothing();
     const bool probes = probe_.is_due(iteration_, splats_.sh_degree());
     if (probes) probe_degree();
     opened_ = iteration_;
+    const std::optional<DensityResult> round = std::exchange(round_, std::nullopt);
     if ((round || probes) && ranks_.mixed) follow_first();
     if (round && on_round) on_round(iteration_, *round);
 }
@@ -240,12 +243,13 @@ gpu::DensifyArgs Trainer::round_args(int iteration) const {
 
 // Of devices that round differently: the splats of the first are everybody's again.
 void Trainer::follow_first() {
-    const int opened = opened_;
+    const int opened = opened_, controlled = controlled_;
     const Bytes bytes =
         ranks_.all->is_first() ? checkpoint_bytes({state(), "", "", 0, ""}) : Bytes{};
     const Bytes first = from_first(*ranks_.all, bytes);
     if (!ranks_.all->is_first()) restore(parse_checkpoint(first, "the first rank").state);
     opened_ = opened;
+    controlled_ = controlled;
 }
 
 DensityResult Trainer::run_round(int iteration) {
@@ -288,11 +292,18 @@ void Trainer::update_smoothing() {
     smoothing_->update(splats_);
 }
 
+// The run goes on from what the probe makes of its state, or from that state where one of its steps
+// throws, as a loss of the caller's may.
 void Trainer::probe_degree() {
     State tried = state();
     // What a trial finishes is no result of the run.
     auto on_finished = std::exchange(step_.on_finished, [this](const StepOutcome& outcome) {
         check_gradients(outcome, splats_.count());
+    });
+    const ScopeGuard reports([&] { step_.on_finished = std::move(on_finished); });
+    const ScopeGuard goes_on([&] {  // before that: it finishes what the trial left under way
+        restore(tried);
+        controlled_ = iteration_;
     });
     const ProbeFork fork{
         .restore = [this](const State& start) { restore(start); },
@@ -312,8 +323,6 @@ void Trainer::probe_degree() {
     bool has_room = memory_.has_room_for_degree(held(), splats_.sh_degree() + 1);
     if (ranks_.several()) has_room = least(*ranks_.all, has_room ? 1 : 0) == 1;
     probe_.run(tried, photos_.views(), has_room, fork);
-    step_.on_finished = std::move(on_finished);
-    restore(tried);
 }
 
 // The last iteration leaves the mean itself. Where there is no room for one the run goes on
@@ -322,7 +331,7 @@ void Trainer::average() {
     drain();
     try {
         average_.add(splats_);
-    } catch (const Error&) {
+    } catch (const NoRoom&) {
         if (average_.count() > 0) throw;
         average_.clear();
         mean_left_out_ = true;
@@ -412,7 +421,7 @@ void Trainer::restore(const State& s) {
     step_.restore_gradient_sum(s.gradient_sum);
     average_.restore(s.mean, s.averaged, splats_);
     iteration_ = s.iteration;
-    opened_ = s.iteration > 0 ? -1 : 0;
+    opened_ = controlled_ = s.iteration > 0 ? -1 : 0;
     totals_.counters = s.counters;
     set_resolution(std::max(iteration_, 1));
 }

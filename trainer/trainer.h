@@ -167,7 +167,9 @@ class Trainer {
     DegreeProbe probe_;
     RunTotals totals_;
     int iteration_ = 0;
-    int opened_ = 0;  // the iteration after which density control and probes had their turn
+    int opened_ = 0;      // the iteration after which density control and probes had their turn
+    int controlled_ = 0;  // and that after which density control had
+    std::optional<DensityResult> round_;       // of it, to be told
     std::optional<GradientTree> tree_;         // steps_by_views()
     std::optional<CameraRefinement> cameras_;  // options.refine_cameras
     TrainingStep step_;  // last: it waits for the device before anything that it uses goes

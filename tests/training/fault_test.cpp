@@ -165,7 +165,7 @@ TEST_F(FaultyRun, photos_that_changed_since_are_noticed) {
 TEST_F(FaultyRun, a_refused_resume_leaves_everything_of_the_run) {
     start_and_lose_the_device();
     std::map<fs::path, Bytes> before;
-    for (const char* name : {"command.json", "cameras.json", "cfg_args", "run.jsonl"})
+    for (const char* name : {"request.json", "cameras.json", "cfg_args", "run.jsonl"})
         before[run_ / name] = read_file(run_ / name);
     expect_says(darb(training(run_) + " --resume --kernel sinc"),
                 {"was written with other settings", "kernel"});

@@ -9,6 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tests/support/test_device_options.h"
 #include "trainer/initial_model.h"
@@ -328,6 +329,24 @@ TEST(Forecast, counts_the_time_that_smaller_photos_save) {
     ASSERT_EQ(f.ramp_ms.size(), 1U);  // half the sides, for 9,000 of 30,000
     EXPECT_NEAR(f.seconds, 21 * f.start_ms + 9 * f.ramp_ms[0], 1e-6 * f.seconds);
     EXPECT_TRUE(forecast_training(scratch, small_scene(), options).ramp_ms.empty());
+}
+
+// A device that is lost passes for no lack of room, and leaves its settings as they were.
+TEST(Forecast, goes_without_times_for_want_of_room_alone) {
+    const Dataset dataset = small_scene();
+    TrainOptions options;
+    options.iterations = 1'000;
+    DeviceOptions device = test::device_options();
+    device.faults = parse_faults("oom:moments of position");
+    Device narrow(device);
+    const PhotoPlace photos = narrow.tuning().photos;
+    const Forecast unmeasured = forecast_training(narrow, dataset, options);
+    EXPECT_EQ(unmeasured.seconds, 0);
+    EXPECT_GT(unmeasured.splats, 0U);
+    device.faults = parse_faults("lost:1");
+    Device lost(device);
+    EXPECT_THROW(forecast_training(lost, dataset, options), DeviceLost);
+    EXPECT_EQ(lost.tuning().photos, photos);
 }
 
 TEST(Forecast, without_measuring_has_no_time) {

@@ -221,7 +221,7 @@ TEST(RunTime, a_pause_is_left_out) {
     int steps = 0;
     run.on_step = [&](const LiveStep&) { return ++steps == 1 ? 1e6 : 0.0; };
     Device device{test::device_options()};
-    const RunSummary summary = run_training(device, shipped_scene(), options, run);
+    const TrainResult summary = run_training(device, shipped_scene(), options, run);
     EXPECT_GT(steps, 0);
     EXPECT_LT(summary.seconds, 0);
     EXPECT_GT(summary.seconds, -1e6);

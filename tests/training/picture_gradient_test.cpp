@@ -61,5 +61,48 @@ TEST(Training, a_loss_that_throws_or_is_no_gradient_leaves_the_iteration_to_be_d
     EXPECT_TRUE(same_state(whole, failed));
 }
 
+// At iteration 20 a round of density control and a probe of the first degree are due. The loss
+// fails in the first and in the second of the probe's trials; the run goes on as if it had not.
+TEST(Training, a_loss_that_throws_while_a_degree_is_probed_leaves_the_run_as_it_was) {
+    TinyTraining t = tiny_training({.views = 12});
+    t.options.probe_sh = true;
+    t.options.sh_degree = 1;
+    t.options.iterations = 40;
+    Trainer whole = t.trainer(), failed = t.trainer();
+    std::vector<int> rounds, results, told_rounds, told_results;
+    whole.on_round = [&](int iteration, const DensityResult&) { rounds.push_back(iteration); };
+    whole.on_result = [&](const IterationResult& r) { results.push_back(r.iteration); };
+    failed.on_round = [&](int iteration, const DensityResult&) {
+        told_rounds.push_back(iteration);
+    };
+    failed.on_result = [&](const IterationResult& r) { told_results.push_back(r.iteration); };
+    int calls = 0, fails_at = -1;
+    const auto loss = [&](const TrainingPicture& picture) {
+        if (calls++ == fails_at) throw Error("mine", "fails");
+        return of_absolute_difference(picture);
+    };
+    whole.set_picture_gradient(loss);
+    run_and_drain(whole, 40);
+    ASSERT_EQ(whole.probes().size(), 1U);
+
+    failed.set_picture_gradient(loss);
+    run_to(failed, 20);
+    for (const int at : {0, 77, 210}) {
+        calls = 0;
+        fails_at = at;
+        EXPECT_THROW(failed.step(), Error);
+        EXPECT_EQ(failed.iteration(), 20);
+        EXPECT_EQ(failed.sh_degree(), 0);
+        EXPECT_TRUE(failed.probes().empty());
+    }
+    fails_at = -1;
+    run_and_drain(failed, 40);
+    ASSERT_EQ(failed.probes().size(), 1U);
+    EXPECT_EQ(failed.probes()[0].gain_db, whole.probes()[0].gain_db);
+    EXPECT_TRUE(same_state(whole, failed));
+    EXPECT_EQ(told_rounds, rounds);
+    EXPECT_EQ(told_results, results);
+}
+
 }  // namespace
 }  // namespace darb::test

@@ -111,13 +111,12 @@ TEST_F(RunFiles, values_of_another_type_are_errors_of_input) {
                        {where, "no JSON object"});
     expect_input_error(with_line("[1]"), {where});
     expect_input_error(with_line("{\"event"), {where});
-    const std::string command = read_text_file(run() / "command.json");
-    for (const char* text : {"{}", "[1]", "[\"train\", null]", "nonsense",
-                             "[\"train\", \".\", \"--lambda-dssim\", \"nan\"]"}) {
-        std::ofstream(run() / "command.json") << text;
-        expect_input_error(resume(), {});
+    const std::string request = read_text_file(run() / "request.json");
+    for (const char* text : {"{}", "[1]", "nonsense"}) {
+        std::ofstream(run() / "request.json") << text;
+        expect_input_error(resume(), {"request.json"});
     }
-    std::ofstream(run() / "command.json") << command;
+    std::ofstream(run() / "request.json") << request;
     ASSERT_EQ(resume().code, 0) << "as it was";
     edit("metrics.json", [](json& m) { m["interrupted"] = "no"; });
     expect_input_error(resume(), {"metrics.json", "'interrupted' is neither true nor false"});

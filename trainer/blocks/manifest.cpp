@@ -8,6 +8,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
 #include "trainer/blocks/camera_choice.h"
 #include "trainer/checkpoint.h"
 
@@ -119,6 +120,8 @@ BlocksManifest read_manifest(const std::filesystem::path& path) {
         m.joined = json.at("joined_splats");
         for (const ManifestJson& row : json.at("blocks"))
             m.blocks.push_back({row.at("name"), row.at("points"), row.at("views"), part_from(row)});
+    } catch (const nlohmann::json::exception& e) {
+        throw Error(path.string(), "is no manifest of blocks: " + json_reason(e), kRemedy);
     } catch (const std::exception& e) {
         throw Error(path.string(), std::string("is no manifest of blocks: ") + e.what(), kRemedy);
     }

@@ -134,8 +134,8 @@ void BlocksRun::open() {
     write_camera_list(job_.run.output / "cameras.json", job_.dataset.views);
     write_file_atomic(job_.run.output / "cfg_args",
                       cfg_args(job_.dataset, job_.options, job_.run.output));
-    if (!job_.run.command.empty())
-        write_file_atomic(job_.run.output / "command.json", job_.run.command);
+    if (!job_.run.request.empty())
+        write_file_atomic(job_.run.output / "request.json", job_.run.request);
     save();  // the last: where it is, a run can be resumed
 }
 
@@ -161,7 +161,7 @@ double BlocksRun::coarse_scale() const {
 void BlocksRun::train_part(const Dataset& dataset, const TrainOptions& options, RunOptions run,
                            PartRecord& part, const std::atomic<bool>& stop) {
     run.test_iterations = run.save_iterations = run.checkpoint_iterations = {};
-    run.command.clear();
+    run.request.clear();
     run.checkpoint_interval = job_.run.checkpoint_interval;
     run.quiet = job_.run.quiet;
     run.report = job_.run.report;
@@ -172,7 +172,7 @@ void BlocksRun::train_part(const Dataset& dataset, const TrainOptions& options, 
     part.error.clear();
     save();
     const std::unique_ptr<Device> device = job_.device();
-    const RunSummary summary = run_training(*device, dataset, options, run, &stop);
+    const TrainResult summary = run_training(*device, dataset, options, run, &stop);
     part.peak_bytes = std::max(part.peak_bytes, device->peak_bytes());
     part.seconds = summary.seconds;
     if (!summary.interrupted) part.state = PartState::done;

@@ -1,9 +1,13 @@
 // Checkpoint files: what is written comes back, and whatever is damaged, cut or of another run is
 // an Error that names the file and the reason.
 #include <gtest/gtest.h>
+#include <malloc.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <set>
 
@@ -195,6 +199,32 @@ TEST_F(CheckpointFile, a_failed_write_leaves_the_older_file) {
     std::set<fs::path> left;
     for (const auto& entry : fs::directory_iterator(folder_)) left.insert(entry.path().filename());
     EXPECT_EQ(left, (std::set<fs::path>{"checkpoint.darb", "blocked"})) << "no temporary files";
+}
+
+// A child process, so that its limit stays its own: beside the state there is room for a fifth of
+// it.
+TEST_F(CheckpointFile, is_written_without_a_copy_of_the_state) {
+    const Checkpoint c = checkpoint(60'000);
+    const std::uint64_t bytes = written(c).size();
+    ASSERT_GT(bytes, 30'000'000U);
+    const auto write_in_little_memory = [&] {
+        ::malloc_trim(0);  // what was freed would do for a copy
+        std::uint64_t pages = 0;
+        std::ifstream("/proc/self/statm") >> pages;
+        const rlim_t most = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + bytes / 5;
+        const rlimit limit{most, most};
+        if (::setrlimit(RLIMIT_AS, &limit) != 0) std::exit(3);
+        try {
+            write_checkpoint(path_, c);
+        } catch (const Error& error) {
+            std::fprintf(stderr, "%s\n", error.what());
+            std::exit(2);
+        }
+        std::exit(0);
+    };
+    fs::remove(path_);
+    EXPECT_EXIT(write_in_little_memory(), testing::ExitedWithCode(0), "");
+    EXPECT_TRUE(read_file(path_) == checkpoint_bytes(c));
 }
 
 TEST_F(CheckpointFile, other_settings_are_named) {
