@@ -17,8 +17,6 @@ constexpr double kReach = 2.5;  // of the median distance: background farther aw
 constexpr float kLogitOfTenth = -2.2f;
 constexpr double kFramed = 1.35, kUnframed = 0.0005;  // radii; share of the splats in them
 constexpr double kWide = 1.5, kWidest = 0.1;  // a splat is framed to so many deviations, radii
-// Of guess_up.
-constexpr double kStray = 0.005, kFoot = 0.03, kSurely = 1.5, kLying = 2;
 
 struct Sample {
     glm::dvec3 position;  // from the origin
@@ -34,49 +32,6 @@ std::vector<Sample> sample(const SplatModel& m, float least_logit) {
         points.push_back({{p[0], p[1], p[2]}, std::exp(double{std::max({s[0], s[1], s[2]})})});
     }
     return points;
-}
-
-struct Weighed {
-    glm::dvec3 at;
-    double weight;
-};
-
-/// Weight of a layer times its width.
-double footing(const std::vector<Weighed>& splats, int axis, double from, double to) {
-    double weight = 0, square = 0;
-    glm::dvec3 sum(0.0);
-    for (const Weighed& s : splats) {
-        if (s.at[axis] < from || s.at[axis] > to) continue;
-        glm::dvec3 across = s.at;
-        across[axis] = 0;
-        weight += s.weight;
-        sum += s.weight * across;
-        square += s.weight * glm::dot(across, across);
-    }
-    if (!(weight > 0)) return 0;
-    const double variance = square / weight - glm::dot(sum, sum) / (weight * weight);
-    return weight * std::sqrt(std::max(variance, 0.0));
-}
-
-/// Of the ends of an axis.
-struct Ends {
-    double low = 0, high = 0;
-};
-
-Ends footing_of_ends(std::vector<Weighed>& splats, int axis) {
-    std::sort(splats.begin(), splats.end(),
-              [axis](const Weighed& a, const Weighed& b) { return a.at[axis] < b.at[axis]; });
-    double total = 0;
-    for (const Weighed& s : splats) total += s.weight;
-    const auto place_of = [&](double share) {
-        double sum = 0;
-        for (const Weighed& s : splats)
-            if ((sum += s.weight) >= share * total) return s.at[axis];
-        return splats.back().at[axis];
-    };
-    const double low = place_of(kStray), high = place_of(1 - kStray), slab = kFoot * (high - low);
-    return {footing(splats, axis, splats.front().at[axis], low + slab),
-            footing(splats, axis, high - slab, splats.back().at[axis])};
 }
 
 }  // namespace
@@ -118,24 +73,6 @@ double framing_distance(const SplatModel& model, const Bounds& bounds, const glm
 
 float near_plane_for(const Bounds& bounds) {
     return std::min(static_cast<float>(NEAR_DEFAULT), static_cast<float>(bounds.radius * 0.1));
-}
-
-glm::dvec3 guess_up(const SplatModel& m) {
-    std::vector<Weighed> splats;
-    const size_t step = std::max<size_t>(1, m.size() / kLooked);
-    for (size_t i = 0; i < m.size(); i += step) {
-        const float* p = &m.position[3 * i];
-        const float* s = &m.log_scale[3 * i];
-        const double log_area = double{s[0]} + s[1] + s[2] - std::min({s[0], s[1], s[2]});
-        const double weight = sigmoid(m.opacity_logit[i]) * std::exp(std::min(log_area, 50.0));
-        if (m.opacity_logit[i] < kLogitOfTenth || !(weight > 0)) continue;
-        splats.push_back({{p[0], p[1], p[2]}, weight});
-    }
-    const glm::dvec3 usual(0, -1, 0);
-    if (splats.size() < 100) return usual;
-    const Ends y = footing_of_ends(splats, 1), z = footing_of_ends(splats, 2);  // y is down
-    if (z.low > kLying * std::max({y.low, y.high, z.high})) return {0, 0, 1};
-    return y.low > kSurely * y.high ? -usual : usual;
 }
 
 }  // namespace darb

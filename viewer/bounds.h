@@ -4,13 +4,10 @@
 #include <glm/glm.hpp>
 
 #include "engine/scene/splat_model.h"
+#include "engine/scene/subject.h"
+#include "engine/scene/upright.h"
 
 namespace darb {
-
-struct Bounds {
-    glm::dvec3 centre{0.0};  // world
-    double radius = 1;       // world
-};
 
 /// Centre: the middle between the 2 % and 98 % quantiles of each coordinate; radius: that of 98 %
 /// of the splats, at most 2.5 times that of half of them. Background far away and stray splats thus
@@ -28,12 +25,5 @@ double framing_distance(const SplatModel& model, const Bounds& bounds, const glm
 /// not see what is nearer: such splats hang before the training cameras, and a nearer plane would
 /// show them. Less only where a scene is so small that it is looked at from nearer.
 float near_plane_for(const Bounds& bounds);
-
-/// A guess which way is up in a scene without cameras: -y, as 3DGS has it, but where another end
-/// looks like a foot: opacity times area within 3 % of the height, times how wide that is. What
-/// stands is wide where it stands. y is up where its low end has 1.5 times the foot of the high
-/// one; z where its low end has twice that of the three others. -z never is: a wall behind the
-/// scene would be a foot, too.
-glm::dvec3 guess_up(const SplatModel& model);
 
 }  // namespace darb

@@ -9,6 +9,8 @@
 #include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
+#include "engine/data/camera_list.h"
 
 namespace darb {
 
@@ -92,12 +94,43 @@ void write_camera_path(const std::filesystem::path& file, const CameraPath& path
     write_file_atomic(file, nlohmann::json{{"key_frames", list}}.dump(1));
 }
 
+namespace {
+
+CameraPath path_of(const NerfstudioPath& other) {
+    CameraPath path;
+    path.width = other.views[0].camera.width;
+    path.height = other.views[0].camera.height;
+    path.fps = other.fps;
+    path.notes = other.notes;
+    for (const View& view : other.views) {
+        KeyFrame key;
+        key.seconds = static_cast<double>(path.keys.size()) / other.fps;
+        key.eye = view.camera.centre();
+        key.orientation = glm::normalize(glm::quat_cast(glm::transpose(view.camera.rotation)));
+        key.fov_y = 2 * std::atan(0.5 * view.camera.height / view.camera.fy);
+        path.keys.push_back(key);
+    }
+    return path;
+}
+
+}  // namespace
+
 CameraPath read_camera_path(const std::filesystem::path& file) {
     CameraPath path;
+    const std::string hint =
+        "A path is written by the viewer's panel \"Camera path\", or is a camera_path.json of "
+        "nerfstudio.";
+    const std::string text = read_text_file(file);
+    const auto json = parse_json_text(text, file.string(), hint);
+    if (const auto other = parse_nerfstudio_path(text, file.string())) path = path_of(*other);
     path.file = file;
-    const std::string hint = "A path is written by the viewer's panel \"Camera path\".";
+    if (!path.keys.empty()) return path;
+    if (!json.is_object() || !json.contains("key_frames") || !json["key_frames"].is_array())
+        throw Error(file.string(), "is no camera path: it has neither key_frames nor camera_path",
+                    json.is_array() || (json.is_object() && json.contains("frames"))
+                        ? "It lists cameras: use it with --cameras."
+                        : hint);
     try {
-        const auto json = nlohmann::json::parse(read_text_file(file));
         for (const auto& k : json.at("key_frames")) {
             const auto eye = k.at("eye").get<std::array<double, 3>>();
             const auto q = k.at("orientation").get<std::array<double, 4>>();
@@ -121,7 +154,8 @@ CameraPath read_camera_path(const std::filesystem::path& file) {
             path.keys.push_back(key);
         }
     } catch (const nlohmann::json::exception& e) {
-        throw Error(file.string(), fmt::format("key {}: {}", path.keys.size(), e.what()), hint);
+        throw Error(file.string(), fmt::format("key {} {}", path.keys.size(), json_reason(e)),
+                    hint);
     }
     if (path.keys.empty()) throw Error(file.string(), "has no key frames", hint);
     return path;

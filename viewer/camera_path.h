@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <glm/gtc/quaternion.hpp>
+#include <string>
 #include <vector>
 
 #include "viewer/navigation.h"
@@ -23,6 +24,10 @@ struct KeyFrame {
 struct CameraPath {
     std::vector<KeyFrame> keys;
     std::filesystem::path file;  // that it was read from, for messages; may be empty
+    // Of a path of nerfstudio, which says them; else 0.
+    int width = 0, height = 0;  // px
+    double fps = 0;             // frames a second
+    std::vector<std::string> notes;
 
     double duration() const { return keys.empty() ? 0 : keys.back().seconds; }
     /// The current view, `seconds` after the last key (the first is at 0).
@@ -35,7 +40,8 @@ struct CameraPath {
 void apply(const KeyFrame& key, Navigation& view);
 
 /// JSON: {"key_frames": [{"seconds", "eye": [3], "orientation": [w, x, y, z], "fov_y_degrees"}]}.
-/// read throws Error naming file and key; a path lasts at most a day.
+/// read takes a camera_path.json of nerfstudio, too, with a key for each of its frames. It throws
+/// Error naming file and key; a path lasts at most a day.
 void write_camera_path(const std::filesystem::path& file, const CameraPath& path);
 CameraPath read_camera_path(const std::filesystem::path& file);
 

@@ -148,6 +148,10 @@ bool holds_a_key(const Input& in) {
 }
 
 void leave_photo(Session& s) {
+    if (s.photos.current >= 0 && s.photos.shown_fov_y > 0) {
+        s.navigation.fov_y = s.photos.shown_fov_y;
+        s.navigation.centre_x = s.photos.shown_centre_x;
+    }
     s.photos.current = -1;
     if (s.display.mode == VIEW_ERROR) s.display.mode = VIEW_COLOUR;
 }

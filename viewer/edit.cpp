@@ -181,20 +181,26 @@ void Edit::cancel_transform(SplatModel& model) {
     changed_model();
 }
 
-void Edit::append(const SplatModel& added, SplatModel& model) {
+void Edit::append(const Merged& merged, SplatModel& model) {
+    const SplatModel& added = merged.added;
     raise_sh_degree(added.sh_degree, model);
     for (int a = 0; a < kAttributeCount; ++a) {
         const std::vector<float>& more = attribute_values(added, a);
         std::vector<float>& values = attribute_values(model, a);
         values.insert(values.end(), more.begin(), more.end());
     }
-    for (SplatMask* mask : {&removed_, &hidden_, &selected_}) mask->resize(model.size(), 0);
+    for (const std::uint32_t i : merged.selected) selected_[i] = 0;
+    for (SplatMask* mask : {&removed_, &hidden_}) mask->resize(model.size(), 0);
+    selected_.resize(model.size(), 1);
+    selected_count_ = added.size();
     changed_model();
 }
 
 void Edit::cut(const Merged& merged, SplatModel& model) {
     const std::size_t left = model.size() - merged.added.size();
     for (SplatMask* mask : {&removed_, &hidden_, &selected_}) mask->resize(left);
+    for (const std::uint32_t i : merged.selected) selected_[i] = 1;
+    selected_count_ = merged.selected.size();
     model.resize(left);
     limit_sh_degree(merged.degree, model);
     changed_model();
@@ -217,10 +223,22 @@ std::size_t Edit::merge(SplatModel added, SplatModel& model) {
     count_from(model.origin, added);
     const std::size_t count = added.size();
     if (count == 0) return 0;
-    Merged merged{std::move(added), model.sh_degree};
-    append(merged.added, model);
+    Merged merged{std::move(added), model.sh_degree, {}};
+    for (std::size_t i = 0; i < selected_.size(); ++i)
+        if (selected_[i] != 0) merged.selected.push_back(static_cast<std::uint32_t>(i));
+    append(merged, model);
     push({counted("merged", count), ++last_id_, std::move(merged)});
     return count;
+}
+
+std::vector<std::size_t> Edit::parts() const {
+    std::vector<std::size_t> parts = {removed_.size()};
+    for (std::size_t i = 0; i < done_; ++i)
+        if (const auto* merged = std::get_if<Merged>(&steps_[i].change)) {
+            parts.push_back(merged->added.size());
+            parts.front() -= parts.back();
+        }
+    return parts;
 }
 
 void Edit::apply_step(Step& step, bool forward, SplatModel& model) {
@@ -233,7 +251,7 @@ void Edit::apply_step(Step& step, bool forward, SplatModel& model) {
         changed_model();
     } else if (const auto* merged = std::get_if<Merged>(&step.change)) {
         if (forward)
-            append(merged->added, model);
+            append(*merged, model);
         else
             cut(*merged, model);
     }

@@ -42,9 +42,13 @@ class Edit {
     std::size_t end_transform(const SplatModel& model);
     void cancel_transform(SplatModel& model);
     bool transforms() const { return dragged_.has_value(); }
-    /// Appends the splats of another scene. Throws Error where one model cannot hold both: another
-    /// kernel, or attributes that only one has. Harmonics of the lesser degree get zeros.
+    /// Appends the splats of another scene and selects them, nothing else. Throws Error where one
+    /// model cannot hold both: another kernel, or attributes that only one has. Harmonics of the
+    /// lesser degree get zeros.
     std::size_t merge(SplatModel added, SplatModel& model);
+
+    /// Splats of the scene as it was opened and of each that was merged into it, in their order.
+    std::vector<std::size_t> parts() const;
 
     bool can_undo() const { return done_ > 0; }
     bool can_redo() const { return done_ < steps_.size(); }
@@ -88,7 +92,8 @@ class Edit {
     };
     struct Merged {
         SplatModel added;
-        int degree = 0;  // of the model before
+        int degree = 0;                       // of the model before
+        std::vector<std::uint32_t> selected;  // before
     };
     struct Step {
         std::string what;
@@ -99,7 +104,7 @@ class Edit {
     std::size_t mark(const char* verb, Marks marks, bool content);
     void flip(const Marks& marks);
     void apply_step(Step& step, bool forward, SplatModel& model);
-    void append(const SplatModel& added, SplatModel& model);
+    void append(const Merged& merged, SplatModel& model);
     void cut(const Merged& merged, SplatModel& model);
     std::vector<std::uint32_t> moved_splats() const;
     void changed_model() { ++model_version_, ++seen_version_, ++version_; }

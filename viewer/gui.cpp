@@ -84,7 +84,7 @@ void Gui::start_backend() {
 void Gui::set_scale(float scale) {
     apply_theme(scale);
     if (ImGui::GetIO().BackendRendererUserData != nullptr) {
-        vkDeviceWaitIdle(device_->handle());
+        device_->wait_idle();
         ImGui_ImplVulkan_Shutdown();
     }
     make_font(std::round(kFontPx * scale));
@@ -129,7 +129,7 @@ void Gui::upload_fonts() {
 }
 
 Gui::~Gui() {
-    vkDeviceWaitIdle(device_->handle());
+    device_->wait_idle();
     ImGui_ImplVulkan_Shutdown();
     if (window_ != nullptr) ImGui_ImplGlfw_Shutdown();
     ImGui::DestroyContext();

@@ -109,6 +109,8 @@ LiveMade LiveDrawer::make(const GpuSplats& splats, const LiveWish& wish, bool wh
         made.visible = picture_.status().visible;
         made.intersections = picture_.status().intersections;
         made.ms = seconds_since(start) * 1000;
+    } catch (const DeviceLost&) {  // so it is for the run
+        throw;
     } catch (const Error& e) {
         made.error = e.what();
     }
@@ -121,6 +123,8 @@ void LiveDrawer::read_photo(const LiveWish& wish, LiveMade& made) {
     const bool wanted = photos_.compare || wish.key.display.mode == VIEW_ERROR;
     if (wanted && photos_.current >= 0 && photos_.loaded != photos_.current) try {
             load_photo_of_view(*device_, photos_);
+        } catch (const DeviceLost&) {
+            throw;
         } catch (const Error& e) {
             made.error = e.what();
             photos_.compare = false;

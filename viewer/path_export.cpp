@@ -13,6 +13,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
+#include "engine/data/video.h"
 
 namespace darb {
 
@@ -38,15 +39,6 @@ std::int64_t count_frames(const CameraPath& path, int fps) {
                     "Set the keys' seconds, which count from the start, or lower the frames a "
                     "second.");
     return static_cast<std::int64_t>(frames);
-}
-
-// ffmpeg reads %05d in the name of its input: a percent sign of the folder is written twice. From
-// the root, so that no name reads as an option or a protocol.
-std::string as_pattern(const fs::path& folder) {
-    std::string pattern;
-    for (const char c : fs::absolute(folder).string())
-        pattern += c == '%' ? "%%" : std::string(1, c);
-    return pattern;
 }
 
 }  // namespace
@@ -97,7 +89,7 @@ void PathExport::start_video() {
                                    "-start_number",
                                    "0",
                                    "-i",
-                                   as_pattern(folder_.path()) + "/frame_%05d.png",
+                                   picture_pattern(folder_.path(), "frame_%05d.png"),
                                    "-frames:v",
                                    std::to_string(frames_),
                                    "-vf",

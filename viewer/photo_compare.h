@@ -15,9 +15,10 @@ struct PhotoOverlay;
 
 struct Photos {
     std::vector<View> views;
-    int current = -1;      // -1: free camera
-    bool compare = false;  // the photo is the first of the panes (panes.h)
-    Buffer buffer;         // uint [height][width]
+    int current = -1;                              // -1: free camera
+    double shown_fov_y = 0, shown_centre_x = 0.5;  // of the window, while one is looked through
+    bool compare = false;                          // the photo is the first of the panes (panes.h)
+    Buffer buffer;                                 // uint [height][width]
     int width = 0, height = 0;
     int loaded = -1;      // the view that buffer holds
     bool failed = false;  // this view's photo could not be read

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "engine/core/error.h"
+#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_file.h"
 
 namespace darb {
@@ -46,7 +47,7 @@ std::string keep(const char* what, const fs::path& beside, const std::string& st
 std::string recover_unsaved(const Session& s) {
     std::string said;
     if (s.scene && s.edit.unsaved())
-        said = keep("The edited scene", s.save_file, s.scene->file.stem().string(), ".ply",
+        said = keep("The edited scene", s.save_file, scene_name(s.scene->file), ".ply",
                     [&](const fs::path& file) {
                         save_splats(file, SplatFormat::ply, s.edit.apply(s.scene->model));
                     });

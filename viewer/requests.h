@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <variant>
 #include <vector>
 
@@ -12,6 +13,10 @@ namespace darb {
 namespace request {
 
 struct FrameAll {};
+struct Frame {
+    glm::dvec3 centre{0.0};
+    double radius = 1;  // world
+};
 struct TakePicture {};
 struct ChooseCamera {
     int view = 0;  // of the data set
@@ -46,7 +51,7 @@ struct LeaveFullScreen {};
 }  // namespace request
 
 using Request =
-    std::variant<request::FrameAll, request::TakePicture, request::ChooseCamera,
+    std::variant<request::FrameAll, request::Frame, request::TakePicture, request::ChooseCamera,
                  request::LeavePhoto, request::FollowPlan, request::Measure, request::ShowOpen,
                  request::Open, request::ShowEdits, request::Save, request::SavePage,
                  request::LoadPath, request::SavePath, request::ExportPath, request::CancelLoad,

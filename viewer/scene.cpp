@@ -62,11 +62,13 @@ std::vector<std::byte> read_in_blocks(const std::filesystem::path& file,
 
 void measure_scene(Scene& scene) {
     scene.bounds = scene_bounds(scene.model);
+    scene.subject = subject_of(scene.model);
     scene.important =
         most_important(scene.model, scene.bounds, std::min(scene.model.size() / 2, kMostMoving));
 }
 
-Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress) {
+Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& progress,
+                      const StoredUnits& units) {
     const auto start = std::chrono::steady_clock::now();
     Scene scene;
     scene.file = file;
@@ -80,10 +82,11 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     decoding(0);
     const auto read_points = [&](const PlyHeader& header) {
         scene.is_points = true;
-        return points_as_splats(parse_point_cloud_ply(bytes, header, file.string(), facts.dropped));
+        return points_as_splats(
+            parse_point_cloud_ply(bytes, header, file.string(), facts.dropped, &facts.notes));
     };
     const std::filesystem::path folder = inner.has_parent_path() ? inner.parent_path() : ".";
-    scene.model = parse_splats(bytes, inner.string(), &facts, decoding, folder, read_points);
+    scene.model = parse_splats(bytes, inner.string(), &facts, decoding, folder, read_points, units);
     scene.format = scene.is_points ? "point cloud" : std::string(format_name(facts.format));
     scene.notes = facts.notes;
     scene.up = facts.up;
@@ -97,8 +100,8 @@ Scene load_scene_file(const std::filesystem::path& file, const LoadProgress& pro
     return scene;
 }
 
-LoadJob::LoadJob(std::filesystem::path file, std::function<void()> wake)
-    : file_(std::move(file)), wake_(std::move(wake)), thread_([this] { run(); }) {}
+LoadJob::LoadJob(std::filesystem::path file, std::function<void()> wake, const StoredUnits& units)
+    : file_(std::move(file)), wake_(std::move(wake)), units_(units), thread_([this] { run(); }) {}
 
 LoadJob::~LoadJob() {
     cancel();
@@ -107,7 +110,7 @@ LoadJob::~LoadJob() {
 
 void LoadJob::run() {
     try {
-        scene_ = load_scene_file(file_, [this](double share, const char* stage) {
+        const auto report = [this](double share, const char* stage) {
             if (cancelled_) throw Cancelled();
             share_ = share;
             {
@@ -115,11 +118,12 @@ void LoadJob::run() {
                 stage_ = stage;
             }
             if (wake_) wake_();
-        });
+        };
+        scene_ = load_scene_file(file_, report, units_);
     } catch (const Cancelled&) {
     } catch (const std::bad_alloc&) {
         error_ = std::make_exception_ptr(
-            Error(file_.string(), "does not fit into memory", "Prune the scene first."));
+            NoRoom(file_.string(), "does not fit into memory", "Prune the scene first."));
     } catch (...) {
         error_ = std::current_exception();
     }

@@ -9,13 +9,14 @@ namespace darb {
 SceneLoader::SceneLoader(Resolve resolve, std::function<void()> wake)
     : resolve_(std::move(resolve)), wake_(std::move(wake)) {}
 
-void SceneLoader::start(const std::filesystem::path& path, bool dropped, bool merges) {
+void SceneLoader::start(const std::filesystem::path& path, bool dropped, bool merges,
+                        const StoredUnits& units) {
     const std::filesystem::path file = resolve_ ? resolve_(path) : path;
     cancel();
     asked_for_ = path;
     dropped_ = dropped;
     merges_ = merges;
-    job_ = std::make_unique<LoadJob>(file, wake_);
+    job_ = std::make_unique<LoadJob>(file, wake_, units);
 }
 
 // Its thread ends at its next report of progress; nobody waits for that.

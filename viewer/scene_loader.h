@@ -28,7 +28,8 @@ class SceneLoader {
     SceneLoader(Resolve resolve, std::function<void()> wake);
 
     /// An earlier load is cancelled. Throws Error where the path means no scene.
-    void start(const std::filesystem::path& path, bool dropped, bool merges = false);
+    void start(const std::filesystem::path& path, bool dropped, bool merges = false,
+               const StoredUnits& units = {});
     void cancel();
     bool loading() const { return job_ != nullptr; }
     double share() const { return job_ ? job_->share() : -1; }  // below 0: nothing is loaded

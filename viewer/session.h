@@ -130,6 +130,7 @@ struct Session {
     bool panels = true;
     bool help = false;  // the list of keys
     float gui_scale = 1;
+    bool up_is_guess = false;   // nothing says what is up, nor did the user
     bool save_upright = false;  // turns what is saved so that up becomes -y
 
     void ask(const Request& request) { requests.push_back(request); }

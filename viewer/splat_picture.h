@@ -49,7 +49,6 @@ class SplatPicture {
     void set_live(const GpuSplats& splats, const Bounds& bounds);
     void clear();
     bool empty() const { return splats() == nullptr; }
-    const Bounds& bounds() const { return bounds_; }
     std::uint32_t splat_count() const { return splats() ? splats()->count() : 0; }
 
     /// Splats that are not to be seen (1) vanish, those that are selected (1) are highlighted, the

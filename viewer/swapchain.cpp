@@ -32,7 +32,7 @@ Swapchain::Swapchain(Device& device, VkSurfaceKHR surface) : device_(&device), s
 }
 
 Swapchain::~Swapchain() {
-    vkDeviceWaitIdle(device_->handle());
+    device_->wait_idle();
     release_images();
     vkDestroySwapchainKHR(device_->handle(), chain_, nullptr);
     vkDestroySemaphore(device_->handle(), acquired_, nullptr);
@@ -68,7 +68,7 @@ void Swapchain::release_images() {
 }
 
 void Swapchain::create(int width, int height) {
-    vkDeviceWaitIdle(device_->handle());
+    device_->wait_idle();
     VkSurfaceCapabilitiesKHR can{};
     check_vulkan(vkGetPhysicalDeviceSurfaceCapabilitiesKHR(device_->physical(), surface_, &can),
                  "window");
@@ -142,7 +142,7 @@ bool Swapchain::finish(Canvas& canvas, std::uint32_t index) {
     info.swapchainCount = 1;
     info.pSwapchains = &chain_;
     info.pImageIndices = &index;
-    const VkResult result = vkQueuePresentKHR(device_->queue(), &info);
+    const VkResult result = device_->present(info);
     stale_ = result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR;
     if (!stale_) check_vulkan(result, "window");
     return result != VK_ERROR_OUT_OF_DATE_KHR;

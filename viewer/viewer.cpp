@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "engine/core/error.h"
+#include "engine/data/camera_list.h"
 #include "viewer/controls.h"
 #include "viewer/tools.h"
 
@@ -19,9 +20,7 @@ constexpr double kLook_s = 0.1;  // between two looks whether ffmpeg has ended
 
 glm::dvec3 start_up(const ViewerOptions& options) {
     if (!options.up.empty()) return up_from_name(options.up);
-    glm::dvec3 sum(0.0);
-    for (const View& view : options.views) sum -= glm::transpose(view.camera.rotation)[1];
-    return glm::length(sum) > 1e-3 ? glm::normalize(sum) : glm::dvec3(0, -1, 0);
+    return up_of_cameras(cameras_of(options.views)).value_or(glm::dvec3(0, -1, 0));
 }
 
 }  // namespace
@@ -59,7 +58,7 @@ void Viewer::choose_camera(int n) {
     session_.photos.failed = false;
     take_back<request::FrameAll>(session_.requests);  // of a load before
     session_.navigation.take(session_.photos.view().camera);
-    if (!shows_nothing()) set_pivot(shown_bounds());
+    if (!shows_nothing()) set_pivot();
 }
 
 void Viewer::set_gui_scale(float scale) {
@@ -90,6 +89,7 @@ double Viewer::frame(const Input& input, int width, int height, bool full) {
     gui_.begin(width, height);  // now it knows whether the pointer is on a panel
     if (!gui_.wants_keys())
         for (const Key key : input.pressed) press(key, session_);
+    follow_photo(width, height);
     const ControlFrame control{width, height, seconds, gui_.wants_mouse(), gui_.wants_keys()};
     Input moves = input;
     if (use_tool(input, control, session_)) moves.left = moves.double_click = false;

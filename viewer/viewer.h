@@ -27,6 +27,7 @@ namespace darb {
 struct ViewerOptions {
     std::vector<View> views;  // cameras of a data set, may be none
     std::string up;           // x, -x, ...; "" = from the cameras, else remembered or guessed
+    StoredUnits units;        // of the scenes that `open` names
     bool quiet = false;       // says nothing of what it has loaded
     float gui_scale = 0;      // size of the panels; 0: as the display wants it
     Accuracy accuracy;        // to start with
@@ -105,7 +106,8 @@ class Viewer {
     void find_own_cameras(const std::filesystem::path& scene, std::vector<std::string>& notes);
     void show_as_meant(const Scene& scene, bool first);
     void follow_plan();
-    void set_pivot(const Bounds& bounds);
+    void find_subject(Scene& scene) const;
+    void set_pivot();
     void start_warm_up();
     void end_warm_up();
     void first_look(bool of_run);
@@ -115,13 +117,14 @@ class Viewer {
     void follow_live(int width, int height);
     void take_live(const LiveMade& made);
     bool shows_nothing() const { return live_ == nullptr && picture_.empty(); }
-    const Bounds& shown_bounds() const { return live_ ? live_bounds_ : picture_.bounds(); }
+    Subject shown_subject() const;
 
     // viewer_requests.cpp: what is asked for.
     void act_on_requests(int width, int height);
     bool attempt(const std::function<void()>& step);
     void need_scene(const char* what) const;
-    void frame_all(int width, int height);
+    void frame_on(const Bounds& bounds, int width, int height);
+    void follow_photo(int width, int height);
     void load_path();
     void save_path();
     void save_scene();
@@ -168,7 +171,7 @@ class Viewer {
     PanePictures panes_;
     bool shows_panes_ = false;  // not picture_
     LivePicture* live_ = nullptr;
-    Bounds live_bounds_;
+    Bounds live_bounds_;  // of its subject
     LiveScene live_scene_;
     Buffer live_pixels_;       // of the run's last picture
     glm::ivec2 live_size_{0};  // px

@@ -44,7 +44,7 @@ void Viewer::take_levels() {
     const bool done = levels_->done();
     try {
         while (const std::optional<SplatModel> level = levels_->take()) picture_.add_level(*level);
-    } catch (const Error&) {  // no room: the important splats do without it
+    } catch (const NoRoom&) {  // no room: the important splats do without it
         levels_->cancel();
     }
     if (done) picture_.end_levels();

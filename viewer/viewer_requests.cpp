@@ -11,6 +11,7 @@
 #include "engine/publish/device_clusters.h"
 #include "engine/publish/web_page.h"
 #include "engine/scene/edit_splats.h"
+#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/controls.h"
 #include "viewer/viewer.h"
@@ -55,7 +56,10 @@ void Viewer::act_on_requests(int width, int height) {
     Session& s = session_;
     s.for_window.clear();
     const ByKind act{
-        [&](request::FrameAll) { frame_all(width, height); },
+        [&](request::FrameAll) { frame_on(shown_subject(), width, height); },
+        [&](const request::Frame& ball) {
+            frame_on({ball.centre, ball.radius}, width, height);
+        },
         [&](request::TakePicture) { take_picture(width, height); },
         [&](request::ChooseCamera camera) { choose_camera(camera.view); },
         [&](request::LeavePhoto) { leave_photo(s); },
@@ -100,9 +104,8 @@ void Viewer::need_scene(const char* what) const {
                     "Open one: name it on the command line, or drop it on the window.");
 }
 
-void Viewer::frame_all(int width, int height) {
+void Viewer::frame_on(const Bounds& bounds, int width, int height) {
     leave_photo(session_);
-    const Bounds bounds = shown_bounds();
     Navigation& n = session_.navigation;
     const double panel = free_area(session_, width, height).left, free = width - panel;
     const bool beside = panel > 0 && draws_every_centre(session_.display.effects);
@@ -138,6 +141,7 @@ void Viewer::show_edits() {
             picture_.update_scene();
         } else {
             measure_scene(scene);
+            find_subject(scene);
             picture_.set_scene(scene.model, scene.bounds, scene.important);
             shares_ = picture_.most_moving() < 1
                           ? motion_shares(picture_.splat_count(), picture_.most_moving())
@@ -205,12 +209,17 @@ void Viewer::save_page(int width, int height) {
     file.replace_extension(".html");
     saved_.check(file);
     WebPageOptions options;
-    options.title = s.scene->file.stem().string();
+    options.title = scene_name(s.scene->file);
     options.background = s.display.background;
     options.views = s.photos.views;
     View shown;
     shown.name = "As it was saved";
-    shown.camera = camera_in_window(s.photos, s.navigation, free_area(s, width, height));
+    // What is seen beside the panel, which a page does not have.
+    const int left = free_area(s, width, height).left;
+    Navigation centred = s.navigation;
+    centred.centre_x = 0.5;
+    shown.camera = camera_in_window(s.photos, centred, {width - left, height, 0});
+    options.up = s.navigation.up;
     options.views.insert(options.views.begin(), shown);
     WebPageFacts facts;
     write_file_atomic(file, make_web_page(*device_, s.edit.apply(s.scene->model), options, &facts));

@@ -3,10 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <numeric>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/data/camera_list.h"
+#include "engine/raster/effects.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/controls.h"
 #include "viewer/viewer.h"
@@ -22,8 +28,11 @@ bool any_lens(const std::vector<View>& views) {
                        [](const View& v) { return v.camera.lens.active; });
 }
 
-// Beside the scene, in its format where that is written.
+// Beside the scene, in its format where that is written; of a run in its output folder, where its
+// cameras are.
 fs::path edited_name(const fs::path& file) {
+    const fs::path run = run_of_scene(file);
+    if (!run.empty()) return run / (scene_name(file) + "_edited.ply");
     const std::string stem = stem_to_write(file),
                       ending = file.filename().string().substr(stem.size());
     const fs::path same = fs::path(file).replace_filename(stem + "_edited" + ending);
@@ -47,6 +56,7 @@ void Viewer::merge(LoadedScene loaded) {
     Session& s = session_;
     const std::string from = loaded.scene.file.filename().string();
     if (s.edit.transforms()) choose_tool(Tool::navigate, s);
+    const Bounds added = loaded.scene.subject;
     const std::size_t count = s.edit.merge(std::move(loaded.scene.model), s.scene->model);
     try {
         show_edits();
@@ -55,7 +65,11 @@ void Viewer::merge(LoadedScene loaded) {
         show_edits();
         throw;
     }
-    s.tell(fmt::format("merged {} splats of {}", count, from));
+    if (count > 0) s.ask(request::Frame{added.centre, added.radius});
+    s.tell(
+        fmt::format("merged {} splats of {}: they are selected, and 6, 7 and 8 move, turn and "
+                    "scale them",
+                    count, from));
 }
 
 // What a user drops: not on a run, and not over unsaved edits without a question.
@@ -71,7 +85,7 @@ void Viewer::drop(const std::filesystem::path& path) {
 
 void Viewer::start_load(const std::filesystem::path& path, bool dropped, bool merges) {
     attempt([&] {
-        loader_.start(path, dropped, merges);
+        loader_.start(path, dropped, merges, dropped ? StoredUnits{} : options_.units);
         edit_at_load_ = session_.edit.content();
         session_.error.clear();
         if (dropped) session_.note.clear();
@@ -117,31 +131,34 @@ void Viewer::show(LoadedScene loaded) {
     const bool first = session_.scene == nullptr && !of_run;
     session_.leaving.reset();
     if (loaded.dropped) find_own_cameras(loaded.asked_for, scene->notes);
+    find_subject(*scene);
     session_.scene = std::move(scene);
     const std::filesystem::path& asked = loaded.asked_for;
-    session_.title =
-        (asked.has_filename() ? asked : asked.parent_path()).filename().string() + " - darb";
+    session_.title = scene_name(asked, true) + " - darb";
     const Scene& s = *session_.scene;
     session_.sh_degree = s.model.sh_degree;
     session_.edit = Edit(s.model.size());
     session_.tools = {};
-    session_.tools.grow = static_cast<float>(s.bounds.radius / 50);
-    session_.tools.scale[1] = static_cast<float>(s.bounds.radius / 10);
+    session_.tools.grow = static_cast<float>(s.subject.radius / 50);
+    session_.tools.scale[1] = static_cast<float>(s.subject.radius / 10);
     shown_model_ = shown_edit_ = 0;
     try {
         recent_.opened(asked);
     } catch (const std::exception& e) {  // the scene is there all the same
         session_.scene->notes.emplace_back(e.what());
     }
-    session_.selection.region = {Region::Shape::box, s.bounds.centre, glm::dvec3(s.bounds.radius)};
+    session_.selection.region = {Region::Shape::box, s.subject.centre,
+                                 glm::dvec3(s.subject.radius)};
     session_.save_file = edited_name(s.file);
-    session_.fly_speed = s.bounds.radius / 2;
+    session_.fly_speed = s.subject.radius / 2;
     show_as_meant(s, first);
     tell(options_.quiet ? nullptr : stdout, "loaded {}: {} splats in {:.2f} s\neffects: {}\n",
          s.file.string(), s.model.size(), s.load_s, plan_line(*session_.plan));
+    for (const std::string& note : s.is_points ? std::vector<std::string>{} : s.notes)
+        say("warning: {}: {}\n", s.file.string(), note);
     if (first) session_.navigation.level();
     first_look(of_run);
-    set_pivot(s.bounds);
+    set_pivot();
     if (of_run && options_.second_device && live_size_.x > 0)
         start_warm_up();
     else
@@ -167,8 +184,10 @@ void Viewer::end_warm_up() {
 void Viewer::first_look(bool of_run) {
     const Scene& s = *session_.scene;
     Photos& p = session_.photos;
+    session_.up_is_guess = false;
     if (!of_run && p.current < 0 && p.views.empty() && options_.up.empty()) {
         const std::optional<glm::dvec3> up = remembered_.find(s.file);
+        session_.up_is_guess = !up && s.up.empty();
         session_.navigation.set_up(up             ? *up
                                    : s.up.empty() ? guess_up(s.model)
                                                   : up_from_name(s.up));
@@ -188,6 +207,7 @@ void Viewer::remember_up() {
     const glm::dvec3 up = session_.navigation.up;
     if (!session_.scene || up == known_up_) return;
     known_up_ = up;
+    session_.up_is_guess = false;
     if (session_.photos.views.empty()) attempt([&] { remembered_.keep(session_.scene->file, up); });
 }
 
@@ -199,10 +219,49 @@ void Viewer::lose_scene(const char* why) {
     ++version_;
 }
 
-// As far as the scene is: orbits turn around it, pans follow the hand.
-void Viewer::set_pivot(const Bounds& bounds) {
+// What was merged into it belongs to it, wherever it is.
+void Viewer::find_subject(Scene& scene) const {
+    const std::vector<std::size_t> parts = session_.edit.parts();
+    const bool merged = session_.scene.get() == &scene && parts.size() > 1;
+    const auto part = [&](std::size_t n) {
+        std::vector<std::uint32_t> splats(parts[n]);
+        const auto begin = std::accumulate(parts.begin(), parts.begin() + std::ptrdiff_t(n), 0u);
+        std::iota(splats.begin(), splats.end(), static_cast<std::uint32_t>(begin));
+        return pick_splats(scene.model, splats);
+    };
+    const std::vector<Camera> cameras = cameras_of(session_.photos.views);
+    if (!cameras.empty())
+        scene.subject = subject_of(scene.model, cameras);
+    else if (merged)
+        scene.subject = subject_of(part(0));
+    for (std::size_t n = 1; merged && n < parts.size(); ++n)
+        static_cast<Bounds&>(scene.subject) = enclosing(scene.subject, dense_bounds(part(n)));
+}
+
+Subject Viewer::shown_subject() const {
+    if (live_ == nullptr && session_.scene) return session_.scene->subject;
+    return {live_bounds_};
+}
+
+// As far as what is looked at: orbits turn around it, pans follow the hand.
+void Viewer::set_pivot() {
+    constexpr int kSize = 1000;  // px
+    static const SplatModel kNone;
     Navigation& n = session_.navigation;
-    n.distance = std::max(glm::distance(n.eye, bounds.centre), bounds.radius * 0.1);
+    const Photos& p = session_.photos;
+    const SplatModel& model = live_ == nullptr && session_.scene ? session_.scene->model : kNone;
+    n.distance = pivot_depth(shown_subject(), model,
+                             p.current >= 0 ? p.view().camera : n.camera(kSize, kSize));
+}
+
+// So that the picture does not jump where the free camera takes over from the photo's.
+void Viewer::follow_photo(int width, int height) {
+    Photos& p = session_.photos;
+    if (p.current < 0) return;
+    const Camera camera =
+        camera_in_window(p, session_.navigation, free_area(session_, width, height));
+    p.shown_fov_y = 2 * std::atan(0.5 * height / camera.fy);
+    p.shown_centre_x = draws_every_centre(session_.display.effects) ? camera.cx / width : 0.5;
 }
 
 // Cameras belong to the scene that they were opened with.
@@ -260,7 +319,7 @@ void Viewer::show_live(LivePicture& pictures, const Bounds& bounds, const LiveSc
     show_as_trained(scene, true);
     session_.fly_speed = bounds.radius / 2;
     if (session_.photos.current < 0) session_.ask(request::FrameAll{});
-    set_pivot(bounds);
+    set_pivot();
 }
 
 // Whoever sees every degree there is goes on to.

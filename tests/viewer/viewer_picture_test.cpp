@@ -1,7 +1,10 @@
 // The viewer's pictures without a window: display modes, motion and rest, accuracy and effects.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "engine/data/metrics.h"
 #include "tests/support/test_lenses.h"
@@ -61,6 +64,47 @@ TEST_F(ViewerTest, Depth_near_is_lighter_than_far) {
         light[i] = image.at(x, y, 0) + image.at(x, y, 1) + image.at(x, y, 2);
     }
     EXPECT_GT(light[0], light[1] + 30);
+}
+
+std::string slowest(const std::vector<PassTime>& passes) {
+    const auto most = std::max_element(passes.begin(), passes.end(),
+                                       [](const auto& a, const auto& b) { return a.ms < b.ms; });
+    return most == passes.end() ? "none" : most->name;
+}
+
+// Thousands of splats, each over all of the picture: the blend takes nearly all of the time. Panels
+// are drawn between two pictures, as in a window.
+TEST_F(ViewerTest, Times_of_passes_stand_at_the_names_that_a_frame_without_a_window_has) {
+    SplatModel m;
+    m.resize(3000);
+    for (size_t i = 0; i < m.size(); ++i) {
+        m.position[3 * i + 2] = 0.1f * static_cast<float>(i) / 3000;
+        m.rotation[4 * i] = 1;
+        m.opacity_logit[i] = -4;
+        for (size_t c = 0; c < 3; ++c) m.log_scale[3 * i + c] = 0.5f;
+    }
+    write_ply(file_, m);
+    load(file_);
+    const Camera camera = viewer_->session().navigation.camera(kWidth, kHeight);
+    Renderer renderer(shared_device(), m, {}, {});
+    renderer.render(camera, glm::vec3(0.0f), -1, near_plane());
+    if (renderer.pass_times().empty()) GTEST_SKIP() << "a device without timestamps";
+    renderer.render(camera, glm::vec3(0.0f), -1, near_plane());
+    ASSERT_EQ(slowest(renderer.pass_times()), "blend");
+    viewer_->session().panels = true;
+    shot();
+    for (int i = 0; i < 3; ++i) {
+        viewer_->session().display.background = {0.1f * static_cast<float>(i + 1), 0, 0};
+        shot();
+        const std::vector<PassTime>& passes = viewer_->session().times.passes;
+        EXPECT_EQ(slowest(passes), "blend");
+        double sum = 0, of_blend = 0;
+        for (const PassTime& pass : passes) {
+            sum += pass.ms;
+            if (pass.name == "blend") of_blend = pass.ms;
+        }
+        EXPECT_GT(of_blend, 0.5 * sum);
+    }
 }
 
 TEST_F(ViewerTest, Background_is_seen_where_nothing_is) {

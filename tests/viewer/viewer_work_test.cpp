@@ -4,9 +4,11 @@
 
 #include <atomic>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/data/camera_list.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/viewer_fixture.h"
@@ -142,6 +144,7 @@ TEST_F(ViewerWork, A_scene_is_merged_and_goes_again) {
     EXPECT_EQ(s.scene->model.size(), 2 * count);
     EXPECT_EQ(viewer_->picture().splat_count(), 2 * count);
     EXPECT_NE(s.note.find("merged 60 splats of scene.ply"), std::string::npos) << s.note;
+    EXPECT_EQ(s.edit.selected_count(), count);
     press(Key::undo);
     EXPECT_EQ(s.scene->model.size(), count);
     EXPECT_EQ(viewer_->picture().splat_count(), count);
@@ -153,6 +156,48 @@ TEST_F(ViewerWork, A_scene_is_merged_and_goes_again) {
     finish_load();
     EXPECT_NE(s.error.find("raised_cosine"), std::string::npos) << s.error;
     EXPECT_EQ(s.scene->model.size(), count);
+}
+
+TEST_F(ViewerWork, What_was_merged_is_framed_and_frame_all_shows_both) {
+    load(file_);
+    Session& s = session();
+    SplatModel far_off = scene_.model;
+    far_off.origin = {300, 0, 0};
+    write_ply(folder_ / "far.ply", far_off);
+    s.ask(request::Open{folder_ / "far.ply", true});
+    frame();
+    finish_load();
+    frame();
+    frame();
+    const Subject own = subject_of(scene_.model);
+    EXPECT_LT(glm::distance(s.navigation.pivot(), own.centre + glm::dvec3(300, 0, 0)), 1e-3);
+    EXPECT_LT(s.navigation.distance, 20 * own.radius);
+    press(Key::frame_all);
+    frame();
+    EXPECT_NEAR(s.navigation.pivot().x, own.centre.x + 150, 1) << "of both";
+    EXPECT_GT(s.scene->subject.radius, 150);
+}
+
+TEST_F(ViewerWork, A_page_opens_without_the_panels_offset) {
+    load(file_);
+    Session& s = session();
+    s.panels = true;
+    const auto wide_frame = [&](const Input& input) { viewer_->frame(input, 800, 200, true); };
+    Input frames_all;
+    frames_all.pressed = {Key::frame_all};
+    wide_frame({});
+    wide_frame(frames_all);
+    ASSERT_GT(s.navigation.centre_x, 0.5) << "beside the panel";
+    s.save_file = folder_ / "page.ply";
+    s.ask(request::SavePage{});
+    wide_frame({});
+    const std::string page = read_text_file(folder_ / "page.html"), mark = "id=\"scene\">";
+    const std::size_t from = page.find(mark) + mark.size();
+    const auto json = nlohmann::json::parse(page.substr(from, page.find("</script>", from) - from));
+    const auto& camera = json["cameras"][0];
+    EXPECT_EQ(camera["cx"].get<double>(), camera["width"].get<double>() / 2);
+    EXPECT_NEAR(json["up"][1].get<double>(), s.navigation.up.y, 1e-12) << "not tilted as the view";
+    EXPECT_NEAR(camera["pivot"].get<double>(), s.navigation.distance, 0.3 * s.navigation.distance);
 }
 
 TEST_F(ViewerWork, What_is_selected_is_highlighted_in_the_window_alone) {
@@ -448,8 +493,9 @@ TEST_F(ViewerWork, From_the_free_camera_to_the_first_or_the_last) {
     load(file_);
     press(Key::next_camera);
     EXPECT_EQ(session().photos.current, 0);
-    EXPECT_NEAR(session().navigation.distance,
-                glm::distance(session().navigation.eye, session().scene->bounds.centre), 1e-9);
+    const Navigation& n = session().navigation;
+    const glm::dvec3 to_subject = session().scene->subject.centre - n.eye;
+    EXPECT_NEAR(n.distance, glm::dot(to_subject, n.forward()), 1e-6) << "orbits pass the subject";
     press(Key::frame_all);
     EXPECT_EQ(session().photos.current, -1);
     press(Key::last_camera);

@@ -11,7 +11,10 @@ namespace {
 
 void up_axis(Session& s) {
     Navigation& n = s.navigation;
-    ImGui::Text("up: %s (kept with --up %s)", up_name(n.up).c_str(), up_name(n.up).c_str());
+    if (s.up_is_guess)
+        ImGui::Text("up: %s, a guess. On its head? Flip it:", up_name(n.up).c_str());
+    else
+        ImGui::Text("up: %s (kept with --up %s)", up_name(n.up).c_str(), up_name(n.up).c_str());
     if (ImGui::Button("Flip")) n.set_up(-n.up);
     tip("the scene stands on its head: turn it over; remembered for the file");
     for (int axis = 0; axis < 3; ++axis) {

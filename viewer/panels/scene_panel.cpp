@@ -6,6 +6,7 @@
 
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
+#include "engine/scene/scene_name.h"
 #include "viewer/panels/panels.h"
 
 namespace darb {
@@ -54,7 +55,8 @@ void scene_panel(Session& s) {
     }
     if (!s.scene || !ImGui::CollapsingHeader("Scene", ImGuiTreeNodeFlags_DefaultOpen)) return;
     const Scene& scene = *s.scene;
-    ImGui::TextWrapped("%s", scene.file.filename().string().c_str());
+    ImGui::TextWrapped("%s", scene_name(scene.file, true).c_str());
+    tip(scene.file.string().c_str());
     ImGui::Text("%zu splats, SH degree %d", scene.model.size() - s.edit.removed_count(),
                 scene.model.sh_degree);
     ImGui::Text("%s, loaded in %.2f s", scene.format.c_str(), scene.load_s);

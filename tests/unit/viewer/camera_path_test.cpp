@@ -116,6 +116,24 @@ TEST_F(CameraPathFile, Round_trip_is_exact) {
     }
 }
 
+TEST_F(CameraPathFile, A_path_of_nerfstudio_has_a_key_a_frame) {
+    write_file_atomic(file_, std::string(R"({"camera_type": "perspective", "render_height": 120,
+        "render_width": 160, "fps": 24, "camera_path": [
+        {"camera_to_world": [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1], "fov": 90},
+        {"camera_to_world": [1,0,0,6, 0,1,0,6, 0,0,1,7, 0,0,0,1], "fov": 60}]})"));
+    const CameraPath path = read_camera_path(file_);
+    ASSERT_EQ(path.keys.size(), 2u);
+    EXPECT_EQ(path.width, 160);
+    EXPECT_EQ(path.height, 120);
+    EXPECT_EQ(path.fps, 24);
+    EXPECT_NEAR(path.keys[1].seconds, 1 / 24.0, 1e-12);
+    EXPECT_NEAR(path.keys[0].fov_y, glm::radians(90.0), 1e-12);
+    EXPECT_NEAR(glm::length(path.keys[1].eye - glm::dvec3(6, 6, 7)), 0, 1e-12);
+    // Forward is the third axis.
+    const glm::dvec3 forward = glm::mat3_cast(path.keys[0].orientation)[2];
+    EXPECT_NEAR(glm::length(forward - glm::dvec3(0, 0, -1)), 0, 1e-12);
+}
+
 TEST_F(CameraPathFile, Broken_files_are_errors_that_name_the_file) {
     const std::string key =
         R"({"seconds":0,"eye":[0,0,0],"orientation":[1,0,0,0],"fov_y_degrees":50})";
@@ -138,6 +156,7 @@ TEST_F(CameraPathFile, Broken_files_are_errors_that_name_the_file) {
             FAIL() << "taken: " << text;
         } catch (const Error& e) {
             EXPECT_NE(std::string(e.what()).find(file_.string()), std::string::npos) << e.what();
+            EXPECT_EQ(std::string(e.what()).find("json.exception"), std::string::npos) << e.what();
         }
     }
 }
@@ -174,6 +193,75 @@ TEST(Turntable, The_whole_scene_is_seen_from_every_side) {
         }
         const double step = glm::distance(path.keys[0].eye, path.keys[1].eye);
         EXPECT_NEAR(glm::distance(path.keys[23].eye, path.keys[0].eye), step, 1e-6);
+    }
+}
+
+// A ball before a wall that is far away, and cameras on a circle or on a part of it.
+TEST(Turntable, Goes_where_the_cameras_were_around_what_they_look_at) {
+    SplatModel m;
+    m.resize(4000);
+    for (size_t i = 0; i < m.size(); ++i) {
+        const double a = 0.7 * static_cast<double>(i), z = 1 - static_cast<double>(i % 1000) / 500;
+        const double r = std::sqrt(1 - z * z), far = i < 2000 ? 1 : 50;
+        for (size_t c = 0; c < 3; ++c) m.log_scale[3 * i + c] = i < 2000 ? -2.5f : 1.0f;
+        m.position[3 * i] = static_cast<float>(far * r * std::cos(a));
+        m.position[3 * i + 1] = static_cast<float>(far * z);
+        m.position[3 * i + 2] = static_cast<float>(far * r * std::sin(a));
+        m.rotation[4 * i] = 1;
+        m.opacity_logit[i] = 4;
+    }
+    for (const double arc : {360.0, 90.0}) {
+        TurntableOptions options;
+        options.seconds = 2;
+        options.fps = 12;
+        for (int i = 0; i < 24; ++i) {
+            Navigation at;
+            at.orbit(glm::radians(40 + arc * i / 24), glm::radians(30.0));
+            at.look_from({0, 0, 0}, 5);
+            options.cameras.push_back(at.camera(400, 300));
+        }
+        const CameraPath path = turntable(m, options);
+        double farthest = 0;
+        for (const KeyFrame& key : path.keys) {
+            EXPECT_LT(glm::length(key.eye), 1.3 * 5) << "not behind the cameras";
+            EXPECT_GT(glm::length(key.eye), 2);
+            EXPECT_NEAR(-key.eye.y / glm::length(key.eye), 0.5, 0.05) << "as high as they are";
+            double nearest = HUGE_VAL;
+            for (const Camera& c : options.cameras)
+                nearest = std::min(
+                    nearest, glm::distance(glm::normalize(c.centre()), glm::normalize(key.eye)));
+            farthest = std::max(farthest, nearest);
+        }
+        EXPECT_LT(farthest, 0.3) << arc;
+        const double step = glm::distance(path.keys[0].eye, path.keys[1].eye);
+        EXPECT_LT(glm::distance(path.keys[23].eye, path.keys[0].eye), 2 * step + 1e-6) << "a loop";
+    }
+}
+
+TEST(Turntable, Turns_its_head_where_the_cameras_look_outwards) {
+    SplatModel m;
+    m.resize(4000);
+    TurntableOptions options;
+    options.seconds = 1;
+    for (size_t i = 0; i < m.size(); ++i) {
+        const double a = 0.7 * static_cast<double>(i), z = 1 - static_cast<double>(i) / 2000;
+        const double r = std::sqrt(std::max(1 - z * z, 0.0));
+        for (size_t c = 0; c < 3; ++c) m.log_scale[3 * i + c] = -1.5f;
+        m.position[3 * i] = static_cast<float>(4 * r * std::cos(a));
+        m.position[3 * i + 1] = static_cast<float>(4 * z);
+        m.position[3 * i + 2] = static_cast<float>(4 * r * std::sin(a));
+        m.rotation[4 * i] = 1;
+        m.opacity_logit[i] = 4;
+    }
+    for (int i = 0; i < 12; ++i) {
+        Navigation at;
+        at.eye = {0.1, 0, 0};
+        at.look(glm::radians(30.0 * i), glm::radians(10.0));
+        options.cameras.push_back(at.camera(400, 300));
+    }
+    for (const KeyFrame& key : turntable(m, options).keys) {
+        EXPECT_LT(glm::length(key.eye), 0.5);
+        EXPECT_NEAR(glm::mat3_cast(key.orientation)[2].y, std::sin(glm::radians(10.0)), 0.02);
     }
 }
 

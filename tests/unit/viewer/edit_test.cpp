@@ -207,20 +207,27 @@ TEST(Edit, A_merge_appends_in_the_world_and_goes_again) {
     const SplatModel before = m;
     Edit edit(4);
     edit.remove(only(4, {0}));
+    edit.select(only(4, {1, 2}), Combine::replace);
     EXPECT_EQ(edit.merge(other, m), 3u);
     ASSERT_EQ(m.size(), 7u);
+    EXPECT_EQ(edit.selected(), only(7, {4, 5, 6})) << "what came, and nothing else";
+    EXPECT_EQ(edit.selected_count(), 3u);
+    EXPECT_EQ(edit.parts(), (std::vector<std::size_t>{4, 3}));
     EXPECT_EQ(m.sh_degree, 2);
     EXPECT_EQ(m.sh_rest.size(), 7u * 24);
     EXPECT_EQ(m.sh_rest[24 * 3 + 8], 3);
     EXPECT_EQ(m.sh_rest[24 * 3 + 9], 0) << "a band that it had not";
     EXPECT_EQ(position_of(m, 6), glm::dvec3(2, 0, 50));
-    EXPECT_EQ(edit.select(only(7, {6}), Combine::replace), 1u);
+    EXPECT_EQ(edit.select(only(7, {6}), Combine::replace), 2u);
     EXPECT_EQ(edit.apply(m).size(), 6u);
     edit.undo(m);
     EXPECT_EQ(edit.undo(m), "merged 3 splats");
     for (int a = 0; a < kAttributeCount; ++a)
         EXPECT_EQ(attribute_values(m, a), attribute_values(before, a)) << a;
     EXPECT_EQ(edit.removed().size(), 4u);
+    EXPECT_EQ(edit.selected(), only(4, {1, 2})) << "as before";
+    EXPECT_EQ(edit.selected_count(), 2u);
+    EXPECT_EQ(edit.parts(), std::vector<std::size_t>{4});
     edit.redo(m);
     edit.redo(m);
     EXPECT_EQ(edit.selected_count(), 1u);
