@@ -2,7 +2,7 @@
 # Nothing of them can be put in the place of, so that functions are called as in a program. Without the
 # module they are compiled as for programs.
 function(darb_linked_anywhere)
-  if(DARB_PYTHON)
+  if(DARB_WITH_PYTHON)
     set_target_properties(${ARGN} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
       VISIBILITY_INLINES_HIDDEN ON)
   endif()

@@ -14,12 +14,13 @@ failed=0
 
 python3 "$here/check_includes.py" . || failed=1
 python3 "$here/links.py" --root . || failed=1
+# python3 "$here/spdx.py" --root . --check || failed=1    # to be enabled once tools/spdx.py has written the lines
 [[ ! -f tools/guards.py ]] || python3 tools/guards.py check || failed=1
 [[ ! -f tools/price_of_determinism.py ]] || python3 tools/price_of_determinism.py --check || failed=1
 [[ ! -f tools/new_attribute.py ]] || python3 tools/new_attribute.py --check || failed=1
 
 folders=()
-for folder in engine trainer viewer tools tests shaders; do
+for folder in engine trainer viewer tools examples tests shaders; do
     [[ -d $folder ]] && folders+=("$folder")
 done
 mapfile -t cpp < <(find "${folders[@]}" -name '*.cpp' -o -name '*.h' | sort)

@@ -35,6 +35,8 @@ def dead_links(path):
         if re.match(r"[a-z]+:", link[1]):
             continue
         name, _, anchor = link[1].partition("#")
+        if re.match(r"\.\./\.\./(releases|issues|deployments)\b", name):
+            continue  # of the repository on GitHub, beside its files
         target = os.path.join(os.path.dirname(path), name) if name else path
         if not os.path.exists(target) or (anchor and target.endswith(".md") and anchor not in anchors(target)):
             found.append((text.count("\n", 0, link.start()) + 1, link[1]))

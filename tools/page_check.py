@@ -216,7 +216,7 @@ def check_hostile(page, scene, arguments, failures, folder):
     cameras = os.path.join(folder, "hostile.json")
     with open(cameras, "w", encoding="utf-8") as file:
         json.dump([dict(c, img_name=HOSTILE + str(i)) for i, c in enumerate(camera_list({"focus": [0, 0, 0], "radius": 1}, 2, 64, 48))], file)
-    darb(arguments, "convert", scene, out, "--title", HOSTILE, "--cameras", cameras)
+    darb(arguments, "convert", "--force", scene, out, "--title", HOSTILE, "--cameras", cameras)
     page.open("file://" + os.path.abspath(out))
     page.run("darb.ready")
     check(failures, page.run("typeof hacked") == "undefined" and page.run("document.images.length") == 1,
@@ -264,9 +264,9 @@ def check_damaged(page, path, arguments, failures, folder):
 def check_scene(page, name, path, arguments, failures, folder):
     width, height = map(int, arguments.size.split("x"))
     plain = os.path.join(folder, "plain.ply")
-    darb(arguments, "convert", path, plain)
+    darb(arguments, "convert", "--force", path, plain)
     first = os.path.join(folder, "first.html")
-    darb(arguments, "convert", plain, first)
+    darb(arguments, "convert", "--force", plain, first)
     cameras = os.path.join(folder, "cameras.json")
     with open(cameras, "w", encoding="utf-8") as file:
         json.dump(camera_list(scene_of_page(first), arguments.views, width, height), file)
@@ -278,7 +278,7 @@ def check_scene(page, name, path, arguments, failures, folder):
         truths = [os.path.join(frames, f"view {i + 1}.png") for i in range(arguments.views)]
         for kind in [arguments.only] if arguments.only else ["rounded", "exact"]:
             out = os.path.join(folder, f"{name}_{kernel}_{kind}.html")
-            said = darb(arguments, "convert", scene, out, "--cameras", cameras, *(["--exact"] if kind == "exact" else []))
+            said = darb(arguments, "convert", "--force", scene, out, "--cameras", cameras, *(["--exact"] if kind == "exact" else []))
             least = arguments.least_exact if kind == "exact" else arguments.least
             row = check_page(page, out, truths, least, f"{name} {kernel} {kind}", arguments, failures, folder, not rows)
             row["stated"] = said.strip().rpartition("\n")[2].partition(": ")[2]

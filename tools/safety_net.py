@@ -133,7 +133,7 @@ class Net:
         source, ending, options = FILES[name]
         out = self.folder / name
         out.mkdir()
-        run(self.darb, ["convert", self.folder / source, out / f"scene.{ending}", *options])
+        run(self.darb, ["convert", "--force", self.folder / source, out / f"scene.{ending}", *options])
         return hashes(out, (ending,))
 
 

@@ -8,7 +8,7 @@ usage() {
 usage: tools/setup.sh [options]
   --dry-run             only say what would be installed
   --no-tests            leave out what only the tests and the quality checks need
-  --with-python         what the Python module is built and used with: -DDARB_PYTHON=ON
+  --with-python         what the Python module is built and used with, with --no-tests too
   --with-torch          PyTorch too, for the tests of LPIPS and of darb.torch: 0.6 GB on disk
   --with-packaging      what tools/package.sh and tools/package_test.sh run
   --with-colmap         COLMAP too: training from photos without cameras runs it
@@ -55,9 +55,12 @@ tests    spirv-tools          spirv-opt and spirv-dis, for the proof that effect
 tests    python3              style script (standard library only)
 tests    universal-ctags      sizes of functions and classes, tools/structure.py
 tests    ffmpeg               the video of a camera path
+tests    python3-dev          the Python module, which every build of the tests loads
+tests    pybind11-dev         the Python module
+tests    python3-numpy        its arrays
 pages    chromium             opens the reports; Debian alone: that of Ubuntu is no package
 pages    fonts-dejavu-core    their letters
-python   python3-dev          the Python module; optional
+python   python3-dev          the Python module where no tests are built; optional
 python   pybind11-dev         the Python module; optional
 python   python3-numpy        its arrays; optional
 torch    python3-torch        tests of LPIPS and of darb.torch, which skip without it; optional
@@ -116,7 +119,7 @@ is_installed() {
 missing=()
 while read -r group package _; do
     [[ -n $group && " $groups " == *" $group "* ]] || continue
-    is_installed "$package" || missing+=("$package")
+    [[ " ${missing[*]-} " == *" $package "* ]] || is_installed "$package" || missing+=("$package")
 done <<<"$packages"
 
 mesa_version() { dpkg-query -W -f='${Version}' mesa-vulkan-drivers 2>/dev/null || echo 0; }

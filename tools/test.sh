@@ -10,8 +10,8 @@ usage() {
 usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all before includes)
   setup      install missing packages (tools/setup.sh)
   style      include arrows, links, clang-format (tools/check_style.sh)
-  release    build with gcc, warnings are errors
-  unit       tests that need no device
+  release    build with gcc, warnings are errors; with the Python module
+  unit       tests that need no device, and the Python module's import, a picture and some iterations
   sync       the quick device tests, under Vulkan synchronization validation
   gpu        the other device tests: training, long frames, numerics, scripts
   clang      build what reads files, its unit tests and the fuzzers with clang, ASan and UBSan; warnings are errors
@@ -20,7 +20,7 @@ usage: tools/test.sh [full | quick | STEP...]      (default: full, which is all 
   includes   build all with clang without precompiled headers: a forgotten include is an error
   pipelines  build command and tests with clang, ASan and UBSan, and run all unit tests and the quick ones of pipelines
   long       device tests that take minutes
-  python     the Python module: installs what it needs, builds it and the command, runs tests/python
+  python     all of tests/python: installs PyTorch, builds the module and the command
   quick      = setup style release unit
 TEXT
 }

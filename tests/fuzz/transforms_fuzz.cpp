@@ -1,4 +1,4 @@
-// Any bytes as transforms.json and cameras.json.
+// Any bytes as transforms.json, cameras.json and camera_path.json.
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -18,6 +18,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     try {
         darb::parse_camera_list(darb::format_camera_list(darb::parse_camera_list(text, "fuzz")),
                                 "again");
+    } catch (const darb::Error&) {
+    }
+    try {
+        darb::parse_nerfstudio_path(text, "fuzz");
     } catch (const darb::Error&) {
     }
     return 0;

@@ -12,6 +12,9 @@
 #include <vector>
 
 #include "engine/core/files.h"
+#include "engine/core/scope_guard.h"
+#include "engine/data/depth_io.h"
+#include "engine/data/image_io.h"
 #include "engine/scene/ply.h"
 #include "tests/support/run_command.h"
 #include "tests/support/test_data.h"
@@ -89,7 +92,7 @@ TEST(Command, missing_files_are_named) {
     const std::string none = scratch() / "none";
     expect_refused({{"train " + none + " -o " + none + "_out", none},
                     {"train " + kScene + " -i no_photos -o " + none + "_out", "no_photos"},
-                    {"train --resume -o " + none, "command.json"},
+                    {"train --resume -o " + none, "request.json"},
                     {"eval " + none + ".ply " + kScene, none + ".ply"},
                     {"render " + none + ".ply --cameras " + kScene + " -o " + none, none + ".ply"},
                     {"info " + none + ".ply", none + ".ply"},
@@ -109,26 +112,99 @@ TEST(Command, a_refused_option_does_not_steer_the_terminal) {
     EXPECT_NE(bad.err.find("--no\\x1b[2J"), std::string::npos) << bad.err;
 }
 
-TEST(Command, a_command_without_its_data_set_is_named) {
-    const fs::path run = scratch() / "no_data_set";
-    write_file_atomic(run / "command.json", R"(["train","-o","out"])");
-    expect_refused({{"train --resume -o " + run.string(),
-                     (run / "command.json").string() + ": names no data set"}});
-    for (const char* wrong :
-         {R"("1e999")", R"("--iterations","x")", R"("--iterations")", R"("-q","--none")"}) {
-        write_file_atomic(run / "command.json",
-                          fmt::format(R"(["train","data","-o","out",{}])", wrong));
-        expect_refused({{"train --resume -o " + run.string(), (run / "command.json").string()}});
+TEST(Command, a_run_of_a_version_without_requests_says_how_to_go_on) {
+    const fs::path run = scratch() / "old_run";
+    write_file_atomic(run / "command.json", R"(["train","data","-o","out"])");
+    expect_refused({{"train --resume -o " + run.string(), "Repeat the whole command"}});
+    write_file_atomic(run / "request.json", "{}");
+    expect_refused({{"train --resume -o " + run.string(), (run / "request.json").string()}});
+}
+
+TEST(Command, depths_of_another_folder_say_where_they_are_read_from) {
+    const std::string train =
+        fmt::format("train {} -o {} ", kScene, (scratch() / "unused").string());
+    const std::string folder = (fs::path(kScene) / "depths").string();
+    std::vector<BadCommand> commands;
+    for (const char* option : {"-d depths", "--depths lidar"})
+        commands.push_back({train + option, "Put them into " + folder});
+    commands.push_back({train + "-d depths --effects -depth", "means nothing with --effects"});
+    commands.push_back({train + "-d depths --effects none", "means nothing with --effects"});
+    expect_refused(commands);
+}
+
+TEST(Command, depths_trains_with_the_measured_depths_of_the_data_set) {
+    const fs::path set = scratch() / "with_depths";
+    fs::remove_all(set);
+    fs::copy(kScene, set, fs::copy_options::recursive);
+    for (const auto& photo : fs::directory_iterator(set / "images")) {
+        const ImageInfo size = read_image_info(photo.path());
+        ImageF depth(size.width, size.height, 1);
+        std::fill(depth.data.begin(), depth.data.end(), 3.0f);
+        write_depth_png(set / "depth" / photo.path().filename().replace_extension(".png"), depth,
+                        1e-3);
+    }
+    const std::string train =
+        fmt::format("train {} -r 8 --iterations 2 -q -o {} ", set.string(), (set / "out").string());
+    for (const std::string& option :
+         {std::string("-d depth"), "--depths " + (set / "depth").string(),
+          std::string("--depths depth --effects -exposure"), std::string("--effects +depth")}) {
+        const Outcome o = darb(train + option);
+        ASSERT_EQ(o.code, 0) << option << ": " << o.err;
+        const json metrics = json::parse(read_text_file(set / "out" / "metrics.json"));
+        bool on = false;
+        for (const json& effect : metrics["effects"])
+            on |= effect["effect"] == "depth" && effect["on"] == true;
+        EXPECT_TRUE(on) << option;
     }
 }
 
-TEST(Command, features_that_are_not_there_say_so) {
-    const std::string train =
-        fmt::format("train {} -o {} ", kScene, (scratch() / "unused").string());
-    std::vector<BadCommand> commands;
-    for (const char* option : {"-d depths", "--depths depths"})
-        commands.push_back({train + option, "not part of this version"});
-    expect_refused(commands);
+TEST(Command, files_and_folders_may_have_names_that_look_like_numbers) {
+    const fs::path folder = scratch() / "numbers";
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    const ScopeGuard back([before = fs::current_path()] { fs::current_path(before); });
+    fs::current_path(folder);
+    for (const char* name : {"inf", "nan", "1e999", "Infinity"}) {
+        fs::copy(kScene, folder / name, fs::copy_options::recursive);
+        const Outcome info = darb(fmt::format("info {}", name));
+        EXPECT_EQ(info.code, 0) << info.err;
+        EXPECT_NE(info.out.find("views"), std::string::npos) << info.out;
+        const Outcome trained =
+            darb(fmt::format("train {} -q -r 8 --iterations 2 -o run_{}", name, name));
+        ASSERT_EQ(trained.code, 0) << trained.err;
+        fs::rename(folder / ("run_" + std::string(name)), folder / "nan.run");
+        const Outcome out = darb("convert nan.run nan.ply");
+        EXPECT_EQ(out.code, 0) << out.err;
+        const Outcome resumed = darb("train --resume -q -o nan.run");
+        EXPECT_EQ(resumed.code, 0) << resumed.err;
+        const ScopeGuard brought([&] { fs::remove_all(folder / "nan.run"); });
+        fs::rename(folder / name, folder / "new place");
+        expect_refused({{"train --resume -q -o nan.run", "with the place where its photos are"}});
+        const Outcome there = darb("train 'new place' --resume -q -r 8 --iterations 2 -o nan.run");
+        EXPECT_EQ(there.code, 0) << there.err;
+        fs::remove_all(folder / "new place");
+    }
+    expect_refused({{"render a.ply -o frames --near nan", "--near nan: is no number"},
+                    {"render a.ply -o frames --near=-inf", "--near"},
+                    {"convert a.ply b.ply --scale 1e999", "--scale 1e999: is no number"}});
+}
+
+TEST(Command, a_quiet_run_is_warned_and_logs_its_forecast) {
+    const fs::path run = scratch() / "quiet_run";
+    const std::string train = fmt::format("train {} -q -r 8 -o {} ", kScene, run.string());
+    const Outcome trained = darb(train + "--iterations 2");
+    ASSERT_EQ(trained.code, 0) << trained.err;
+    EXPECT_EQ(trained.err, "");
+    const std::string log = read_text_file(run / "run.jsonl");
+    const json start = json::parse(log.substr(0, log.find('\n')));
+    EXPECT_GT(start.at("forecast").at("start_splats"), 0) << start;
+
+    ::setenv("DARB_FAULT", "oom:splat shape", 1);  // it ends once the plan is there
+    const ScopeGuard clear([] { ::unsetenv("DARB_FAULT"); });
+    const Outcome large = darb(train + "--strategy budget --budget 1000000000");
+    EXPECT_EQ(large.code, 2);
+    EXPECT_NE(large.err.find("warning: more than the"), std::string::npos) << large.err;
+    EXPECT_EQ(large.err.find("forecast:"), std::string::npos) << large.err;
 }
 
 TEST(Command, help_and_version_are_exit_code_0) {

@@ -16,6 +16,7 @@
 #include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/gaussian_scene.h"
+#include "engine/scene/orbit_cameras.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/run_command.h"
 #include "tests/support/shared_device.h"
@@ -41,10 +42,11 @@ TEST(Convert, every_format_to_every_other) {
         {"all.spz", "SPZ"}, {"all.glb", "glTF"},
         {"all.sog", "SOG"}, {"all.splat", ".splat"}};
     for (const auto& [from, from_name] : names) {
-        ASSERT_EQ(darb("convert " + ply + " " + scratch_file("to_" + from)).code, 0) << from;
+        ASSERT_EQ(darb("convert --no-measure " + ply + " " + scratch_file("to_" + from)).code, 0)
+            << from;
         for (const auto& [to, to_name] : names) {
-            const Outcome o =
-                darb("convert " + scratch_file("to_" + from) + " " + scratch_file("again_" + to));
+            const Outcome o = darb("convert --no-measure --force " + scratch_file("to_" + from) +
+                                   " " + scratch_file("again_" + to));
             ASSERT_EQ(o.code, 0) << o.err;
             const json info = json::parse(darb("info --json - " + scratch_file("again_" + to)).out);
             EXPECT_EQ(info["format"], to_name);
@@ -62,7 +64,8 @@ TEST(Convert, a_comparison_sees_a_scene_far_from_the_origin) {
     ASSERT_EQ(darb("convert " + near + " " + far + " --translate 10000,0,0").code, 0);
     std::map<std::string, std::string> said;
     for (const std::string& ply : {near, far})
-        said[ply] = darb("convert " + ply + " " + scratch_file("seen.splat") + " --compare").out;
+        said[ply] =
+            darb("convert " + ply + " " + scratch_file("seen.splat") + " --compare --force").out;
     const auto psnr_of = [&](const std::string& ply) {
         return std::stod(said[ply].substr(said[ply].find("scene: ") + 7));
     };
@@ -110,7 +113,7 @@ TEST(Convert, what_gets_lost_is_said) {
               std::string::npos);
     EXPECT_EQ(json::parse(darb("info --json - " + scratch_file("k.spz")).out)["render_mode"],
               "mip");
-    EXPECT_EQ(darb("convert " + ply + " " + scratch_file("k.compressed.ply")).err, "");
+    EXPECT_EQ(darb("convert --no-measure " + ply + " " + scratch_file("k.compressed.ply")).err, "");
     const json kept = json::parse(darb("info --json - " + scratch_file("k.compressed.ply")).out);
     EXPECT_EQ(kept["kernel"], "raised_cosine");
     EXPECT_EQ(kept["footprint"], "exact");
@@ -144,6 +147,206 @@ TEST(Convert, kernels_become_gaussians_with_the_error_printed) {
     const SplatModel gaussians = load_splats(scratch_file("rc_gaussian.splat"));
     const GaussianEquivalent fit = gaussian_equivalent(KERNEL_RAISED_COSINE, Footprint::psi, false);
     EXPECT_NEAR(gaussians.log_scale[0], model.log_scale[0] + 0.5 * std::log(fit.covariance), 1e-5);
+}
+
+/// Rows that vary smoothly: harmonics that 4 bits show the steps of, in splats that fill the view.
+SplatModel shaded_model(size_t count) {
+    SplatModel model = sample_model(3, count);
+    for (float& scale : model.log_scale) scale = -2.5f;
+    for (float& logit : model.opacity_logit) logit = 3;
+    for (size_t i = 0; i < model.sh_rest.size(); ++i) model.sh_rest[i] *= 0.3f;
+    return model;
+}
+
+double worst_db_of(const std::string& said) {
+    const size_t at = said.find(" dB at worst"), from = said.rfind(' ', at - 1);
+    return at == std::string::npos ? -1 : std::stod(said.substr(from + 1));
+}
+
+TEST(Convert, spz_keeps_as_many_bits_as_pictures_need) {
+    const std::string ply = scene_file("shaded.ply", shaded_model(300));
+    const Outcome o = darb("convert " + ply + " " + scratch_file("shaded.spz"));
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.out.find("harmonics rounded at level "), std::string::npos) << o.out;
+    const double found = worst_db_of(o.out);
+    // The coarsest precision alone, against what was chosen.
+    const SplatModel model = load_splats(ply);
+    EncodeOptions coarsest;
+    coarsest.precision = 0;
+    const SplatModel coarse =
+        parse_splats(encode_scene(SplatFormat::spz, model, "coarse", coarsest).file, "coarse");
+    Renderer a(shared_device(), model), b(shared_device(), coarse);
+    double coarse_db = 100;
+    for (const Camera& camera : orbit_cameras(model, 8, 480, 360))
+        coarse_db = std::min(coarse_db, psnr(b.render(camera), a.render(camera)));
+    EXPECT_LT(coarse_db, 49) << "the case shows nothing";
+    EXPECT_GT(found, coarse_db + 1) << o.out;
+    const auto whole = fs::file_size(scratch_file("shaded.spz"));
+    const Outcome small = darb("convert " + ply + " " + scratch_file("small.spz") +
+                               fmt::format(" --max-size {}", whole / 2));
+    ASSERT_EQ(small.code, 0) << small.err;
+    EXPECT_LE(fs::file_size(scratch_file("small.spz")), whole / 2);
+    EXPECT_LT(worst_db_of(small.out), found) << small.out;
+    EXPECT_GT(worst_db_of(small.out), 5) << small.out;
+}
+
+TEST(Convert, every_lossy_format_says_its_loss_and_exact_ones_that_they_are) {
+    const std::string ply = scene_file("said.ply", sample_model(1, 60));
+    for (const char* name : {"said.compressed.ply", "said.splat", "said.spz", "said.sog",
+                             "said_sog/meta.json", "said_lod/lod-meta.json"}) {
+        const Outcome o = darb("convert " + ply + " " + scratch_file(name));
+        ASSERT_EQ(o.code, 0) << o.err;
+        EXPECT_NE(o.out.find("the file against the scene: "), std::string::npos) << name << o.out;
+        EXPECT_GT(worst_db_of(o.out), 5) << name << o.out;
+    }
+    const Outcome exact = darb("convert " + ply + " " + scratch_file("same.ply"));
+    EXPECT_NE(exact.out.find("has the values of the scene"), std::string::npos) << exact.out;
+    const Outcome part =
+        darb("convert " + ply + " " + scratch_file("part.ply") + " --max-size 6KB");
+    EXPECT_NE(part.out.find(" merged from 60"), std::string::npos) << part.out << part.err;
+    EXPECT_LE(fs::file_size(scratch_file("part.ply")), 6000u);
+    EXPECT_GT(worst_db_of(part.out), 5) << part.out;
+}
+
+TEST(Convert, without_a_device_scenes_are_written_and_the_loss_is_not_measured) {
+    const std::string ply = scene_file("alone.ply", sample_model(2, 3000));
+    ASSERT_EQ(::setenv("VK_DRIVER_FILES", "/nonexistent.json", 1), 0);
+    ASSERT_EQ(::setenv("VK_ICD_FILENAMES", "/nonexistent.json", 1), 0);
+    for (const char* name : {"alone.spz", "alone.sog", "alone.splat", "alone.ply.glb"}) {
+        const Outcome o = darb("convert " + ply + " " + scratch_file(name));
+        EXPECT_EQ(o.code, 0) << o.err;
+        EXPECT_EQ(load_splats(scratch_file(name)).size(), 3000u);
+        EXPECT_NE(o.out.find("not measured"), std::string::npos) << name << o.out;
+        EXPECT_NE(o.err.find("not measured"), std::string::npos) << name << o.err;
+        const Outcome quick = darb("convert --no-measure " + ply + " " + scratch_file(name));
+        EXPECT_EQ(quick.code, 0) << quick.err;
+        EXPECT_EQ(quick.err.find("Vulkan"), std::string::npos) << name << quick.err;
+    }
+    EXPECT_EQ(darb("convert " + ply + " " + scratch_file("named.spz") + " --device 0").code, 2);
+    const Outcome few = darb("convert " + ply + " " + scratch_file("few.ply") + " --splats 9");
+    EXPECT_EQ(few.code, 0) << few.err;
+    EXPECT_EQ(load_splats(scratch_file("few.ply")).size(), 9u);
+    ::unsetenv("VK_DRIVER_FILES");
+    ::unsetenv("VK_ICD_FILENAMES");
+}
+
+TEST(Convert, a_page_shows_what_the_cameras_of_the_run_saw_as_they_were_held) {
+    const fs::path run = scratch() / "held";
+    fs::create_directories(run);
+    const std::string ply = scene_file("held/scene.ply", sample_model(0, 60));
+    const auto page_of = [&](const std::string& scene, const std::string& options = "") {
+        const std::string file = scratch_file("held.html"), mark = "id=\"scene\">";
+        const Outcome o = darb("convert --force " + scene + " " + file + options);
+        EXPECT_EQ(o.code, 0) << o.err;
+        const std::string page = read_text_file(file);
+        const std::size_t from = page.find(mark) + mark.size();
+        return json::parse(page.substr(from, page.find("</script>", from) - from));
+    };
+    const auto expect_up = [](const json& page, const glm::dvec3& up) {
+        for (int i = 0; i < 3; ++i) EXPECT_NEAR(page["up"][i].get<double>(), up[i], 1e-9) << i;
+    };
+    // Held upside down, which no guess from the splats would find.
+    json cameras = json::array();
+    for (int i = 0; i < 3; ++i)
+        cameras.push_back({{"id", i},
+                           {"img_name", fmt::format("photo{}.jpg", i)},
+                           {"width", 64},
+                           {"height", 48},
+                           {"position", {0.1 * i, 0, -4}},
+                           {"rotation", {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},
+                           {"fx", 60},
+                           {"fy", 60}});
+    write_file_atomic(run / "cameras.json", cameras.dump());
+    const json held = page_of(ply);
+    expect_up(held, {0, 1, 0});
+    ASSERT_EQ(held["cameras"].size(), 3U);
+    EXPECT_EQ(held["cameras"][0]["name"], "photo0.jpg");
+    expect_up(page_of(ply, " --rotate 180,0,0"), {0, -1, 0});
+    expect_up(page_of(ply, " --up z"), {0, -1, 0});
+    write_file_atomic(run / "cameras.json", "[");
+    EXPECT_EQ(page_of(ply)["cameras"].size(), 8U) << "a list that cannot be read costs no page";
+    fs::remove(run / "cameras.json");
+    std::string text = read_text_file(ply);
+    text.insert(text.find("element"), "comment Vertical axis: z\n");
+    write_file_atomic(ply, text);
+    expect_up(page_of(ply), {0, 0, 1});
+    expect_up(page_of(ply, " --up z --rotate 0,0,90"), {1, 0, 0});
+}
+
+TEST(Convert, a_file_that_is_there_is_replaced_by_the_same_scene_alone) {
+    const std::string a = scene_file("a.ply", sample_model(0, 30)),
+                      b = scene_file("b.ply", sample_model(0, 40)),
+                      out = scratch_file("once.splat"), to = " " + out + " --no-measure",
+                      there = "is there already";
+    ASSERT_EQ(darb("convert " + a + to).code, 0);
+    EXPECT_EQ(darb("convert " + a + to).code, 0) << "the same again";
+    save_splats(a, SplatFormat::ply, sample_model(0, 31));
+    EXPECT_EQ(darb("convert " + a + to).code, 0) << "the same scene, trained on";
+    expect_refused({{"convert " + b + to, there},
+                    {"convert " + b + " " + a, there},
+                    {"convert " + a + " " + b + " -o" + to, there}});
+    EXPECT_EQ(load_splats(out).size(), 31u);
+    EXPECT_EQ(darb("convert --force " + b + to).code, 0);
+    EXPECT_EQ(load_splats(out).size(), 40u);
+    fs::remove(out);
+    save_splats(out, SplatFormat::dot_splat, sample_model(0, 50));  // somebody else's by now
+    expect_refused({{"convert " + b + to, there}});
+    const std::string folder = scratch_file("folder.ply"), loop = scratch_file("loop.ply"),
+                      hard = scratch_file("hard.ply");
+    fs::create_directories(folder);
+    fs::create_symlink(loop, loop);
+    fs::create_hard_link(a, hard);
+    write_file_atomic(scratch_file("lod.2.ply"), "mine");
+    write_file_atomic(scratch_file("sogs/quats.webp"), "mine");
+    expect_refused(
+        {{"convert --force " + a + " " + folder, "is a folder"},
+         {"convert --force " + a + " " + loop, "symbolic links"},
+         {"convert --force " + a + " " + hard, "is what is read"},
+         {"convert " + a + " " + scratch_file("lod.ply") + " --levels 2", there},
+         {"convert " + a + " " + scratch_file("sogs/meta.json") + " --no-measure", there}});
+    EXPECT_FALSE(fs::exists(scratch_file("lod.1.ply")));
+    EXPECT_FALSE(fs::exists(scratch_file("sogs/meta.json")));
+    write_file_atomic(scratch_file("empty.splat"), "");
+    EXPECT_EQ(darb("convert --no-measure " + a + " " + scratch_file("empty.splat")).code, 0);
+}
+
+TEST(Convert, several_scenes_become_one) {
+    SplatModel first = sample_model(1, 30), second = sample_model(3, 20, 2), far = second;
+    for (float& p : second.position) p += 3;
+    far.origin = {4e5, 0, 5e6};
+    const std::string a = scene_file("join_a.ply", first), b = scene_file("join_b.ply", second),
+                      c = scene_file("join_c.ply", far), out = scratch_file("joined.ply");
+    const Outcome o = darb("convert " + a + " " + b + " -o " + out);
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("degree 1; those up to 3 are zero"), std::string::npos) << o.err;
+    const SplatModel joined = load_splats(out);
+    ASSERT_EQ(joined.size(), 50u);
+    EXPECT_EQ(joined.sh_degree, 3);
+    EXPECT_TRUE(std::equal(first.position.begin(), first.position.end(), joined.position.begin()));
+    EXPECT_TRUE(
+        std::equal(second.position.begin(), second.position.end(), joined.position.begin() + 90));
+    EXPECT_TRUE(
+        std::equal(second.sh_rest.begin(), second.sh_rest.end(), joined.sh_rest.begin() + 30 * 45));
+    for (size_t i = 0; i < 30; ++i)
+        for (size_t k = 0; k < 45; ++k)
+            EXPECT_EQ(joined.sh_rest[45 * i + k], k < 9 ? first.sh_rest[9 * i + k] : 0);
+    const std::string apart = scratch_file("apart.ply");
+    const Outcome wide = darb("convert " + a + " " + c + " -o " + apart);
+    ASSERT_EQ(wide.code, 0) << wide.err;
+    EXPECT_NE(wide.err.find("rounded by"), std::string::npos) << wide.err;
+    const SplatModel both = load_splats(apart);
+    for (size_t i = 0; i < 30; ++i)
+        EXPECT_LT(glm::distance(position_of(both, i), position_of(first, i)), 0.5);
+    SplatModel cosine = first;
+    cosine.kernel = KERNEL_RAISED_COSINE;
+    const std::string k = scene_file("join_k.ply", cosine), new_out = scratch_file("gaussian.ply");
+    expect_refused({{"convert " + a + " " + k + " -o " + new_out, "--kernel gaussian"},
+                    {"convert " + a + " " + a + " -o " + new_out, "is named twice"},
+                    {"convert " + a + " " + b + " " + new_out, "-o OUT"},
+                    {"convert --force " + a + " " + b + " -o " + b, "is what is read"}});
+    EXPECT_EQ(darb("convert --kernel gaussian " + a + " " + k + " -o " + new_out).code, 0);
+    EXPECT_EQ(load_splats(new_out).kernel, KERNEL_GAUSSIAN);
+    EXPECT_EQ(load_splats(new_out).size(), 60u);
 }
 
 TEST(Convert, bad_options_are_refused) {

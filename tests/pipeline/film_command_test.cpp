@@ -37,6 +37,32 @@ TEST(FilmCommand, Render_without_cameras_turns_or_follows_a_path) {
               read_image(film + "/frame_00002.png").data);
 }
 
+TEST(FilmCommand, What_is_no_scene_says_what_to_type) {
+    const fs::path folder = scratch() / "no_scene";
+    for (const char* name : {"photos", "set/images", "set/sparse/0", "run"})
+        fs::create_directories(folder / name);
+    for (const char* name : {"photos/a.jpg", "set/images/a.png", "run/run.jsonl", "clip.mp4",
+                             "run/checkpoint.darb", "page.html", "cameras.json"})
+        write_file_atomic(folder / name, "{}");
+    const auto expect_said = [&](const std::string& what, const std::string& said,
+                                 const std::string& hint) {
+        for (const char* command : {"view --screenshot /dev/null", "render -o x"}) {
+            const Outcome o = darb(fmt::format("{} '{}'", command, (folder / what).string()));
+            EXPECT_EQ(o.code, 2) << o.err;
+            EXPECT_NE(o.err.find(said), std::string::npos) << o.err;
+            EXPECT_NE(o.err.find(hint), std::string::npos) << o.err;
+        }
+    };
+    expect_said("photos", "is a folder of photos",
+                "/photos -o OUT. Then look at it: darb view OUT");
+    expect_said("set", "is a data set", "/set -o OUT");
+    expect_said("run", "has not saved a scene yet", "--resume");
+    expect_said("clip.mp4", "is a video", "/clip.mp4 -o OUT");
+    expect_said("run/checkpoint.darb", "is the checkpoint of a run", "the folder of the run");
+    expect_said("page.html", "is a web page", "browser");
+    expect_said("cameras.json", "is no scene", "--cameras");
+}
+
 TEST(FilmCommand, What_goes_with_cameras_alone_is_refused) {
     expect_refused({{"render a.ply -o b -r 2", "--size"},
                     {"render a.ply -o b --lens original", "--cameras"},

@@ -95,6 +95,33 @@ TEST_F(Outputs, no_command_writes_over_its_input) {
     expect_as_before();
 }
 
+// Work of others that no command reads: numbers and frames replace their own kind alone.
+TEST_F(Outputs, scenes_and_photos_of_others_are_left_alone) {
+    const std::string s = ply().string(), other = link("other.ply"), photo = link("other.png"),
+                      cameras = link("cameras.json"), frames = link("frames");
+    fs::copy_file(ply(), other);
+    fs::copy_file(this->photo(), photo);
+    fs::create_symlink(photo, folder_ / "photo_link.json");
+    write_file_atomic(fs::path(cameras), R"([{"id": 0, "img_name": "mine", "width": 32,
+        "height": 32, "position": [0,0,-5], "rotation": [[1,0,0],[0,1,0],[0,0,1]],
+        "fx": 30, "fy": 30}])");
+    fs::create_directories(frames);
+    fs::copy_file(this->photo(), frames + "/mine.png");
+    for (const auto& entry : fs::recursive_directory_iterator(folder_))
+        if (entry.is_regular_file()) before_[entry.path()] = read_file(entry.path());
+    const std::string render = "render " + s + " --cameras " + cameras + " -o " + frames;
+    expect_refused({{"info " + s + " --json " + other, "is a scene"},
+                    {"info " + s + " --json " + link("photo_link.json"), "is a picture"},
+                    {"plan " + s + " --no-price --json " + other, "is a scene"},
+                    {"psi --samples 1 --cells 8 --html " + other, "is a scene"},
+                    {render, "was not written by darb"}});
+    expect_as_before();
+    EXPECT_EQ(darb(render + " --force -q").code, 0);
+    EXPECT_EQ(darb(render + " -q").code, 0) << "its own by now";
+    EXPECT_EQ(darb("info " + s + " --json " + link("facts.json")).code, 0);
+    EXPECT_EQ(darb("info " + s + " --json " + link("facts.json")).code, 0) << "its own kind";
+}
+
 TEST_F(Outputs, a_comparison_leaves_photos_alone) {
     const Outcome o = darb(fmt::format("compare '{}' -r 8 -o '{}/out' --iterations 1 --json '{}'",
                                        data_.string(), folder_.string(), photo().string()));

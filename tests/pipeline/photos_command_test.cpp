@@ -53,9 +53,10 @@ TEST_F(PhotosCommand, colmap_runs_once_for_the_same_photos) {
     const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
     const Outcome first = with_path(path, train() + " --sequential");
     ASSERT_EQ(first.code, 0) << first.err;
-    // The first call asks for the names of options.
+    // The first calls ask for the names of options.
     const std::string all =
-        "feature_extractor\nfeature_extractor\nsequential_matcher\nmapper\nimage_undistorter\n";
+        "feature_extractor\nsequential_matcher\nfeature_extractor\nsequential_matcher\nmapper\n"
+        "image_undistorter\n";
     EXPECT_EQ(read_text_file(calls()), all);
     EXPECT_EQ(with_path(path, train()).code, 0);
     EXPECT_EQ(
@@ -65,6 +66,46 @@ TEST_F(PhotosCommand, colmap_runs_once_for_the_same_photos) {
     const Outcome other = with_path(path, train());
     EXPECT_EQ(other.code, 2);
     EXPECT_NE(other.err.find("other photos"), std::string::npos) << other.err;
+}
+
+TEST_F(PhotosCommand, preview_compares_neighbours_where_many_photos_follow_each_other) {
+    const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
+    const auto preview = [&](const std::string& output, const std::string& preset = "preview") {
+        return with_path(path,
+                         fmt::format("train {} -o {} --preset {} --iterations 1", photos().string(),
+                                     (scratch() / output).string(), preset));
+    };
+    const Outcome few = preview("few");
+    EXPECT_EQ(few.code, 0) << few.err;
+    EXPECT_NE(few.err.find("all 3 pairs, as 3 photos are few"), std::string::npos) << few.err;
+    for (int i = 3; i < 49; ++i)
+        fs::copy_file(photos() / "view_00.png", photos() / fmt::format("view_{:02}.png", i));
+    fs::remove(calls());
+    const Outcome many = preview("many");
+    EXPECT_NE(many.err.find("the numbers in their names"), std::string::npos) << many.err;
+    const std::string called = read_text_file(calls());
+    EXPECT_NE(called.find("sequential_matcher"), std::string::npos) << called;
+    EXPECT_NE(many.err.find("Not found were those of view_48.png"), std::string::npos) << many.err;
+    // The next preset takes these cameras, and says so.
+    const Outcome good = preview("many", "good");
+    EXPECT_EQ(good.code, 0) << good.err;
+    EXPECT_EQ(read_text_file(calls()), called);
+    EXPECT_NE(good.err.find("those of a run with --preset preview"), std::string::npos) << good.err;
+    fs::rename(photos() / "view_48.png", photos() / "another.png");
+    fs::remove(calls());
+    const Outcome mixed = preview("mixed");
+    EXPECT_NE(mixed.err.find("neither the times"), std::string::npos) << mixed.err;
+    EXPECT_EQ(read_text_file(calls()).find("sequential"), std::string::npos);
+}
+
+TEST_F(PhotosCommand, another_size_straightens_again_and_keeps_the_cameras) {
+    const std::string path = (scratch() / "bin").string() + ":/usr/bin:/bin";
+    ASSERT_EQ(with_path(path, train()).code, 0);
+    fs::remove(calls());
+    ASSERT_EQ(with_path(path, train() + " -r 64").code, 0);
+    EXPECT_EQ(read_text_file(calls()), "image_undistorter\n");
+    ASSERT_EQ(with_path(path, train()).code, 0) << "these are large enough";
+    EXPECT_EQ(read_text_file(calls()), "image_undistorter\n");
 }
 
 TEST_F(PhotosCommand, photos_are_found_in_folders_below_and_files_of_a_dot_are_not) {

@@ -14,7 +14,7 @@ def skip(reason):
 
 try:
     import numpy as np
-except ImportError as error:
+except ModuleNotFoundError as error:
     skip(f"numpy is not here: {error}")
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]

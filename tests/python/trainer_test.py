@@ -15,7 +15,7 @@ try:
     import numpy as np
 
     import darb
-except ImportError as error:
+except ModuleNotFoundError as error:  # one that is there and does not load fails the test
     support.skip(f"the module is not here: {error}")
 
 SCENE = support.SHIPPED
@@ -41,6 +41,15 @@ class Training(unittest.TestCase):
     def bytes_of(self, trainer, name="mine.ply"):
         trainer.scene().write(self.path / name)
         return (self.path / name).read_bytes()
+
+    def test_a_budget_that_is_too_small_is_no_room(self):
+        with self.assertRaises(darb.NoRoom) as caught:
+            self.trained(max_memory="1MB")
+        self.assertIsInstance(caught.exception, darb.Error)
+        self.assertIsInstance(caught.exception, MemoryError)
+        self.assertFalse(issubclass(darb.DeviceLost, MemoryError))
+        self.assertTrue(issubclass(darb.DeviceLost, RuntimeError))
+        self.assertTrue(caught.exception.hint)
 
     @unittest.skipUnless(os.path.exists(support.COMMAND), "the command is not built")
     def test_a_run_has_the_bytes_of_darb_train_and_resumes_bit_by_bit(self):

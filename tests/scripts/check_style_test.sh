@@ -81,6 +81,10 @@ expect "link to no file" 1 'docs/b.md:7: a link to ../docs/nowhere.md, which is 
 printf '# A\n\n[Bad](#b)\n' >"$root/docs/b.md"
 expect "link to no heading" 1 'docs/b.md:3: a link to #b, which is not there'
 
+printf '# A\n\n[Releases](../../releases/latest), [bad](../../release)\n' >"$root/docs/b.md"
+expect "link to the releases beside the files" 1 '^docs/b.md:3: a link to ../../release, which is not there'
+expect "no more than that one" 1 '^links: 2 pages, 1 dead links'
+
 fresh_tree
 rm "$root/ARCHITECTURE.md" && printf 'no arrows\n' >"$root/ARCHITECTURE.md"
 expect "architecture without arrows" 1 'no block fenced'

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The programs of docs/library.md, word for word, built against an installed darb alone, and run.
+# The programs of docs/library.md, word for word, and those of examples/, built against an installed darb alone, and run.
 #   install.sh BUILD_FOLDER
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
@@ -23,8 +23,19 @@ prefix/bin/darb --version
 cmake -G Ninja -S program -B out -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_CXX_COMPILER="${CXX:-c++}"
 cmake --build out
 out/reconstruct "$root/assets/scene" 30
+# A program of one's own trains the same bits as the command.
+prefix/bin/darb train "$root/assets/scene" -o command -r 4 --iterations 30 --kernel raised_cosine -q
+scene=point_cloud/iteration_30/point_cloud.ply
+cmp "run/$scene" "command/$scene"
+cp "run/$scene" scene.ply
 prefix/bin/darb info scene.ply
 [[ -s view.png ]]
+cmake -G Ninja -S "$root/examples" -B examples -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_CXX_COMPILER="${CXX:-c++}"
+cmake --build examples
+examples/train_scene "$root/assets/scene" trained.ply 60 | tee trained
+awk '/^PSNR/ { psnr = $2 } END { exit !(psnr > 15 && psnr < 60) }' trained
+examples/render_scene trained.ply drawn.png
+[[ $(file -b drawn.png) == "PNG image data, 960 x 720"* ]]
 out/repaint scene.ply >losses
 awk 'NR == 1 { first = $2 } END { exit !(NR == 20 && $2 < first / 2) }' losses
 status=0

@@ -42,6 +42,11 @@ mapfile -t all < <(sed -n "/^packages='/,/^'/p" "$setup" | awk 'NF > 2 { print $
 machine "debian 12" none=1
 expect "bare Debian lists every package" 0 "to install: g\+\+ cmake .*mesa-vulkan-drivers .*python3 .*chromium"
 expect "--no-tests leaves the test packages out" 0 'libimgui-dev fonts-roboto-unhinted mesa-vulkan-drivers *$' --no-tests
+expect "the tests take the Python module" 0 ' ffmpeg python3-dev pybind11-dev python3-numpy '
+expect "--with-python names each package once" 0 ' ffmpeg python3-dev pybind11-dev python3-numpy chromium fonts-dejavu-core *$' \
+    --with-python
+expect "--with-python adds it without tests" 0 'mesa-vulkan-drivers python3-dev pybind11-dev python3-numpy *$' \
+    --no-tests --with-python
 expect "--with-mpi adds it" 0 'libopenmpi-dev openmpi-bin *$' --no-tests --with-mpi
 expect "--with-colmap adds it" 0 'mesa-vulkan-drivers colmap *$' --no-tests --with-colmap
 machine "ubuntu 24.04" none=1

@@ -205,6 +205,7 @@ struct BlendPipelines {
         constants["SEGMENT"] = static_cast<std::int32_t>(scene.segment);
         constants["DEPTH_SUM"] = constants["ALPHA_GRADIENT"] = scene.depth_sum ? 1 : 0;
         constants["BUCKET"] = static_cast<std::int32_t>(bucket);
+        constants = for_several_passes(constants);
         const bool team = scene.back == BackwardBlend::team;
         constants["THREADS"] = static_cast<std::int32_t>(team ? 4 * subgroup : subgroup);
         backward = Pipeline(device,
@@ -219,6 +220,7 @@ struct BlendPipelines {
         constants["CHECKPOINTS"] = scene.buckets() ? 1 : 0;
         constants["MIN_TRANSMITTANCE"] = least_transmittance(scene.stop);
         blend = Pipeline(device, "blend", constants, true, subgroup);
+        constants = for_several_passes(constants);
         constants["THREADS"] = SPLAT_GROUP;
         bucket_tiles = Pipeline(device, "bucket_tiles", constants);
         bucket_behind = Pipeline(device, "bucket_behind", constants);

@@ -38,6 +38,9 @@ inline std::string scratch_file(const std::string& name) {
     return scratch() / name;
 }
 
+/// What darb remembers between commands is not the user's here.
+inline const int kOwnState = ::setenv("XDG_STATE_HOME", scratch_file("state").c_str(), 1);
+
 class RemoveScratch : public testing::Environment {
     void TearDown() override { fs::remove_all(scratch()); }
 };

@@ -93,7 +93,7 @@ std::vector<GrowthCurve> measure_growth(Device& device, const GrowthPlan& plan,
             curve.points.push_back(measure(device, splats, width, plan.sampling));
             progress(fmt::format("{}: {:.3f} ms, {:.0f} intersections", what,
                                  curve.points.back().ms.median, curve.points.back().intersections));
-        } catch (const Error& e) {
+        } catch (const NoRoom& e) {
             progress(fmt::format("{} is left out: {}", what, e.reason));
         }
     };

@@ -20,6 +20,7 @@
 #include "tools/darb/devices.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/json_output.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
 
@@ -107,7 +108,7 @@ void add_bench(CLI::App& app, Action& action) {
                       "the long set-up: fox_800 after 7,000 iterations, not 1,000");
     command->add_option("--seconds", flags->options.sampling.seconds, "of each case, at least")
         ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
+        ->check(zero_or_more());
     command->add_option("--samples", flags->options.sampling.least, "of each case, at least")
         ->capture_default_str()
         ->check(CLI::Range(1, 200));

@@ -35,6 +35,7 @@ struct CheckFlags {
     DatasetOptions data;
     check::CheckOptions checks;
     KernelFlags kernel;
+    StoredUnits units;
 };
 
 nlohmann::json row_json(const check::Row& row) {
@@ -63,7 +64,7 @@ int dump_view(const CheckFlags& flags) {
     if (!flags.json.empty() || flags.checks.every_kernel)
         throw Error(flags.json.empty() ? "darb check --every-kernel" : "darb check --json",
                     "has nothing to say of --dump", "Leave one of them out.");
-    const SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
+    const SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, nullptr, flags.units));
     const std::vector<View> views = open_cameras(flags.cameras, flags.data);
     if (flags.view < 0 || static_cast<size_t>(flags.view) >= views.size())
         throw Error(flags.cameras.string(), fmt::format("there is no view {}", flags.view),
@@ -144,6 +145,7 @@ void add_check(CLI::App& app, Action& action) {
     command->add_flag("--reference", flags->reference,
                       "--dump from the double-precision reference, not from the device");
     add_quiet_flag(*command, flags->quiet);
+    add_unit_options(*command, flags->units);
     command->callback([flags, &action] { action = [flags] { return check_command(*flags); }; });
 }
 

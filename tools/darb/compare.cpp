@@ -12,6 +12,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/data/run_colmap.h"
 #include "engine/gpu/device.h"
 #include "engine/ranks/ranks.h"
 #include "tools/darb/command_list.h"
@@ -21,8 +22,7 @@
 #include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/stop_signals.h"
-#include "tools/darb/train_data.h"
-#include "tools/darb/train_run.h"
+#include "trainer/job/training_data.h"
 #include "trainer/portable_path.h"
 #include "trainer/rank_group.h"
 #include "trainer/run_folder.h"
@@ -74,9 +74,9 @@ int compare(Ranks& ranks, CompareFlags flags) {
     Comparison comparison;
     const std::optional<Lpips> lpips = load_lpips(flags, comparison.lpips_note);
     for (const std::string& dataset : flags.datasets) {  // bad options end it before it begins
-        const TrainFlags run = train_flags_of(flags, dataset, kernels.front(), 0);
+        const TrainRequest run = train_request_of(flags, dataset, kernels.front(), 0);
         refuse_without_cameras(run, ranks.count());
-        if (asks_for_cameras(run.effects))
+        if (effect_in_words(run.effects, "cameras").value_or(false))
             throw Error("--effects with cameras", "has no place in compare, which has one for all",
                         "Leave cameras out: darb eval measures runs that refine theirs.");
     }
@@ -134,7 +134,13 @@ void add_compare(CLI::App& app, Action& action) {
     add_compare_flags(*command, *flags);
     command->callback([flags, &action] {
         action = [flags] {
-            return with_ranks([&](Ranks& ranks) { return compare(ranks, *flags); });
+            return with_ranks([&](Ranks& ranks) {
+                try {
+                    return compare(ranks, *flags);
+                } catch (const ColmapStopped&) {
+                    return stop_exit_code();
+                }
+            });
         };
     });
 }

@@ -9,6 +9,7 @@
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_family.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
 #include "trainer/strategy.h"
 
@@ -55,7 +56,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
         ->capture_default_str()
         ->check(CLI::Range(1, 100));
     command.add_option("--max-splats", flags.max_splats, "growth stops there: equal count")
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     forward(command, flags, "-r,--resolution", "--resolution", "as in darb train");
     add_scales_flag(command, flags.scales);
     forward(command, flags, "--hold-out", "--hold-out", "as in darb train");
@@ -74,7 +75,7 @@ void add_compare_flags(CLI::App& command, CompareFlags& flags) {
                      "colours from 0 to 1 into LPIPS, as published numbers of splats have it");
     command.add_option("--blending-views", flags.blending_views, "to count and time; 0: none")
         ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
+        ->check(zero_or_more());
     command.add_option("--html", flags.html, "default OUT/compare.html");
     command.add_option("--json", flags.json, "default OUT/compare.json; - is stdout");
     command.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
@@ -103,8 +104,8 @@ std::string dataset_name(const std::string& dataset) {
     return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
-TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset, int kernel,
-                          std::uint64_t seed) {
+TrainRequest train_request_of(const CompareFlags& flags, const std::string& dataset, int kernel,
+                              std::uint64_t seed) {
     const std::string name(kernel_name(kernel)), path = dataset_path(dataset);
     const auto folder = flags.output / dataset_name(dataset) / name / fmt::format("seed{}", seed);
     std::vector<std::string> words{path, "-o", folder.string(), "--eval"};
@@ -120,9 +121,7 @@ TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset,
     if (own_images) words.push_back("--images=" + dataset.substr(path.size() + 1));
     for (const std::string& word : flags.forwarded)
         if (!own_images || !word.starts_with("--images=")) words.push_back(word);
-    TrainFlags f = parse_train_flags(std::move(words), flags.train_options, "darb compare");
-    f.run.quiet = flags.quiet;
-    return f;
+    return parse_train_flags(std::move(words), flags.train_options, "darb compare").request;
 }
 
 }  // namespace darb

@@ -46,8 +46,8 @@ std::string dataset_name(const std::string& dataset);
 
 /// The options that `darb train` would have for this run. Throws Error for --train-options that it
 /// does not know.
-TrainFlags train_flags_of(const CompareFlags& flags, const std::string& dataset, int kernel,
-                          std::uint64_t seed);
+TrainRequest train_request_of(const CompareFlags& flags, const std::string& dataset, int kernel,
+                              std::uint64_t seed);
 
 /// Files and folders that the options of the runs name.
 std::vector<std::filesystem::path> paths_in_options(const CompareFlags& flags);

@@ -58,7 +58,7 @@ void check_same_runs(Ranks& ranks, const CompareFlags& flags, const std::string&
     facts.emplace_back("runs", runs);
     facts.emplace_back("measurements", measurements);
     facts.emplace_back("settings",
-                       settings_text(train_flags_of(flags, dataset, kernels.front(), 0).train));
+                       settings_text(train_request_of(flags, dataset, kernels.front(), 0).train));
     check_same(ranks, facts);
 }
 

@@ -11,12 +11,14 @@
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/run_measurer.h"
-#include "tools/darb/train_data.h"
-#include "tools/darb/train_run.h"
+#include "tools/darb/stop_signals.h"
+#include "tools/darb/train_plan.h"
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_measure.h"
 #include "tools/paper/compare_share.h"
 #include "trainer/checkpoint.h"
+#include "trainer/job/job.h"
+#include "trainer/job/training_data.h"
 #include "trainer/run_folder.h"
 
 namespace darb {
@@ -28,13 +30,12 @@ class Comparer {
   public:
     Comparer(const CompareFlags& flags, const std::string& name, int kernel, const Lpips* lpips)
         : flags_(flags), name_(name) {
-        TrainFlags first = train_flags_of(flags, name, kernel, 0);
+        TrainRequest first = train_request_of(flags, name, kernel, 0);
         std::optional<RunLock> lock;  // while COLMAP writes
-        dataset_ = load_training_data(first, lock);
+        dataset_ = load_training_data(first, lock, {flags.quiet, &stop_on_signals()});
         print_notes(dataset_.notes);
         if (held_out().empty())
             throw Error(name, "holds no view out", "Give it more photos, or a list of test views.");
-        plan_sees_photos_ = !dataset_.points.seen_begin.empty() || dataset_.has_alpha;
         photos_ = load_photos(dataset_.views);
         measurer_.emplace(flags, dataset_path(name), dataset_, first, lpips);
     }
@@ -49,36 +50,34 @@ class Comparer {
 
   private:
     ComparedRun run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop);
-    void train(TrainFlags& f, const std::atomic<bool>& stop);
+    void train(TrainJob& job, const std::atomic<bool>& stop);
 
     const CompareFlags& flags_;
     std::string name_;
     Dataset dataset_;
-    bool plan_sees_photos_ = false;
     std::vector<ImageU8> photos_;
     std::optional<RunMeasurer> measurer_;
 };
 
-void Comparer::train(TrainFlags& f, const std::atomic<bool>& stop) {
-    if (plan_sees_photos_) f.photos = photos_;  // as the plan of `darb train` sees them
-    dataset_.start = {};                        // of the run before
-    plan_effects(dataset_, f);
-    plan_strategy(dataset_, f);
-    f.photos = photos_;
+void Comparer::train(TrainJob& job, const std::atomic<bool>& stop) {
+    job = resolve(job.request, dataset_, photos_);
+    const TrainRequest& request = job.request;
+    for (const std::string& note : job.notes) say_note("note: " + note);
+    const TrainOptions& options = job.options;
     const RunState state =
-        run_state(f.run.output, settings_text(f.train), format_camera_list(dataset_.views),
-                  f.train.iterations, held_out().size(), hold_out_text(f.data.held_out));
+        run_state(request.output, settings_text(options), format_camera_list(job.dataset.views),
+                  options.iterations, held_out().size(), hold_out_text(request.data.held_out));
     const std::string title = fmt::format("{}: {}, seed {}", dataset_name(name_),
-                                          kernel_name(f.train.kernel), f.train.seed);
+                                          kernel_name(options.kernel), options.seed);
     if (state == RunState::finished) return say_note(title + ": is there");
-    if (state == RunState::partial) f.run.resume_from = f.run.output / "checkpoint.darb";
+    if (state == RunState::partial) job.resume_from = request.output / "checkpoint.darb";
     say_note(title);
-    const RunLock lock(f.run.output);
+    const RunLock lock(request.output);
     Device device(
         command_device(flags_.device));  // of its own, so that the peak of memory is this run's
     settle_tuning(device);
-    plan_start(device, dataset_, f);
-    run_training(device, dataset_, f.train, f.run, &stop, std::move(f.photos));
+    find_start(device, job, say_stereo_begins);
+    darb::run(device, job, {.quiet = flags_.quiet, .stop = &stop});
 }
 
 std::vector<ComparedRun> Comparer::runs(const std::vector<int>& kernels, const Ranks& ranks,
@@ -92,13 +91,15 @@ std::vector<ComparedRun> Comparer::runs(const std::vector<int>& kernels, const R
 }
 
 ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool>& stop) {
-    TrainFlags f = train_flags_of(flags_, name_, kernel, seed);
+    const TrainRequest request = train_request_of(flags_, name_, kernel, seed);
     ComparedRun run;
     run.kernel = kernel_name(kernel);
     run.seed = seed;
-    run.folder = f.run.output;
+    run.folder = request.output;
+    TrainJob job{.request = request, .options = request.train};
+    job.dataset.views = dataset_.views;
     try {
-        train(f, stop);
+        train(job, stop);
         if (stop) run.failure = "interrupted; the same command goes on with it";
         if (!stop) read_run(run, flags_.iterations);
     } catch (const std::exception& e) {
@@ -108,8 +109,8 @@ ComparedRun Comparer::run(int kernel, std::uint64_t seed, const std::atomic<bool
     if (run.failure.empty())
         measurer_->measure(run);
     else
-        read_unfinished_run(run, flags_.iterations, settings_text(f.train),
-                            format_camera_list(dataset_.views));
+        read_unfinished_run(run, flags_.iterations, settings_text(job.options),
+                            format_camera_list(job.dataset.views));
     say_what_went_wrong(run);
     return run;
 }

@@ -1,117 +1,357 @@
-// darb convert IN OUT: another format, frame, kernel, degree or part of a scene.
+// darb convert IN OUT: another format, frame, kernel, degree or part of a scene, or of several.
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "engine/core/error.h"
-#include "engine/core/files.h"
 #include "engine/core/say.h"
+#include "engine/publish/fit_pictures.h"
 #include "engine/scene/gaussian_scene.h"
+#include "engine/scene/scene_name.h"
+#include "engine/scene/splat_file.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_scenes.h"
 #include "tools/darb/convert_levels.h"
+#include "tools/darb/device_options.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/page_output.h"
 #include "tools/darb/palette_device.h"
 #include "tools/darb/scene_edits.h"
 #include "tools/darb/scene_file.h"
+#include "tools/darb/slow_progress.h"
 
 namespace darb {
 
 namespace {
 
-struct ConvertFlags {
-    std::filesystem::path input, output, cameras;
-    std::string kernel, device;
-    SceneEdits edits;
+struct OutputChoices {
     EncodeOptions encode;
-    LevelFlags levels;
-    PageFlags page;
-    bool compare = false, quiet = false;
+    std::uint64_t max_bytes = 0;  // 0: as it comes
+    bool measure = true;
+    std::string device;
 };
 
+/// The device that pictures are made on, opened at the first of them.
+class PictureDevice {
+  public:
+    explicit PictureDevice(const OutputChoices& choices) : choices_(choices) {}
+    /// null where there is none, or none is wanted; says so once. One that --device names and that
+    /// is not there is an Error.
+    Device* get();
+
+  private:
+    const OutputChoices& choices_;
+    bool tried_ = false;
+    std::optional<Device> device_;
+};
+
+struct WrittenScene {
+    EncodedSplats encoded;
+    PictureFit fit;
+    std::size_t splats = 0;
+    int levels = 1;  // that fit.level was chosen from
+};
+
+class SceneOutput : public PictureOutput {
+  public:
+    SceneOutput(const std::filesystem::path& output, SplatFormat format, EncodeOptions options,
+                bool read_back)
+        : output_(output), format_(format), options_(std::move(options)), read_back_(read_back) {}
+
+    SplatModel pack(const SplatModel& splats, int level) override {
+        options_.precision = level;
+        encoded_ = encode_scene(format_, splats, output_.string(), options_);
+        splats_ = splats.size();
+        return read_back_ ? parse_splats(encoded_.file, output_.string()) : SplatModel();
+    }
+    std::size_t finish(const PictureFit&) override { return encoded_.bytes(); }
+    EncodedSplats take() { return std::move(encoded_); }
+    std::size_t splats() const { return splats_; }
+
+  private:
+    std::filesystem::path output_;
+    SplatFormat format_;
+    EncodeOptions options_;
+    bool read_back_;
+    EncodedSplats encoded_;
+    std::size_t splats_ = 0;
+};
+
+bool same_values(const SplatModel& a, const SplatModel& b) {
+    if (a.sh_degree != b.sh_degree || a.kernel != b.kernel || a.footprint != b.footprint ||
+        a.antialias != b.antialias || a.origin != b.origin)
+        return false;
+    for (int attribute = 0; attribute < kAttributeCount; ++attribute)
+        if (attribute_values(a, attribute) != attribute_values(b, attribute)) return false;
+    return true;
+}
+
+Device* PictureDevice::get() {
+    if (!choices_.measure) return nullptr;
+    if (!tried_) {
+        tried_ = true;
+        try {
+            device_.emplace(command_device(choices_.device));
+        } catch (const Error& error) {
+            if (!choices_.device.empty()) throw;
+            say("warning: the loss in dB is not measured: {}\n", error.what());
+        }
+    }
+    return device_ ? &*device_ : nullptr;
+}
+
+/// Says what of the scene is lost, chooses, checks and writes. views: of a measure. Throws Error.
+WrittenScene write_scene(const std::filesystem::path& output, SplatFormat format, SplatModel& model,
+                         const std::vector<View>& views, const OutputChoices& choices,
+                         PictureDevice& device, const WrittenFiles& files, const Paths& inputs) {
+    for (const std::string& loss : losses_of(format, model, output.string()))
+        say("warning: {}: {}\n", output.string(), loss);
+    drop_unwritable(format, model);
+    PaletteDevice palettes(choices.device);
+    EncodeOptions options = choices.encode;
+    options.assign_rows = palettes.assign_rows();
+    SlowProgress palette("palette of harmonics"), pictures("measuring");
+    options.progress = [&](double share) { palette.at(share); };
+    for (SplatModel& level : options.coarser) drop_unwritable(format, level);
+    WrittenScene written;
+    written.levels = precisions_of(format, model);
+    std::optional<PictureMeasure> measure;
+    if (written.levels > 1 && model.size() > 0 && device.get())
+        measure.emplace(*device.get(), model, views, glm::vec3(0.0f),
+                        [&](std::size_t count) { pictures.at(count, "pictures"); });
+    SceneOutput splats(output, format, std::move(options), measure.has_value());
+    written.fit = fit_pictures(model, measure ? &*measure : nullptr,
+                               {written.levels, 0, choices.max_bytes}, splats);
+    written.encoded = splats.take();
+    written.splats = splats.splats();
+    const Paths outputs = outputs_of(output, written.encoded);
+    refuse_to_overwrite_inputs(outputs, inputs, Replaces::all);
+    files.check(outputs);
+    write_encoded(output, written.encoded);
+    files.wrote(outputs);
+    return written;
+}
+
+SplatModel read_again(const WrittenScene& written, const std::filesystem::path& output) {
+    return written.encoded.beside.empty() ? parse_splats(written.encoded.file, output.string())
+                                          : load_splats(output);
+}
+
+void print_loss(std::FILE* say, const std::filesystem::path& output, const WrittenScene& written,
+                const SplatModel& scene, const std::vector<View>& views, PictureDevice& device) {
+    if (say == nullptr || scene.size() == 0) return;
+    PictureLoss loss = written.fit.loss;
+    if (loss.views == 0) {
+        const SplatModel read = read_again(written, output);
+        if (same_values(read, scene)) return tell(say, "the file has the values of the scene\n");
+        Device* const chosen = device.get();
+        if (!chosen) return tell(say, "the file against the scene: not measured\n");
+        SlowProgress pictures("measuring");
+        const PictureMeasure measure(*chosen, scene, views, glm::vec3(0.0f),
+                                     [&](std::size_t count) { pictures.at(count, "pictures"); });
+        loss = measure.compare(read);
+    }
+    tell(say, "the file against the scene: {}\n", loss_text(loss));
+}
+
+struct ConvertFlags {
+    Paths files;  // inputs and, without -o, the output
+    std::filesystem::path output, cameras;
+    std::string kernel;
+    SceneEdits edits;
+    OutputChoices choices;
+    LevelFlags levels;
+    PageFlags page;
+    bool compare = false, quiet = false, no_measure = false, force = false;
+    StoredUnits units;
+};
+
+/// Without -o the last of two names is the output.
+void sort_names(ConvertFlags& flags) {
+    if (flags.output.empty()) {
+        if (flags.files.size() < 2)
+            throw Error("convert", "names no output",
+                        "Add it, as darb convert IN.ply OUT.spz, or with -o.");
+        if (flags.files.size() > 2)
+            throw Error("convert", fmt::format("{} files and no -o", flags.files.size()),
+                        "To write several scenes as one: darb convert A.ply B.ply -o OUT.ply.");
+        flags.output = flags.files.back();
+        flags.files.pop_back();
+    }
+    std::error_code none;
+    for (std::size_t i = 0; i < flags.files.size(); ++i)
+        for (std::size_t k = 0; k < i; ++k)
+            if (std::filesystem::equivalent(flags.files[i], flags.files[k], none))
+                throw Error(flags.files[i].string(), "is named twice", "Name each scene once.");
+}
+
+SplatFormat checked_format(const ConvertFlags& flags) {
+    const std::optional<SplatFormat> format = format_to_write(flags.output);
+    if (!format && !is_page(flags.output))
+        throw Error(flags.output.string(), "names no format that can be written",
+                    "Let it end in .html, " + endings_to_write() + ".");
+    check_page_options(flags.page, flags.output);
+    if (flags.choices.encode.spz_version != EncodeOptions{}.spz_version &&
+        format != SplatFormat::spz)
+        throw Error("--spz-version", "is for files that end in .spz", "Leave it out.");
+    if (flags.choices.max_bytes > 0 && flags.levels.asked())
+        throw Error("--max-size", "and --splats, --share or --levels all say how small",
+                    "Leave out one of them.");
+    if (is_page(flags.output) && flags.levels.asked())
+        throw Error("web page", "has one level", "See --max-size.");
+    return format.value_or(SplatFormat::ply);
+}
+
+/// The cameras that are named, or some of those that the run left beside the scene, turned with it;
+/// eight around it where there are none.
 std::vector<View> views_for(const SplatModel& scene, const ConvertFlags& flags) {
-    return flags.cameras.empty() ? views_around(scene) : named_views(flags.cameras);
+    constexpr std::size_t kOfRun = 8;
+    std::vector<View> views;
+    if (!flags.cameras.empty()) {
+        views = named_views(flags.cameras);
+    } else if (flags.files.size() == 1) {
+        try {
+            const std::vector<View> all = cameras_beside(flags.files[0]);
+            const std::size_t count = std::min(kOfRun, all.size());
+            for (std::size_t i = 0; i < count; ++i) views.push_back(all[i * all.size() / count]);
+        } catch (const Error&) {  // not a list of cameras
+        }
+    }
+    edit_views(flags.edits, views);
+    return views.empty() && scene.size() > 0 ? views_around(scene) : views;
 }
 
 void print_difference(std::FILE* say, const char* what, const SplatModel& scene,
                       const SplatModel& other, const ConvertFlags& flags) {
     const std::vector<View> views = views_for(scene, flags);
     tell(say, "{}: {}\n", what,
-         difference_text(compare_scenes(scene, other, views, flags.device), views.size()));
+         difference_text(compare_scenes(scene, other, views, flags.choices.device), views.size()));
 }
 
-EncodedSplats write_scene(const std::filesystem::path& output, SplatFormat format,
-                          SplatModel& model, const Paths& inputs, const ConvertFlags& flags,
-                          std::vector<SplatModel> coarser = {}) {
-    for (const std::string& loss : losses_of(format, model, output.string()))
-        darb::say("warning: {}: {}\n", output.string(), loss);
-    drop_unwritable(format, model);
-    PaletteDevice palettes(flags.device);
-    EncodeOptions options = flags.encode;
-    options.assign_rows = palettes.assign_rows();
-    for (SplatModel& level : coarser) drop_unwritable(format, level);
-    options.coarser = std::move(coarser);
-    EncodedSplats encoded = encode_scene(format, model, output.string(), options);
-    refuse_to_overwrite_inputs(outputs_of(output, encoded), inputs);
-    write_encoded(output, encoded);
-    return encoded;
-}
-
-int convert(const ConvertFlags& flags) {
-    check_level_options(flags.levels);
-    const Paths inputs =
-        together({files_of(flags.input), files_of(flags.cameras), files_of(flags.levels.refine)});
-    refuse_to_overwrite_inputs({flags.output}, inputs);
-    const std::optional<SplatFormat> format = format_to_write(flags.output);
-    if (!format && !is_page(flags.output))
-        throw Error(flags.output.string(), "names no format that can be written",
-                    "Let it end in .html, " + endings_to_write() + ".");
-    check_page_options(flags.page, flags.output);
-    if (flags.encode.spz_version != EncodeOptions{}.spz_version && format != SplatFormat::spz)
-        throw Error("--spz-version", "is for files that end in .spz", "Leave it out.");
-    SplatModel model = load_scene(flags.input);
-    std::FILE* const say = flags.quiet ? nullptr : stream_beside(flags.output);
-    edit_scene(flags.edits, model, say);
-    if (flags.kernel == "gaussian" && model.kernel != KERNEL_GAUSSIAN) {
-        GaussianEquivalent fit{};
-        const SplatModel gaussians = as_gaussians(model, false, &fit);
-        tell(say,
-             "kernel {} to gaussian: covariance x {:.4f}, opacity x {:.4f}, profile off by "
-             "{:.2f} % (relative L2)\n",
-             kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
+void turn_to_gaussians(SplatModel& model, const ConvertFlags& flags, PictureDevice& device,
+                       std::FILE* say) {
+    if (flags.kernel != "gaussian" || model.kernel == KERNEL_GAUSSIAN) return;
+    GaussianEquivalent fit{};
+    const SplatModel gaussians = as_gaussians(model, false, &fit);
+    tell(say,
+         "kernel {} to gaussian: covariance x {:.4f}, opacity x {:.4f}, profile off by "
+         "{:.2f} % (relative L2)\n",
+         kernel_name(model.kernel), fit.covariance, fit.opacity, 100 * fit.error);
+    if (say != nullptr && device.get())
         print_difference(say, "renders of both kernels", model, gaussians, flags);
-        model = gaussians;
+    model = gaussians;
+}
+
+/// stated_up: as the file of a single scene says it; else empty.
+SplatModel load_all(const ConvertFlags& flags, PictureDevice& device, std::FILE* say,
+                    std::string& stated_up) {
+    std::vector<SplatModel> scenes;
+    for (const std::filesystem::path& file : flags.files) {
+        SplatFile facts;
+        scenes.push_back(load_scene(file, &facts, flags.units));
+        if (flags.files.size() == 1) stated_up = facts.up;
+        edit_scene(flags.edits, scenes.back(), say);
+        turn_to_gaussians(scenes.back(), flags, device, say);
     }
-    if (is_page(flags.output)) {
-        if (flags.levels.asked()) throw Error("web page", "has one level", "See --max-size.");
-        return convert_to_page(model, flags.page, flags.input, flags.cameras, flags.output,
-                               flags.device, say);
+    return scenes.size() == 1 ? std::move(scenes[0]) : join_scenes(std::move(scenes), flags.files);
+}
+
+/// The cameras that are named, else all that the run left beside the scene, as in the pages of
+/// darb train and of the viewer; turned with the scene. They say what it is looked at for.
+std::vector<View> bookmarks_for(const ConvertFlags& flags) {
+    std::vector<View> views = named_views(flags.cameras);
+    if (flags.cameras.empty() && flags.files.size() == 1) {
+        try {
+            views = cameras_beside(flags.files[0]);
+        } catch (const Error& e) {
+            say_note(fmt::format("warning: {}", e.what()));
+        }
     }
+    edit_views(flags.edits, views);
+    return views;
+}
+
+int convert_to_page(const SplatModel& model, const ConvertFlags& flags,
+                    const std::string& stated_up, const WrittenFiles& files, std::FILE* say) {
+    Device device(command_device(flags.choices.device));
+    std::vector<View> views = bookmarks_for(flags);
+    PageFlags page = flags.page;
+    page.max_bytes = flags.choices.max_bytes;
+    const bool up_given = flags.edits.up != SceneEdits{}.up;
+    if (up_given || (views.empty() && !stated_up.empty()))
+        page.up = edited_axis(flags.edits, up_given ? flags.edits.up : stated_up);
+    tell(say, "{}",
+         write_page(device, model, page, scene_name(flags.files[0]), std::move(views),
+                    flags.output));
+    files.wrote({flags.output});
+    tell_paths(say == nullptr && stream_beside(flags.output) == stdout, {flags.output});
+    return 0;
+}
+
+/// One file, or those of a folder.
+int convert_to_scene(SplatModel& model, SplatFormat format, const ConvertFlags& flags,
+                     const Paths& inputs, const WrittenFiles& files, PictureDevice& device,
+                     std::FILE* say) {
+    const std::vector<View> views = views_for(model, flags);
     if (flags.levels.asked()) {
         const auto write = [&](const std::filesystem::path& file, SplatModel& level,
                                std::vector<SplatModel> coarser) {
-            return write_scene(file, *format, level, inputs, flags, std::move(coarser));
+            OutputChoices choices = flags.choices;
+            choices.encode.coarser = std::move(coarser);
+            return write_scene(file, format, level, views, choices, device, files, inputs).encoded;
         };
-        const LevelOutput to{flags.output, *format, views_for(model, flags),
-                             flags.device, say,     write};
+        const LevelOutput to{
+            flags.output, format, views, flags.choices.device, device.get() != nullptr, say, write};
         tell_paths(flags.quiet, write_levels(flags.levels, model, to));
         return 0;
     }
-    const auto losses = losses_of(*format, model, flags.output.string());
-    const EncodedSplats encoded = write_scene(flags.output, *format, model, inputs, flags);
-    tell(say, "{}: {}, {} splats, {} bytes\n", flags.output.string(), format_name(*format),
-         model.size(), encoded.bytes());
-    // What is lost is said in dB, too.
-    if (flags.compare || (say != nullptr && model.size() > 0 && !losses.empty()))
+    const WrittenScene written =
+        write_scene(flags.output, format, model, views, flags.choices, device, files, inputs);
+    const PictureFit& fit = written.fit;
+    tell(say, "{}: {}, {} splats{}, {} bytes{}\n", flags.output.string(), format_name(format),
+         written.splats, fit.merged_from > 0 ? fmt::format(" merged from {}", fit.merged_from) : "",
+         written.encoded.bytes(),
+         written.levels > 1
+             ? fmt::format(", harmonics rounded at level {} of {}", fit.level, written.levels - 1)
+             : "");
+    if (flags.compare)
         print_difference(say, "the file against the scene", model,
-                         encoded.beside.empty() ? parse_splats(encoded.file, flags.output.string())
-                                                : load_splats(flags.output),
-                         flags);
+                         read_again(written, flags.output), flags);
+    else if (!flags.no_measure)
+        print_loss(say, flags.output, written, model, views, device);
     tell_paths(say == nullptr && stream_beside(flags.output) == stdout, {flags.output});
     return 0;
+}
+
+int convert(ConvertFlags flags) {
+    sort_names(flags);
+    check_level_options(flags.levels);
+    Paths sources;  // that decide whose an output is
+    for (const std::filesystem::path& file : flags.files) sources.push_back(file);
+    Paths inputs = together({files_of(flags.cameras), files_of(flags.levels.refine)});
+    for (const std::filesystem::path& file : flags.files)
+        inputs = together({inputs, files_of(file)});
+    refuse_to_overwrite_inputs({flags.output}, inputs, Replaces::all);
+    const SplatFormat format = checked_format(flags);
+    const WrittenFiles files(sources, flags.force);
+    const bool several = flags.levels.levels > 0 && format != SplatFormat::streamed_sog;
+    Paths first{flags.output};  // what is known to be written
+    if (several) first.clear();
+    for (int level = 1; several && level <= flags.levels.levels; ++level)
+        first.push_back(level_file(flags.output, format, level));
+    files.check(first);
+    flags.choices.measure = !flags.no_measure;
+    PictureDevice device(flags.choices);
+    std::FILE* const say = flags.quiet ? nullptr : stream_beside(flags.output);
+    std::string stated_up;
+    SplatModel model = load_all(flags, device, say, stated_up);
+    if (is_page(flags.output)) return convert_to_page(model, flags, stated_up, files, say);
+    return convert_to_scene(model, format, flags, inputs, files, device, say);
 }
 
 }  // namespace
@@ -120,28 +360,45 @@ void add_convert(CLI::App& app, Action& action) {
     auto flags = std::make_shared<ConvertFlags>();
     CLI::App* command = app.add_subcommand(
         "convert", "Write a scene in another format, frame, kernel, degree, or a part of it");
-    command->add_option("input", flags->input, "splat file, or the output folder of darb train")
+    command
+        ->add_option("files", flags->files,
+                     "IN OUT, or several scenes, which become one, and -o: splat files, or output "
+                     "folders of darb train")
         ->required();
-    command->add_option("output", flags->output, "ends in .html, " + endings_to_write())
-        ->required();
+    command->add_option("-o,--output", flags->output, "ends in .html, " + endings_to_write());
+    command->add_flag("--force", flags->force,
+                      "replace a file that darb did not write from the same scene");
     command
         ->add_option("--kernel", flags->kernel,
                      "gaussian: the nearest Gaussians; prints how far renders of both differ")
         ->check(CLI::IsMember({"gaussian"}));
     add_edit_options(*command, flags->edits);
     command
-        ->add_option("--spz-version", flags->encode.spz_version,
+        ->add_option("--spz-version", flags->choices.encode.spz_version,
                      "3: one gzip stream, which more programs read")
         ->check(CLI::IsMember({3, 4}))
         ->capture_default_str();
     add_level_options(*command, flags->levels);
+    command
+        ->add_option("--max-size", flags->choices.max_bytes,
+                     "largest size of what is written, as 10MB (1,000,000 bytes each): values are "
+                     "rounded and splats are merged to fit, and the loss is printed")
+        ->transform(CLI::AsSizeValue(true))
+        ->check(above_zero());
     add_page_options(*command, flags->page);
-    command->add_flag("--compare", flags->compare, "print how far renders of the file differ");
+    command->add_flag("--no-measure", flags->no_measure,
+                      "render nothing: the loss is not printed, and SPZ keeps all its bits");
+    command
+        ->add_flag("--compare", flags->compare,
+                   "measure the loss in all views at their whole size, not in 8 of them")
+        ->excludes("--no-measure");
     command->add_option("--cameras", flags->cameras,
-                        "cameras of the comparisons and of a web page, as darb render takes them "
-                        "(default: 8 around the scene)");
-    command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
+                        "cameras of the input, for its losses and a web page, as darb render takes "
+                        "them (default: those of the run, else 8 around the scene)");
+    command->add_option("--device", flags->choices.device,
+                        "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);
+    add_unit_options(*command, flags->units);
     command->callback([flags, &action] { action = [flags] { return convert(*flags); }; });
 }
 

@@ -7,6 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/text.h"
+#include "tools/darb/numbers.h"
 
 namespace darb {
 
@@ -19,7 +20,7 @@ constexpr int kMostLevels = 20;  // a million times fewer
 
 void add_level_options(CLI::App& app, LevelFlags& flags) {
     app.add_option("--splats", flags.splats, "merge the scene to so many splats")
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     app.add_option("--share", flags.share,
                    "merge it to this share of its splats; of --levels each to this share of the "
                    "one before (default there: 0.5)")
@@ -31,7 +32,7 @@ void add_level_options(CLI::App& app, LevelFlags& flags) {
     app.add_option("--refine", flags.refine,
                    "a data set: train the merged splats on its photos for a little while");
     app.add_option("--refine-iterations", flags.iterations, "of --refine")
-        ->check(CLI::PositiveNumber)
+        ->check(above_zero())
         ->capture_default_str();
     app.add_option("--refine-resolution", flags.data.resolution,
                    "of its photos, as -r of darb train")

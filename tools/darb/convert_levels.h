@@ -44,6 +44,7 @@ struct LevelOutput {
     SplatFormat format = SplatFormat::ply;
     std::vector<View> views;
     std::string device;
+    bool measure = true;  // false: the table has no PSNR against the scene
     std::FILE* say = stdout;
     std::function<EncodedSplats(const std::filesystem::path&, SplatModel&, std::vector<SplatModel>)>
         write;

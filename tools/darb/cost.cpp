@@ -59,7 +59,7 @@ int cost(const CostFlags& flags) {
     refuse_to_overwrite_inputs({flags.json, flags.html},
                                together({files_of(flags.scene), files_of(flags.dataset)}));
     const Extent extent = extent_of(flags);
-    const SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
+    const SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, nullptr, flags.units));
     if (model.size() == 0)
         throw Error(flags.scene, "holds no splats", "There is nothing to measure.");
     const CostViews views = views_of(flags, model, extent.views);
@@ -121,6 +121,7 @@ void add_cost(CLI::App& app, Action& action) {
     add_hold_out_flag(*command, flags->data);
     command->add_flag("-w,--white-background", flags->white_background, "white, not black");
     add_quiet_flag(*command, flags->quiet);
+    add_unit_options(*command, flags->units);
     add_kernel_flags(*command, flags->kernel,
                      "measure with this kernel in the place of the scene's");
     for (const char* option : {"--kernel", "--kernel-file"})

@@ -6,6 +6,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/ranks/ranks.h"
+#include "engine/scene/stored_units.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/tune_flags.h"
 
@@ -20,6 +21,7 @@ struct CostFlags {
     TuneFlags tune;
     KernelFlags kernel;  // in the place of the scene's
     std::string size = "640x480";
+    StoredUnits units;  // of the scene
 };
 
 /// darb cost --train DATASET

@@ -11,7 +11,9 @@
 #include "tools/darb/json_output.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
-#include "tools/darb/train_run.h"
+#include "tools/darb/train_flags.h"
+#include "tools/darb/train_plan.h"
+#include "trainer/job/job.h"
 
 namespace darb {
 
@@ -28,8 +30,9 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
         words.push_back(fmt::format("--resolution={}", flags.data.resolution));
     if (flags.data.hold_out) words.push_back("--hold-out=" + hold_out_text(flags.data.held_out));
     if (flags.white_background) words.emplace_back("--white-background");
-    TrainFlags run = parse_train_flags(words, flags.train_options, "darb cost --train");
-    if (run.train.accuracy != Accuracy{})
+    const TrainRequest request =
+        parse_train_flags(words, flags.train_options, "darb cost --train").request;
+    if (request.train.accuracy != Accuracy{})
         throw Error("--train-options " + flags.train_options,
                     "sets the accuracy, which each row of the measurement sets itself",
                     "Leave it out; the rows fast and exact are among them.");
@@ -37,19 +40,19 @@ int train_cost(Ranks& ranks, const CostFlags& flags) {
     plan.ranks = &ranks;
     plan.seeds = flags.quick ? 1 : flags.full ? 5 : 3;
     if (flags.seeds > 0) plan.seeds = flags.seeds;
-    Dataset dataset = load_dataset(run.dataset, run.data);
+    Dataset dataset = load_dataset(request.dataset, request.data);
     print_notes(dataset.notes);
     refuse_to_overwrite_inputs({flags.json, flags.html},
                                together({files_of(flags.train), files_of(dataset.views)}));
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
-    plan_effects(dataset, run);
-    plan_start(device, dataset, run);
-    plan_strategy(dataset, run);
-    say_note("effects: " + run.run.effects);
-    if (!run.start_note.empty()) say_note(run.start_note);
-    TrainCostResult result = measure_train_cost(device, dataset, run.train, plan, say_note);
+    TrainJob job = resolve(request, std::move(dataset));
+    for (const std::string& note : job.notes) say_note("note: " + note);
+    find_start(device, job, say_stereo_begins);
+    say_note("effects: " + plan_line(job.effects));
+    if (!job.start_note.empty()) say_note(job.start_note);
+    TrainCostResult result = measure_train_cost(device, job.dataset, job.options, plan, say_note);
     if (!ranks.is_first()) return 0;
     result.dataset = name_in_json(flags.json, flags.train);
     write_json(flags.json, train_cost_json(result));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -31,6 +32,7 @@ struct EvalFlags {
     std::string split = "test", device, effects = "auto";
     bool eval_exposure = false, quiet = false, light = false, align = false, white = false;
     std::vector<double> scales;  // none: as the photos are
+    StoredUnits units;
     DatasetOptions data;
     AccuracyFlags accuracy;
 };
@@ -58,7 +60,7 @@ int eval(Ranks& ranks, EvalFlags flags) {
     options.background = glm::vec3(flags.white ? 1.0f : 0.0f);
     options.fit_exposure = flags.eval_exposure;
     options.align_cameras = flags.align;
-    const SplatModel model = load_scene(flags.scene);
+    const SplatModel model = load_scene(flags.scene, nullptr, flags.units);
     note_unused_choices(flags.accuracy, model.kernel);
     Dataset dataset = load_dataset(flags.dataset, flags.data);
     take_trained_cameras(flags.scene, dataset.views);
@@ -105,6 +107,38 @@ int eval(Ranks& ranks, EvalFlags flags) {
     return 0;
 }
 
+double size_to_measure_at(const std::string& word) {
+    double size = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), size);
+    if (error != std::errc{} || end != word.data() + word.size() || !(size >= 0.01 && size <= 100))
+        throw CLI::ValidationError(
+            "--scales", fmt::format("{} is neither a number of 0.01 to 100, nor linear or "
+                                    "logarithms",
+                                    word));
+    return size;
+}
+
+// Sizes to measure at and, as in other commands, what stands in the place of scales.
+void add_scales_or_units(CLI::App& command, std::vector<double>& scales, StoredUnits& units) {
+    command
+        .add_option_function<std::vector<std::string>>(
+            "--scales",
+            [&scales, &units](const std::vector<std::string>& words) {
+                for (const std::string& word : words) {
+                    if (word == "linear" || word == "logarithms") {
+                        units.scales =
+                            word == "linear" ? StoredScales::linear : StoredScales::logarithms;
+                        continue;
+                    }
+                    scales.push_back(size_to_measure_at(word));
+                }
+            },
+            "sizes to measure at, as multiples of that of -r, with commas: 0.5,1,2,4; or, as in "
+            "darb info, linear or logarithms: what stands in the file in the place of scales")
+        ->delimiter(',')
+        ->allow_extra_args(false);
+}
+
 }  // namespace
 
 void add_eval(CLI::App& app, Action& action) {
@@ -125,7 +159,7 @@ void add_eval(CLI::App& app, Action& action) {
         ->capture_default_str();
     command->add_option("-r,--resolution", flags->data.resolution,
                         "as in training: 1, 2, 4, 8 or a width in px");
-    add_scales_flag(*command, flags->scales);
+    add_scales_or_units(*command, flags->scales, flags->units);
     add_hold_out_flag(*command, flags->data)->default_str("as the scene was trained, else every:8");
     command->add_flag("--light-share", flags->light,
                       "also the share of the light that comes from splats which fewer than three "
@@ -142,6 +176,7 @@ void add_eval(CLI::App& app, Action& action) {
         "turn and move each camera until the picture fits its photo, before measuring");
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);
+    add_unit_options(*command, flags->units, false);
     command->callback([flags, &action] {
         action = [flags] { return with_ranks([&](Ranks& ranks) { return eval(ranks, *flags); }); };
     });

@@ -23,6 +23,7 @@ struct InfoFlags {
     std::filesystem::path path, json;
     bool quiet = false;
     DatasetOptions data;
+    StoredUnits units;
 };
 
 bool is_dataset(const std::filesystem::path& path) {
@@ -36,8 +37,8 @@ int info(const InfoFlags& flags) {
     const bool dataset = is_dataset(flags.path);
     if (dataset && std::filesystem::is_regular_file(flags.json))
         refuse_to_overwrite_inputs({flags.json}, files_of(load_cameras(flags.path, flags.data)));
-    const nlohmann::json facts =
-        dataset ? dataset_info(flags.path, flags.data) : scene_info(find_scene(flags.path));
+    const nlohmann::json facts = dataset ? dataset_info(flags.path, flags.data)
+                                         : scene_info(find_scene(flags.path), flags.units);
     if (!flags.json.empty()) {
         nlohmann::json shared = facts;
         for (const char* texts : {"notes", "warnings"})
@@ -67,6 +68,7 @@ void add_info(CLI::App& app, Action& action) {
     command->add_option("-r,--resolution", flags->data.resolution,
                         "sizes as in training: 1, 2, 4, 8 or a width in px");
     add_quiet_flag(*command, flags->quiet);
+    add_unit_options(*command, flags->units);
     command->callback([flags, &action] { action = [flags] { return info(*flags); }; });
 }
 

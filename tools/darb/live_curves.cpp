@@ -2,11 +2,15 @@
 
 #include <algorithm>
 
+#include "engine/data/camera_list.h"
+#include "engine/data/point_splats.h"
+
 namespace darb {
 
 namespace {
 
 constexpr size_t kLongestCurve = 1000;
+constexpr std::size_t kPointsLookedAt = 20'000;
 constexpr float kSmoothing = 0.05f;  // of loss and PSNR, which jump from photo to photo
 
 void thin(std::vector<float>& values) {
@@ -17,12 +21,14 @@ void thin(std::vector<float>& values) {
 }  // namespace
 
 Bounds bounds_of(const Dataset& dataset) {
-    SplatModel points;
-    const std::vector<double>& p = dataset.points.position;
-    points.resize(p.size() / 3);
-    std::transform(p.begin(), p.end(), points.position.begin(),
-                   [](double v) { return static_cast<float>(v); });
-    if (points.size() > 0) return scene_bounds(points);
+    const std::size_t step = dataset.points.size() / kPointsLookedAt + 1;
+    PointCloud few;
+    for (std::size_t i = 0; i < dataset.points.size(); i += step)
+        for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) {
+            few.position.push_back(dataset.points.position[c]);
+            few.colour.push_back(dataset.points.colour[c]);
+        }
+    if (few.size() > 0) return subject_of(points_as_splats(few), cameras_of(dataset.views));
     Bounds bounds;
     for (const View& view : dataset.views)
         bounds.centre += view.camera.centre() / double(dataset.views.size());

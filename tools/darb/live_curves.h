@@ -16,7 +16,7 @@ struct LiveCurves {
     int stride = 1;               // iterations of one value of a curve
 };
 
-/// Where the sparse points are; the cameras where there are none.
+/// What the cameras look at of the sparse points; the cameras where there are none.
 Bounds bounds_of(const Dataset& dataset);
 
 }  // namespace darb

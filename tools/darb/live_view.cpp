@@ -7,6 +7,7 @@
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "tools/darb/live_window.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/view_flags.h"
 #include "viewer/display_loss.h"
@@ -51,6 +52,8 @@ double LiveView::show(const LiveStep& step) {
     try {
         s.drawer.draw(step.splats, change, s.picture);
         paused_s = wait_while_paused(step);
+    } catch (const DeviceLost&) {  // which is the run's, too
+        throw;
     } catch (const std::exception& e) {
         failure = e.what();
     }

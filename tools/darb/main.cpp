@@ -76,7 +76,6 @@ int run(int argc, char** argv) {
     std::vector<std::string> arguments = with_dashes(argc, argv);
     join_effects(arguments);
     darb::refuse_empty_values(arguments);
-    darb::refuse_no_numbers(arguments);
     CLI::App app(
         "Train, render and measure 3D splat scenes with a choice of kernel, on any Vulkan device.",
         "darb");
@@ -100,6 +99,7 @@ int run(int argc, char** argv) {
         if (e.get_exit_code() == 0) return show_help(app, e);
         throw darb::usage_error(app, e);
     }
+    darb::refuse_no_numbers(app);
     return action();
 }
 

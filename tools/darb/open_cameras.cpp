@@ -19,4 +19,17 @@ std::vector<View> open_cameras(const std::filesystem::path& path, const DatasetO
     return views;
 }
 
+std::vector<View> cameras_beside(const std::filesystem::path& scene) {
+    for (std::filesystem::path folder = std::filesystem::absolute(scene);
+         folder.has_relative_path(); folder = folder.parent_path()) {
+        if (std::filesystem::is_regular_file(folder / "cameras.json"))
+            return load_cameras(folder / "cameras.json");
+        if (folder.filename() != "point_cloud" &&
+            folder.parent_path().filename() != "point_cloud" &&
+            !std::filesystem::is_regular_file(folder))
+            break;
+    }
+    return {};
+}
+
 }  // namespace darb

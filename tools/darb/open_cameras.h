@@ -16,4 +16,7 @@ void print_notes(const std::vector<std::string>& notes);
 std::vector<View> open_cameras(const std::filesystem::path& path,
                                const DatasetOptions& options = {});
 
+/// The cameras.json that darb train left beside a scene; none where there is none. Throws Error.
+std::vector<View> cameras_beside(const std::filesystem::path& scene);
+
 }  // namespace darb

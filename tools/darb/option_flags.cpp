@@ -17,7 +17,6 @@ struct Removed {
 };
 
 constexpr Removed kRemoved[] = {
-    {"--depths,-d", "depth supervision is not part of this version", "Leave the option out."},
     {"--position-lr-falls", "is no option any more",
      "It follows from --average-from: 1 lets the rate fall for the whole run, as 3DGS does."},
     {"--final-lr-share", "is no option any more",

@@ -1,9 +1,14 @@
 #include "tools/darb/outputs.h"
 
+#include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <array>
+#include <cstring>
 #include <map>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -11,6 +16,7 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "tools/darb/scene_file.h"
+#include "tools/darb/user_folders.h"
 
 namespace darb {
 
@@ -47,6 +53,37 @@ bool describes(const fs::path& path) {
     for (const char* ending : {".bin", ".txt", ".ply"})
         if (has_extension(path, ending)) return true;
     return false;
+}
+
+bool begins_with(const std::vector<std::byte>& bytes, std::string_view text) {
+    return bytes.size() >= text.size() && std::memcmp(bytes.data(), text.data(), text.size()) == 0;
+}
+
+// Somebody's work by its first bytes, whatever its name: what it is, or "".
+std::string_view work_in(const fs::path& path) {
+    constexpr std::size_t kHead = 8;
+    std::vector<std::byte> head;
+    try {
+        head = read_file_head(path, kHead);
+    } catch (const Error&) {
+        return "";  // whoever writes to it will say why not
+    }
+    if (begins_with(head, "\x89PNG") || begins_with(head, "\xff\xd8\xff")) return "a picture";
+    for (const std::string_view scene : {"ply\n", "ply\r", "NGSP", "glTF", "PK\x03\x04"})
+        if (begins_with(head, scene)) return "a scene";
+    const bool named = has_extension(path, ".splat") || has_extension(path, ".spz") ||
+                       has_extension(path, ".ksplat");
+    return named && !head.empty() ? "a scene" : "";
+}
+
+void refuse_to_lose_work(const fs::path& output) {
+    const std::string_view work = work_in(output);
+    if (work.empty()) return;
+    const bool picture = has_extension(output, ".png") || has_extension(output, ".jpg") ||
+                         has_extension(output, ".jpeg");
+    if (work == "a picture" && picture) return;
+    throw Error(output.string(), fmt::format("is there already, and is {}", work),
+                "Name another file to write, or delete it first.");
 }
 
 void add_described(const fs::path& folder, Paths& files) {
@@ -97,7 +134,7 @@ Paths outputs_of(const fs::path& output, const EncodedSplats& encoded) {
     return outputs;
 }
 
-void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs) {
+void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs, Replaces replaces) {
     std::map<Identity, fs::path> there;  // the outputs that are
     std::map<fs::path, bool> named;
     Identity identity;
@@ -113,6 +150,123 @@ void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs) {
         if (identify(input, identity))
             if (const auto at = there.find(identity); at != there.end())
                 throw Error(at->second.string(), "is what is read", "Name another file to write.");
+    if (replaces == Replaces::all) return;
+    for (const auto& one : there) refuse_to_lose_work(one.second);
+}
+
+void refuse_to_overwrite_inputs(const Paths& outputs, const Paths& inputs) {
+    refuse_to_overwrite_inputs(outputs, inputs, Replaces::reports);
+}
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMostWritten = 10'000;  // files that are remembered, the newest
+
+std::string whole_name(const fs::path& path) {
+    std::error_code none;
+    const fs::path whole = fs::weakly_canonical(path, none);
+    return (none ? fs::absolute(path, none) : whole).lexically_normal().string();
+}
+
+/// Size and time of the last change: another program's work shows in one of them.
+bool stamp_of(const fs::path& path, std::int64_t& bytes, std::int64_t& changed_ns) {
+    struct stat facts {};
+    if (::stat(path.c_str(), &facts) != 0 || !S_ISREG(facts.st_mode)) return false;
+    bytes = facts.st_size;
+    changed_ns = std::int64_t{facts.st_mtim.tv_sec} * 1'000'000'000 + facts.st_mtim.tv_nsec;
+    return true;
+}
+
+/// The list of what was written; empty where there is none or the file is something else.
+json read_record(const fs::path& record) {
+    std::error_code none;
+    if (record.empty() || !fs::is_regular_file(record, none)) return json::array();
+    try {
+        const json whole = json::parse(read_text_file(record));
+        if (whole.is_object() && whole.contains("written") && whole["written"].is_array())
+            return whole["written"];
+    } catch (const std::exception&) {  // is rewritten
+    }
+    return json::array();
+}
+
+bool names_file(const json& entry, const std::string& file) {
+    return entry.is_object() && entry.value("file", json()) == json(file);
+}
+
+bool counts_as_output(const fs::path& path) {
+    return !path.empty() && path != "-";
+}
+
+}  // namespace
+
+WrittenFiles::WrittenFiles(const Paths& sources, bool force) : force_(force) {
+    for (const fs::path& source : sources) sources_.push_back(whole_name(source));
+    std::ranges::sort(sources_);
+    if (const fs::path folder = state_folder(); !folder.empty()) record_ = folder / "written.json";
+}
+
+bool WrittenFiles::is_ours(const json& record, const fs::path& output) const {
+    std::int64_t bytes = 0, changed_ns = 0;
+    if (!stamp_of(output, bytes, changed_ns)) return false;
+    const std::string name = whole_name(output);
+    for (const json& entry : record)
+        if (names_file(entry, name))
+            return entry.value("bytes", json()) == json(bytes) &&
+                   entry.value("changed_ns", json()) == json(changed_ns) &&
+                   (sources_.empty() || entry.value("sources", json()) == json(sources_));
+    return false;
+}
+
+void WrittenFiles::check(const Paths& outputs) const {
+    const json record = read_record(record_);
+    for (const fs::path& output : outputs) {
+        if (!counts_as_output(output)) continue;
+        std::error_code none;
+        const fs::file_status status = fs::status(output, none);
+        if (status.type() == fs::file_type::directory)
+            throw Error(output.string(), "is a folder", "Name a file to write.");
+        std::int64_t bytes = 0, changed_ns = 0;
+        if (force_ || !stamp_of(output, bytes, changed_ns) || bytes == 0 || is_ours(record, output))
+            continue;
+        throw Error(output.string(),
+                    sources_.empty()
+                        ? "is there already, and was not written by darb"
+                        : "is there already, and was not written by darb from this scene",
+                    "Name another file to write, or add --force to replace it.");
+    }
+}
+
+void WrittenFiles::wrote(const Paths& outputs) const {
+    if (record_.empty()) return;
+    json list = read_record(record_), fresh = json::array();
+    std::set<std::string> again;
+    for (const fs::path& output : outputs) {
+        std::int64_t bytes = 0, changed_ns = 0;
+        if (!counts_as_output(output) || !stamp_of(output, bytes, changed_ns)) continue;
+        const std::string name = whole_name(output);
+        again.insert(name);
+        fresh.push_back(
+            {{"file", name}, {"bytes", bytes}, {"changed_ns", changed_ns}, {"sources", sources_}});
+    }
+    const std::size_t room = kMostWritten - std::min(kMostWritten, fresh.size());
+    std::size_t skip = list.size() - std::min(list.size(), room);  // the oldest
+    json kept = json::array();
+    for (json& entry : list) {
+        if (skip > 0 && skip--) continue;
+        const json file = entry.is_object() ? entry.value("file", json()) : json();
+        if (file.is_string() && !again.contains(file.get<std::string>()))
+            kept.push_back(std::move(entry));
+    }
+    for (json& entry : fresh) kept.push_back(std::move(entry));
+    try {
+        write_file_atomic(
+            record_,
+            json{{"written", kept}}.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+    } catch (const Error&) {  // the next time darb asks
+    }
 }
 
 CLI::Option* add_quiet_flag(CLI::App& command, bool& quiet) {

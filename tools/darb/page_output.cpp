@@ -9,9 +9,10 @@
 #include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/publish/web_page.h"
-#include "tools/darb/device_options.h"
+#include "engine/scene/scene_name.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/slow_progress.h"
 
 namespace darb {
 
@@ -45,13 +46,6 @@ void add_page_options(CLI::App& command, PageFlags& flags) {
         ->capture_default_str()
         ->group(group);
     command
-        .add_option("--max-size", flags.max_bytes,
-                    "largest size of the file, as 10MB (1,000,000 bytes each): splats are merged "
-                    "to fit, and the error is printed")
-        ->transform(CLI::AsSizeValue(true))
-        ->check(CLI::PositiveNumber)
-        ->group(group);
-    command
         .add_flag("--exact", flags.exact,
                   "keep float32 values; without, they are rounded, and the error is printed")
         ->group(group);
@@ -67,7 +61,6 @@ void check_page_options(const PageFlags& flags, const std::filesystem::path& out
     const char* given = !flags.title.empty()                  ? "--title"
                         : !flags.start_camera.empty()         ? "--start-camera"
                         : flags.background != none.background ? "--background"
-                        : flags.max_bytes > 0                 ? "--max-size"
                         : flags.exact                         ? "--exact"
                                                               : nullptr;
     if (given) throw Error(given, "is an option of web pages", "Let the output end in .html.");
@@ -81,14 +74,6 @@ std::vector<View> named_views(const std::filesystem::path& cameras) {
     return views;
 }
 
-std::string title_of(const std::filesystem::path& input) {
-    const std::filesystem::path path =
-        input.has_filename() ? input : input.parent_path();  // a folder with its slash
-    const std::string name =
-        std::filesystem::is_directory(path) ? path.filename().string() : path.stem().string();
-    return name.empty() || name == "." ? "Scene" : name;
-}
-
 std::string write_page(Device& device, const SplatModel& model, const PageFlags& flags,
                        const std::string& title, std::vector<View> views,
                        const std::filesystem::path& output) {
@@ -99,6 +84,9 @@ std::string write_page(Device& device, const SplatModel& model, const PageFlags&
     options.exact = flags.exact;
     options.max_bytes = flags.max_bytes;
     options.views = std::move(views);
+    options.up = flags.up;
+    SlowProgress progress("measuring");
+    options.progress = [&](std::size_t pictures) { progress.at(pictures, "pictures"); };
     WebPageFacts facts;
     write_file_atomic(output, make_web_page(device, model, options, &facts));
     return fmt::format("{}: {}\n", printable(output.string()), web_page_text(facts));
@@ -107,17 +95,6 @@ std::string write_page(Device& device, const SplatModel& model, const PageFlags&
 std::FILE* stream_beside(const std::filesystem::path& output) {
     return std::filesystem::exists(output) && !std::filesystem::is_regular_file(output) ? stderr
                                                                                         : stdout;
-}
-
-int convert_to_page(const SplatModel& model, const PageFlags& flags,
-                    const std::filesystem::path& input, const std::filesystem::path& cameras,
-                    const std::filesystem::path& output, const std::string& device,
-                    std::FILE* say) {
-    Device chosen(command_device(device));
-    tell(say, "{}",
-         write_page(chosen, model, flags, title_of(input), named_views(cameras), output));
-    tell_paths(say == nullptr && stream_beside(output) == stdout, {output});
-    return 0;
 }
 
 }  // namespace darb

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct PageFlags {
     std::string title, start_camera, background = "black";
     std::uint64_t max_bytes = 0;
     bool exact = false;
+    std::optional<glm::dvec3> up;  // unit, world; nothing: as the views are held, else a guess
 };
 
 void add_page_options(CLI::App& command, PageFlags& flags);
@@ -37,15 +39,7 @@ std::string write_page(Device& device, const SplatModel& model, const PageFlags&
 /// Those that open_cameras finds, at least one; none where no cameras are named.
 std::vector<View> named_views(const std::filesystem::path& cameras);
 
-/// The name of a file or folder as a title.
-std::string title_of(const std::filesystem::path& path);
-
 /// Where the scene goes through a pipe, which may be stdout, all that is said goes to stderr.
 std::FILE* stream_beside(const std::filesystem::path& output);
-
-/// The same from the names of a command line, with the line printed to `say`; returns 0.
-int convert_to_page(const SplatModel& model, const PageFlags& flags,
-                    const std::filesystem::path& input, const std::filesystem::path& cameras,
-                    const std::filesystem::path& output, const std::string& device, std::FILE* say);
 
 }  // namespace darb

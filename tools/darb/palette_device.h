@@ -1,4 +1,5 @@
-// The device that makes SOG's palettes of harmonics, opened at the first of them.
+// The device that makes SOG's palettes of harmonics, opened at the first of them; the host makes
+// them where there is no device.
 #pragma once
 
 #include <memory>
@@ -15,7 +16,10 @@ class PaletteDevice {
     AssignRows assign_rows();
 
   private:
+    void open();
+
     std::string select_;
+    bool tried_ = false;
     std::unique_ptr<Device> device_;
     std::unique_ptr<DeviceClusters> clusters_;
 };

@@ -111,6 +111,7 @@ void add_plan(CLI::App& app, Action& action) {
     add_json_option(*command, flags->json);
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_quiet_flag(*command, flags->quiet);
+    add_unit_options(*command, flags->units);
     command->callback([flags, &action] { action = [flags] { return run_plan(*flags); }; });
 }
 

@@ -58,7 +58,7 @@ PlanSubject open_subject(const PlanFlags& flags) {
     refuse(!flags.kernel.kernel.empty(), "--kernel");
     refuse(!flags.kernel.files.empty(), "--kernel-file");
     refuse(flags.probe, "--probe");
-    s.model = load_scene(flags.what);
+    s.model = load_scene(flags.what, nullptr, flags.units);
     if (!flags.cameras.empty()) s.views = open_cameras(flags.cameras, flags.data);
     return s;
 }

@@ -10,6 +10,7 @@
 #include "engine/data/dataset.h"
 #include "engine/plan/effect_plan.h"
 #include "engine/scene/splat_model.h"
+#include "engine/scene/stored_units.h"
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/plan_price.h"
 #include "tools/darb/plan_probe.h"
@@ -24,6 +25,7 @@ struct PlanFlags {
     std::optional<int> sh_degree;
     KernelFlags kernel;
     DatasetOptions data;
+    StoredUnits units;  // of a scene
 };
 
 struct PlanSubject {

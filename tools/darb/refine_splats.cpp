@@ -7,8 +7,7 @@
 #include "engine/plan/effect_plan.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/open_cameras.h"
-#include "tools/darb/train_flags.h"
-#include "tools/darb/train_run.h"
+#include "trainer/job/job.h"
 #include "trainer/trainer.h"
 
 namespace darb {
@@ -18,14 +17,14 @@ namespace {
 // Of 3DGS where it ends: the splats are where they belong, and only settle.
 constexpr float kPositionRate = 1.6e-5f, kLastPositionRate = 1.6e-6f;
 
-TrainFlags refine_flags(const SplatModel& model, int iterations) {
-    TrainFlags flags;
-    TrainOptions& t = flags.train;
+TrainRequest refine_request(const SplatModel& model, int iterations) {
+    TrainRequest request;
+    TrainOptions& t = request.train;
     t.iterations = iterations;
     t.kernel = model.kernel;
     t.footprint = model.footprint;
     t.sh_degree = model.sh_degree;
-    return flags;
+    return request;
 }
 
 // After the plan of effects, which is that of a run from points.
@@ -59,12 +58,9 @@ Refiner::Refiner(const std::filesystem::path& dataset, const DatasetOptions& opt
 }
 
 SplatModel Refiner::refine(Device& device, const SplatModel& model, int iterations) const {
-    TrainFlags flags = refine_flags(model, iterations);
-    flags.photos = photos_;
-    Dataset dataset = dataset_;
-    plan_effects(dataset, flags);
-    keep_splats_as_they_are(model, flags.train);
-    Trainer trainer(device, dataset, photos_, model, flags.train);
+    TrainJob job = resolve(refine_request(model, iterations), dataset_, photos_);
+    keep_splats_as_they_are(model, job.options);
+    Trainer trainer(device, job.dataset, photos_, model, job.options);
     while (trainer.iteration() < iterations) trainer.step();
     trainer.drain();
     return trainer.model();

@@ -21,6 +21,7 @@
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/render_film.h"
@@ -49,7 +50,7 @@ int render(RenderFlags flags) {
     const EffectChoice choice = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     check_depth(flags.depth, accuracy, choice);
     if (flags.cameras.empty()) return render_film(flags, accuracy, choice);
-    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene));
+    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, nullptr, flags.units));
     note_unused_choices(flags.accuracy, model.kernel);
     std::vector<View> views = open_cameras(flags.cameras, flags.data);
     const bool is_list = !views.empty() && views[0].photo.empty();
@@ -62,6 +63,8 @@ int render(RenderFlags flags) {
     add_depth_files(flags.depth, files, outputs);
     refuse_to_overwrite_inputs(
         outputs, together({files_of(flags.scene), files_of(flags.cameras), files_of(views)}));
+    const WrittenFiles written({}, flags.force);
+    written.check(outputs);
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
@@ -87,6 +90,7 @@ int render(RenderFlags flags) {
         write_png(file, to_8bit(image));
         if (plan.on(EFFECT_DEPTH)) depths.write(file, renderer.render_depth());
     }
+    written.wrote(outputs);
     depths.print_clipped();
     std::FILE* const out = flags.quiet ? nullptr : stdout;
     tell(out, "effects: {}\n", plan_line(plan));
@@ -106,11 +110,13 @@ void add_render(CLI::App& app, Action& action) {
         ->required();
     CLI::Option* const cameras =
         command->add_option("--cameras", flags->cameras,
-                            "a cameras.json, a transforms.json, or a data set; photos are not "
-                            "needed");
+                            "a cameras.json, a transforms.json, a camera_path.json of nerfstudio, "
+                            "or a data set; photos are not needed");
     add_film_flags(*command, flags->film, cameras);
     command->add_option("-o,--output", flags->output, "folder of the frames, made where missing")
         ->required();
+    command->add_flag("--force", flags->force, "replace pictures that darb did not write")
+        ->needs(cameras);
     command->add_option("-r,--resolution", flags->data.resolution,
                         "1, 2, 4, 8: divide the cameras' size; above 8: width in px; default: as "
                         "they are, those of a data set at most 1,600 px wide");
@@ -119,7 +125,7 @@ void add_render(CLI::App& app, Action& action) {
         ->add_option("--near", flags->near_plane,
                      "nearest distance drawn, world units [0.2; without --cameras less of a small "
                      "scene]")
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     add_kernel_flags(*command, flags->kernel, "draw with it in the place of the scene's own");
     add_accuracy_flags(*command, flags->accuracy);
     add_effects_flag(*command, flags->effects);
@@ -132,10 +138,11 @@ void add_render(CLI::App& app, Action& action) {
         ->check(CLI::IsMember({"png", "npy"}));
     command->add_option("--depth-unit", flags->depth.unit, "world units of one step of a depth PNG")
         ->capture_default_str()
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     command->add_option("--device", flags->device, "number or part of a name, see `darb devices`");
     add_tune_flags(*command, flags->tune);
     add_quiet_flag(*command, flags->quiet);
+    add_unit_options(*command, flags->units);
     command->callback([flags, &action] { action = [flags] { return render(*flags); }; });
 }
 

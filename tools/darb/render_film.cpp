@@ -2,13 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/data/camera_list.h"
 #include "engine/data/metrics.h"
 #include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/pixel_size.h"
 #include "tools/darb/scene_file.h"
@@ -21,33 +26,63 @@ namespace darb {
 
 namespace {
 
-CameraPath film_path(const FilmFlags& flags, const PixelSize& size, const SplatModel& model,
-                     const std::string& stated_up) {
-    if (!flags.path.empty()) return read_camera_path(flags.path);
+constexpr const char* kUsualSize = "1280x720";
+constexpr int kUsualFps = 30;
+
+// What is given, else what the path says.
+PixelSize film_size(const FilmFlags& flags, const CameraPath& path) {
+    if (!flags.size.empty()) return parse_size(flags.size);
+    return path.width > 0 ? PixelSize{path.width, path.height} : parse_size(kUsualSize);
+}
+
+int film_fps(const FilmFlags& flags, const CameraPath& path) {
+    if (flags.fps > 0) return flags.fps;
+    return path.fps > 0 ? std::clamp(static_cast<int>(std::lround(path.fps)), 1, 240) : kUsualFps;
+}
+
+/// What the turn goes around is what these look at; those beside the scene may be unreadable.
+std::vector<Camera> cameras_of_turn(const RenderFlags& flags) {
+    if (!flags.film.around.empty()) return cameras_of(open_cameras(flags.film.around));
+    try {
+        return cameras_of(cameras_beside(flags.scene));
+    } catch (const Error& e) {
+        say("warning: {}\n", e.what());
+        return {};
+    }
+}
+
+CameraPath turn_around(const RenderFlags& render, const PixelSize& size, const SplatModel& model,
+                       const std::string& stated_up) {
+    const FilmFlags& flags = render.film;
     TurntableOptions options;
     options.seconds = flags.seconds;
-    options.fps = flags.fps;
+    options.fps = film_fps(flags, {});
     options.width = size.width;
     options.height = size.height;
-    const std::string& up = flags.up.empty() ? stated_up : flags.up;
-    options.up = up.empty() ? guess_up(model) : up_from_name(up);
+    options.cameras = cameras_of_turn(render);
+    const std::optional<glm::dvec3> held = up_of_cameras(options.cameras);
+    options.up = !flags.up.empty()    ? up_from_name(flags.up)
+                 : held               ? *held
+                 : !stated_up.empty() ? up_from_name(stated_up)
+                                      : guess_up(model);
     return turntable(model, options);
 }
 
 }  // namespace
 
 void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
-    CLI::Option* const path =
-        c.add_option("--path", flags.path,
-                     "a camera path that the viewer saved; without it and --cameras the camera "
-                     "goes once around the scene. Both make a video, too, where ffmpeg is");
+    CLI::Option* const path = c.add_option(
+        "--path", flags.path,
+        "a camera path that the viewer saved, or a camera_path.json of nerfstudio; "
+        "without it and --cameras the camera goes once around what the scene's cameras "
+        "look at. Both make a video, too, where ffmpeg is");
     path->excludes(cameras);
     c.add_option("--size", flags.size, "WIDTHxHEIGHT of a path's or a turn's frames, px")
-        ->capture_default_str()
+        ->default_str("nerfstudio's path: as it says, else 1280x720")
         ->excludes(cameras);
     c.add_option("--fps", flags.fps, "their frames a second")
         ->check(CLI::Range(1, 240))
-        ->capture_default_str()
+        ->default_str("nerfstudio's path: as it says, else 30")
         ->excludes(cameras);
     c.add_option("--seconds", flags.seconds, "of the turn")
         ->check(CLI::Range(0.1, 600.0))
@@ -55,7 +90,13 @@ void add_film_flags(CLI::App& c, FilmFlags& flags, CLI::Option* cameras) {
         ->excludes(cameras)
         ->excludes(path);
     c.add_option("--up", flags.up,
-                 "x, -x, y, -y, z or -z, of the turn (default: what the file says, else a guess)")
+                 "x, -x, y, -y, z or -z, of the turn (default: as the cameras were held, else what "
+                 "the file says, else a guess)")
+        ->excludes(cameras)
+        ->excludes(path);
+    c.add_option("--around", flags.around,
+                 "a cameras.json, a transforms.json or a data set: the turn goes around what these "
+                 "cameras look at (default: the cameras.json of the scene's run)")
         ->excludes(cameras)
         ->excludes(path);
 }
@@ -65,11 +106,14 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
         throw Error("--depth", "goes with --cameras alone", "Name the cameras, or leave it out.");
     if (flags.data.resolution != -1)
         throw Error("-r", "divides the size of cameras, and there are none", "Use --size.");
-    const PixelSize size = parse_size(flags.film.size);
+    CameraPath path;
+    if (!flags.film.path.empty()) path = read_camera_path(flags.film.path);
+    print_notes(path.notes);
+    const PixelSize size = film_size(flags.film, path);
     SplatFile facts;
-    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts));
+    SplatModel model = in_kernel(flags.kernel, load_scene(flags.scene, &facts, flags.units));
     note_unused_choices(flags.accuracy, model.kernel);
-    const CameraPath path = film_path(flags.film, size, model, facts.up);
+    if (flags.film.path.empty()) path = turn_around(flags, size, model, facts.up);
     DeviceOptions device_options = command_device(flags.device);
     Device device(device_options);
     settle_tuning(device, flags.tune);
@@ -81,7 +125,7 @@ int render_film(const RenderFlags& flags, const Accuracy& accuracy, const Effect
     apply_plan(plan, model);
     Renderer renderer(device, model, accuracy, plan.projection(), plan.huge_splat_path());
     const glm::vec3 background(flags.white_background ? 1.0f : 0.0f);
-    PathExport film(path, {flags.output, flags.film.fps, size.width, size.height, {}});
+    PathExport film(path, {flags.output, film_fps(flags.film, path), size.width, size.height, {}});
     while (!film.done())
         film.step(
             [&](const Camera& camera, const DisplaySettings&) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "engine/scene/stored_units.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/depth_file.h"
 #include "tools/darb/kernel_flags.h"
@@ -15,16 +16,16 @@
 namespace darb {
 
 struct FilmFlags {
-    std::filesystem::path path;
-    std::string size = "1280x720", up;
-    int fps = 30;
-    double seconds = 6;  // of a turn
+    std::filesystem::path path, around;
+    std::string size, up;  // size: empty where not given
+    int fps = 0;           // 0: not given
+    double seconds = 6;    // of a turn
 };
 
 struct RenderFlags {
     std::filesystem::path scene, cameras, output;
     std::string device;
-    bool white_background = false, quiet = false;
+    bool white_background = false, quiet = false, force = false;
     std::optional<float> near_plane;  // world units
     std::string effects = "auto";
     FilmFlags film;
@@ -33,6 +34,7 @@ struct RenderFlags {
     KernelFlags kernel;
     AccuracyFlags accuracy;
     TuneFlags tune;
+    StoredUnits units;
 };
 
 /// cameras: the option that they stand against.

@@ -20,7 +20,7 @@ void say_what_went_wrong(const ComparedRun& run) {
 }
 
 RunMeasurer::RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
-                         const Dataset& dataset, const TrainFlags& first, const Lpips* lpips)
+                         const Dataset& dataset, const TrainRequest& first, const Lpips* lpips)
     : flags_(flags),
       lpips_(lpips),
       off_path_(off_path_of(path, dataset.options)),

@@ -22,7 +22,7 @@ class RunMeasurer {
     /// path: of the data set. Throws Error where a photo is too small for one of flags.scales.
     /// lpips may be null.
     RunMeasurer(const CompareFlags& flags, const std::filesystem::path& path,
-                const Dataset& dataset, const TrainFlags& first, const Lpips* lpips);
+                const Dataset& dataset, const TrainRequest& first, const Lpips* lpips);
 
     // Of runs that came to their end. What fails here becomes a note and leaves the run as it is.
 

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -14,6 +15,8 @@
 #include "engine/core/files.h"
 #include "engine/core/say.h"
 #include "engine/core/text.h"
+#include "engine/data/image_io.h"
+#include "engine/data/video.h"
 #include "tools/darb/outputs.h"
 
 namespace darb {
@@ -56,6 +59,66 @@ std::optional<HoldOut> hold_out_of_run(const fs::path& scene) {
         at != start.end() && at->is_string() ? at->get<std::string>() : std::string();
     if (text.empty()) return std::nullopt;
     return while_doing(log.string(), [&] { return parse_hold_out(text); });
+}
+
+bool has_photos(const fs::path& folder) {
+    std::error_code none;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, none))
+        if (is_photo_name(entry.path()) && entry.is_regular_file(none)) return true;
+    return false;
+}
+
+bool holds_cameras(const fs::path& folder) {
+    std::error_code none;
+    for (const char* name : {"transforms.json", "transforms_train.json", "sparse", "colmap",
+                             "cameras.bin", "cameras.txt"})
+        if (fs::exists(folder / name, none)) return true;
+    return false;
+}
+
+/// What it is in place of a scene, and what to type; nothing where nobody can tell.
+struct Other {
+    std::string what, hint;
+};
+
+std::optional<Other> other_folder(const fs::path& path) {
+    std::error_code none;
+    const std::string name = printable(path.string());
+    if (fs::is_regular_file(path / "run.jsonl", none) || fs::exists(path / "run.lock", none))
+        return Other{"is the folder of a run that has not saved a scene yet",
+                     "Wait for its first save (darb train --save-iterations says when), or go on "
+                     "with it where it was stopped: darb train DATASET -o " +
+                         name + " --resume."};
+    const std::string train =
+        "Train a scene first: darb train " + name + " -o OUT. Then look at it: darb view OUT.";
+    if (holds_cameras(path))
+        return Other{"is a data set, photos with cameras, and no scene", train};
+    if (has_photos(path) || has_photos(path / "images"))
+        return Other{"is a folder of photos, and no scene", train};
+    return {};
+}
+
+std::optional<Other> other_file(const fs::path& path) {
+    std::error_code none;
+    if (!fs::is_regular_file(path, none)) return {};
+    const std::string name = printable(path.string());
+    if (is_video_name(path))
+        return Other{"is a video, and no scene",
+                     "Train a scene first: darb train " + name + " -o OUT. Then: darb view OUT."};
+    if (is_photo_name(path))
+        return Other{"is a picture, and no scene",
+                     "Name a splat file, or train a scene of a folder of photos: darb train FOLDER "
+                     "-o OUT."};
+    if (has_extension(path, ".darb"))
+        return Other{"is the checkpoint of a run, and no scene",
+                     "Name the folder of the run, which holds its scene; darb train DATASET -o OUT "
+                     "--resume goes on from the checkpoint."};
+    if (has_extension(path, ".html") || has_extension(path, ".htm"))
+        return Other{"is a web page, and no scene", "Open it in a browser."};
+    if (has_extension(path, ".json") && !names_scene_folder(path))
+        return Other{"is no scene: cameras and camera paths are .json files",
+                     "Name the scene, and cameras after --cameras, a path after --path."};
+    return {};
 }
 
 }  // namespace
@@ -105,13 +168,21 @@ fs::path scene_of_run(const fs::path& output) {
 }
 
 fs::path find_scene(const fs::path& path) {
-    if (!fs::is_directory(path) || scene_file_in(path)) return path;
+    if (!fs::is_directory(path)) {
+        if (const auto other = other_file(path))
+            throw Error(path.string(), other->what, other->hint);
+        return path;
+    }
+    if (scene_file_in(path)) return path;
     const fs::path found = scene_of_run(path);
-    if (found.empty())
+    if (found.empty()) {
+        if (const auto other = other_folder(path))
+            throw Error(path.string(), other->what, other->hint);
         throw Error(path.string(),
                     "is a folder without point_cloud/iteration_N/point_cloud.ply and without the "
                     "meta.json of a SOG scene",
                     "Name a splat file, a SOG folder, or the output folder of darb train.");
+    }
     return found;
 }
 
@@ -120,16 +191,55 @@ bool is_scene(const fs::path& path) {
     return fs::exists(path / "point_cloud") || scene_file_in(path);
 }
 
-SplatModel load_scene(const fs::path& path, SplatFile* facts) {
+SplatModel load_scene(const fs::path& path, SplatFile* facts, const StoredUnits& units) {
     const fs::path file = find_scene(path);
     SplatFile unused;
     SplatFile& said = facts ? *facts : unused;
-    SplatModel model = while_doing(file.string(), [&] { return load_splats(file, &said); });
+    SplatModel model = while_doing(file.string(), [&] { return load_splats(file, &said, units); });
     if (said.dropped > 0)
         say("warning: {}: {} splats with NaN or infinity were dropped\n", file.string(),
             said.dropped);
     for (const std::string& note : said.notes) say("warning: {}: {}\n", file.string(), note);
     return model;
+}
+
+namespace {
+
+template <class Value>
+void add_unit_option(CLI::App& command, const char* name, Value& to,
+                     const std::map<std::string, Value>& words, const char* help) {
+    std::vector<std::string> known;
+    for (const auto& word : words) known.push_back(word.first);
+    command
+        .add_option_function<std::string>(
+            name, [&to, words](const std::string& word) { to = words.at(word); }, help)
+        ->check(CLI::IsMember(known))
+        ->group("Files that store splats in another way than their format");
+}
+
+}  // namespace
+
+void add_unit_options(CLI::App& command, StoredUnits& units, bool with_scales) {
+    if (with_scales)
+        add_unit_option<StoredScales>(
+            command, "--scales", units.scales,
+            {{"linear", StoredScales::linear}, {"logarithms", StoredScales::logarithms}},
+            "what stands in the place of scales: lengths, or their logarithms");
+    add_unit_option<StoredOpacities>(
+        command, "--opacities", units.opacities,
+        {{"linear", StoredOpacities::linear}, {"bytes", StoredOpacities::bytes}},
+        "what stands in the place of logits: 0 to 1, or 0 to 255");
+    add_unit_option<StoredColours>(command, "--colours", units.colours,
+                                   {{"rgb", StoredColours::rgb}, {"bytes", StoredColours::bytes}},
+                                   "what stands in the place of f_dc: red, green and blue, 0 to 1 "
+                                   "or 0 to 255");
+    add_unit_option<StoredRotations>(command, "--rotations", units.rotations,
+                                     {{"xyzw", StoredRotations::xyzw}},
+                                     "the last of the four numbers of a rotation comes first");
+    add_unit_option<StoredOrder>(command, "--harmonics", units.harmonics,
+                                 {{"swapped", StoredOrder::swapped}},
+                                 "f_rest: the channels of a coefficient side by side; in formats "
+                                 "that have them so, those of a channel");
 }
 
 }  // namespace darb

@@ -107,9 +107,9 @@ void add_warnings(json& info) {
 
 }  // namespace
 
-json scene_info(const std::filesystem::path& path) {
+json scene_info(const std::filesystem::path& path, const StoredUnits& units) {
     SplatFile file;
-    const SplatModel model = load_splats(path, &file);
+    const SplatModel model = load_splats(path, &file, units);
     json info = {{"path", path.string()},
                  {"format", format_name(file.format)},
                  {"version", file.version == 0 ? json() : json(file.version)},

@@ -12,6 +12,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
 #include "tools/paper/study1d.h"
 
@@ -101,15 +102,15 @@ void add_sim1d(CLI::App& app, Action& action) {
         ->check(CLI::Range(16, 1'000'000));
     command->add_option("--lr", study.fit.learning_rate, "of Adam")
         ->capture_default_str()
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     command
         ->add_option("--target", study.target_share,
                      "loss whose time is reported, as a share of the signal's mean square")
         ->capture_default_str()
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     command->add_option("--threads", study.threads, "0: one per core")
         ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
+        ->check(zero_or_more());
     add_json_option(*command, flags->json);
     command->add_option("--html", flags->html, "write a page with plots to this file");
     add_quiet_flag(*command, flags->quiet);

@@ -2,30 +2,36 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/data/run_colmap.h"
 #include "engine/ranks/ranks.h"
+#include "engine/scene/scene_name.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/page_output.h"
 #include "tools/darb/rank_tuning.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/train_blocks.h"
-#include "tools/darb/train_data.h"
 #include "tools/darb/train_flags.h"
 #include "tools/darb/train_plan.h"
-#include "tools/darb/train_recall.h"
-#include "tools/darb/train_run.h"
 #include "tools/darb/train_summary.h"
 #include "tools/darb/tune_flags.h"
+#include "trainer/job/job.h"
+#include "trainer/job/training_data.h"
 #include "trainer/run_folder.h"
 #include "trainer/start_memory.h"
 
@@ -35,27 +41,27 @@ namespace {
 
 // The scene as a web page, with the photos' cameras as its bookmarks; of a run that was finished
 // before, where there is none yet.
-void leave_page(Device& device, const Dataset& dataset, const TrainFlags& flags,
-                const RunSummary& summary) {
-    const std::filesystem::path file = flags.run.output / "scene.html";
-    const bool trained = !summary.model.empty();
-    if (!flags.page || summary.interrupted || (!trained && std::filesystem::exists(file))) return;
+void leave_page(Device& device, const TrainJob& job, const TrainResult& result) {
+    const TrainRequest& request = job.request;
+    const std::filesystem::path file = request.output / "scene.html";
+    const bool trained = !result.model.empty();
+    if (!request.page || result.interrupted || (!trained && std::filesystem::exists(file))) return;
     PageFlags page;
-    if (flags.train.white_background) page.background = "white";
-    const SplatModel scene = load_scene(trained ? summary.model : scene_of_run(flags.run.output));
-    write_or_let_go("page     " + write_page(device, scene, page, title_of(flags.run.output),
-                                             dataset.views, file));
+    if (request.train.white_background) page.background = "white";
+    const SplatModel scene = load_scene(trained ? result.model : scene_of_run(request.output));
+    write_or_let_go("page     " + write_page(device, scene, page, scene_name(request.output),
+                                             job.dataset.views, file));
 }
 
-void refuse_stereo(const Dataset& dataset, const TrainFlags& flags, int ranks) {
-    if (ranks == 1 || !starts_from_stereo(dataset, flags)) return;
-    const bool asked = flags.train.start == StartPoints::dense;
+void refuse_stereo(const TrainJob& job, int ranks) {
+    if (ranks == 1 || !starts_from_stereo(job)) return;
+    const bool asked = job.options.start == StartPoints::dense;
     throw Error(
-        asked ? "--start dense" : dataset.root.string(),
+        asked ? "--start dense" : job.dataset.root.string(),
         fmt::format("{} begun by {} ranks: each device may find other points",
                     asked ? "is not" : "has no points, and stereo in their place is not", ranks),
         fmt::format("Begin on one rank; several go on with --resume, or use --start {}.",
-                    dataset.points.size() > 0 ? "points" : "random"));
+                    job.dataset.points.size() > 0 ? "points" : "random"));
 }
 
 // Whatever takes a folder or a window for itself.
@@ -64,57 +70,82 @@ void check_for_ranks(const Ranks& ranks, const TrainFlags& flags) {
     if (flags.view)
         throw Error("--view", fmt::format("has no place in a run of {} ranks", ranks.count()),
                     "Leave it out; darb view opens what the run saves.");
-    refuse_without_cameras(flags, ranks.count());
+    refuse_without_cameras(flags.request, ranks.count());
 }
 
-int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, std::vector<std::string> arguments) {
-    const bool recalled = flags.resume && flags.dataset.empty() && !flags.run.output.empty();
-    if (recalled) recall_arguments(arguments, flags, tune);
-    if (!flags.blocks.empty()) check_for_blocks(flags);
-    finish_train_flags(flags);
-    if (flags.dataset.empty())
-        throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
-    if (!flags.blocks.empty())
-        return train_blocks(ranks, flags, tune,
-                            recalled ? "" : command_text(std::move(arguments), flags));
-    check_for_ranks(ranks, flags);
-    flags.run.ranks = {&ranks, flags.allow_mixed};
+// `darb train --resume -o OUT` alone goes on with the request of the run. What was typed beside it
+// says where and how it shows, not what it trains.
+void recall_request(const std::vector<std::string>& typed, TrainRequest& request) {
+    constexpr std::array<std::string_view, 12> kBeside{
+        "--resume", "-o",      "-m",     "--output", "--model-path", "--device",
+        "-q",       "--quiet", "--view", "--tune",   "--retune",     "--verbose"};
+    for (const std::string& word : typed) {
+        const std::string_view name = std::string_view(word).substr(0, word.find('='));
+        if (name.starts_with('-') &&
+            std::find(kBeside.begin(), kBeside.end(), name) == kBeside.end())
+            throw Error(word, "is not taken beside --resume without the data set",
+                        "Repeat the whole command with --resume.");
+    }
+    TrainRequest recalled = read_request(request.output);
+    if (!std::filesystem::exists(recalled.dataset))
+        throw Error(
+            recalled.dataset,
+            fmt::format("does not exist, and the run in {} trains on it", request.output.string()),
+            "Move it back, or repeat the whole command of the run with the place where its "
+            "photos are now, and --resume.");
+    if (!request.device.empty()) recalled.device = request.device;
+    if (!request.tune.empty()) recalled.tune = request.tune;
+    request = std::move(recalled);
+}
 
-    DeviceOptions device_options = command_device(flags.device);
+int train(Ranks& ranks, TrainFlags flags, TuneFlags tune, const std::vector<std::string>& typed) {
+    TrainRequest& request = flags.request;
+    request.tune = tune.choice;
+    const bool recalled = request.resume && request.dataset.empty() && !request.output.empty();
+    if (recalled)
+        recall_request(typed, request);
+    else
+        finish_train_flags(flags);
+    tune.choice = request.tune;
+    if (request.dataset.empty())
+        throw Error("darb train", "no data set", "Name a folder: darb train DATASET -o OUT.");
+    if (!request.blocks.empty()) return train_blocks(ranks, flags, tune);
+    check_for_ranks(ranks, flags);
+
+    DeviceOptions device_options = command_device(request.device);
     const LiveSystem live(flags.view, device_options);
     Device device(device_options);
     settle_tuning(device, tune);
-    take_tuning_of_first(ranks, device, flags.allow_mixed || !tune.choice.empty());
+    take_tuning_of_first(ranks, device, request.allow_mixed || !tune.choice.empty());
     std::optional<RunLock> lock;
-    Dataset dataset = load_training_data(flags, lock);
-    refuse_stereo(dataset, flags, ranks.count());
+    Dataset dataset = load_training_data(request, lock, {flags.quiet, &stop_on_signals()});
     if (ranks.is_first()) {
-        check_run_folder(flags.run.output, dataset);
-        if (!lock) lock.emplace(flags.run.output);
+        check_run_folder(request.output, dataset);
+        if (!lock) lock.emplace(request.output);
     }
-    plan_effects(dataset, flags);
-    plan_start(device, dataset, flags);
-    plan_strategy(dataset, flags);
+    TrainJob job = resolve(request, std::move(dataset));
+    refuse_stereo(job, ranks.count());
+    for (const std::string& note : job.notes) say_note("note: " + note);
+    find_start(device, job, say_stereo_begins);
     std::atomic<bool>& stop = stop_on_signals();
+    JobSinks sinks{.quiet = flags.quiet, .stop = &stop, .ranks = {&ranks, request.allow_mixed}};
     if (!ranks.is_first()) {
-        run_training(device, dataset, flags.train, flags.run, &stop, std::move(flags.photos));
+        run(device, job, sinks);
         return 0;
     }
-    if (!recalled) flags.run.command = command_text(std::move(arguments), flags);
-    if (flags.run.resume_from.empty())  // before the forecast, which makes them
-        check_start_memory(device, dataset, flags.train);
-    print_plan(device, dataset, flags);
+    if (job.resume_from.empty())  // before the forecast, which makes them
+        check_start_memory(device, job.dataset, job.options);
+    print_plan(device, job, flags);
     const std::unique_ptr<LiveView> view =
-        live.open(device, dataset, stop, flags.train.white_background);
-    if (view) flags.run.on_step = [&](const LiveStep& step) { return view->show(step); };
-    const RunSummary summary =
-        run_training(device, dataset, flags.train, flags.run, &stop, std::move(flags.photos));
-    if (!write_or_let_go(summary_text(summary, flags)))
+        live.open(device, job.dataset, stop, request.train.white_background);
+    if (view) sinks.on_step = [&](const LiveStep& step) { return view->show(step); };
+    const TrainResult result = run(device, job, sinks);
+    if (!write_or_let_go(summary_text(result, flags, sinks.ranks)))
         throw Error("standard output", std::string("cannot be written: ") + std::strerror(errno),
                     "The run is complete: its folder holds everything.");
-    leave_page(device, dataset, flags, summary);
-    if (view) view->finish(summary.model);
-    return summary.interrupted ? stop_exit_code() : 0;
+    leave_page(device, job, result);
+    if (view) view->finish(result.model);
+    return result.interrupted ? stop_exit_code() : 0;
 }
 
 }  // namespace
@@ -127,7 +158,13 @@ void add_train(CLI::App& app, Action& action, const std::vector<std::string>& ar
     add_tune_flags(*command, *tune);
     command->callback([flags, tune, arguments, &action] {
         action = [flags, tune, arguments] {
-            return with_ranks([&](Ranks& ranks) { return train(ranks, *flags, *tune, arguments); });
+            return with_ranks([&](Ranks& ranks) {
+                try {
+                    return train(ranks, *flags, *tune, arguments);
+                } catch (const ColmapStopped&) {
+                    return stop_exit_code();
+                }
+            });
         };
     });
 }

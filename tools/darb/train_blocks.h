@@ -14,11 +14,8 @@ namespace darb {
 /// "auto" as 0 x 0, else columns x rows. Throws Error for anything else.
 Grid parse_blocks(const std::string& text);
 
-/// Throws Error where an option was given that has no place beside --blocks. Before
-/// finish_train_flags, which fills in the lists of iterations.
-void check_for_blocks(const TrainFlags& flags);
-
-/// The run; command: of command.json. Returns the exit code.
-int train_blocks(Ranks& ranks, TrainFlags flags, const TuneFlags& tune, std::string command);
+/// The run. Throws Error where an option was given that has no place beside --blocks. Returns the
+/// exit code.
+int train_blocks(Ranks& ranks, const TrainFlags& flags, const TuneFlags& tune);
 
 }  // namespace darb

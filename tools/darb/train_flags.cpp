@@ -7,6 +7,7 @@
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/help.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
 #include "trainer/strategy.h"
 
@@ -23,13 +24,7 @@ const std::map<std::string, StartPoints> kStarts = {{"auto", StartPoints::automa
 void add_schedule_flag(CLI::App& command, TrainFlags& f) {
     command
         .add_option_function<std::string>(
-            "--schedule",
-            [&f](const std::string& schedule) {
-                f.schedule = schedule;
-                if (schedule != "3dgs") return;
-                use_3dgs_schedule(f.train);
-                f.schedule_effects = "+sh,-exposure,-antialias";
-            },
+            "--schedule", [&f](const std::string& schedule) { use_schedule(f.request, schedule); },
             "3dgs: its rates, limits, resets and background, no regularisers, harmonics by the "
             "iteration, whole photos, in runs of any length; options that are given beside it "
             "count")
@@ -53,7 +48,7 @@ void add_scene_flags(CLI::App& command, TrainFlags& f) {
         ->capture_default_str()
         ->group(option_group::kScene);
     command
-        .add_option("--start", f.train.start,
+        .add_option("--start", f.request.train.start,
                     "what splats start from; dense: surfaces that stereo between the photos finds; "
                     "auto: points of the data set, else dense, else random")
         ->transform(CLI::CheckedTransformer(kStarts, CLI::ignore_case).description(""))
@@ -62,10 +57,16 @@ void add_scene_flags(CLI::App& command, TrainFlags& f) {
         ->group(option_group::kStart);
     add_effects_flag(command, f.effects);
     command.get_option("--effects")->group(option_group::kScene);
-    command.add_flag("--antialiasing", f.antialiasing, "as --effects +antialias")
+    command.add_flag("--antialiasing", f.request.antialiasing, "as --effects +antialias")
         ->group(option_group::kEffects);
     command
-        .add_option("--refine-cameras", f.refine_cameras,
+        .add_option("-d,--depths", f.depths,
+                    "as --effects +depth; FOLDER: of the measured depths, depths or depth in the "
+                    "data set")
+        ->type_name("FOLDER")
+        ->group(option_group::kEffects);
+    command
+        .add_option("--refine-cameras", f.request.refine_cameras,
                     "train poses and intrinsics beside the splats, as --effects +cameras; auto: as "
                     "the plan says, off")
         ->check(CLI::IsMember({"auto", "on", "off"}))
@@ -78,27 +79,29 @@ void add_scene_flags(CLI::App& command, TrainFlags& f) {
         ->check(CLI::Range(1, KERNEL_MAX_PULSES))
         ->group(help_group::kAccuracy);
     add_accuracy_flags(command, f.accuracy, true);
-    command.add_option("--blocks", f.blocks, "train a scene too large for the memory in parts")
+    command
+        .add_option("--blocks", f.request.blocks, "train a scene too large for the memory in parts")
         ->type_name("TEXT:{auto,NxM}")
         ->group(option_group::kScene);
 }
 
 void add_run_flags(CLI::App& command, TrainFlags& f) {
     command
-        .add_flag("--resume", f.resume,
+        .add_flag("--resume", f.request.resume,
                   "go on from OUT/checkpoint.darb; `darb train --resume -o OUT` is enough")
         ->group(option_group::kRun);
     command.add_flag("--view", f.view, "follow the run in a window; closing it goes on training")
         ->group(option_group::kRun);
     command
-        .add_flag("--allow-mixed", f.allow_mixed,
+        .add_flag("--allow-mixed", f.request.allow_mixed,
                   "ranks of mpirun may have other devices and drivers; the result then depends on "
                   "which")
         ->group(help_group::kDevice);
-    add_quiet_flag(command, f.run.quiet)->group(option_group::kRun);
+    add_quiet_flag(command, f.quiet)->group(option_group::kRun);
     command.add_flag("--verbose", f.verbose, "print the time of each pass at the end")
         ->group(help_group::kDevice);
-    command.add_option("--device", f.device, "number or part of a name, see `darb devices`")
+    command
+        .add_option("--device", f.request.device, "number or part of a name, see `darb devices`")
         ->group(option_group::kRun);
     command.add_flag("--deterministic", f.deterministic)->group("");
 }
@@ -106,27 +109,28 @@ void add_run_flags(CLI::App& command, TrainFlags& f) {
 void add_saving_flags(CLI::App& command, TrainFlags& f) {
     const auto at_least_one = CLI::Range(1, 1'000'000'000);
     for (const auto& [name, list, help] :
-         {std::tuple{"--test-iterations", &f.run.test_iterations,
+         {std::tuple{"--test-iterations", &f.request.test_iterations,
                      "evaluate after these (default 7000 30000 and the last)"},
-          {"--save-iterations", &f.run.save_iterations,
+          {"--save-iterations", &f.request.save_iterations,
            "write a PLY after these (default 7000 30000 and the last)"},
-          {"--checkpoint-iterations", &f.run.checkpoint_iterations,
+          {"--checkpoint-iterations", &f.request.checkpoint_iterations,
            "keep a checkpoint of its own after these"}})
         command.add_option(name, *list, help)->check(at_least_one)->group(help_group::kSaving);
     command
-        .add_option("--checkpoint-interval", f.run.checkpoint_interval,
+        .add_option("--checkpoint-interval", f.request.checkpoint_interval,
                     "refresh checkpoint.darb every so many iterations; 0: at the end only")
         ->capture_default_str()
-        ->check(CLI::NonNegativeNumber)
-        ->group(help_group::kSaving);
-    command.add_option("--start-checkpoint", f.start_checkpoint, "go on from this checkpoint")
+        ->check(zero_or_more())
         ->group(help_group::kSaving);
     command
-        .add_flag("--report,!--no-report", f.run.report,
+        .add_option("--start-checkpoint", f.request.start_checkpoint, "go on from this checkpoint")
+        ->group(help_group::kSaving);
+    command
+        .add_flag("--report,!--no-report", f.request.report,
                   "write OUT/report.html at the end (default): curves, time by pass, pictures")
         ->group(help_group::kSaving);
     command
-        .add_flag("--html", f.page,
+        .add_flag("--html", f.request.page,
                   "write OUT/scene.html at the end: a web page that shows the scene")
         ->group(help_group::kSaving);
 }
@@ -138,7 +142,7 @@ void add_train_flags(CLI::App& command, TrainFlags& f) {
     add_data_flags(command, f);
     add_run_flags(command, f);
     add_scene_flags(command, f);
-    add_option_rows(command, f.train, f.of_strategies);
+    add_option_rows(command, f.request.train, f.of_strategies);
     add_saving_flags(command, f);
     add_removed_options(command);
     command.parse_complete_callback([&command, &f] {

@@ -9,6 +9,7 @@
 #include "engine/core/say.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/open_cameras.h"
+#include "tools/darb/outputs.h"
 #include "tools/darb/train_presets.h"
 #include "trainer/forecast.h"
 #include "trainer/progress.h"
@@ -78,7 +79,8 @@ std::string memory_text(const Device& device, const Forecast& f) {
                        where);
 }
 
-void print_advice(const Device& device, const Dataset& dataset, const Forecast& f) {
+// Quiet runs are warned, too.
+void print_advice(const Device& device, const Dataset& dataset, const Forecast& f, bool quiet) {
     const std::uint64_t budget = usable_bytes(device.info());
     const bool too_large = plan_memory(device, f.peak).total() > budget;
     if (!too_large && f.seconds < kLongSeconds) return;
@@ -92,20 +94,22 @@ void print_advice(const Device& device, const Dataset& dataset, const Forecast& 
     if (too_large)
         say("warning: more than the {} of this device allow.{}\n",
             format_bytes(static_cast<double>(device.info().heap_bytes)), advice);
-    else if (!advice.empty())
+    else if (!advice.empty() && !quiet)
         say("hint:{}\n", advice);
 }
 
-void print_forecast(const Device& device, const Dataset& dataset, TrainFlags& flags) {
-    DeviceOptions options = command_device(flags.device);
+void print_forecast(const Device& device, TrainJob& job, const TrainFlags& flags) {
+    const Dataset& dataset = job.dataset;
+    DeviceOptions options = command_device(job.request.device);
     Device scratch(options);
     scratch.set_tuning(device.tuning());
     const Forecast f =
-        forecast_training(scratch, dataset, flags.train, flags.train.iterations >= kShortRun);
-    say("forecast: {}; {}\n", time_text(f, flags.train), memory_text(device, f));
-    print_advice(device, dataset, f);
-    print_presets(scratch, dataset, flags, f);
-    flags.run.pace = pace_of(f);
+        forecast_training(scratch, dataset, job.options, job.options.iterations >= kShortRun);
+    const bool quiet = flags.quiet;
+    if (!quiet) say("forecast: {}; {}\n", time_text(f, job.options), memory_text(device, f));
+    print_advice(device, dataset, f, quiet);
+    if (!quiet) print_presets(scratch, job, flags, f);
+    job.pace = pace_of(f);
 }
 
 void print_growth(const TrainOptions& options) {
@@ -118,24 +122,32 @@ void print_growth(const TrainOptions& options) {
             schedule.rounds.end, schedule.rounds.begin);
 }
 
-}  // namespace
-
-void print_plan(Device& device, const Dataset& dataset, TrainFlags& flags) {
-    if (flags.run.quiet) return;
-    size_t held_out = 0;
-    for (const View& v : dataset.views) held_out += v.is_test ? 1 : 0;
+void print_scene(const Device& device, const TrainJob& job, std::size_t held_out) {
+    const Dataset& dataset = job.dataset;
     say("{}: {}, {} photos to train on, {} held out, {} points\n", dataset.root.string(),
         dataset.source, dataset.views.size() - held_out, held_out, dataset.points.size());
     print_notes(dataset.notes);
     say("device: {}\n", device.description());
-    say("effects: {}\n", flags.run.effects);
-    if (!flags.cameras_note.empty()) say("{}\n", flags.cameras_note);
-    if (!flags.start_note.empty()) say("{}\n", flags.start_note);
-    if (!flags.strategy_note.empty()) say("{}\n", flags.strategy_note);
-    print_growth(flags.train);
+    say("effects: {}\n", plan_line(job.effects));
+    for (const std::string& note : {job.cameras_note, job.start_note, job.strategy_note})
+        if (!note.empty()) say("{}\n", note);
+    print_growth(job.options);
+}
+
+}  // namespace
+
+void say_stereo_begins() {
+    say_note("start: stereo between the photos, about a second of a core for each");
+}
+
+void print_plan(Device& device, TrainJob& job, const TrainFlags& flags) {
+    const Dataset& dataset = job.dataset;
+    const auto held_out =
+        static_cast<std::size_t>(std::ranges::count_if(dataset.views, &View::is_test));
+    if (!flags.quiet) print_scene(device, job, held_out);
     // A resumed run knows better: its progress shows the time left.
-    if (flags.run.resume_from.empty() && held_out < dataset.views.size())
-        print_forecast(device, dataset, flags);
+    if (job.resume_from.empty() && held_out < dataset.views.size())
+        print_forecast(device, job, flags);
 }
 
 }  // namespace darb

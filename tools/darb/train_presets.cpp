@@ -34,19 +34,21 @@ std::string typed(const std::string& word) {
 
 }  // namespace
 
-void print_presets(Device& scratch, const Dataset& dataset, const TrainFlags& flags,
+void print_presets(Device& scratch, const TrainJob& job, const TrainFlags& flags,
                    const Forecast& chosen) {
     if (flags.length_given || chosen.seconds <= 0) return;
-    const std::string_view own = flags.preset.empty() ? kRunPresets.back().name : flags.preset;
+    const std::string_view own =
+        flags.request.preset.empty() ? kRunPresets.back().name : flags.request.preset;
     std::string line, instead;
     for (const RunPreset& preset : kRunPresets) {
         double seconds = chosen.seconds;
         if (preset.name != own) {
-            TrainOptions options = flags.train;
+            TrainOptions options = job.options;
             options.iterations = preset.iterations;
             seconds =
                 forecast_training(
-                    scratch, flags.width_given ? dataset : at_width(dataset, preset.width), options)
+                    scratch, flags.width_given ? job.dataset : at_width(job.dataset, preset.width),
+                    options)
                     .seconds;
         }
         line += fmt::format("{}{} ({}; {} iterations{}) {}", line.empty() ? "" : ", ", preset.name,
@@ -54,11 +56,12 @@ void print_presets(Device& scratch, const Dataset& dataset, const TrainFlags& fl
                             flags.width_given ? "" : fmt::format(" at {} px", preset.width),
                             time_of(seconds));
         if (preset.name == own) break;  // those above take longer still, and longer to measure
-        instead += fmt::format("\n  darb train {} -o {} --preset {}    {}", typed(flags.dataset),
-                               typed(flags.run.output.string()), preset.name, time_of(seconds));
+        instead +=
+            fmt::format("\n  darb train {} -o {} --preset {}    {}", typed(job.request.dataset),
+                        typed(job.request.output.string()), preset.name, time_of(seconds));
     }
     say("presets: {}\n", line);
-    if (flags.preset.empty() && chosen.seconds > kSlowSeconds && !instead.empty())
+    if (flags.request.preset.empty() && chosen.seconds > kSlowSeconds && !instead.empty())
         say("This takes {} here. Quicker, after Ctrl-C:{}\n", time_of(chosen.seconds), instead);
 }
 

@@ -30,7 +30,7 @@ std::string passes_text(std::vector<ReportPass> passes) {
 }
 
 // What several ranks cost: of this part of a run that was resumed.
-std::string ranks_text(const RankGroup& ranks, const RunSummary& summary) {
+std::string ranks_text(const RankGroup& ranks, const TrainResult& summary) {
     if (!ranks.several() || summary.trained_steps == 0) return "";
     const double steps = summary.trained_steps;
     return fmt::format(
@@ -41,8 +41,9 @@ std::string ranks_text(const RankGroup& ranks, const RunSummary& summary) {
 
 }  // namespace
 
-std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
-    const bool quiet = flags.run.quiet;
+std::string summary_text(const TrainResult& summary, const TrainFlags& flags,
+                         const RankGroup& ranks) {
+    const bool quiet = flags.quiet;
     std::string text;
     if (!quiet)
         text = fmt::format("{} iterations in {:.1f} s\n", summary.iteration, summary.seconds);
@@ -51,7 +52,7 @@ std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
         text += fmt::format("held-out PSNR {:.2f} dB, SSIM {:.4f}, {} splats\n", e.psnr_db, e.ssim,
                             e.splats);
     }
-    if (!quiet) text += ranks_text(flags.run.ranks, summary);
+    if (!quiet) text += ranks_text(ranks, summary);
     if (!quiet && flags.verbose) text += passes_text(summary.passes);
     const auto written = [&](const char* what, const std::filesystem::path& path) {
         if (path.empty()) return;
@@ -63,7 +64,7 @@ std::string summary_text(const RunSummary& summary, const TrainFlags& flags) {
     if (summary.interrupted)
         text += fmt::format("interrupted{}{}; go on with: darb train --resume -o '{}'\n",
                             stop_exit_code() == 0 ? "" : " by ", stop_name(),
-                            flags.run.output.string());
+                            flags.request.output.string());
     return printable(text, true);
 }
 

@@ -9,6 +9,7 @@
 namespace darb {
 
 /// Of a quiet run the paths, and what goes on with one that was interrupted.
-std::string summary_text(const RunSummary& summary, const TrainFlags& flags);
+std::string summary_text(const TrainResult& summary, const TrainFlags& flags,
+                         const RankGroup& ranks);
 
 }  // namespace darb

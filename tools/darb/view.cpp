@@ -12,6 +12,7 @@
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"
+#include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/user_folders.h"
@@ -58,6 +59,7 @@ int without_window(const ViewFlags& flags, const ViewerOptions& options, const P
         viewer.compose();
         viewer.canvas().submit_and_wait();
         write_screenshot(flags.screenshot, viewer.canvas().read_back());
+        WrittenFiles({}, flags.force).wrote({flags.screenshot});
         tell("{}\n", flags.screenshot.string());
     }
     if (!flags.frames.empty()) {
@@ -84,6 +86,7 @@ int view(ViewFlags flags) {
     options.up = flags.up;
     options.gui_scale = flags.gui_scale;
     options.quiet = flags.quiet;
+    options.units = flags.units;
     options.accuracy = chosen_accuracy(flags.accuracy);
     options.effects = choose_effects(flags.effects, EffectUse::pictures, flags.data);
     if (!flags.up.empty()) up_from_name(flags.up);
@@ -91,9 +94,12 @@ int view(ViewFlags flags) {
         {flags.screenshot, flags.times},
         together({files_of(flags.scene), files_of(flags.cameras), files_of(flags.path)}));
     refuse_other_pictures(flags.screenshot);
+    if (!flags.scene.empty())
+        find_scene(flags.scene);  // says what is no scene before a window opens
     std::string note;
     options.views = find_views(flags, note);
     refuse_to_overwrite_inputs({flags.screenshot, flags.times}, files_of(options.views));
+    WrittenFiles({}, flags.force).check({flags.screenshot});
     refuse_frames_among_photos(flags.frames, options.views);
     if (!note.empty()) say("warning: {}\n", note);
     options.resolve = find_scene;

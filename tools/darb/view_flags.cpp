@@ -5,29 +5,18 @@
 #include <algorithm>
 
 #include "engine/core/error.h"
-#include "engine/data/camera_list.h"
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/kernel_flags.h"
+#include "tools/darb/numbers.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
+#include "tools/darb/scene_file.h"
 
 namespace darb {
 
 namespace fs = std::filesystem;
-
-std::vector<View> cameras_beside(const fs::path& scene) {
-    for (fs::path folder = fs::absolute(scene); folder.has_relative_path();
-         folder = folder.parent_path()) {
-        if (fs::is_regular_file(folder / "cameras.json"))
-            return load_cameras(folder / "cameras.json");
-        if (folder.filename() != "point_cloud" &&
-            folder.parent_path().filename() != "point_cloud" && !fs::is_regular_file(folder))
-            break;
-    }
-    return {};
-}
 
 std::vector<View> find_views(const ViewFlags& flags, std::string& note) {
     DatasetOptions options = flags.data;
@@ -97,7 +86,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     c.add_option("--cameras", flags.cameras,
                  "a data set, to look through its cameras and compare with its photos");
     c.add_option("--camera", flags.camera, "start at this camera of the data set, from 0")
-        ->check(CLI::NonNegativeNumber);
+        ->check(zero_or_more());
     c.add_option(
         "--up", flags.up,
         "x, -x, y, -y, z or -z (default: from the cameras, else as turned before, else guessed)");
@@ -105,7 +94,10 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
         ->capture_default_str();
     c.add_option("--screenshot", flags.screenshot,
                  "write the window's content to this .png or .jpg, without a window");
-    c.add_option("--path", flags.path, "a camera path that the viewer saved");
+    c.add_flag("--force", flags.force, "let --screenshot replace a picture that darb did not write")
+        ->needs(c.get_option("--screenshot"));
+    c.add_option("--path", flags.path,
+                 "a camera path that the viewer saved, or a camera_path.json of nerfstudio");
     c.add_option("--export", flags.frames,
                  "write the path's frames (and a video, with ffmpeg) to this folder, no window")
         ->needs(c.get_option("--path"));
@@ -137,6 +129,7 @@ void add_view_flags(CLI::App& c, ViewFlags& flags) {
     add_lens_flag(c, flags.data);
     c.add_option("--device", flags.device, "number or part of a name, see `darb devices`");
     add_tune_flags(c, flags.tune);
+    add_unit_options(c, flags.units);
 }
 
 }  // namespace darb

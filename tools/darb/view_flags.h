@@ -19,17 +19,16 @@ struct ViewFlags {
     int camera = -1, fps = 30;
     float gui_scale = 0;  // of the panels; 0: the display's
     bool white_background = false, compare = false, difference = false, no_panels = false,
-         quiet = false;
+         quiet = false, force = false;
     std::vector<std::filesystem::path> kernel_files;
     AccuracyFlags accuracy;
     std::string effects = "auto";
     DatasetOptions data;
     TuneFlags tune;
+    StoredUnits units;
 };
 
 void add_view_flags(CLI::App& command, ViewFlags& flags);
-/// The cameras.json that darb train left beside a scene; none where there is none. Throws Error.
-std::vector<View> cameras_beside(const std::filesystem::path& scene);
 /// The data set of --cameras; else cameras_beside the scene, and where those cannot be read none,
 /// and why in `note`. Throws Error.
 std::vector<View> find_views(const ViewFlags& flags, std::string& note);

@@ -4,6 +4,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
+#include "engine/scene/scene_name.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/view_times.h"
@@ -54,7 +55,7 @@ int view_in_window(const ViewFlags& flags, const ViewerOptions& options, const P
     if (!note.empty()) window.viewer().session().tell(note);
     if (!flags.scene.empty()) {
         window.viewer().open(flags.scene);
-        window.set_title(flags.scene.filename().string() + " - darb");
+        window.set_title(scene_name(flags.scene, true) + " - darb");
     }
     if (flags.times.empty()) return show_until_closed(window, lost);
     write_view_times(window, device, lost, flags.times);

@@ -34,6 +34,10 @@ std::vector<SplatModel> merged(const SplatModel& model, const std::vector<std::s
     return merge_levels(model, counts, {.progress = progress});
 }
 
+std::string decibels(const SceneDifference& difference, double db) {
+    return difference.worst_view.empty() ? "-" : fmt::format("{:.2f}", db);
+}
+
 void print_table(const std::vector<Row>& rows, std::size_t views, double photos_db, bool refined,
                  std::FILE* to) {
     tell(to, "{:>9}  {:>11}  {:>8}  {:>8}{}  file\n", "splats", "bytes", "PSNR dB", "at worst",
@@ -41,11 +45,13 @@ void print_table(const std::vector<Row>& rows, std::size_t views, double photos_
     for (const Row& r : rows) {
         const std::string photos =
             refined ? fmt::format("  {:>9.2f}  {:>8.2f}", r.photos_db, r.refined_db) : "";
-        tell(to, "{:>9}  {:>11}  {:>8.2f}  {:>8.2f}{}  {}\n", r.splats, r.bytes,
-             r.difference.mean_psnr_db, r.difference.worst_psnr_db, photos,
+        tell(to, "{:>9}  {:>11}  {:>8}  {:>8}{}  {}\n", r.splats, r.bytes,
+             decibels(r.difference, r.difference.mean_psnr_db),
+             decibels(r.difference, r.difference.worst_psnr_db), photos,
              printable(r.file.string()));
     }
-    tell(to, "PSNR of renders against those of the scene, {} views", views);
+    tell(to, "PSNR of renders against those of the scene, {} views",
+         rows.front().difference.worst_view.empty() ? 0 : views);
     if (refined) tell(to, "; photos: held-out ones, {:.2f} dB with all splats", photos_db);
     tell(to, "\n");
 }
@@ -86,7 +92,7 @@ void write_streamed(const SplatModel& model, std::vector<SplatModel> levels, con
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const SplatModel level = load_streamed_level(to.output, i);
         rows[i].splats = level.size();
-        rows[i].difference = compare_scenes(model, level, to.views, to.device);
+        if (to.measure) rows[i].difference = compare_scenes(model, level, to.views, to.device);
     }
 }
 
@@ -108,7 +114,8 @@ Paths write_levels(const LevelFlags& flags, const SplatModel& model, const Level
                                     : to.output;
         row.bytes = to.write(row.file, levels[i], {}).bytes();
         row.splats = levels[i].size();
-        row.difference = compare_scenes(model, load_splats(row.file), to.views, to.device);
+        if (to.measure)
+            row.difference = compare_scenes(model, load_splats(row.file), to.views, to.device);
         levels[i] = SplatModel();
     }
     const double photos_db = refinement ? refinement->photos_db : 0;

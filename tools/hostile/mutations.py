@@ -42,7 +42,7 @@ KINDS = {
                    ["train in/colmap --resume -o in/run -q", "train in/colmap --start-checkpoint {f} -o out/run -q"], True),
     "metrics": (DATA, ["run/metrics.json"], RUN[:1], RUN, False),
     "log": (DATA, ["run/run.jsonl"], RUN[:1], RUN, False),
-    "command": (DATA, ["run/command.json"], RUN[:1], RUN[1:2], False),
+    "request": (DATA, ["run/request.json"], RUN[:1], RUN[1:2], False),
     "cfg_args": (DATA, ["run/cfg_args"], RUN[:1], RUN + ["eval in/run in/colmap", "view in/run --screenshot out/s.png "
                                                         "--size 64x48"], False),
     "run's cameras": (DATA, ["run/cameras.json"], ["info in/run"], RUN[1:] + ["view in/run --screenshot out/s.png "

@@ -7,6 +7,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
+#include "engine/core/json_text.h"
 #include "engine/data/image_io.h"
 #include "engine/data/run_events.h"
 #include "engine/report/html.h"
@@ -105,8 +106,7 @@ void read_run(ComparedRun& run, const std::vector<int>& iterations) {
         for (const Json& e : metrics.at("evaluations")) take_evaluation(e, iterations, run);
         run.peak_mb = 1e-6 * metrics.at("peak_device_bytes").get<double>();
     } catch (const Json::exception& e) {
-        throw Error(path.string(), std::string("lacks what it should have: ") + e.what(),
-                    "Remove the folder to train again.");
+        throw Error(path.string(), json_reason(e), "Remove the folder to train again.");
     }
     run.curve = curve_of(read_events(run.folder / "run.jsonl"));
     for (const int iteration : iterations)

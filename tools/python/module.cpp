@@ -17,6 +17,12 @@ namespace darb::python {
 
 namespace {
 
+// A kind of darb.Error that scripts also find under a name of Python's own.
+PyObject* kind_of(PyObject* error, const char* name, const char* doc, PyObject* pythons) {
+    const py::tuple bases = py::make_tuple(py::handle(error), py::handle(pythons));
+    return PyErr_NewExceptionWithDoc(name, doc, bases.ptr(), nullptr);
+}
+
 // An Error of the engine as the exception of Python, with its parts.
 void translate_errors(py::module_& module) {
     static PyObject* type = PyErr_NewExceptionWithDoc(
@@ -24,7 +30,15 @@ void translate_errors(py::module_& module) {
         "What was wrong, where, and what to do: the words of the command. Attributes: where, "
         "reason, hint.",
         PyExc_ValueError, nullptr);
+    static PyObject* no_room =
+        kind_of(type, "darb.NoRoom", "No memory, of the device, of the host or within a budget.",
+                PyExc_MemoryError);
+    static PyObject* lost =
+        kind_of(type, "darb.DeviceLost", "The device is gone: nothing on it can be used any more.",
+                PyExc_RuntimeError);
     module.attr("Error") = py::handle(type);
+    module.attr("NoRoom") = py::handle(no_room);
+    module.attr("DeviceLost") = py::handle(lost);
     py::register_exception_translator([](std::exception_ptr thrown) {
         try {
             if (thrown) std::rethrow_exception(thrown);
@@ -33,11 +47,14 @@ void translate_errors(py::module_& module) {
                 return py::reinterpret_steal<py::object>(
                     PyUnicode_DecodeUTF8(s.data(), static_cast<py::ssize_t>(s.size()), "replace"));
             };
-            const py::object instance = py::handle(type)(text(error.what()));
+            PyObject* const kind = dynamic_cast<const NoRoom*>(&error) != nullptr       ? no_room
+                                   : dynamic_cast<const DeviceLost*>(&error) != nullptr ? lost
+                                                                                        : type;
+            const py::object instance = py::handle(kind)(text(error.what()));
             instance.attr("where") = text(error.where);
             instance.attr("reason") = text(error.reason);
             instance.attr("hint") = text(error.hint);
-            PyErr_SetObject(type, instance.ptr());
+            PyErr_SetObject(kind, instance.ptr());
         }
     });
 }

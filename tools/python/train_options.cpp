@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tools/darb/numbers.h"
+#include "tools/darb/train_flags.h"
 #include "tools/python/kernel.h"
 
 namespace darb::python {
@@ -70,10 +71,9 @@ std::vector<std::string> words_of(const py::dict& options) {
 
 }  // namespace
 
-TrainFlags take_train_options(const py::dict& options) {
+TrainRequest take_train_options(const py::dict& options) {
     std::vector<std::string> words = words_of(options);
     refuse_empty_values(words);
-    refuse_no_numbers(words);
     TrainFlags flags;
     CLI::App app;
     add_train_flags(*app.add_subcommand("train"), flags);
@@ -81,20 +81,22 @@ TrainFlags take_train_options(const py::dict& options) {
     words.insert(words.end(), {"-q", "-o", "."});
     try {
         app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+        refuse_no_numbers(app);
     } catch (const CLI::ParseError& e) {
         throw Error("darb.Trainer", e.what(),
                     "`darb train --help-all` lists the options; here they have underscores.");
     }
     finish_train_flags(flags);
-    if (!options.contains("kernel")) return flags;
+    TrainRequest& request = flags.request;
+    if (!options.contains("kernel")) return request;
     const auto own = kernel_of_object(options["kernel"]);
-    if (!own) return flags;
+    if (!own) return request;
     if (flags.pulses != 1)
         throw Error("pulses", "means nothing with a kernel of one's own", "Leave it out.");
-    if (flags.train.footprint == Footprint::exact && !has_exact_footprint(*own))
+    if (request.train.footprint == Footprint::exact && !has_exact_footprint(*own))
         throw Error("footprint exact", "is not there for this kernel", "Use psi.");
-    flags.train.kernel = *own;
-    return flags;
+    request.train.kernel = *own;
+    return request;
 }
 
 }  // namespace darb::python

@@ -8,7 +8,6 @@
 #include "engine/plan/tuning_names.h"
 #include "engine/raster/frame_limit.h"
 #include "engine/scene/edit_splats.h"
-#include "tools/darb/train_run.h"
 #include "tools/python/scene.h"
 #include "tools/python/train_options.h"
 #include "trainer/checkpoint.h"
@@ -21,7 +20,8 @@ namespace darb::python {
 namespace {
 
 // Whose lens and size the data set was read with; the options say so only for a path.
-Dataset take_dataset(const py::object& given, const py::dict& options, const TrainFlags& flags) {
+Dataset take_dataset(const py::object& given, const py::dict& options,
+                     const TrainRequest& request) {
     Dataset dataset;
     if (py::isinstance<PyDataset>(given)) {
         for (const char* name : {"resolution", "r", "eval", "images", "i", "lens"})
@@ -32,7 +32,7 @@ Dataset take_dataset(const py::object& given, const py::dict& options, const Tra
     } else {
         const std::string path = take_path(given, "dataset");
         const py::gil_scoped_release free;
-        dataset = load_dataset(path, flags.data);
+        dataset = load_dataset(path, request.data);
     }
     if (!dataset.options.hold_out)
         for (View& view : dataset.views) view.is_test = false;
@@ -81,8 +81,9 @@ class Training {
 
 PyTrainer::PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset,
                      const py::dict& options)
-    : device_(std::move(device)), flags_(take_train_options(options)) {
-    dataset_ = take_dataset(dataset, options, flags_);
+    : device_(std::move(device)) {
+    job_.request = take_train_options(options);
+    job_.dataset = take_dataset(dataset, options, job_.request);
     const py::gil_scoped_release free;
     const auto lock = device_->lock();
     const Training training(*device_);
@@ -96,25 +97,26 @@ PyTrainer::PyTrainer(std::shared_ptr<PyDevice> device, const py::object& dataset
 
 void PyTrainer::make_trainer() {
     Device& device = device_->device();
-    for (const View& view : dataset_.views)
+    for (const View& view : job_.dataset.views)
         check_frame(device, view.camera.width, view.camera.height, view.name);
-    plan_effects(dataset_, flags_);
-    plan_start(device, dataset_, flags_);
-    plan_strategy(dataset_, flags_);
+    job_ = resolve(std::move(job_.request), std::move(job_.dataset));
+    find_start(device, job_);
+    job_.start.reset();  // its pictures are for a run's folder
     check_signals();
-    photos_ = photos_of_run(dataset_, flags_.train, std::move(flags_.photos));
+    photos_ = photos_of_run(job_.dataset, job_.options, std::move(job_.photos));
     check_signals();
     std::optional<Checkpoint> start;
-    if (!flags_.run.resume_from.empty()) {
-        start = read_checkpoint(flags_.run.resume_from);
-        check_resumable(*start, flags_.run.resume_from, flags_.train, dataset_, fingerprint());
+    if (!job_.resume_from.empty()) {
+        start = read_checkpoint(job_.resume_from);
+        check_resumable(*start, job_.resume_from, job_.options, job_.dataset, fingerprint());
         device.set_tuning(resumed_tuning(device.info(), device.tuning(), start->tuning,
-                                         flags_.run.resume_from.string()));
+                                         job_.resume_from.string()));
     } else {
-        check_start_memory(device, dataset_, flags_.train);
+        check_start_memory(device, job_.dataset, job_.options);
     }
-    trainer_ = std::make_unique<Trainer>(device, dataset_, photos_,
-                                         first_model(dataset_, flags_.train, start), flags_.train);
+    trainer_ =
+        std::make_unique<Trainer>(device, job_.dataset, photos_,
+                                  first_model(job_.dataset, job_.options, start), job_.options);
     trainer_->on_result = [this](const IterationResult& result) { latest_ = result; };
     trainer_->on_round = [this](int iteration, const DensityResult& result) {
         tell_round(iteration, result);
@@ -129,7 +131,7 @@ PyTrainer::~PyTrainer() {
     device_->let_go(
         [this] {
             trainer_.reset();
-            if (flags_.train.max_memory_bytes) device_->device().set_memory_budget(0);
+            if (job_.options.max_memory_bytes) device_->device().set_memory_budget(0);
         },
         [this] { static_cast<void>(trainer_.release()); });
 }
@@ -192,13 +194,13 @@ py::dict PyTrainer::evaluate() {
         const py::gil_scoped_release free;
         const auto lock = device_->lock();
         const Training training(*device_);
-        for (std::size_t i = 0; i < dataset_.views.size(); ++i) {
-            const View& view = dataset_.views[i];
+        for (std::size_t i = 0; i < job_.dataset.views.size(); ++i) {
+            const View& view = job_.dataset.views[i];
             if (!view.is_test) continue;
             check_signals();
             evaluation.views.push_back(compare_view(view.name, trainer_->render(view.camera),
                                                     photos_[i], trainer_->background(),
-                                                    dataset_.alpha_is_mask));
+                                                    job_.dataset.alpha_is_mask));
             evaluation.views.back().in_arc = view.in_arc;
         }
         if (evaluation.views.empty())
@@ -233,7 +235,7 @@ SplatModel PyTrainer::model() {
 }
 
 const std::string& PyTrainer::fingerprint() {
-    if (fingerprint_.empty()) fingerprint_ = dataset_fingerprint(dataset_, photos_);
+    if (fingerprint_.empty()) fingerprint_ = dataset_fingerprint(job_.dataset, photos_);
     return fingerprint_;
 }
 
@@ -242,7 +244,7 @@ void PyTrainer::checkpoint(const py::object& value) {
     const py::gil_scoped_release free;
     const auto lock = device_->lock();
     const Training training(*device_);
-    write_checkpoint(path, {trainer_->state(), settings_text(flags_.train), fingerprint(), seconds_,
+    write_checkpoint(path, {trainer_->state(), settings_text(job_.options), fingerprint(), seconds_,
                             result_tuning(device_->device())});
 }
 

@@ -5,9 +5,9 @@
 #include <memory>
 #include <string>
 
-#include "tools/darb/train_flags.h"
 #include "tools/python/dataset.h"
 #include "tools/python/device.h"
+#include "trainer/job/job.h"
 #include "trainer/trainer.h"
 
 namespace darb::python {
@@ -27,7 +27,7 @@ class PyTrainer {
     void checkpoint(const py::object& path);
 
     int iteration() const { return trainer_->iteration(); }
-    int iterations() const { return flags_.train.iterations; }
+    int iterations() const { return job_.options.iterations; }
     std::uint32_t splats() const { return trainer_->splat_count(); }
     py::object on_round = py::none();
 
@@ -37,8 +37,7 @@ class PyTrainer {
     const std::string& fingerprint();
 
     std::shared_ptr<PyDevice> device_;
-    Dataset dataset_;
-    TrainFlags flags_;
+    TrainJob job_;
     std::vector<ImageU8> photos_;
     std::string fingerprint_;
     std::unique_ptr<Trainer> trainer_;

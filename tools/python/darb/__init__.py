@@ -11,8 +11,9 @@ lies on the host. darb.torch has the same with gradients for PyTorch.
     psi, sim1d          a kernel's correction factor; signals as sums of kernels
     plan, devices       the effects that a scene calls for; the Vulkan devices
     Error               what was wrong, where, and what to do
+    NoRoom, DeviceLost  kinds of it that a script may answer: less memory, another device
 
-Every mistake is a darb.Error, which is a ValueError. Long calls let other threads run and end with
+Every mistake is a darb.Error, which is a ValueError; NoRoom is a MemoryError and DeviceLost a RuntimeError as well. Long calls let other threads run and end with
 Ctrl-C. A Device is used by one call at a time; others wait.
 """
 
@@ -24,13 +25,15 @@ _darb.check_interpreter()
 
 import numpy as _np  # noqa: E402
 
-from ._darb import Dataset, Device, Error, Kernel, Scene, __version__
+from ._darb import Dataset, Device, DeviceLost, Error, Kernel, NoRoom, Scene, __version__
 
 __all__ = [
     "Dataset",
     "Device",
+    "DeviceLost",
     "Error",
     "Kernel",
+    "NoRoom",
     "Scene",
     "Trainer",
     "__version__",

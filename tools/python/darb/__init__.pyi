@@ -23,6 +23,9 @@ class Error(ValueError):
     reason: str
     hint: str
 
+class NoRoom(Error, MemoryError): ...
+class DeviceLost(Error, RuntimeError): ...
+
 class Device:
     def __init__(self, select: str = "") -> None: ...
     @property
