@@ -245,7 +245,9 @@ std::pair<std::uint64_t, std::uint64_t> growth_with_photos(Device& device, int s
         for (double* value : {&c.fx, &c.fy, &c.cx, &c.cy}) *value *= scale;
         c.width *= scale;
         c.height *= scale;
-        bytes += photos.emplace_back(c.width, c.height, 4).data.size();
+        std::vector<std::uint8_t>& data = photos.emplace_back(c.width, c.height, 4).data;
+        std::fill(data.begin(), data.end(), std::uint8_t{255});  // opaque, else nothing to train on
+        bytes += data.size();
     }
     RunOptions run;
     run.output = std::filesystem::temp_directory_path() / fmt::format("darb_once_{}", ::getpid());
