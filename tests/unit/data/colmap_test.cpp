@@ -347,7 +347,7 @@ TEST(ColmapProject, remedies_that_errors_name_work_as_typed) {
          {std::pair<std::string, std::string>{"depth_unit_scale_factor", "0"},
           {"integer_depth_scale", "1000"},
           {"x_fov", "200"}}) {
-        const auto text = [&](const std::string& number) {
+        const auto text = [&key = key](const std::string& number) {
             return "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"" + key + "\": " + number +
                    ", \"frames\": [{\"file_path\": \"images/a.png\", \"transform_matrix\": "
                    "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}";
@@ -412,8 +412,8 @@ TEST(ColmapProject, frames_and_rigs_say_the_poses_as_in_colmap) {
         for (const auto& [bytes, rig] : {std::pair{rigs.data, true}, std::pair{frames.data, false}})
             for (std::size_t length = 0; length < bytes.size(); ++length) {
                 const auto part = std::span(bytes).first(length);
-                EXPECT_FALSE(error_of([&] {
-                                 if (rig)
+                EXPECT_FALSE(error_of([&, is_rig = rig] {
+                                 if (is_rig)
                                      parse_colmap_rigs(part, "rigs.bin");
                                  else
                                      parse_colmap_frames(part, "frames.bin");
