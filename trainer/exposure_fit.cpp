@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <glm/glm.hpp>
 
-#include "trainer/evaluation.h"
+#include "engine/data/compare_view.h"
 
 namespace darb {
 

@@ -9,6 +9,7 @@
 #include "engine/core/scope_guard.h"
 #include "engine/raster/gpu_splats.h"
 #include "trainer/initial_model.h"
+#include "trainer/predicted_growth.h"
 #include "trainer/resolution_ramp.h"
 #include "trainer/schedule.h"
 #include "trainer/strategy.h"
@@ -20,10 +21,6 @@ namespace {
 
 // The stand-in for a trained scene: most trained splats are more opaque than those at the start.
 constexpr float kTrainedLogit = 0;  // of an opacity of a half
-// Trainer's buffers grow to 1.5 times the intersections that did not fit.
-constexpr double kIntersectionRoom = 1.5;
-constexpr std::uint32_t kMinIntersectionsPerSplat = 4;
-constexpr double kMemoryShare = 0.85;  // of the device's memory that a run can hope to have
 
 // The measurement: enough to average over, no more than a moment.
 constexpr int kViews = 4, kIterations = 10;
@@ -45,10 +42,6 @@ struct Measurement {
 // The first round of density control, in which random splats go that no photo holds up.
 int first_round(const Schedule& schedule) {
     return schedule.rounds.begin + schedule.rounds.interval;
-}
-
-bool has_rounds(const Schedule& schedule) {
-    return schedule.rounds.end > schedule.rounds.begin;
 }
 
 // A few training views, evenly picked.
@@ -116,21 +109,6 @@ Measurement measure_training(Device& device, const Dataset& few, const SplatMode
 
 double intersections_per_splat(const Measurement& m, const SplatModel& model) {
     return static_cast<double>(m.intersections) / std::max(static_cast<double>(model.size()), 1.0);
-}
-
-// Room that the buffers will have for the intersections of a splat.
-double intersection_room(double intersections) {
-    return std::max(double{kMinIntersectionsPerSplat}, kIntersectionRoom * intersections);
-}
-
-// At the end, whatever memory says.
-std::uint32_t wanted_splats(const Device& device, const Dataset& dataset,
-                            const TrainOptions& options, const MemoryDemand& photos,
-                            std::uint32_t start) {
-    const std::uint32_t limit = std::min(options.max_splats.value_or(kAnyNumberOfSplats),
-                                         GpuSplats::max_count(device, options.sh_degree, true));
-    return predict_splats(options, {start, photos.photo_pixels, dataset.detail, limit,
-                                    starts_random(dataset, options), dataset.start.size() > 0});
 }
 
 // Splats and intersections at the end: of the splats that are wanted no more than a budget of
@@ -280,64 +258,6 @@ void find_peak(const Device& device, const TrainOptions& options, const MemoryDe
 
 }  // namespace
 
-std::uint32_t predict_splats(const TrainOptions& options, const GrowthStart& start) {
-    return strategy_row(options.strategy).forecast_end(options, start);
-}
-
-std::uint64_t usable_bytes(const DeviceInfo& info) {
-    return static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(info.heap_bytes));
-}
-
-bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
-                   const MemoryDemand& photos, std::uint32_t start_splats) {
-    const PhotoPlace place = device.tuning().photos;
-    if (place != PhotoPlace::automatic) return place == PhotoPlace::streamed;
-    const bool shared = device.info().unified_memory;
-    if (shared && !options.max_memory_bytes) return false;
-    MemoryDemand all = photos;
-    all.splats = start_splats;
-    all.densifies = false;
-    if (shared) {  // the ramp does without its smaller photos where there is no room
-        all.small_pixels = all.small_cameras = 0;
-    } else {
-        const Schedule schedule(options);
-        all.splats =
-            std::max(start_splats, wanted_splats(device, dataset, options, photos, start_splats));
-        all.densifies = has_rounds(schedule);
-        all.averages = schedule.averages();
-    }
-    all.intersections =
-        static_cast<std::uint64_t>(intersection_room(0) * static_cast<double>(all.splats));
-    MemoryDemand streamed = all;
-    streamed.streams = true;
-    const std::uint64_t total = plan_memory(device, all).total();
-    return total > options.max_memory_bytes.value_or(usable_bytes(device.info())) &&
-           plan_memory(device, streamed).total() < total;
-}
-
-int predict_degree(const TrainOptions& options, int iterations) {
-    if (!options.probe_sh) return options.sh_degree;
-    return std::min(options.sh_degree,
-                    std::max(iterations - 1, 0) / Schedule(options).degree_interval);
-}
-
-std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options) {
-    TrainOptions usual = options;
-    usual.strategy = Strategy{};
-    if (usual.start != StartPoints::random)  // the same before the points of stereo are there
-        usual.start = dataset.points.size() > 0 ? StartPoints::points : StartPoints::random;
-    std::uint64_t pixels = 0;
-    for (const View& view : dataset.views)
-        if (!view.is_test) pixels += std::uint64_t(view.camera.width) * view.camera.height;
-    return predict_splats(
-        usual, {initial_count(dataset, usual), pixels, dataset.detail,
-                options.max_splats.value_or(kAnyNumberOfSplats), starts_random(dataset, usual)});
-}
-
-double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options) {
-    return strategy_row(options.strategy).forecast_mean(options, start, end);
-}
-
 SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64_t seed) {
     const size_t n = start.size(), pieces = n == 0 ? 1 : std::max<size_t>(count / n, 1);
     if (pieces == 1) return start;
@@ -382,7 +302,7 @@ Forecast forecast_training(Device& scratch, const Dataset& dataset, const TrainO
     start.sh_rest.assign(start.size() * static_cast<size_t>(start.rest_count()), 0.0f);
     f.start_splats = static_cast<std::uint32_t>(start.size());
     f.demand.streams = photos_stream(scratch, dataset, options, photos, f.start_splats);
-    f.splats = wanted_splats(scratch, dataset, options, photos, f.start_splats);
+    f.splats = wanted_splats(scratch, dataset, options, photos.photo_pixels, f.start_splats);
     f.demand.densifies = has_rounds(schedule);
     f.falls = starts_random(dataset, options) && has_rounds(schedule) &&
               strategy_row(options.strategy).prunes_random_start;

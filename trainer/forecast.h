@@ -31,30 +31,6 @@ struct Forecast {
     MemoryDemand peak;
 };
 
-/// Splats at the end: by the strategy's rule of thumb.
-std::uint32_t predict_splats(const TrainOptions& options, const GrowthStart& start);
-
-/// Whether training photos wait on the host and stream: as Tuning::photos says, else where a run
-/// from so many splats has no room for them. A device with memory of its own has it where all that
-/// the run is forecast to come to fits into options.max_memory_bytes, or the most of the device
-/// that a run can hope for. Where host and device share theirs streaming frees nothing, and a
-/// budget alone calls for it, where it does not hold the start. photos: as add_photos gives them.
-bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
-                   const MemoryDemand& photos, std::uint32_t start_splats);
-/// Of the device's memory, what a run can hope to have.
-std::uint64_t usable_bytes(const DeviceInfo& info);
-
-/// The degree of colour that a run has after so many iterations, where options.probe_sh does not
-/// refuse the first.
-int predict_degree(const TrainOptions& options, int iterations);
-
-/// The count that a strategy grows to where no --max-splats is given: what adc would be forecast to
-/// end with from its points, or from random ones where there are none.
-std::uint32_t default_budget(const Dataset& dataset, const TrainOptions& options);
-
-/// Mean count over the run; adc: where it grows evenly while density control runs.
-double mean_splats(std::uint32_t start, std::uint32_t end, const TrainOptions& options);
-
 /// `start` split into pieces, at least as many as it has and at most `count`, which cover what it
 /// covers: a stand-in for a trained scene of that size.
 SplatModel split_model(const SplatModel& start, std::uint32_t count, std::uint64_t seed);

@@ -4,15 +4,48 @@
 
 #include "engine/raster/frame_buffers.h"
 #include "engine/raster/gpu_splats.h"
-#include "trainer/forecast.h"
+#include "trainer/predicted_growth.h"
 
 namespace darb {
 
 namespace {
+
+constexpr double kMemoryShare = 0.85;  // of the device's memory that a run can hope to have
 constexpr std::uint32_t kNoLimit = 0xFFFFFFFFu;
 // Of the intersections that the device binds: beyond, splats do not grow in number.
 constexpr double kMostIntersections = 0.7;
 }  // namespace
+
+std::uint64_t usable_bytes(const DeviceInfo& info) {
+    return static_cast<std::uint64_t>(kMemoryShare * static_cast<double>(info.heap_bytes));
+}
+
+bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
+                   const MemoryDemand& photos, std::uint32_t start_splats) {
+    const PhotoPlace place = device.tuning().photos;
+    if (place != PhotoPlace::automatic) return place == PhotoPlace::streamed;
+    const bool shared = device.info().unified_memory;
+    if (shared && !options.max_memory_bytes) return false;
+    MemoryDemand all = photos;
+    all.splats = start_splats;
+    all.densifies = false;
+    if (shared) {  // the ramp does without its smaller photos where there is no room
+        all.small_pixels = all.small_cameras = 0;
+    } else {
+        const Schedule schedule(options);
+        all.splats =
+            std::max(start_splats, wanted_splats(device, dataset, options, photos.photo_pixels, start_splats));
+        all.densifies = has_rounds(schedule);
+        all.averages = schedule.averages();
+    }
+    all.intersections =
+        static_cast<std::uint64_t>(intersection_room(0) * static_cast<double>(all.splats));
+    MemoryDemand streamed = all;
+    streamed.streams = true;
+    const std::uint64_t total = plan_memory(device, all).total();
+    return total > options.max_memory_bytes.value_or(usable_bytes(device.info())) &&
+           plan_memory(device, streamed).total() < total;
+}
 
 MemoryBudget::MemoryBudget(Device& device, const Dataset& dataset, const TrainOptions& options,
                            const Schedule& schedule, std::uint32_t start_splats)

@@ -15,6 +15,16 @@
 
 namespace darb {
 
+/// Whether training photos wait on the host and stream: as Tuning::photos says, else where a run
+/// from so many splats has no room for them. A device with memory of its own has it where all that
+/// the run is forecast to come to fits into options.max_memory_bytes, or the most of the device
+/// that a run can hope for. Where host and device share theirs streaming frees nothing, and a
+/// budget alone calls for it, where it does not hold the start. photos: as add_photos gives them.
+bool photos_stream(const Device& device, const Dataset& dataset, const TrainOptions& options,
+                   const MemoryDemand& photos, std::uint32_t start_splats);
+/// Of the device's memory, what a run can hope to have.
+std::uint64_t usable_bytes(const DeviceInfo& info);
+
 /// What a run holds on the device at a moment.
 struct HeldMemory {
     std::uint32_t splats = 0;
@@ -31,7 +41,7 @@ class MemoryBudget {
     MemoryBudget(Device& device, const Dataset& dataset, const TrainOptions& options,
                  const Schedule& schedule, std::uint32_t start_splats);
 
-    /// Whether photos are to wait on the host: photos_stream() of forecast.h.
+    /// Whether photos are to wait on the host: photos_stream().
     bool streams_photos() const { return photos_.streams; }
 
     /// What plan_memory() asks for.

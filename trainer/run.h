@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/data/compare_view.h"
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
+#include "trainer/evaluation.h"
 #include "trainer/options.h"
 #include "trainer/rank_group.h"
 #include "trainer/run_report.h"
@@ -24,8 +24,6 @@
 #include "trainer/trainer.h"
 
 namespace darb {
-
-struct Evaluation;
 
 /// What a run shows to a live view between two iterations; valid during the call.
 struct LiveStep {
@@ -58,21 +56,6 @@ struct RunOptions {
     /// initial_model().
     const SplatModel* start = nullptr;
     std::uint32_t frozen = 0;
-};
-
-struct ArcMeans {  // over the views of an arc that was held out
-    std::size_t views = 0;
-    double psnr_db = 0, ssim = 0;
-};
-
-struct Evaluation {
-    int iteration = 0;
-    double seconds = 0;  // of training, evaluation left out
-    std::uint32_t splats = 0;
-    std::vector<ViewMetrics> views;
-    double psnr_db = 0, ssim = 0;  // means over the views; but for an arc, where others are there
-    std::optional<ArcMeans> arc;   // where others are there
-    std::optional<DepthError> depth;  // means over the views that have one
 };
 
 struct TrainResult {

@@ -11,7 +11,7 @@
 #include "engine/core/error.h"
 #include "engine/core/memory.h"
 #include "engine/raster/gpu_splats.h"
-#include "trainer/forecast.h"
+#include "trainer/memory_budget.h"
 #include "trainer/initial_model.h"
 #include "trainer/memory_plan.h"
 #include "trainer/progress.h"

@@ -1,5 +1,6 @@
 // trainer/forecast: splats, time and memory before a run.
 #include "trainer/forecast.h"
+#include "trainer/predicted_growth.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include "engine/core/files.h"
 #include "tests/support/shared_device.h"
 #include "trainer/evaluation.h"
-#include "trainer/forecast.h"
+#include "trainer/predicted_growth.h"
 #include "trainer/initial_model.h"
 #include "trainer/strategy.h"
 #include "trainer/trainer.h"

@@ -4,7 +4,7 @@
 
 #include "engine/core/error.h"
 #include "tests/support/resumed_run.h"
-#include "trainer/forecast.h"
+#include "trainer/predicted_growth.h"
 
 namespace darb::test {
 namespace {

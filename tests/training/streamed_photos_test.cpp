@@ -10,6 +10,7 @@
 #include "tests/support/test_device_options.h"
 #include "tests/support/tiny_training.h"
 #include "trainer/forecast.h"
+#include "trainer/memory_budget.h"
 #include "trainer/memory_plan.h"
 #include "trainer/start_memory.h"
 

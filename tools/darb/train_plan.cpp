@@ -12,6 +12,7 @@
 #include "tools/darb/outputs.h"
 #include "tools/darb/train_presets.h"
 #include "trainer/forecast.h"
+#include "trainer/memory_budget.h"
 #include "trainer/progress.h"
 #include "trainer/schedule.h"
 

@@ -7,6 +7,7 @@
 #include "trainer/blocks/part_options.h"
 #include "trainer/blocks/run_blocks.h"
 #include "trainer/forecast.h"
+#include "trainer/predicted_growth.h"
 #include "trainer/memory_plan.h"
 #include "trainer/progress.h"
 

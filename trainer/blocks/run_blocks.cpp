@@ -18,7 +18,7 @@
 #include "trainer/blocks/camera_choice.h"
 #include "trainer/blocks/part_options.h"
 #include "trainer/checkpoint.h"
-#include "trainer/forecast.h"
+#include "trainer/memory_budget.h"
 #include "trainer/progress.h"
 #include "trainer/run_folder.h"
 #include "trainer/run_log.h"
