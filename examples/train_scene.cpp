@@ -14,8 +14,8 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "engine/scene/splat_file.h"
-#include "trainer/initial_model.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/step/trainer.h"
 
 namespace {
 

@@ -10,7 +10,7 @@
 
 #include "engine/core/check.h"
 #include "engine/core/error.h"
-#include "trainer/checkpoint.h"
+#include "trainer/step/checkpoint.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     std::vector<std::uint8_t> bytes(data, data + size);

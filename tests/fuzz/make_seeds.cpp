@@ -25,7 +25,7 @@
 #include "tests/support/ksplat_file.h"
 #include "tests/support/photo_files.h"
 #include "tests/support/test_scene.h"
-#include "trainer/checkpoint.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb::test {
 namespace {

@@ -24,10 +24,10 @@
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
 #include "tests/support/tiny_training.h"
-#include "trainer/exposure.h"
-#include "trainer/iterate_average.h"
-#include "trainer/option_table.h"
-#include "trainer/smoothing.h"
+#include "trainer/options/option_table.h"
+#include "trainer/step/exposure.h"
+#include "trainer/step/iterate_average.h"
+#include "trainer/step/smoothing.h"
 
 namespace darb::test {
 namespace {

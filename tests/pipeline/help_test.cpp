@@ -7,7 +7,7 @@
 #include <string>
 
 #include "tests/support/run_command.h"
-#include "trainer/option_table.h"
+#include "trainer/options/option_table.h"
 
 namespace darb {
 namespace {

@@ -11,7 +11,7 @@
 #include "engine/core/files.h"
 #include "engine/data/dataset.h"
 #include "tests/support/run_command.h"
-#include "trainer/predicted_growth.h"
+#include "trainer/growth/predicted_growth.h"
 
 namespace darb::test {
 namespace {

@@ -9,8 +9,8 @@
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_walk.h"
 #include "tests/support/tiny_training.h"
-#include "trainer/checkpoint.h"
-#include "trainer/run.h"
+#include "trainer/run/run.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb::test {
 namespace {

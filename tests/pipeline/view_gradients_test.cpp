@@ -12,8 +12,7 @@
 #include "engine/render/render_gradients.h"
 #include "tests/support/compare_images.h"
 #include "tests/support/test_walk.h"
-#include "trainer/batch_step.h"
-#include "trainer/gradient_tree.h"
+#include "trainer/step/batch_step.h"
 
 namespace darb::test {
 namespace {

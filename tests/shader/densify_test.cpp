@@ -12,7 +12,7 @@
 #include "tests/support/every_kernel.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
-#include "trainer/density/density_control.h"
+#include "trainer/growth/density_control.h"
 
 namespace darb::test {
 namespace {

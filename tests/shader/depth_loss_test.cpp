@@ -1,7 +1,7 @@
 // The loss of measured depths: its pass against the same in double, its gradient through blending
 // to every parameter and to the camera against the reference, whose own differences are tested, and
 // smaller photos.
-#include "trainer/depth_loss.h"
+#include "trainer/step/step.h"
 
 #include "engine/core/rng.h"
 #include "engine/raster/backward.h"
@@ -14,7 +14,7 @@
 #include "tests/support/shared_device.h"
 #include "tests/support/test_lenses.h"
 #include "tests/support/test_scene.h"
-#include "trainer/resolution_ramp.h"
+#include "trainer/step/photos.h"
 
 namespace darb::test {
 namespace {

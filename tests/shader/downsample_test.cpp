@@ -1,7 +1,7 @@
 // Smaller photos against area means in double.
 #include "engine/core/rng.h"
 #include "tests/support/shared_device.h"
-#include "trainer/resolution_ramp.h"
+#include "trainer/step/photos.h"
 
 namespace darb::test {
 namespace {

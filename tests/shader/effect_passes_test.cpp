@@ -7,8 +7,8 @@
 #include "tests/support/compare_arrays.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
-#include "trainer/exposure.h"
-#include "trainer/smoothing.h"
+#include "trainer/step/exposure.h"
+#include "trainer/step/smoothing.h"
 
 namespace darb::test {
 namespace {

@@ -4,7 +4,7 @@
 #include "shaders/shared/render_args.h"
 #include "tests/support/compare_arrays.h"
 #include "tests/support/shared_device.h"
-#include "trainer/exposure.h"
+#include "trainer/step/exposure.h"
 
 namespace darb::test {
 namespace {

@@ -12,7 +12,7 @@
 #include "tests/support/same_rounding.h"
 #include "tests/support/test_lenses.h"
 #include "tests/support/test_scene.h"
-#include "trainer/exposure.h"
+#include "trainer/step/exposure.h"
 
 namespace darb::test {
 namespace {

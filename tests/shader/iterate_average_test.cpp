@@ -1,5 +1,5 @@
 // The mean of the splats over iterations: against one in double, what it holds and gives back.
-#include "trainer/iterate_average.h"
+#include "trainer/step/iterate_average.h"
 
 #include <gtest/gtest.h>
 

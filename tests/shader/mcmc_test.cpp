@@ -1,6 +1,6 @@
 // The passes of the strategy mcmc against double precision, one after the other and together; and
 // the law that they are for: a splat that several take the place of looks as it did.
-#include "trainer/density/relocation.h"
+#include "trainer/growth/relocation.h"
 
 #include "engine/core/rng.h"
 #include "engine/kernels/relocation_table.h"
@@ -16,7 +16,7 @@
 #include "tests/support/guarded_buffer.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
-#include "trainer/density/shape_rows.h"
+#include "trainer/growth/density_control.h"
 
 namespace darb::test {
 namespace {

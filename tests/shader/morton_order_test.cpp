@@ -1,6 +1,6 @@
 // Splats in Morton order: against a stable sort on the host, with all that belongs to a splat, and
 // the picture that they make.
-#include "trainer/density/morton_order.h"
+#include "trainer/growth/morton_order.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "tests/support/tiny_training.h"
-#include "trainer/checkpoint.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb::test {
 

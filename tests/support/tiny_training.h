@@ -8,9 +8,9 @@
 #include "engine/render/renderer.h"
 #include "tests/support/shared_device.h"
 #include "tests/support/test_scene.h"
-#include "trainer/evaluation.h"
-#include "trainer/initial_model.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/run/evaluation.h"
+#include "trainer/step/trainer.h"
 
 namespace darb::test {
 

@@ -12,8 +12,8 @@
 #include "tests/support/test_scene.h"
 #include "tools/cost/cost_report.h"
 #include "tools/cost/train_cost.h"
-#include "trainer/initial_model.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/step/trainer.h"
 
 namespace darb::test {
 namespace {

@@ -8,7 +8,7 @@
 #include "tests/support/resumed_run.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
-#include "trainer/memory_plan.h"
+#include "trainer/step/memory_plan.h"
 
 namespace darb::test {
 namespace {

@@ -1,5 +1,5 @@
 // How a render is compared with a photo: alpha as transparency, and alpha as a mask.
-#include "trainer/evaluation.h"
+#include "trainer/run/evaluation.h"
 
 #include <gtest/gtest.h>
 

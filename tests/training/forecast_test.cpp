@@ -1,6 +1,6 @@
 // trainer/forecast: splats, time and memory before a run.
-#include "trainer/forecast.h"
-#include "trainer/predicted_growth.h"
+#include "trainer/growth/predicted_growth.h"
+#include "trainer/run/forecast.h"
 
 #include <gtest/gtest.h>
 
@@ -13,9 +13,9 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tests/support/test_device_options.h"
-#include "trainer/initial_model.h"
-#include "trainer/strategy.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/options/strategy.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "trainer/initial_model.h"
+#include "trainer/growth/initial_model.h"
 
 namespace darb::test {
 namespace {

@@ -15,7 +15,7 @@
 #include "engine/raster/frame_limit.h"
 #include "engine/raster/gpu_splats.h"
 #include "tests/support/test_device_options.h"
-#include "trainer/memory_plan.h"
+#include "trainer/step/memory_plan.h"
 
 namespace darb {
 namespace {

@@ -1,5 +1,5 @@
 // trainer/memory_plan: the plan against what a device counted.
-#include "trainer/memory_plan.h"
+#include "trainer/step/memory_plan.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -13,11 +13,11 @@
 #include "tests/support/resident_bytes.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
-#include "trainer/forecast.h"
-#include "trainer/initial_model.h"
-#include "trainer/run.h"
-#include "trainer/strategy.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/options/strategy.h"
+#include "trainer/run/forecast.h"
+#include "trainer/run/run.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 namespace {

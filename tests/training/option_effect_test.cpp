@@ -9,8 +9,8 @@
 #include "engine/core/error.h"
 #include "engine/data/track_observations.h"
 #include "tests/support/measured_depths.h"
-#include "trainer/option_table.h"
-#include "trainer/strategy.h"
+#include "trainer/options/option_table.h"
+#include "trainer/options/strategy.h"
 
 namespace darb::test {
 namespace {

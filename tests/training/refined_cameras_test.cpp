@@ -4,7 +4,7 @@
 #include "engine/core/quantile.h"
 #include "tests/support/resumed_run.h"
 #include "tests/support/tracked_dataset.h"
-#include "trainer/align_camera.h"
+#include "trainer/step/camera_refinement.h"
 
 namespace darb::test {
 namespace {

@@ -8,7 +8,7 @@
 #include "engine/core/error.h"
 #include "engine/data/point_cloud_ply.h"
 #include "tests/support/run_command.h"
-#include "trainer/checkpoint.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "trainer/run_log.h"
+#include "trainer/run/run_log.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,7 +7,7 @@
 
 #include "engine/core/files.h"
 #include "tests/support/test_device_options.h"
-#include "trainer/initial_model.h"
+#include "trainer/growth/initial_model.h"
 
 namespace darb {
 namespace {

@@ -1,6 +1,6 @@
 // engine/report, trainer/run_report: the page is well-formed, whole in itself, and stands strange
 // input.
-#include "trainer/run_report.h"
+#include "trainer/run/run_report.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -3,11 +3,11 @@
 
 #include "engine/core/files.h"
 #include "tests/support/shared_device.h"
-#include "trainer/evaluation.h"
-#include "trainer/predicted_growth.h"
-#include "trainer/initial_model.h"
-#include "trainer/strategy.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/growth/predicted_growth.h"
+#include "trainer/options/strategy.h"
+#include "trainer/run/evaluation.h"
+#include "trainer/step/trainer.h"
 
 namespace darb::test {
 namespace {

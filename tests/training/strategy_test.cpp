@@ -1,10 +1,10 @@
 // The strategies mcmc and budget in whole training runs: they repeat bit by bit, go on from a
 // checkpoint as if never stopped, keep to their counts and bring held-out pictures closer.
-#include "trainer/strategy.h"
+#include "trainer/options/strategy.h"
 
 #include "engine/core/error.h"
 #include "tests/support/resumed_run.h"
-#include "trainer/predicted_growth.h"
+#include "trainer/growth/predicted_growth.h"
 
 namespace darb::test {
 namespace {

@@ -9,10 +9,8 @@
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_device_options.h"
 #include "tests/support/tiny_training.h"
-#include "trainer/forecast.h"
-#include "trainer/memory_budget.h"
-#include "trainer/memory_plan.h"
-#include "trainer/start_memory.h"
+#include "trainer/run/forecast.h"
+#include "trainer/step/memory_plan.h"
 
 namespace darb::test {
 namespace {

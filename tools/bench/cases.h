@@ -11,7 +11,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "tools/bench/measure.h"
-#include "trainer/options.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 

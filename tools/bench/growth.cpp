@@ -10,7 +10,7 @@
 #include "engine/core/error.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
-#include "trainer/trainer.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 

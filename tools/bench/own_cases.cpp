@@ -6,7 +6,7 @@
 #include "engine/scene/splat_file.h"
 #include "tools/bench/cases.h"
 #include "tools/cost/views.h"
-#include "trainer/trainer.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 

@@ -11,13 +11,13 @@
 #include "engine/render/upsample.h"
 #include "tools/bench/bench_step.h"
 #include "tools/bench/scenes.h"
-#include "trainer/density/density_strategy.h"
-#include "trainer/density/morton_order.h"
-#include "trainer/exposure.h"
-#include "trainer/iterate_average.h"
-#include "trainer/resolution_ramp.h"
-#include "trainer/schedule.h"
-#include "trainer/smoothing.h"
+#include "trainer/growth/density_strategy.h"
+#include "trainer/growth/morton_order.h"
+#include "trainer/options/schedule.h"
+#include "trainer/step/exposure.h"
+#include "trainer/step/iterate_average.h"
+#include "trainer/step/photos.h"
+#include "trainer/step/smoothing.h"
 
 namespace darb {
 

@@ -7,9 +7,9 @@
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
 #include "tools/bench/yardstick.h"
-#include "trainer/initial_model.h"
-#include "trainer/schedule.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/options/schedule.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 

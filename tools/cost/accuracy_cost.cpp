@@ -9,7 +9,7 @@
 
 #include "engine/core/quantile.h"
 #include "engine/render/renderer.h"
-#include "trainer/evaluation.h"
+#include "trainer/run/evaluation.h"
 
 namespace darb {
 

@@ -10,13 +10,13 @@
 #include "engine/check/walk_truth.h"
 #include "engine/core/error.h"
 #include "engine/reference/reference_loss.h"
-#include "trainer/checkpoint.h"
-#include "trainer/evaluation.h"
-#include "trainer/initial_model.h"
-#include "trainer/rank_group.h"
-#include "trainer/schedule.h"
-#include "trainer/strategy.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/options/schedule.h"
+#include "trainer/options/strategy.h"
+#include "trainer/run/evaluation.h"
+#include "trainer/step/checkpoint.h"
+#include "trainer/step/rank_group.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 

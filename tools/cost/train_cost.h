@@ -12,7 +12,7 @@
 #include "engine/data/dataset.h"
 #include "engine/ranks/ranks.h"
 #include "tools/cost/accuracy_cost.h"
-#include "trainer/options.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 

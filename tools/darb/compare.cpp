@@ -23,9 +23,8 @@
 #include "tools/darb/outputs.h"
 #include "tools/darb/stop_signals.h"
 #include "trainer/job/training_data.h"
-#include "trainer/portable_path.h"
-#include "trainer/rank_group.h"
-#include "trainer/run_folder.h"
+#include "trainer/run/run_folder.h"
+#include "trainer/step/rank_group.h"
 
 namespace darb {
 

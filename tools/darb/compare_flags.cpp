@@ -11,7 +11,7 @@
 #include "tools/darb/kernel_flags.h"
 #include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
-#include "trainer/strategy.h"
+#include "trainer/options/strategy.h"
 
 namespace darb {
 

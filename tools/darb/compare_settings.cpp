@@ -3,9 +3,9 @@
 
 #include "engine/core/say.h"
 #include "tools/darb/compare_flags.h"
-#include "trainer/checkpoint.h"
-#include "trainer/portable_path.h"
-#include "trainer/rank_group.h"
+#include "trainer/run/run_folder.h"
+#include "trainer/step/checkpoint.h"
+#include "trainer/step/rank_group.h"
 
 namespace darb {
 

@@ -16,10 +16,10 @@
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_measure.h"
 #include "tools/paper/compare_share.h"
-#include "trainer/checkpoint.h"
 #include "trainer/job/job.h"
 #include "trainer/job/training_data.h"
-#include "trainer/run_folder.h"
+#include "trainer/run/run_folder.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb {
 

@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "trainer/option_table.h"
+#include "trainer/options/option_table.h"
 
 namespace darb {
 

@@ -6,7 +6,7 @@
 
 #include "engine/core/say.h"
 #include "engine/core/text.h"
-#include "trainer/progress.h"
+#include "trainer/run/progress.h"
 
 namespace darb {
 

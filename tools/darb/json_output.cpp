@@ -2,7 +2,7 @@
 
 #include "engine/core/files.h"
 #include "engine/core/say.h"
-#include "trainer/portable_path.h"
+#include "trainer/run/run_folder.h"
 
 namespace darb {
 

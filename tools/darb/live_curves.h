@@ -2,7 +2,7 @@
 #pragma once
 
 #include "engine/data/dataset.h"
-#include "trainer/run.h"
+#include "trainer/run/run.h"
 #include "viewer/bounds.h"
 #include "viewer/session.h"
 

@@ -10,7 +10,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "trainer/run.h"
+#include "trainer/run/run.h"
 
 namespace darb {
 

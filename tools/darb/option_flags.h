@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "trainer/option_table.h"
+#include "trainer/options/option_table.h"
 
 namespace darb {
 

@@ -10,8 +10,8 @@
 #include "engine/render/renderer.h"
 #include "tools/darb/effect_flags.h"
 #include "tools/darb/tune_flags.h"
-#include "trainer/initial_model.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 

@@ -9,7 +9,7 @@
 
 #include "engine/gpu/device.h"
 #include "engine/plan/effect_plan.h"
-#include "trainer/options.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 

@@ -11,7 +11,7 @@
 #include "tools/darb/scene_evaluation.h"
 #include "tools/darb/tune_flags.h"
 #include "tools/paper/compare_stats.h"
-#include "trainer/dense_start.h"
+#include "trainer/growth/initial_model.h"
 
 namespace darb {
 

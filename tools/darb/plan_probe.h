@@ -8,7 +8,7 @@
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/trial.h"
-#include "trainer/options.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 

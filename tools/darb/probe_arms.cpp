@@ -4,8 +4,8 @@
 #include <chrono>
 #include <memory>
 
-#include "trainer/initial_model.h"
-#include "trainer/trainer.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 

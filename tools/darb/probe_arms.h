@@ -7,7 +7,7 @@
 #include "engine/gpu/device.h"
 #include "engine/plan/antialias_probe.h"
 #include "engine/scene/splat_model.h"
-#include "trainer/options.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 

@@ -8,7 +8,7 @@
 #include "engine/render/renderer.h"
 #include "tools/darb/open_cameras.h"
 #include "trainer/job/job.h"
-#include "trainer/trainer.h"
+#include "trainer/step/trainer.h"
 
 namespace darb {
 

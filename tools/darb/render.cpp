@@ -27,7 +27,7 @@
 #include "tools/darb/render_film.h"
 #include "tools/darb/scene_file.h"
 #include "tools/darb/tune_flags.h"
-#include "trainer/evaluation.h"
+#include "trainer/run/evaluation.h"
 
 namespace darb {
 

@@ -17,7 +17,7 @@
 #include "tools/darb/outputs.h"
 #include "tools/darb/pixel_size.h"
 #include "tools/darb/scene_file.h"
-#include "trainer/evaluation.h"
+#include "trainer/run/evaluation.h"
 #include "viewer/bounds.h"
 #include "viewer/path_export.h"
 #include "viewer/turntable.h"

@@ -15,10 +15,10 @@
 #include "engine/raster/frame_limit.h"
 #include "engine/render/renderer.h"
 #include "tools/paper/compare_stats.h"
-#include "trainer/align_camera.h"
-#include "trainer/evaluation.h"
-#include "trainer/exposure_fit.h"
-#include "trainer/rank_group.h"
+#include "trainer/run/evaluation.h"
+#include "trainer/step/camera_refinement.h"
+#include "trainer/step/exposure.h"
+#include "trainer/step/rank_group.h"
 
 namespace darb {
 

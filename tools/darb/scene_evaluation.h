@@ -12,7 +12,7 @@
 #include "engine/plan/effect_plan.h"
 #include "engine/ranks/ranks.h"
 #include "engine/scene/splat_model.h"
-#include "trainer/run.h"
+#include "trainer/run/run.h"
 
 namespace darb {
 

@@ -32,8 +32,8 @@
 #include "tools/darb/tune_flags.h"
 #include "trainer/job/job.h"
 #include "trainer/job/training_data.h"
-#include "trainer/run_folder.h"
-#include "trainer/start_memory.h"
+#include "trainer/run/forecast.h"
+#include "trainer/run/run_folder.h"
 
 namespace darb {
 

@@ -18,7 +18,7 @@
 #include "trainer/blocks/run_blocks.h"
 #include "trainer/job/job.h"
 #include "trainer/job/training_data.h"
-#include "trainer/run_folder.h"
+#include "trainer/run/run_folder.h"
 
 namespace darb {
 

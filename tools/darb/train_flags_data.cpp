@@ -6,7 +6,7 @@
 #include "tools/darb/evaluation_flags.h"
 #include "tools/darb/help.h"
 #include "tools/darb/train_flags.h"
-#include "trainer/presets.h"
+#include "trainer/options/presets.h"
 
 namespace darb {
 

@@ -8,7 +8,7 @@
 #include "tools/darb/numbers.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/train_flags.h"
-#include "trainer/strategy.h"
+#include "trainer/options/strategy.h"
 
 namespace darb {
 

@@ -11,10 +11,10 @@
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/train_presets.h"
-#include "trainer/forecast.h"
-#include "trainer/memory_budget.h"
-#include "trainer/progress.h"
-#include "trainer/schedule.h"
+#include "trainer/options/schedule.h"
+#include "trainer/run/forecast.h"
+#include "trainer/run/progress.h"
+#include "trainer/step/memory_plan.h"
 
 namespace darb {
 

@@ -4,9 +4,9 @@
 
 #include "engine/core/say.h"
 #include "engine/data/run_colmap.h"
-#include "trainer/presets.h"
-#include "trainer/progress.h"
-#include "trainer/resolution_ramp.h"
+#include "trainer/options/presets.h"
+#include "trainer/run/progress.h"
+#include "trainer/step/photos.h"
 
 namespace darb {
 

@@ -3,8 +3,8 @@
 
 #include "engine/gpu/device.h"
 #include "tools/darb/train_flags.h"
-#include "trainer/forecast.h"
 #include "trainer/job/job.h"
+#include "trainer/run/forecast.h"
 
 namespace darb {
 

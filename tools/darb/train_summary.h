@@ -4,7 +4,7 @@
 #include <string>
 
 #include "tools/darb/train_flags.h"
-#include "trainer/run.h"
+#include "trainer/run/run.h"
 
 namespace darb {
 

@@ -10,10 +10,10 @@
 #include "engine/scene/edit_splats.h"
 #include "tools/python/scene.h"
 #include "tools/python/train_options.h"
-#include "trainer/checkpoint.h"
-#include "trainer/evaluation.h"
-#include "trainer/follow_run.h"
-#include "trainer/start_memory.h"
+#include "trainer/run/evaluation.h"
+#include "trainer/run/follow_run.h"
+#include "trainer/run/forecast.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb::python {
 

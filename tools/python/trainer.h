@@ -8,7 +8,7 @@
 #include "tools/python/dataset.h"
 #include "tools/python/device.h"
 #include "trainer/job/job.h"
-#include "trainer/trainer.h"
+#include "trainer/step/trainer.h"
 
 namespace darb::python {
 

@@ -6,7 +6,7 @@
 #include "engine/core/check.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/scene/edit_splats.h"
-#include "trainer/initial_model.h"
+#include "trainer/growth/initial_model.h"
 
 namespace darb {
 

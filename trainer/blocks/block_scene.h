@@ -9,7 +9,7 @@
 #include "engine/data/dataset.h"
 #include "engine/scene/splat_model.h"
 #include "trainer/blocks/partition.h"
-#include "trainer/options.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 

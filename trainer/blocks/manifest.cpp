@@ -9,8 +9,8 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
-#include "trainer/blocks/camera_choice.h"
-#include "trainer/checkpoint.h"
+#include "trainer/blocks/partition.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb {
 

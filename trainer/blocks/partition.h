@@ -8,6 +8,10 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
+#include "engine/raster/effects.h"
+#include "engine/scene/splat_model.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 
@@ -71,5 +75,40 @@ struct Grid {
     int columns = 1, rows = 1;
 };
 Grid grid_for(int blocks, const GroundPlane& plane, std::span<const double> points);
+
+// Which cameras a block is trained on: those in whose pictures the splats of its cell, in the
+// coarse model of the whole, make up enough.
+
+/// Share of a picture from which on its camera sees a cell enough.
+constexpr double kLeastShare = 0.05;
+/// A cell that fewer see enough gets those that see most of it.
+constexpr std::size_t kFewestViews = 3;
+
+/// [view][cell]: the mean over the picture of sum alpha T over the splats of the cell, which is
+/// what they contribute. Three cells a picture: their splats are drawn red, green and blue, the
+/// others black.
+std::vector<std::vector<double>> cell_shares(Device& device, const SplatModel& coarse,
+                                             const Partition& cells, const std::vector<View>& views,
+                                             const ProjectionEffects& effects);
+
+/// [cell] the views, ascending, that show at least `least` of it, and of each view the cell that it
+/// shows most of; fewer than kFewestViews only where fewer show any of it.
+std::vector<std::vector<std::size_t>> choose_views(const std::vector<std::vector<double>>& shares,
+                                                   double least = kLeastShare);
+
+// What the parts of a run in blocks are trained with.
+
+/// That all blocks together may come to: options.max_splats, or what a run of the whole is forecast
+/// to.
+std::uint32_t whole_splats(const Dataset& dataset, const TrainOptions& options);
+/// Of the coarse model of so many.
+std::uint32_t coarse_splats(std::uint32_t whole);
+/// Half the iterations, no view-dependent colour, an eighth of the splats.
+TrainOptions coarse_options(const Dataset& dataset, const TrainOptions& options);
+/// Degrees of colour by the iteration, without a probe. Beside the frozen ones, the share of
+/// options.max_splats that the cell with its margin has of the points; start: what the block begins
+/// with, at least.
+TrainOptions block_options(const TrainOptions& options, const CellCount& count, std::size_t points,
+                           std::uint32_t frozen, std::uint32_t start);
 
 }  // namespace darb

@@ -10,7 +10,7 @@
 
 #include "engine/ranks/ranks.h"
 #include "trainer/blocks/manifest.h"
-#include "trainer/run.h"
+#include "trainer/run/run.h"
 
 namespace darb {
 

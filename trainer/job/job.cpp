@@ -7,10 +7,10 @@
 #include "engine/core/error.h"
 #include "engine/data/source.h"
 #include "engine/data/track_adjustment.h"
-#include "trainer/predicted_growth.h"
+#include "trainer/growth/predicted_growth.h"
 #include "trainer/job/training_data.h"
-#include "trainer/start_memory.h"
-#include "trainer/strategy.h"
+#include "trainer/options/strategy.h"
+#include "trainer/run/forecast.h"
 
 namespace darb {
 

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "engine/plan/effect_plan.h"
-#include "trainer/dense_start.h"
+#include "trainer/growth/initial_model.h"
 #include "trainer/job/request.h"
-#include "trainer/run.h"
+#include "trainer/run/run.h"
 
 namespace darb {
 

@@ -12,8 +12,8 @@
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/plan/effect_plan.h"
-#include "trainer/option_table.h"
-#include "trainer/portable_path.h"
+#include "trainer/options/option_table.h"
+#include "trainer/run/run_folder.h"
 
 namespace darb {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
-#include "trainer/options.h"
+#include "trainer/options/options.h"
 
 namespace darb {
 

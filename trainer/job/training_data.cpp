@@ -21,9 +21,9 @@
 #include "engine/data/straight_masks.h"
 #include "engine/data/video.h"
 #include "trainer/job/photo_folder.h"
-#include "trainer/portable_path.h"
-#include "trainer/presets.h"
-#include "trainer/progress.h"
+#include "trainer/options/presets.h"
+#include "trainer/run/progress.h"
+#include "trainer/run/run_folder.h"
 
 namespace darb {
 

@@ -10,7 +10,7 @@
 #include "engine/data/colmap_progress.h"
 #include "engine/data/dataset.h"
 #include "trainer/job/request.h"
-#include "trainer/run_folder.h"
+#include "trainer/run/run_folder.h"
 
 namespace darb {
 

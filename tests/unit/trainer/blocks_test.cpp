@@ -13,9 +13,8 @@
 #include "engine/raster/gpu_splats.h"
 #include "engine/scene/edit_splats.h"
 #include "trainer/blocks/block_scene.h"
-#include "trainer/blocks/camera_choice.h"
 #include "trainer/blocks/manifest.h"
-#include "trainer/blocks/part_options.h"
+#include "trainer/blocks/partition.h"
 
 namespace darb {
 namespace {

@@ -1,5 +1,5 @@
 // Refined cameras without a picture: what the anchor of the tracks alone makes of them.
-#include "trainer/camera_refinement.h"
+#include "trainer/step/camera_refinement.h"
 
 #include <gtest/gtest.h>
 

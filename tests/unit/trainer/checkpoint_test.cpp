@@ -14,7 +14,7 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "tests/support/test_scene.h"
-#include "trainer/checkpoint.h"
+#include "trainer/step/checkpoint.h"
 
 namespace darb::test {
 namespace {

@@ -1,5 +1,5 @@
 // trainer/optimizer: rates in the units of the scene, regularisers, and what a trial changes.
-#include "trainer/optimizer.h"
+#include "trainer/step/optimizer.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The table of training options: every row takes its values and no others, and is in the settings
 // that a resumed run must repeat. That each does something: option_effect_test.
-#include "trainer/option_table.h"
+#include "trainer/options/option_table.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <set>
 
 #include "engine/core/error.h"
-#include "trainer/strategy.h"
+#include "trainer/options/strategy.h"
 
 namespace darb::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "trainer/portable_path.h"
+#include "trainer/run/run_folder.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

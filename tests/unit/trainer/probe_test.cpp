@@ -1,5 +1,5 @@
 // trainer/probe: what a probe of the degree does with the run that it forks, on a run that is none.
-#include "trainer/probe.h"
+#include "trainer/step/probe.h"
 
 #include <gtest/gtest.h>
 

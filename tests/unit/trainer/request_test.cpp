@@ -12,8 +12,8 @@
 #include "engine/core/files.h"
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_registry.h"
-#include "trainer/option_table.h"
-#include "trainer/strategy.h"
+#include "trainer/options/option_table.h"
+#include "trainer/options/strategy.h"
 
 namespace darb::test {
 namespace {

@@ -1,5 +1,5 @@
 // What a run does at which iteration, from its options alone.
-#include "trainer/schedule.h"
+#include "trainer/options/schedule.h"
 
 #include <gtest/gtest.h>
 

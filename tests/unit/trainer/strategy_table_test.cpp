@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "engine/core/files.h"
-#include "trainer/strategy.h"
+#include "trainer/options/strategy.h"
 
 namespace darb {
 namespace {

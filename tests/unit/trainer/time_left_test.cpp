@@ -1,5 +1,5 @@
 // What is left of a run, on runs whose pace was recorded (tools/record_pace.py).
-#include "trainer/time_left.h"
+#include "trainer/run/time_left.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
-#include "trainer/schedule.h"
-#include "trainer/strategy.h"
+#include "trainer/options/schedule.h"
+#include "trainer/options/strategy.h"
 
 namespace darb {
 namespace {

@@ -1,5 +1,5 @@
 // trainer/view_order: every epoch shows each view once, in an order that repeats.
-#include "trainer/view_order.h"
+#include "trainer/step/trainer.h"
 
 #include <gtest/gtest.h>
 

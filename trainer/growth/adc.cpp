@@ -1,0 +1,95 @@
+// Strategy adc: clone, split and prune by the screen gradient, reset opacities. Source: 3DGS,
+// section 5, with graphdeco's schedule.
+#include <algorithm>
+#include <cmath>
+
+#include "trainer/growth/density_strategy.h"
+
+namespace darb {
+
+namespace {
+
+// Rules of thumb for the growth, of runs on photos of 100 to 400 px (docs/experiments/growth.md).
+// Splats go up by the detail of the photos' opaque pixels and, as photos of one scene show the
+// same, slowly by their number. Beyond the most pixels that were tried, and where the detail is not
+// known, it goes by the root of the pixels. A dense start grows by so much at least; splats go up
+// to so many for one of the start, and not faster than so much a round.
+constexpr double kSplatsByDetail = 8'600, kDetailPower = 0.7, kPixelPower = 0.25;
+constexpr double kMostPixelsTried = 5e6;
+constexpr double kSplatsPerRootPixel = 25;
+constexpr double kDenseGrowth = 1.3;
+constexpr double kMaxGrowth = 60;
+constexpr double kGrowthPerRound = 1.4;
+
+double splats_wanted(const GrowthStart& start) {
+    const auto pixels = static_cast<double>(start.photo_pixels);
+    const auto& [per_pixel, opaque] = start.detail;
+    if (opaque == 0) return kSplatsPerRootPixel * std::sqrt(pixels);
+    const double tried = std::min(pixels, kMostPixelsTried);
+    const double by_detail = kSplatsByDetail * std::pow(per_pixel * opaque, kDetailPower) *
+                             std::pow(tried * opaque, kPixelPower) *
+                             std::sqrt(pixels / std::max(tried, 1.0));
+    return start.dense ? std::max(by_detail, kDenseGrowth * start.splats) : by_detail;
+}
+
+class Adc : public DensityStrategy {
+  public:
+    DensityResult round(const DensityRound& round) override {
+        return round.control.run(round.splats, round.gradient_sum, round.args, round.limit);
+    }
+};
+
+std::uint32_t no_target(const TrainOptions&, const Schedule&, int, std::uint32_t,
+                        std::uint32_t limit) {
+    return limit;
+}
+
+std::uint32_t end_by_photos(const TrainOptions& options, const GrowthStart& start) {
+    const Schedule::Rounds every = Schedule(options).rounds;
+    const int first = every.begin / every.interval;
+    const int last = std::max(every.end - 1, 0) / every.interval;
+    const int rounds = std::max(0, last - first);
+    const double growth = std::min(kMaxGrowth, std::pow(kGrowthPerRound, rounds));
+    const double most = std::min(growth * start.splats, static_cast<double>(start.limit));
+    const auto end = static_cast<std::uint32_t>(std::min(splats_wanted(start), most));
+    return start.random && rounds > 0 ? end : std::max(start.splats, end);
+}
+
+// The count grows evenly while density control runs.
+double even_mean(const TrainOptions& options, std::uint32_t start, std::uint32_t end) {
+    const double all = options.iterations;
+    const Schedule::Rounds rounds = Schedule(options).rounds;
+    const double to = std::clamp<double>(rounds.end, 0, all);
+    const double from = std::clamp<double>(rounds.begin, 0, to);
+    return (from * start + (to - from) * 0.5 * (double(start) + end) + (all - to) * end) / all;
+}
+
+std::uint64_t even_until(const Schedule& schedule, int iteration, double start, std::uint32_t end) {
+    const double rounds = std::max(1, schedule.rounds.end - schedule.rounds.begin);
+    const double until = iteration - schedule.rounds.begin;
+    const double share = std::clamp(until / rounds, 0.0, 1.0);
+    return static_cast<std::uint64_t>(start + share * (end - start));
+}
+
+}  // namespace
+
+const StrategyRow& adc_row();
+const StrategyRow& adc_row() {
+    static const StrategyRow row{
+        .name = "adc",
+        .summary = "clone, split and prune by the screen gradient, as 3DGS",
+        .defaults = {},
+        .follows_3dgs = true,
+        .grows_to_limit = false,
+        .target = no_target,
+        .forecast_end = end_by_photos,
+        .forecast_mean = even_mean,
+        .forecast_until = even_until,
+        .device_bytes = [](int) { return std::uint64_t{0}; },
+        .make = [](const StrategySetup&) -> std::unique_ptr<DensityStrategy> {
+            return std::make_unique<Adc>();
+        }};
+    return row;
+}
+
+}  // namespace darb

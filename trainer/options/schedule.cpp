@@ -1,0 +1,200 @@
+#include "trainer/options/schedule.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/error.h"
+#include "engine/kernels/kernel_family.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kShortRun = 4'000;  // iterations
+constexpr float kMostSpeedup = 5, kMostRateScale = 10;
+constexpr std::size_t kPhotosThatBear = 50;
+
+struct RampSize {
+    int divisor;
+    double until;  // share of the run
+};
+constexpr RampSize kRampSizes[] = {{4, 0.1}, {2, 0.3}};
+constexpr int kSmallestSide = 100;  // px
+
+// A run that is shorter than kShortRun is that run in fast motion, at most kMostSpeedup times.
+float speedup_of(const TrainOptions& o) {
+    const float times = float(kShortRun) / static_cast<float>(std::max(o.iterations, 1));
+    return o.speed_up_short_runs ? std::clamp(times, 1.0f, kMostSpeedup) : 1.0f;
+}
+
+// Of what would not settle in a run shorter than the 30,000 iterations of 3DGS.
+float rate_scale_of(const TrainOptions& o) {
+    return std::sqrt(std::max(1.0f, 30'000.0f / static_cast<float>(std::max(o.iterations, 1))));
+}
+
+int sped_up(std::optional<int> given, int usual, float speedup) {
+    return given ? *given : static_cast<int>(std::lround(static_cast<float>(usual) / speedup));
+}
+
+// Harmonics above the first band: of steps of the mean of so many iterations.
+float rest_rate(const TrainOptions& o, int every) {
+    float times = std::sqrt(static_cast<float>(every));
+    const float rate_scale = rate_scale_of(o);
+    if (o.speed_up_sh_rest) times *= std::min(rate_scale * rate_scale, kMostRateScale);
+    return o.sh_dc_lr * std::min(1.0f, times / 20);
+}
+
+int rounds_end(const TrainOptions& o) {
+    if (o.densify_until) return std::min(*o.densify_until, o.iterations);
+    const StrategyDefaults& d = strategy_row(o.strategy).defaults;
+    return std::min(o.iterations / d.rounds_of * d.rounds_part, d.rounds_latest);
+}
+
+// What is reset keeps twice the opacity that is pruned, as 3DGS does, and at least 0.01, its value,
+// or twice what is drawn at all: what is not seen never comes back.
+Schedule::Resets resets_of(const TrainOptions& o, float prune_opacity,
+                           const Schedule::Rounds& rounds) {
+    Schedule::Resets resets;
+    resets.interval = o.opacity_reset_interval;
+    const int last = rounds.end - (o.late_resets ? 1 : resets.interval);
+    resets.last = std::max(last, 0) / resets.interval * resets.interval;
+    const auto seen = static_cast<float>(2 * o.accuracy.value(kAlphaCutoff));
+    resets.to = std::clamp(2.0f * prune_opacity, std::max(0.01f, seen), 0.9f);
+    const bool first_round_follows = rounds.begin + rounds.interval < rounds.end;
+    resets.at_begin = o.white_background && !o.random_background && first_round_follows;
+    return resets;
+}
+
+}  // namespace
+
+Schedule::Schedule(const TrainOptions& o)
+    : iterations(o.iterations),
+      batch(o.batch),
+      strategy(o.strategy),
+      speedup(speedup_of(o)),
+      prune_extent_(o.prune_extent),
+      exposure_lr_init_(o.exposure_lr_init),
+      exposure_lr_final_(o.exposure_lr_final),
+      sh_degree_(o.sh_degree),
+      ramp_(o.resolution_ramp) {
+    if (batch < 1 || (batch & (batch - 1)) != 0)
+        throw Error(fmt::format("--batch {}", batch), "is no power of two",
+                    "Give 1, 2, 4, 8 and so on: gradients are added in pairs.");
+    const StrategyDefaults& defaults = strategy_row(strategy).defaults;
+    initial_opacity = o.initial_opacity.value_or(defaults.initial_opacity);
+    initial_scale = o.initial_scale.value_or(defaults.initial_scale);
+    prune_opacity = o.prune_opacity.value_or(defaults.prune_opacity);
+    rest_every = o.sh_rest_every;
+
+    degree_interval = sped_up(o.sh_interval, 1'000, speedup);
+    rounds.begin = sped_up(o.densify_from, 500, speedup);
+    rounds.interval = sped_up(o.densify_interval, 100, speedup);
+    degree_interval = std::max(degree_interval, 1);
+    rounds.interval = std::max(rounds.interval, 1);
+    rounds.end = rounds_end(o);
+    resets = resets_of(o, prune_opacity, rounds);
+    average_begin = std::max(static_cast<int>(o.average_from * iterations), rounds.end);
+
+    // A kernel that covers less of the picture than a Gaussian has its lengths longer, learns its
+    // scales faster, and gains from a limit of them; a Gaussian loses with one.
+    if (o.lengths_by_area) length_scale = std::max(1.0, equal_area_scale(o.kernel, o.footprint));
+    largest_scale = o.largest_scale.value_or(length_scale > 1 ? 1.0f : 0.0f);
+
+    const float rate_scale = rate_scale_of(o),
+                first_position = o.position_lr_init.value_or(1.6e-4f * rate_scale);
+    first.position = first_position;
+    last_position_rate = o.position_lr_final.value_or(1.6e-6f * rate_scale);
+    first.scale = o.scale_lr.value_or(0.005f * speedup) * (length_scale > 1 ? 1.5f : 1.0f);
+    first.rotation = o.rotation_lr.value_or(0.001f * speedup);
+    // The root of the speedup: with the whole, fewer splats and less time, but 0.8 dB less.
+    first.opacity = o.opacity_lr.value_or(0.05f * std::sqrt(speedup));
+    first.sh_dc = o.sh_dc_lr;
+    first.shape = o.shape_lr.value_or(0.004f * speedup);
+    first.sh_rest = rest_rate(o, rest_every);
+    // A mean settles what large steps scatter.
+    position_falls_for =
+        o.position_lr_falls.value_or(averages() ? defaults.position_lr_falls : 1.0);
+    last_share = o.final_lr_share.value_or(averages() ? 1.0 : 0.3);
+}
+
+int Schedule::step_end(int iteration) const {
+    const int end = iteration / batch * batch + batch;
+    return iteration < iterations ? std::min(end, iterations) : end;
+}
+
+double Schedule::position_rate(int iteration) const {
+    const double t =
+        std::clamp(double(iteration) / std::max(iterations, 1), 0.0, position_falls_for);
+    const auto from = static_cast<float>(first.position);
+    return std::exp((1 - t) * std::log(from) + t * std::log(last_position_rate));
+}
+
+Schedule::Rates Schedule::rates(int iteration) const {
+    const double t = std::clamp(double(iteration) / std::max(iterations, 1), 0.0, 1.0);
+    const auto late = static_cast<float>(std::pow(last_share, std::max(0.0, 2 * t - 1)));
+    Rates now = first;
+    now.position = position_rate(iteration);
+    for (float* rate :
+         {&now.scale, &now.rotation, &now.opacity, &now.shape, &now.sh_dc, &now.sh_rest})
+        *rate *= late;
+    return now;
+}
+
+double Schedule::exposure_rate(int iteration) const {
+    const double t = std::clamp(double(iteration) / iterations, 0.0, 1.0);
+    return exposure_lr_init_ * std::pow(exposure_lr_final_ / exposure_lr_init_, t);
+}
+
+int Schedule::sh_degree(int iteration) const {
+    return std::min(sh_degree_, iteration / degree_interval);
+}
+
+bool Schedule::refines_after(int iteration) const {
+    return iteration > rounds.begin && iteration < rounds.end && iteration % rounds.interval == 0;
+}
+
+bool Schedule::resets_after(int iteration) const {
+    if (!strategy_row(strategy).follows_3dgs || iteration <= 0) return false;
+    return (resets.at_begin && iteration == rounds.begin) ||
+           (iteration % resets.interval == 0 && iteration <= resets.last);
+}
+
+bool Schedule::prunes_by_size(int iteration) const {
+    return prune_extent_ > 0 && iteration > resets.interval;
+}
+
+bool Schedule::regularises_unseen(std::size_t photos, int iteration) const {
+    const auto interval = static_cast<int>((photos + kPhotosThatBear - 1) / kPhotosThatBear);
+    return strategy_row(strategy).defaults.regularises_all ||
+           iteration % std::max(interval, 1) == 0;
+}
+
+bool Schedule::averages_after(int iteration) const {
+    const int interval = std::clamp(iterations / 160, 1, 10);
+    return iteration > average_begin && (iterations - iteration) % interval == 0;
+}
+
+std::vector<RampStep> Schedule::ramp_steps(int longest_side) const {
+    std::vector<RampStep> steps;
+    if (!ramp_) return steps;
+    int before = 0;
+    for (const RampSize& size : kRampSizes) {
+        const int until = static_cast<int>(size.until * iterations);
+        if (longest_side < kSmallestSide * size.divisor || until == before) continue;
+        steps.push_back({size.divisor, until - before});
+        before = until;
+    }
+    return steps;
+}
+
+int Schedule::resolution_divisor(int iteration, int longest_side) const {
+    for (const RampStep& step : ramp_steps(longest_side)) {
+        if (iteration <= step.iterations) return step.divisor;
+        iteration -= step.iterations;
+    }
+    return 1;
+}
+
+}  // namespace darb

@@ -1,0 +1,104 @@
+// Schedule: what a training run does at which iteration. It is resolved once from TrainOptions,
+// where what is absent takes its default by the length of the run, the kernel and the strategy;
+// from then on it only answers. It knows no scene: lengths are in scene extents, photos come as
+// arguments.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "trainer/options/strategy.h"
+
+namespace darb {
+
+/// Some iterations that begin a run and see smaller photos.
+struct RampStep {
+    int divisor;     // of the photos' sides
+    int iterations;  // how many see photos of this size
+};
+
+class Schedule {
+  public:
+    explicit Schedule(const TrainOptions& options);
+
+    /// Learning rates of Adam. position is in scene extents.
+    struct Rates {
+        double position = 0;
+        float scale = 0, rotation = 0, opacity = 0;
+        float shape = 0;               // of a kernel with shapes
+        float sh_dc = 0, sh_rest = 0;  // of steps of the mean of rest_every iterations
+    };
+    Rates rates(int iteration) const;
+    double position_rate(int iteration) const;
+    double exposure_rate(int iteration) const;
+
+    /// The degree of view-dependent colour where no probe decides on it.
+    int sh_degree(int iteration) const;
+
+    /// Whether density control has a round after this iteration.
+    bool refines_after(int iteration) const;
+    /// Whether opacities are reset after this iteration: every so many up to resets.last, and, as
+    /// 3DGS does, where growth begins over a white background.
+    bool resets_after(int iteration) const;
+    /// Whether a round after this iteration prunes by size: as 3DGS does after its first opacity
+    /// reset, where there is a size to prune by.
+    bool prunes_by_size(int iteration) const;
+    /// Whether the regularisers act at this iteration on what its frame does not show too. A splat
+    /// that few photos show is worth less than one that many show: in sets of up to 50 photos at
+    /// each, in larger ones at 50 in a round of the photos, so that what ten of a thousand show
+    /// stays; at each where the strategy wants it.
+    bool regularises_unseen(std::size_t photos, int iteration) const;
+
+    /// Whether the run ends with the mean of its last splats, and whether that takes in what this
+    /// iteration leaves.
+    bool averages() const { return average_begin < iterations; }
+    bool averages_after(int iteration) const;
+
+    /// The steps of the resolution ramp, smallest photos first: a quarter of the sides in the first
+    /// tenth of the run, half up to 3/10 of it, the longest side never below 100 px; none where it
+    /// is off. longest_side: of all photos, px.
+    std::vector<RampStep> ramp_steps(int longest_side) const;
+    /// What the sides of the photos are divided by in an iteration (from 1): 1 after the last step.
+    int resolution_divisor(int iteration, int longest_side) const;
+
+    /// A step ends with iterations in (step_begin(i), i], i being its last: one, or a batch.
+    int step_begin(int iteration) const { return std::max(0, (iteration - 1) / batch * batch); }
+    /// The last iteration of the step after this one: steps begin at multiples of the batch.
+    int step_end(int iteration) const;
+
+    int iterations;
+    int batch = 1;
+    Strategy strategy;
+    // Where they are not given, the strategy's.
+    float initial_opacity = 0, initial_scale = 0, prune_opacity = 0;
+    int rest_every = 1;  // see TrainOptions::sh_rest_every
+    /// How many times faster a run below kShortRun iterations learns shapes and opacities, grows,
+    /// and comes to its degrees of colour: at most kMostSpeedup times.
+    float speedup = 1;
+    int degree_interval = 0;
+    /// Density control: rounds every `interval` iterations after `begin` and before `end`.
+    struct Rounds {
+        int begin = 0, end = 0, interval = 1;
+    } rounds;
+    /// Opacity resets. last: the last iteration that ends with one; 0: none does.
+    struct Resets {
+        int interval = 1, last = 0;
+        float to = 0;           // opacity
+        bool at_begin = false;  // where growth begins, too
+    } resets;
+    Rates first;                    // at the start of the run
+    float last_position_rate = 0;   // where it has fallen to its end
+    double position_falls_for = 1;  // share of the run, then it stays
+    double last_share = 1;          // of the other rates, fallen to over the second half
+    int average_begin = 0;
+    double length_scale = 1;  // multiplies every length that options have for a Gaussian
+    float largest_scale = 0;  // of a splat, over scene_reach() and length_scale; 0: no limit
+
+  private:
+    float prune_extent_, exposure_lr_init_, exposure_lr_final_;
+    int sh_degree_;
+    bool ramp_;
+};
+
+}  // namespace darb

@@ -1,0 +1,473 @@
+#include "trainer/run/run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "engine/core/doing.h"
+#include "engine/core/error.h"
+#include "engine/core/files.h"
+#include "engine/core/memory.h"
+#include "engine/core/say.h"
+#include "engine/data/camera_list.h"
+#include "engine/data/run_events.h"
+#include "engine/plan/tuning_names.h"
+#include "engine/raster/frame_limit.h"
+#include "engine/scene/edit_splats.h"
+#include "engine/scene/ply.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/run/evaluation.h"
+#include "trainer/run/follow_run.h"
+#include "trainer/run/forecast.h"
+#include "trainer/run/progress.h"
+#include "trainer/run/run_folder.h"
+#include "trainer/run/run_log.h"
+#include "trainer/step/checkpoint.h"
+
+namespace darb {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Whether the list has an iteration of (begin, end].
+bool contains(const std::vector<int>& list, int begin, int end) {
+    return std::any_of(list.begin(), list.end(), [&](int i) { return begin < i && i <= end; });
+}
+
+// Measured before there is a budget of memory, and no part of the run's peak.
+DeviceRates rates_of(Device& device) {
+    const DeviceRates rates = measure_rates(device);
+    device.forget_peak();
+    return rates;
+}
+
+// Said once, by the first of several ranks, which all have the same photos.
+std::vector<ImageU8> with_doubts(const Dataset& dataset, std::vector<ImageU8> photos) {
+    for (const std::string& doubt : photo_doubts(dataset, photos))
+        say("warning: {}: {}\n", dataset.root.string(), doubt);
+    return photos;
+}
+
+// One run: the loop and what it writes. The stopwatch counts training alone.
+class Run {
+  public:
+    Run(Device& device, const Dataset& dataset, const TrainOptions& options, const RunOptions& run,
+        std::vector<ImageU8> photos)
+        : device_(device),
+          dataset_(dataset),
+          options_(options),
+          run_(run),
+          photos_(with_doubts(dataset, photos_of_run(dataset, options, std::move(photos)))),
+          fingerprint_(dataset_fingerprint(dataset, photos_)),
+          rates_(rates_of(device)),
+          tuning_(result_tuning(device)),
+          checkpoint_(checkpoint_of(device, run)),
+          trainer_(while_doing("the splats of the start",
+                               [&] {
+                                   return Trainer(
+                                       device, dataset, photos_,
+                                       first_model(dataset, options, checkpoint_, run.start),
+                                       options, run.ranks, run.frozen);
+                               })),
+          log_(run.output),
+          progress_(1, options.iterations, run.quiet) {
+        for (std::size_t i = 0; i < photos_.size(); ++i)  // the others are where steps read them
+            if (!dataset.views[i].is_test) photos_[i] = {};
+        give_back_freed_memory();
+    }
+
+    TrainResult execute(const std::atomic<bool>* stop);
+
+  private:
+    void resume();
+    void on_result(const IterationResult& result);
+    void evaluate(int iteration);
+    std::filesystem::path model_path(int iteration) const {
+        return run_.output / "point_cloud" / fmt::format("iteration_{}", iteration) /
+               "point_cloud.ply";
+    }
+    void save_model(int iteration);
+    void write_cameras();
+    void show_step();
+    void save_checkpoint(const std::filesystem::path& path);
+    void begin();
+    void train(const std::atomic<bool>* stop);
+    void after_step(int begin);
+    void save_what_is_there(bool failed);
+    bool is_finished() const;
+    TrainResult finished();
+    std::string other_way() const;
+    void report_troubles();
+    void report_resolution();
+    void report_memory();
+    void report_probes();
+    void report_cameras();
+    double seconds() const {
+        return seconds_ +
+               (running_ ? std::chrono::duration<double>(Clock::now() - started_).count() : 0);
+    }
+    void stopwatch(bool run) {
+        seconds_ = seconds();
+        running_ = run;
+        started_ = Clock::now();
+    }
+
+    Device& device_;
+    const Dataset& dataset_;
+    const TrainOptions& options_;
+    const RunOptions& run_;
+    std::vector<ImageU8> photos_;  // [view]; while it trains of held-out views alone
+    const std::string fingerprint_;
+    const DeviceRates rates_;
+    const std::string tuning_;              // of this device, before the checkpoint's is used
+    std::optional<Checkpoint> checkpoint_;  // to go on with, until resume()
+    Trainer trainer_;
+    RunLog log_;
+    Progress progress_;
+    TrainResult summary_;
+    IterationResult latest_;
+    size_t told_probes_ = 0;
+    std::uint32_t told_by_memory_ = 0,
+                  told_by_intersections_ = 0;  // the splats at which growth stopped
+    bool told_no_mean_ = false;
+    int told_divisor_ = 1;
+    bool whole_ = false;  // between two iterations, when the splats can be saved
+    double seconds_ = 0;
+    bool running_ = false;
+    Clock::time_point started_;
+};
+
+// Whether the run that wrote a checkpoint is the one that the folder holds.
+bool is_own(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
+    std::error_code none;
+    const std::filesystem::path folder = std::filesystem::absolute(checkpoint).parent_path();
+    return !checkpoint.filename().string().starts_with("earlier.") &&
+           std::filesystem::equivalent(folder, output, none);
+}
+
+void Run::resume() {
+    const Checkpoint checkpoint = std::move(checkpoint_.value());
+    checkpoint_.reset();
+    check_resumable(checkpoint, run_.resume_from, options_, dataset_, fingerprint_);
+    trainer_.restore(checkpoint.state);
+    told_divisor_ = trainer_.resolution_divisor();
+    seconds_ = checkpoint.seconds;
+    const bool own = is_own(run_.resume_from, run_.output);
+    if (!own) set_aside(run_.output);
+    own ? log_.go_on(checkpoint.state.iteration) : log_.begin();
+    progress_ = Progress(checkpoint.state.iteration + 1, options_.iterations, run_.quiet);
+    progress_.note(fmt::format("resumed {} at iteration {}", run_.resume_from.string(),
+                               checkpoint.state.iteration));
+    if (checkpoint.tuning != tuning_)
+        progress_.note(fmt::format("goes on with {} as it began; {} is for a run that starts again",
+                                   checkpoint.tuning, tuning_));
+}
+
+// As 3DGS writes it: name -> three rows of four.
+std::string exposure_text(const std::map<std::string, ColourMap>& maps) {
+    nlohmann::json all = nlohmann::json::object();
+    for (const auto& [name, map] : maps)
+        for (size_t r = 0; r < 3; ++r)
+            all[name].push_back(std::vector<float>(map.begin() + std::ptrdiff_t(4 * r),
+                                                   map.begin() + std::ptrdiff_t(4 * r + 4)));
+    return all.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+void Run::on_result(const IterationResult& result) {
+    latest_ = result;
+    log_.iteration(result, trainer_.counters(), seconds(), trainer_.pass_totals());
+    if (result.ends_step) progress_.update(result, device_);
+}
+
+void Run::evaluate(int iteration) {
+    stopwatch(false);
+    Evaluation evaluation = evaluate_held_out(trainer_, dataset_, photos_);
+    if (evaluation.views.empty()) return stopwatch(true);  // nothing is held out
+    evaluation.iteration = iteration;
+    evaluation.seconds = seconds_;
+    evaluation.splats = trainer_.splat_count();
+    const auto folder = run_.output / "held_out" / std::to_string(iteration);
+    const auto files = write_side_by_side(trainer_, dataset_, photos_, folder);
+    summary_.pictures.clear();
+    for (size_t v = 0; v < files.size(); ++v)
+        summary_.pictures.push_back({evaluation.views[v].name, files[v],
+                                     evaluation.views[v].psnr_db, evaluation.views[v].ssim});
+    progress_.note(fmt::format(
+        "iteration {}: held-out PSNR {:.2f} dB, SSIM {:.4f} over {} views, {} splats", iteration,
+        evaluation.psnr_db, evaluation.ssim,
+        evaluation.views.size() - (evaluation.arc ? evaluation.arc->views : 0), evaluation.splats));
+    if (const auto& arc = evaluation.arc)
+        progress_.note(fmt::format("the arc: PSNR {:.2f} dB, SSIM {:.4f} over {} views",
+                                   arc->psnr_db, arc->ssim, arc->views));
+    log_.evaluation(evaluation);
+    summary_.evaluations.push_back(std::move(evaluation));
+    stopwatch(true);
+}
+
+void Run::save_model(int iteration) {
+    stopwatch(false);
+    summary_.model = model_path(iteration);
+    SplatModel model = trainer_.model();
+    if (const std::size_t lost = drop_non_finite(model); lost > 0)
+        progress_.warn(fmt::format("{} splats with NaN or infinity are left out of {}", lost,
+                                   summary_.model.string()));
+    if (model.size() == 0)
+        progress_.warn("no splat is left: " + summary_.model.string() + " is empty");
+    while_doing(summary_.model.string(), [&] { write_ply(summary_.model, model); });
+    if (const auto maps = trainer_.exposures(); !maps.empty())
+        write_file_atomic(run_.output / "exposure.json", exposure_text(maps));
+    if (trainer_.camera_moves()) write_cameras();
+    stopwatch(true);
+}
+
+// As they are trained now.
+void Run::write_cameras() {
+    std::vector<View> views = dataset_.views;
+    for (size_t v = 0; v < views.size(); ++v) views[v].camera = trainer_.camera(v);
+    write_camera_list(run_.output / "cameras.json", views);
+}
+
+void Run::save_checkpoint(const std::filesystem::path& path) {
+    stopwatch(false);
+    write_checkpoint(path, {trainer_.state(), settings_text(options_), fingerprint_, seconds_,
+                            result_tuning(device_)});
+    stopwatch(true);
+}
+
+// The stopwatch counts what the view draws, which shares the device, and no pause.
+void Run::show_step() {
+    const double paused_s = run_.on_step({trainer_.splats(), trainer_.iteration(),
+                                          options_.iterations, latest_, summary_.evaluations});
+    seconds_ -= paused_s;
+    progress_.leave_out(paused_s);
+}
+
+// Whether metrics.json is that of a whole run, which nothing is to be added to.
+bool Run::is_finished() const {
+    const std::filesystem::path path = run_.output / "metrics.json";
+    if (trainer_.iteration() < options_.iterations || !std::filesystem::exists(path)) return false;
+    const RunEnd end = read_run_end(path);
+    return !end.interrupted && end.iteration == options_.iterations;
+}
+
+// Nothing is left to do but a report that could not be written then.
+TrainResult Run::finished() {
+    progress_.note("the run is finished: nothing is left to do");
+    if (run_.report && !std::filesystem::exists(run_.output / "report.html"))
+        summary_.report = log_.report_again();
+    summary_.iteration = trainer_.iteration();
+    summary_.seconds = seconds_;
+    return summary_;
+}
+
+void Run::begin() {
+    check_ranks(device_, options_, run_.ranks, fingerprint_);
+    remove_leftovers(run_.output);
+    if (!run_.resume_from.empty()) {
+        resume();  // before anything of an earlier run is moved: it may be refused
+    } else {
+        set_aside(run_.output);
+        log_.begin();
+        if (run_.write_start) run_.write_start(run_.output / "dense_start");
+    }
+    write_cameras();
+    write_file_atomic(run_.output / "cfg_args", cfg_args(dataset_, options_, run_.output));
+    if (!run_.request.empty()) write_file_atomic(run_.output / "request.json", run_.request);
+}
+
+TrainResult Run::execute(const std::atomic<bool>* stop) {
+    trainer_.on_result = [this](const IterationResult& result) { on_result(result); };
+    begin();
+    if (!run_.resume_from.empty() && is_finished()) return finished();
+    // Of where the run was interrupted; it goes on, and its scene is the latest until it has ended.
+    std::error_code none;
+    std::filesystem::remove(run_.output / "metrics.json", none);
+    const std::optional<PaceForecast> pace = run_.pace ? run_.pace : log_.pace();
+    if (pace) progress_.expect(options_, *pace);
+    log_.start(device_, rates_, dataset_, options_, trainer_.splat_count(), run_.effects_json,
+               pace);
+    try {
+        train(stop);
+    } catch (const std::exception& e) {
+        log_.failure(trainer_.iteration(), e.what());
+        save_what_is_there(true);
+        throw;
+    }
+    summary_.interrupted = trainer_.iteration() < options_.iterations;
+    if (summary_.interrupted) save_what_is_there(false);
+    report_troubles();
+    report_cameras();
+    progress_.finish();
+    summary_.iteration = trainer_.iteration();
+    summary_.seconds = seconds_;
+    summary_.passes = log_.passes(trainer_);
+    summary_.report = log_.finish(summary_, trainer_, device_, run_.report);
+    return summary_;
+}
+
+// failed: by something else than the device, as a full disk, which may have room for one of the
+// two; what cannot be saved is left out, for the run ends with the first failure.
+void Run::save_what_is_there(bool failed) {
+    if (!whole_ || trainer_.iteration() >= options_.iterations) return;
+    std::string saved;
+    const auto save = [&](const char* what, const auto& write) {
+        try {
+            write();
+            saved += fmt::format("{}{}", saved.empty() ? "" : " and ", what);
+        } catch (const std::exception&) {
+            if (!failed) throw;
+        }
+    };
+    save("the checkpoint", [&] { save_checkpoint(run_.output / "checkpoint.darb"); });
+    save("the scene", [&] { save_model(trainer_.iteration()); });
+    stopwatch(false);
+    if (!saved.empty())
+        progress_.note(fmt::format("iteration {}: saved {} in {}", trainer_.iteration(), saved,
+                                   run_.output.string()));
+}
+
+// Of the backward blend, where that holds more intersections.
+std::string Run::other_way() const {
+    if (device_.tuning().backward == BackwardBlend::subgroup) return "";
+    return fmt::format(
+        ", and so does --tune backward=subgroup, which holds {}, in a run that "
+        "starts again",
+        FrameBuffers::max_intersections(device_, BackwardBlend::subgroup));
+}
+
+void Run::train(const std::atomic<bool>* stop) {
+    const std::filesystem::path latest = run_.output / "checkpoint.darb";
+    stopwatch(true);
+    // A checkpoint of the run's end that was made in another folder.
+    if (const int end = options_.iterations;
+        trainer_.iteration() == end && !std::filesystem::exists(model_path(end))) {
+        evaluate(end);
+        save_model(end);
+        save_checkpoint(latest);
+    }
+    whole_ = true;
+    const Ranks* const ranks = run_.ranks.all;
+    const std::uint64_t sent = ranks ? ranks->sent_bytes() : 0;
+    const double waited = ranks ? ranks->seconds() : 0;
+    const auto is_over = [&] {
+        if (trainer_.iteration() >= options_.iterations) return true;
+        whole_ = false;  // a rank that differs: whose splats are right, nobody knows
+        const bool stops = is_to_stop(trainer_, run_.ranks, stop && stop->load());
+        whole_ = true;
+        return stops;
+    };
+    while (!is_over()) {
+        whole_ = false;
+        const int begin = trainer_.iteration();
+        while_doing(fmt::format("iteration {}", begin + 1), [&] { trainer_.step(); });
+        whole_ = true;
+        while_doing(fmt::format("what follows iteration {}", trainer_.iteration()),
+                    [&] { after_step(begin); });
+        if (run_.on_step) show_step();
+        ++summary_.trained_steps;
+    }
+    if (ranks) summary_.sent_bytes = ranks->sent_bytes() - sent;
+    if (ranks) summary_.exchange_seconds = ranks->seconds() - waited;
+    whole_ = false;
+    trainer_.drain();
+    whole_ = true;
+    stopwatch(false);
+}
+
+// Of the iterations (begin, now].
+void Run::after_step(int begin) {
+    report_resolution();
+    report_memory();
+    report_probes();
+    const int i = trainer_.iteration();
+    const bool last = i == options_.iterations;
+    if (last || contains(run_.test_iterations, begin, i)) evaluate(i);
+    if (last || contains(run_.save_iterations, begin, i)) save_model(i);
+    if (contains(run_.checkpoint_iterations, begin, i))
+        save_checkpoint(run_.output / fmt::format("chkpnt{}.darb", i));
+    if (last || (run_.checkpoint_interval > 0 &&
+                 i / run_.checkpoint_interval != begin / run_.checkpoint_interval))
+        save_checkpoint(run_.output / "checkpoint.darb");
+}
+
+void Run::report_resolution() {
+    const int divisor = trainer_.resolution_divisor();
+    if (divisor == told_divisor_) return;
+    told_divisor_ = divisor;
+    const int i = trainer_.iteration();
+    progress_.restart_rate(i);
+    log_.resolution(i, divisor);
+    progress_.note(divisor == 1
+                       ? fmt::format("iteration {}: photos at their full size", i)
+                       : fmt::format("iteration {}: photos at 1/{} of their sides", i, divisor));
+}
+
+void Run::report_memory() {
+    if (trainer_.mean_left_out() && !std::exchange(told_no_mean_, true)) {
+        progress_.warn(
+            "no device memory is left for the mean of the last iterations: the run ends without; "
+            "with --average-from 1 rates fall instead");
+        log_.mean_left_out(trainer_.iteration());
+    }
+    const auto tell = [&](std::uint32_t splats, std::uint32_t& told, const char* limit,
+                          const std::string& reason) {
+        if (splats == told) return;
+        if (told == 0) progress_.note(fmt::format("growth stops at {} splats: {}", splats, reason));
+        log_.growth_stopped(trainer_.iteration(), limit, told = splats);
+    };
+    tell(trainer_.stopped_by_memory(), told_by_memory_, "memory", "--max-memory");
+    tell(trainer_.stopped_by_intersections(), told_by_intersections_, "pairs",
+         fmt::format("frames come near the {} intersections of splats with tiles that this device "
+                     "can hold; a "
+                     "smaller -r leaves room{}",
+                     FrameBuffers::max_intersections(device_), other_way()));
+}
+
+void Run::report_probes() {
+    for (; told_probes_ < trainer_.probes().size(); ++told_probes_) {
+        const Trainer::Probe& p = trainer_.probes()[told_probes_];
+        log_.probe(trainer_.iteration(), p);
+        const std::string reason = !std::isnan(p.gain_db)
+                                       ? fmt::format("{:+.3f} dB on photos set aside", p.gain_db)
+                                   : p.admitted && p.degree > 1 ? "follows the first"
+                                   : p.admitted                 ? "too few photos to set some aside"
+                                                                : "--max-memory has no room for it";
+        progress_.note(fmt::format("iteration {}: colour of degree {} {} ({})", p.iteration,
+                                   p.degree, p.admitted ? "admitted" : "refused", reason));
+    }
+}
+
+void Run::report_cameras() {
+    const std::optional<CameraMoves> m = trainer_.camera_moves();
+    if (!m) return;
+    progress_.note(fmt::format(
+        "{} cameras moved by {:.2f} px and {:.3f} degrees in the middle, at most {:.2f} px and "
+        "{:.3f} degrees; focal lengths by up to {:.2f} %, principal points by {:.2f} px",
+        m->cameras, m->median_px, m->median_degrees, m->largest_px, m->largest_degrees,
+        100 * m->largest_focal, m->largest_centre_px));
+}
+
+void Run::report_troubles() {
+    if (const std::uint64_t bad = trainer_.counters().bad_gradients; bad > 0)
+        progress_.warn(fmt::format("{} gradients of splats were not finite and were skipped", bad));
+}
+
+}  // namespace
+
+TrainResult run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                         const RunOptions& run, const std::atomic<bool>* stop,
+                         std::vector<ImageU8> photos) {
+    for (const View& view : dataset.views)
+        check_frame(device, view.camera.width, view.camera.height, view.name);
+    if (run.ranks.several() && !run.ranks.all->is_first())
+        return follow_training(device, dataset, options, run, stop, std::move(photos));
+    check_run_folder(run.output, dataset);
+    if (run.resume_from.empty() && !run.start) check_start_memory(device, dataset, options);
+    return Run(device, dataset, options, run, std::move(photos)).execute(stop);
+}
+
+}  // namespace darb

@@ -1,0 +1,94 @@
+// A whole training run: photos in, output folder out. Folder layout as the ecosystem's viewers
+// expect:
+//   point_cloud/iteration_N/point_cloud.ply  cameras.json  cfg_args
+//   run.jsonl (a line an event)  metrics.json  report.html  held_out/ITERATION/*.png
+//   dense_start/ (points.ply and pictures of a dense start)
+//   checkpoint.darb
+// What an earlier run left there is kept in earlier.1, earlier.2, ...
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/data/dataset.h"
+#include "engine/gpu/device.h"
+#include "trainer/options/options.h"
+#include "trainer/run/evaluation.h"
+#include "trainer/run/run_report.h"
+#include "trainer/run/time_left.h"
+#include "trainer/step/rank_group.h"
+#include "trainer/step/trainer.h"
+
+namespace darb {
+
+/// What a run shows to a live view between two iterations; valid during the call.
+struct LiveStep {
+    const GpuSplats& splats;  // Trainer::splats
+    int iteration = 0, last_iteration = 0;
+    const IterationResult& result;  // of the latest iteration whose result is known
+    const std::vector<Evaluation>& evaluations;
+};
+
+struct RunOptions {
+    std::filesystem::path output;
+    std::vector<int> test_iterations, save_iterations, checkpoint_iterations;
+    int checkpoint_interval =
+        1'000;  // of checkpoint.darb, the latest; 0: only at the end and Ctrl-C
+    std::filesystem::path resume_from;  // empty: start afresh
+    bool quiet = false;
+    bool report = true;  // report.html at the end
+    /// May be empty. Returns the seconds that it held the run up on purpose (a pause), which are
+    /// no training time.
+    std::function<double(const LiveStep&)> on_step;
+    std::optional<PaceForecast> pace;  // for the time that is left, and for the log
+    std::string request;               // of request.json, for --resume; may be empty
+    std::string effects;               // the plan in a line, for the log
+    std::string effects_json;          // the same as JSON, for metrics.json; may be empty
+    RankGroup ranks;                   // that train together; the first one writes and talks
+    /// Writes into OUT/start what splats start from, once an earlier run is out of the way; may be
+    /// empty.
+    std::function<void(const std::filesystem::path& folder)> write_start;
+    /// What splats start from in place of points, and how many of the first are frozen; null:
+    /// initial_model().
+    const SplatModel* start = nullptr;
+    std::uint32_t frozen = 0;
+};
+
+struct TrainResult {
+    std::vector<Evaluation> evaluations;
+    int iteration = 0;
+    bool interrupted = false;
+    double seconds = 0;
+    // Of this process's steps, with several ranks: what it sent, and how long that took and it
+    // waited.
+    int trained_steps = 0;
+    std::uint64_t sent_bytes = 0;
+    double exchange_seconds = 0;
+    std::filesystem::path model;  // the last PLY written
+    std::vector<ReportPicture>
+        pictures;  // held-out views beside their photos, of the last evaluation
+    std::filesystem::path report;
+    std::vector<ReportPass>
+        passes;  // mean ms an iteration and share of the roofline, in their order
+};
+
+/// The photos as a run trains on them and compares with: without the effect alpha every pixel is
+/// opaque. loaded: as load_photos gives them, or none.
+std::vector<ImageU8> photos_of_run(const Dataset& dataset, const TrainOptions& options,
+                                   std::vector<ImageU8> loaded = {});
+
+/// Trains until options.iterations or until *stop; saves, evaluates and logs as RunOptions says.
+/// Progress goes to stderr: a bar on a terminal, plain lines elsewhere. Throws Error; the last
+/// checkpoint is then intact, and where the device is not what failed, checkpoint and scene are
+/// saved once more as far as they can be. The caller holds the RunLock of the folder.
+/// photos: already loaded, in the order of the views; else empty. Once training photos are where
+/// steps read them, the run keeps the others alone.
+TrainResult run_training(Device& device, const Dataset& dataset, const TrainOptions& options,
+                         const RunOptions& run, const std::atomic<bool>* stop = nullptr,
+                         std::vector<ImageU8> photos = {});
+
+}  // namespace darb

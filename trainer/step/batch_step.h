@@ -1,0 +1,58 @@
+// The step of a batch: the views one after the other into a tree of gradients, then one step of the
+// optimizer of their mean. Of several ranks each does its aligned part of the views; their sums are
+// added in the same tree, by all of them, and all make the step.
+#pragma once
+
+#include <vector>
+
+#include "engine/ranks/ranks.h"
+#include "engine/raster/gradient_buffers.h"
+#include "trainer/step/step.h"
+
+namespace darb {
+
+class GradientTree {
+  public:
+    /// Of batches of so many views at most, a power of two.
+    GradientTree(Device& device, int batch);
+
+    /// Device memory of a tree of so many views, with the buffers of reserve().
+    static std::uint64_t device_bytes(std::uint64_t splats, int sh_degree, int kernel, int batch);
+    /// Buffers for these splats; where they change, what they held is gone. The queue must be idle.
+    void reserve(const GpuSplats& splats);
+
+    /// Begins a batch, of no view.
+    void begin() { views_ = held_ = 0; }
+    /// Where the next view leaves its gradients.
+    GradientBuffers& leaf() { return nodes_[static_cast<std::size_t>(held_)]; }
+    /// That view is there: adds what now has its pair.
+    void record_view(Commands& commands);
+    /// No view follows: adds what is left, whose pair has no view, in the order of the tree.
+    void record_end(Commands& commands);
+    /// Of all views, after record_end; another process's, too, once it is added.
+    GradientBuffers& sum() { return nodes_.front(); }
+    /// Room for the sum of other views, to be added to that of these.
+    GradientBuffers& other() { return nodes_[1]; }
+
+  private:
+    void record_pair(Commands& commands);
+
+    Device* device_;
+    std::vector<GradientBuffers> nodes_;  // sums of complete subtrees, the largest first, a leaf
+    int views_ = 0, held_ = 0;            // so far; nodes that hold something
+};
+
+/// views: in the order of their places, which their inputs name; fewer than the batch at the end of
+/// a run. One outcome a view, in order, the same on all ranks but for the times of passes.
+std::vector<StepOutcome> run_batch_step(TrainingStep& step, GradientTree& tree,
+                                        const GpuSplats& splats, std::vector<StepInput>& views,
+                                        Ranks& ranks, int batch);
+
+/// What one rank's gradients are for another: which rows any of its views showed, a bit a splat,
+/// and these rows, of the degree of harmonics in use. The queue must be idle.
+Bytes packed_gradients(const GradientBuffers& gradients, int sh_degree);
+/// Back into buffers of as many splats; rows that are not there are 0. Throws Error where the bytes
+/// are not of such gradients.
+void unpack_gradients(std::span<const std::byte> bytes, int sh_degree, GradientBuffers& to);
+
+}  // namespace darb

@@ -1,0 +1,113 @@
+// CameraRefinement: poses of the training photos, and the intrinsics that they share, trained
+// beside the splats. The gradient through the picture comes from the device; the reprojection of
+// tracks anchors it. Adam, a camera and a group of intrinsics at a time, in coordinates of which a
+// step of 1 shifts a picture by 1 px (engine/scene/pose_metric.h). What moves the scene as a whole
+// is taken out of every step. All on the host in double, rounded to float where it is kept: a run
+// repeats, and every rank makes the same step.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/data/dataset.h"
+#include "engine/data/track_observations.h"
+#include "engine/render/camera_gradient.h"
+#include "engine/render/render_gradients.h"
+#include "engine/scene/pose_metric.h"
+#include "trainer/options/options.h"
+
+namespace darb {
+
+/// How far the cameras have come from where they began, each the root of the mean square over a
+/// picture, px at the photos' whole size.
+struct CameraMoves {
+    std::size_t cameras = 0;
+    double median_px = 0, largest_px = 0;
+    double median_degrees = 0, largest_degrees = 0;  // of the turn
+    double largest_focal = 0;                        // share by which a focal length changed
+    double largest_centre_px = 0;                    // of a principal point
+};
+
+/// What one photo of a step says.
+struct CameraVisit {
+    int view = 0;  // of Dataset::views
+    CameraGradient gradient;
+    int width = 0, height = 0;  // px, of the picture
+};
+
+class CameraRefinement {
+  public:
+    /// Throws Error where fewer than three photos are trained on.
+    CameraRefinement(const Dataset& dataset, const TrainOptions& options);
+
+    /// The camera of a view at its whole size, as refined; a held-out one has its intrinsics alone.
+    const Camera& camera(int view) const { return cameras_[static_cast<std::size_t>(view)]; }
+
+    /// After an iteration's step of the splats; nothing happens before the run's share
+    /// camera_from. True where cameras changed.
+    bool step(int iteration, std::span<const CameraVisit> visits);
+
+    CameraMoves moves() const;
+
+    /// For checkpoints: values, moments and visits of poses, then of intrinsics.
+    std::vector<float> state() const;
+    void restore(const std::vector<float>& state);
+    std::size_t state_size() const { return poses_.size() * 19 + groups_.size() * 13; }
+
+  private:
+    template <std::size_t N>
+    struct Trained {
+        std::array<float, N> value{}, first{}, second{};  // px; moments of Adam
+        float visits = 0;
+        void step(const std::array<double, N>& gradient, double rate);
+    };
+    struct Pose {
+        int view = 0;
+        PoseMetric metric;
+        Trained<6> trained;
+        std::vector<TrackObservation> tracks;
+    };
+    struct Group {  // of views with the same intrinsics
+        double trained_views = 0;
+        glm::dvec4 unit{1.0};  // of fx, fy, cx, cy: what shifts a picture by 1 px
+        Trained<4> trained;
+    };
+    double rate(int iteration) const;
+    void add_anchor(const Pose& pose, CameraGradient& gradient) const;
+    PoseVector pose_gradient(const Pose& pose, const CameraGradient& gradient) const;
+    PoseVector step_of(const Pose& pose) const;
+    void place_cameras();
+
+    double rate_px_, anchor_, from_;
+    int iterations_;
+    std::vector<Camera> start_, cameras_;  // [view]
+    std::vector<glm::dvec3> points_;       // of the data set, fixed
+    std::vector<Pose> poses_;              // of the training photos, in order
+    std::vector<Group> groups_;
+    std::vector<int> pose_of_, group_of_;  // [view], pose -1: held out
+    Gauge gauge_;
+};
+
+// The pose under which the picture of a scene comes nearest to a photo, the scene as it is: what
+// makes held-out photos comparable between runs whose cameras moved, or whose poses are not exact.
+
+class CameraAlignment {
+  public:
+    /// Of this model's pictures.
+    CameraAlignment(Device& device, const SplatModel& model, const Accuracy& accuracy = {});
+
+    /// The camera, turned and moved; intrinsics stay. 40 steps of Adam on the mean squared error,
+    /// of 0.2 px at first and 0.01 px in the end; that with the least error on the way counts.
+    /// photo: RGBA of the camera's size. Masked pixels do not count where alpha is a mask.
+    Camera align(const Camera& camera, const ImageU8& photo, const glm::vec3& background,
+                 bool alpha_is_mask);
+
+  private:
+    GradientRenderer renderer_;
+    std::vector<glm::dvec3> places_;  // of splats
+    double depth_ = 1;
+};
+
+}  // namespace darb

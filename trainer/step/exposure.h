@@ -1,0 +1,106 @@
+// Per-photo exposure in training: an affine map of colours a photo, or a bilateral grid of them,
+// between picture and loss, trained by Adam beside the splats. Off in pictures for evaluation. The
+// mean of all maps stays the identity. It maps what the splats show and leaves the background as it
+// is.
+#pragma once
+
+#include <array>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/gpu/buffer_list.h"
+#include "engine/gpu/commands.h"
+#include "engine/gpu/pipeline.h"
+#include "trainer/options/options.h"
+
+namespace darb {
+
+/// Row-major [3][4]: out_r = m[r][0] R + m[r][1] G + m[r][2] B + m[r][3].
+using ColourMap = std::array<float, 12>;
+constexpr ColourMap kIdentityColours = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+/// Least squares of apply_exposure(map, render, photo) against the photo over the background, over
+/// pixels that count (all, or alpha of at least 128 where alpha is a mask); held to the identity by
+/// a weight of 1e-6 a pixel, so that pictures of one colour have an answer.
+ColourMap fit_exposure(const ImageF& render, const ImageU8& photo, const glm::vec3& background,
+                       bool alpha_is_mask);
+
+/// RGB, not clamped. Where alpha is no mask a pixel is mapped by the share that the photo's alpha
+/// says: what is behind is the background, which no exposure changes.
+ImageF apply_exposure(const ColourMap& map, const ImageF& image, const ImageU8& photo,
+                      bool alpha_is_mask);
+
+/// The step of one photo's map.
+struct ExposureStep {
+    std::uint32_t photo = 0, pixels = 0;
+    float rate = 0;  // of Adam
+    int visits = 1;  // of this photo, this one counted
+};
+
+/// What a map applies to.
+struct ExposedPicture {
+    const Buffer& image;          // float [3][H W]
+    const Buffer& transmittance;  // float [H W], what of the background is seen
+    glm::vec3 background;
+    std::uint32_t width = 0;  // px, read for grids
+};
+
+/// What is trained for each photo.
+struct ExposureMaps {
+    std::uint32_t photos = 0;
+    bool grid = false;          // a grid of maps, EXPOSURE_GRID_*; false: one map
+    int batch = 1;              // views of a step
+    std::size_t terms() const;  // floats a photo
+    /// Of Exposure::state().
+    std::size_t state_size() const { return photos * terms() * 3; }
+};
+
+/// What these options train, of so many photos.
+ExposureMaps exposure_maps(const TrainOptions& options, std::uint32_t photos);
+
+class Exposure {
+  public:
+    /// For photos of at most `pixels` pixels, all identities.
+    Exposure(Device& device, const ExposureMaps& maps, std::uint64_t pixels);
+
+    /// Device memory of an Exposure made with these arguments.
+    static std::uint64_t device_bytes(const ExposureMaps& maps, std::uint64_t pixels);
+
+    /// image [3][H W] over picture.background -> mapped(), the picture as this photo shows it.
+    void record(Commands& commands, const ExposedPicture& picture, std::uint32_t photo,
+                std::uint32_t pixels);
+    const Buffer& mapped() const { return mapped_; }
+
+    /// d_image [4][H W], whose first three planes are dL/d(mapped), becomes dL/d(image) and
+    /// dL/d(1 - transmittance), as ForwardOptions::alpha_gradient takes them; the map's own
+    /// gradient stays for the step of this place in the batch.
+    void record_backward(Commands& commands, const ExposedPicture& picture, const Buffer& d_image,
+                         const ExposureStep& step, int place = 0);
+    /// The photo's Adam step of what record_backward left. status: gpu::FrameStatus of the frame.
+    void record_step(Commands& commands, const Buffer& status, const ExposureStep& step,
+                     int place = 0);
+
+    /// What record_backward left for this place, and as another process has it. The queue must be
+    /// idle.
+    std::vector<float> gradient(int place) const;
+    std::size_t gradient_floats() const;
+    void set_gradient(int place, const std::vector<float>& values);
+
+    /// Of each photo; of a grid the mean of its maps.
+    std::vector<ColourMap> maps() const;
+    /// maps and moments as one array, for checkpoints: [photos][terms], [photos][terms][2].
+    std::vector<float> state() const;
+    void restore(const std::vector<float>& state);
+
+  private:
+    static BufferList<Exposure> buffers(const ExposureMaps& maps, std::uint64_t pixels);
+    BufferRange partials(int place) const;
+
+    ExposureMaps of_;
+    Pipeline map_, gradient_, backward_,
+        update_;  // backward_ of grids, of one map gradient_ is both
+    Buffer maps_, moments_, mapped_, partials_;
+};
+
+}  // namespace darb

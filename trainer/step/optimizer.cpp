@@ -1,0 +1,82 @@
+#include "trainer/step/optimizer.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace darb {
+
+namespace {
+// In a trial, the rate of the bands above the first over that of the first.
+constexpr float kTrialRestRate = 0.2f;
+}  // namespace
+
+Optimizer::Optimizer(const TrainOptions& options, const Schedule& schedule, double extent,
+                     double reach, std::size_t photos)
+    : schedule_(schedule),
+      opacity_weight_(options.opacity_weight),
+      scale_weight_(options.scale_weight),
+      extent_(extent),
+      reach_(reach),
+      photos_(photos) {}
+
+AdamStep Optimizer::rates(int iteration) const {
+    const Schedule::Rates now = schedule_.rates(iteration);
+    AdamStep step;
+    step.rate[kPosition] = static_cast<float>(now.position * extent_);
+    step.rate[kLogScale] = now.scale;
+    step.rate[kRotation] = now.rotation;
+    step.rate[kOpacityLogit] = now.opacity;
+    step.rate[kShDc] = now.sh_dc;
+    step.rate[kShRest] = now.sh_rest;
+    step.rate[kShape] = now.shape;
+    step.rest_every = schedule_.rest_every;
+    return step;
+}
+
+// Rates times the root of the views, betas to their power, so that moments reach back over as many
+// views as those of single ones (Zhao et al., Grendel-GS, arXiv 2406.18533). Harmonics above the
+// first band that gather make their step when as many views are over, or at each of larger batches.
+AdamStep Optimizer::of_batch(AdamStep step) const {
+    const int views = schedule_.batch;
+    if (views == 1) return step;
+    const double gathered = schedule_.rest_every;
+    step.rest_every = std::max(schedule_.rest_every / views, 1);
+    const double rest_steps = step.rest_every * views / gathered;
+    for (int a = 0; a < kAttributeCount; ++a)
+        step.rate[static_cast<std::size_t>(a)] *=
+            static_cast<float>(std::sqrt(a == kShRest ? rest_steps : views));
+    step.rest_beta1 = std::pow(step.beta1, rest_steps);
+    step.rest_beta2 = std::pow(step.beta2, rest_steps);
+    step.beta1 = std::pow(step.beta1, views);
+    step.beta2 = std::pow(step.beta2, views);
+    return step;
+}
+
+AdamStep Optimizer::with_regularisers(AdamStep step, int iteration) const {
+    step.opacity_weight = opacity_weight_;
+    step.scale_weight = scale_weight_ / static_cast<float>(length());
+    if (schedule_.largest_scale > 0)
+        step.largest_log_scale =
+            static_cast<float>(std::log(schedule_.largest_scale * schedule_.length_scale * reach_));
+    const int begin = schedule_.step_begin(iteration);
+    int unseen = 0;
+    for (int i = begin + 1; i <= iteration; ++i)
+        unseen += schedule_.regularises_unseen(photos_, i) ? 1 : 0;
+    step.regularise_unseen = static_cast<float>(unseen) / static_cast<float>(iteration - begin);
+    return step;
+}
+
+AdamStep Optimizer::step(int iteration) const {
+    const int steps = (iteration - 1) / schedule_.batch + 1;
+    return with_regularisers(adam_step(of_batch(rates(iteration)), steps), iteration);
+}
+
+AdamStep Optimizer::trial_step(int iteration, float share) const {
+    AdamStep step = rates(iteration);
+    step.rest_every = 1;
+    step.rate[kShRest] = kTrialRestRate * step.rate[kShDc];
+    for (float& rate : step.rate) rate *= share;
+    return with_regularisers(adam_step(step, iteration), iteration);
+}
+
+}  // namespace darb

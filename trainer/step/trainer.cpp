@@ -1,0 +1,429 @@
+#include "trainer/step/trainer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/core/error.h"
+#include "engine/core/rng.h"
+#include "engine/core/scope_guard.h"
+#include "trainer/step/batch_step.h"
+#include "trainer/step/checkpoint.h"
+
+namespace darb {
+
+namespace {
+
+constexpr int kStepsApart = 64;    // that mixed devices take between two looks at the first
+constexpr float kGridExtents = 4;  // of half the grid's side: a cell is 1/128 of the scene's extent
+
+SplatModel start_model(SplatModel start, const TrainOptions& options) {
+    start.antialias = options.antialias;
+    if (options.probe_sh) {
+        start.sh_degree = 0;
+        start.sh_rest.clear();
+    }
+    return start;
+}
+
+// Before anything of the run is there.
+Device& with_budget(Device& device, const TrainOptions& options) {
+    if (options.max_memory_bytes) device.set_memory_budget(*options.max_memory_bytes);
+    return device;
+}
+
+double psnr_of(double mse) {
+    return -10.0 * std::log10(std::max(mse, 1e-12));
+}
+
+// The last iteration of (begin, end] for which it holds; 0: none.
+template <class Holds>
+int last_in(int begin, int end, Holds holds) {
+    for (int i = end; i > begin; --i)
+        if (holds(i)) return i;
+    return 0;
+}
+
+// While it is there, the parameters are the mean, where there is one.
+class ShownMean {
+  public:
+    ShownMean(IterateAverage& average, GpuSplats& splats) : average_(average), splats_(splats) {
+        average_.swap(splats_);
+    }
+    ~ShownMean() { average_.swap(splats_); }
+    ShownMean(const ShownMean&) = delete;
+    ShownMean& operator=(const ShownMean&) = delete;
+
+  private:
+    IterateAverage& average_;
+    GpuSplats& splats_;
+};
+
+}  // namespace
+
+Trainer::Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
+                 const SplatModel& start, const TrainOptions& options, RankGroup ranks,
+                 std::uint32_t frozen)
+    : device_(&with_budget(device, options)),
+      ranks_(ranks.all ? ranks : RankGroup{&alone_}),
+      options_(options),
+      schedule_(options),
+      background_(options.white_background ? 1.0f : 0.0f),
+      extent_(scene_extent(dataset)),
+      memory_(device, dataset, options, schedule_, static_cast<std::uint32_t>(start.size())),
+      splats_(device, start_model(start, options), true, schedule_.rest_every > 1),
+      photos_(device, dataset, photos, splats_.origin(), memory_.streams_photos(), options.depth),
+      order_(photos_.views(), options.seed),
+      optimizer_(options, schedule_, extent_, scene_reach(dataset), photos_.count()),
+      density_(device, options.kernel, options.footprint),
+      strategy_(strategy_row(options.strategy).make({device, options_, schedule_, extent_})),
+      average_(device),
+      probe_(options, schedule_),
+      step_(device, splats_, photos_, loss_options(options, dataset), options) {
+    check_batch(*ranks_.all, options.batch);
+    splats_.freeze(frozen);
+    step_.on_finished = [this](const StepOutcome& outcome) { finish(outcome); };
+    step_.on_reserved = [this] { memory_.record(held()); };
+    if (options_.antialias)
+        smoothing_.emplace(device, forward_options(options).effects, photos_.training_cameras());
+    if (options_.morton_order) morton_.emplace(device);
+    if (options_.refine_cameras) cameras_.emplace(dataset, options_);
+    if (steps_by_views(options_)) tree_.emplace(device, options_.batch);
+    set_resolution(1);
+    update_smoothing();
+    step_.reserve(photos_.largest_width(), photos_.largest_height());
+}
+
+int Trainer::degree_at(int iteration) const {
+    return options_.probe_sh ? splats_.sh_degree() : schedule_.sh_degree(iteration);
+}
+
+glm::vec3 Trainer::background_for(int iteration) const {
+    if (!options_.random_background) return background_;
+    Pcg32 random(options_.seed, 0x6261636Bull << 32 | static_cast<std::uint32_t>(iteration));
+    glm::vec3 colour;
+    for (int c = 0; c < 3; ++c) colour[c] = static_cast<float>(random.uniform());
+    return colour;
+}
+
+// last: of the step, whose rates and degree all of its views have.
+StepInput Trainer::input_for(int iteration, int view, int last) const {
+    StepInput input;
+    input.iteration = iteration;
+    input.view = photos_.view(view, degree_at(last), background_for(iteration));
+    input.adam = optimizer_.step(last);
+    input.adam.clearance = static_cast<float>(options_.clearance * photos_.nearest_distance(view));
+    input.exposure_rate = static_cast<float>(schedule_.exposure_rate(iteration));
+    input.exposure_visits = (iteration - 1) / static_cast<int>(photos_.count()) + 1;
+    input.strategy = strategy_.get();
+    return input;
+}
+
+// Density control opens the next step rather than closing its own, so that what is evaluated and
+// saved between them is what was trained, not what was just reset.
+void Trainer::step() {
+    if (opened_ != iteration_) open_step();
+    if (ranks_.mixed && iteration_ / schedule_.batch % kStepsApart == 0) follow_first();
+    set_resolution(iteration_ + 1);
+    const int begin = iteration_;
+    tree_ ? run_batch() : run_step();
+    if (smoothing_) smoothing_->advance(begin, iteration_);
+    update_smoothing();
+    if (last_in(begin, iteration_, [&](int i) { return schedule_.averages_after(i); })) average();
+}
+
+void Trainer::run_step() {
+    StepInput input = input_for(iteration_ + 1, order_.view(iteration_ + 1), iteration_ + 1);
+    if (photos_.stream()) input.next_view = order_.view(iteration_ + 2);
+    if (step_.picture_gradient) step_.run(input);
+    ++iteration_;
+    if (!step_.picture_gradient) step_.run(input);
+}
+
+void Trainer::run_batch() {
+    const int end = schedule_.step_end(iteration_);
+    std::vector<StepInput> views;
+    for (int i = iteration_ + 1; i <= end; ++i) {
+        views.push_back(input_for(i, order_.view(i), end));
+        views.back().place = i - iteration_ - 1;
+    }
+    const std::vector<StepOutcome> outcomes =
+        run_batch_step(step_, *tree_, splats_, views, *ranks_.all, options_.batch);
+    iteration_ = end;
+    if (cameras_) refine_cameras(views, outcomes);
+    for (const StepOutcome& outcome : outcomes) finish(outcome);
+}
+
+void Trainer::refine_cameras(const std::vector<StepInput>& views,
+                             const std::vector<StepOutcome>& outcomes) {
+    std::vector<CameraVisit> visits;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+        const int view = static_cast<int>(views[i].view.frame.index);
+        visits.push_back({view, camera_gradient(photos_.camera(view), outcomes[i].camera),
+                          views[i].view.width(), views[i].view.height()});
+    }
+    if (cameras_->step(iteration_, visits)) place_cameras();
+}
+
+void Trainer::place_cameras() {
+    std::vector<Camera> cameras;
+    for (std::size_t v = 0; v < photos_.view_count(); ++v)
+        cameras.push_back(cameras_->camera(static_cast<int>(v)));
+    photos_.set_cameras(cameras);
+}
+
+std::optional<CameraMoves> Trainer::camera_moves() const {
+    return cameras_ ? std::optional(cameras_->moves()) : std::nullopt;
+}
+
+void Trainer::open_step() {
+    if (controlled_ != iteration_) round_ = control_density();
+    controlled_ = iteration_;  // a probe that fails is tried again, the round before it is not
+    update_smoothing();
+    const bool probes = probe_.is_due(iteration_, splats_.sh_degree());
+    if (probes) probe_degree();
+    opened_ = iteration_;
+    const std::optional<DensityResult> round = std::exchange(round_, std::nullopt);
+    if ((round || probes) && ranks_.mixed) follow_first();
+    if (round && on_round) on_round(iteration_, *round);
+}
+
+void Trainer::set_picture_gradient(std::function<ImageF(const TrainingPicture&)> gradient) {
+    drain();
+    step_.picture_gradient = nullptr;
+    if (!gradient) return;
+    step_.picture_gradient = [this, gradient = std::move(gradient)](const ImageF& picture,
+                                                                    const StepInput& input) {
+        const TrainingView& view = input.view;
+        ImageU8 photo(view.width(), view.height(), 4);
+        view.pixels->download(std::as_writable_bytes(std::span(photo.data)));
+        return gradient({picture, photo, photos_.name(photos_.views()[view.photo]), input.iteration,
+                         view.frame.background});
+    };
+}
+
+void Trainer::finish(const StepOutcome& outcome) {
+    totals_.count(outcome);
+    check_gradients(outcome, splats_.count());
+    totals_.add_times(outcome);
+    if (!on_result) return;
+    on_result({outcome.iteration, outcome.loss, psnr_of(outcome.mse), splats_.count(),
+               outcome.status.visible, outcome.status.intersections, outcome.pixels,
+               static_cast<int>(splats_.stride(kShRest)), outcome.ends_step});
+}
+
+// What is due after any iteration of the step comes once, as after the last of them.
+std::optional<DensityResult> Trainer::control_density() {
+    const int begin = schedule_.step_begin(iteration_);
+    const int end = std::min(iteration_, schedule_.rounds.end - 1);
+    const int round = last_in(begin, end, [&](int i) { return schedule_.refines_after(i); });
+    const int reset = last_in(begin, end, [&](int i) { return schedule_.resets_after(i); });
+    if (round == 0 && reset == 0) return std::nullopt;
+    drain();
+    std::optional<DensityResult> result;
+    if (round > 0) result = run_round(round);
+    if (reset > 0) density_.reset_opacity(splats_, schedule_.resets.to);
+    return result;
+}
+
+gpu::DensifyArgs Trainer::round_args(int iteration) const {
+    gpu::DensifyArgs args{};
+    args.gradient_threshold = options_.densify_grad_threshold;
+    const double length = optimizer_.length();
+    args.clone_split_scale = static_cast<float>(options_.clone_split_extent * length);
+    args.prune_opacity = schedule_.prune_opacity;
+    args.prune_scale = schedule_.prunes_by_size(iteration)
+                           ? static_cast<float>(options_.prune_extent * length)
+                           : 0.0f;
+    args.seed = static_cast<std::uint32_t>(options_.seed * 0x9E3779B9u + iteration);
+    return args;
+}
+
+// Of devices that round differently: the splats of the first are everybody's again.
+void Trainer::follow_first() {
+    const int opened = opened_, controlled = controlled_;
+    const Bytes bytes =
+        ranks_.all->is_first() ? checkpoint_bytes({state(), "", "", 0, ""}) : Bytes{};
+    const Bytes first = from_first(*ranks_.all, bytes);
+    if (!ranks_.all->is_first()) restore(parse_checkpoint(first, "the first rank").state);
+    opened_ = opened;
+    controlled_ = controlled;
+}
+
+DensityResult Trainer::run_round(int iteration) {
+    const std::uint32_t limit = least(*ranks_.all, memory_.growth_limit(held(), totals_.counters));
+    const DensityResult result = strategy_->round(
+        {splats_, density_, step_.gradient_sum(), round_args(iteration), iteration, limit});
+    memory_.end_round(result.after);
+    totals_.counters.cloned_or_split += result.grown;
+    totals_.counters.pruned += result.pruned;
+    if (result.grown > 0 || result.pruned > 0) {
+        memory_.record_round(held(), result.before);
+        if (smoothing_) smoothing_->mark_stale();
+    }
+    reorder();
+    step_.clear_gradient_sum();
+    return result;
+}
+
+void Trainer::reorder() {
+    if (!morton_) return;
+    morton_->run(splats_, density_,
+                 {photos_.mean_centre(), kGridExtents * static_cast<float>(extent_)});
+    memory_.record_round(held(), splats_.count());
+    if (smoothing_) smoothing_->mark_stale();
+}
+
+// Both iterations under way end with the photos that they began with.
+void Trainer::set_resolution(int iteration) {
+    const int divisor = photos_.has_room_for_smaller()
+                            ? schedule_.resolution_divisor(iteration, photos_.longest_side())
+                            : 1;
+    if (divisor == photos_.divisor()) return;
+    drain();
+    photos_.set_divisor(divisor);
+}
+
+void Trainer::update_smoothing() {
+    if (!smoothing_ || !smoothing_->is_stale()) return;
+    drain();
+    smoothing_->update(splats_);
+}
+
+// The run goes on from what the probe makes of its state, or from that state where one of its steps
+// throws, as a loss of the caller's may.
+void Trainer::probe_degree() {
+    State tried = state();
+    // What a trial finishes is no result of the run.
+    auto on_finished = std::exchange(step_.on_finished, [this](const StepOutcome& outcome) {
+        check_gradients(outcome, splats_.count());
+    });
+    const ScopeGuard reports([&] { step_.on_finished = std::move(on_finished); });
+    const ScopeGuard goes_on([&] {  // before that: it finishes what the trial left under way
+        restore(tried);
+        controlled_ = iteration_;
+    });
+    const ProbeFork fork{
+        .restore = [this](const State& start) { restore(start); },
+        .step =
+            [this](int iteration, int view, float share) {
+                StepInput input = input_for(iteration, view, iteration);
+                const float clearance = input.adam.clearance;
+                input.adam = optimizer_.trial_step(iteration, share);
+                input.adam.clearance = clearance;
+                step_.run(input);
+            },
+        .photo_psnr =
+            [this](int view) {
+                drain();
+                return psnr_of(step_.photo_mse(photos_.view(view, sh_degree(), background_)));
+            }};
+    bool has_room = memory_.has_room_for_degree(held(), splats_.sh_degree() + 1);
+    if (ranks_.several()) has_room = least(*ranks_.all, has_room ? 1 : 0) == 1;
+    probe_.run(tried, photos_.views(), has_room, fork);
+}
+
+// The last iteration leaves the mean itself. Where there is no room for one the run goes on
+// without.
+void Trainer::average() {
+    drain();
+    try {
+        average_.add(splats_);
+    } catch (const NoRoom&) {
+        if (average_.count() > 0) throw;
+        average_.clear();
+        mean_left_out_ = true;
+        return;
+    }
+    memory_.record_peak(held());
+    if (iteration_ < options_.iterations) return;
+    average_.swap(splats_);
+    average_.clear();
+}
+
+HeldMemory Trainer::held() const {
+    return {.splats = splats_.count(),
+            .sh_degree = splats_.sh_degree(),
+            .frame = step_.frame_size(),
+            .averages = average_.count() > 0,
+            .divisor = photos_.divisor(),
+            .small_pixels = photos_.small_pixels(),
+            .small_cameras = photos_.small_cameras()};
+}
+
+SplatModel Trainer::model() {
+    drain();
+    SplatModel model;
+    {
+        const ShownMean mean(average_, splats_);
+        model = splats_.download();
+    }
+    if (!smoothing_ || model.size() == 0) return model;
+    return bake_smoothing(model, splats_.smoothing().download<float>(model.size()));
+}
+
+std::map<std::string, ColourMap> Trainer::exposures() {
+    std::map<std::string, ColourMap> named;
+    if (!step_.exposure()) return named;
+    drain();
+    const std::vector<ColourMap> maps = step_.exposure()->maps();
+    for (size_t p = 0; p < maps.size(); ++p) named[photos_.name(photos_.views()[p])] = maps[p];
+    return named;
+}
+
+ImageF Trainer::render(const Camera& camera) {
+    drain();
+    const ShownMean mean(average_, splats_);
+    return step_.render(camera, sh_degree(), background_);
+}
+
+Trainer::State Trainer::state() {
+    State s;
+    drain();
+    s.model = splats_.download();
+    s.iteration = iteration_;
+    s.next_probe = probe_.next();
+    if (smoothing_) s.smoothing = splats_.smoothing().download<float>(splats_.count());
+    if (step_.exposure()) s.exposure = step_.exposure()->state();
+    if (cameras_) s.cameras = cameras_->state();
+    for (int a = 0; a < kAttributeCount; ++a) s.moments.push_back(splats_.download_moments(a));
+    s.rest_sum = splats_.download_rest_sum();
+    s.gradient_sum = step_.gradient_sum_values();
+    s.mean = average_.state(splats_);
+    s.averaged = average_.count();
+    s.counters = totals_.counters;
+    return s;
+}
+
+void Trainer::restore(const State& s) {
+    check_state(s);
+    DARB_CHECK(s.model.origin == photos_.origin(), "splats of another origin than the cameras'");
+    drain();
+    if (step_.exposure() && !s.exposure.empty()) step_.exposure()->restore(s.exposure);
+    const std::uint32_t frozen = splats_.frozen();
+    if (cameras_ && !s.cameras.empty()) {
+        cameras_->restore(s.cameras);
+        place_cameras();
+    }
+    splats_ = GpuSplats();  // first, so that there are never two
+    splats_ = GpuSplats(*device_, s.model, true, schedule_.rest_every > 1);
+    splats_.freeze(frozen);
+    probe_.set_next(s.next_probe);
+    if (smoothing_) {
+        smoothing_->update(splats_);
+        if (!s.smoothing.empty()) splats_.smoothing().upload(s.smoothing);
+    }
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (!s.moments[a].empty()) splats_.upload_moments(a, s.moments[a]);
+    if (!s.rest_sum.empty()) splats_.upload_rest_sum(s.rest_sum);
+    step_.restore_gradient_sum(s.gradient_sum);
+    average_.restore(s.mean, s.averaged, splats_);
+    iteration_ = s.iteration;
+    opened_ = controlled_ = s.iteration > 0 ? -1 : 0;
+    totals_.counters = s.counters;
+    set_resolution(std::max(iteration_, 1));
+}
+
+}  // namespace darb

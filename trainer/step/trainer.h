@@ -1,0 +1,207 @@
+// Trainer: one training run on one device, free of globals. A loop over parts that know nothing of
+// each other: ViewOrder says which view, Schedule and Optimizer at which rates, TrainingStep trains
+// on it, a DensityStrategy adds and removes splats between steps. step() submits an iteration while
+// the one before still runs; the host reads a result after the next is on its way, so nothing waits
+// inside.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/core/rng.h"
+#include "engine/data/dataset.h"
+#include "trainer/growth/density_control.h"
+#include "trainer/growth/density_strategy.h"
+#include "trainer/growth/morton_order.h"
+#include "trainer/step/batch_step.h"
+#include "trainer/step/camera_refinement.h"
+#include "trainer/step/iterate_average.h"
+#include "trainer/step/memory_plan.h"
+#include "trainer/step/optimizer.h"
+#include "trainer/step/photos.h"
+#include "trainer/step/probe.h"
+#include "trainer/step/rank_group.h"
+#include "trainer/step/smoothing.h"
+#include "trainer/step/step.h"
+#include "trainer/step/trainer_state.h"
+
+namespace darb {
+
+class ViewOrder {
+  public:
+    /// views: at least one.
+    ViewOrder(std::vector<int> views, std::uint64_t seed) : views_(std::move(views)), seed_(seed) {}
+
+    /// The view of an iteration, from 1. Any order of calls gives the same answers; those of one
+    /// epoch after each other are cheap.
+    int view(int iteration) {
+        const int count = static_cast<int>(views_.size());
+        const int epoch = (iteration - 1) / count;
+        if (epoch != epoch_) shuffle(epoch);
+        return order_[(iteration - 1) % count];
+    }
+
+  private:
+    void shuffle(int epoch) {
+        order_ = views_;
+        Pcg32 random(seed_, 1000 + static_cast<std::uint64_t>(epoch));
+        for (int i = static_cast<int>(order_.size()) - 1; i > 0; --i)
+            std::swap(order_[i], order_[random.below(i + 1)]);
+        epoch_ = epoch;
+    }
+
+    std::vector<int> views_, order_;  // order_: of this epoch
+    std::uint64_t seed_;
+    int epoch_ = -1;
+};
+
+/// What one finished iteration tells.
+struct IterationResult {
+    int iteration = 0;  // from 1
+    double loss = 0;
+    double psnr_db = 0;  // of the training view
+    std::uint32_t splats = 0, visible = 0, intersections = 0;
+    std::uint32_t pixels = 0;  // of the photo, at the size of now
+    int rest_floats = 0;       // of a splat's harmonics, as buffers hold them
+    bool ends_step = true;     // false: other views of its batch follow
+};
+
+/// A picture in training, as a loss of the caller's sees it; valid during the call.
+struct TrainingPicture {
+    const ImageF& image;      // [H][W][3] as it is compared with the photo, not clamped
+    const ImageU8& photo;     // [H][W][4], at the size that photos have now
+    const std::string& name;  // of the view
+    int iteration = 0;        // that this is a step of, from 1
+    glm::vec3 background{0.0f};
+};
+
+class Trainer {
+  public:
+    using State = TrainerState;
+    using Probe = ProbeResult;
+
+    /// photos: as load_photos gives them, in the order of dataset.views. frozen: of the start, the
+    /// first splats that are drawn and not trained (GpuSplats::freeze). ranks: that train
+    /// together, each with such a trainer; null: this one alone. Throws Error where the batch has
+    /// no equal parts for them.
+    Trainer(Device& device, const Dataset& dataset, const std::vector<ImageU8>& photos,
+            const SplatModel& start, const TrainOptions& options, RankGroup ranks = {},
+            std::uint32_t frozen = 0);
+    Trainer(const Trainer&) = delete;
+    Trainer& operator=(const Trainer&) = delete;
+
+    /// Runs iteration `iteration() + 1`, or as many as a batch has views, and what density control
+    /// has to do before it. Results of finished iterations go to on_result, in order, at the latest
+    /// at drain().
+    void step();
+    void drain() { step_.drain(); }
+    std::function<void(const IterationResult&)> on_result;
+    /// After each round of density control, with the iteration that it followed. Where it throws,
+    /// step() does; it goes on where it stopped.
+    std::function<void(int iteration, const DensityResult& result)> on_round;
+    /// A loss of the caller's: TrainingStep::picture_gradient. Empty: the built-in one. Where it
+    /// throws, step() does, and the iteration is still to be done.
+    void set_picture_gradient(std::function<ImageF(const TrainingPicture&)> gradient);
+
+    /// Iterations finished or under way.
+    int iteration() const { return iteration_; }
+    int views_a_step() const { return options_.batch; }
+    std::uint32_t splat_count() const { return splats_.count(); }
+    /// On the device, for work on the same queue between steps; the object stays, its buffers are
+    /// replaced by density control.
+    const GpuSplats& splats() const { return splats_; }
+    int sh_degree() const { return degree_at(iteration_); }  // in use at the current iteration
+    double extent() const { return extent_; }
+    /// Behind the splats where pictures are compared: black or white.
+    glm::vec3 background() const { return background_; }
+    /// What the sides of the photos are divided by now: 1 without a resolution ramp.
+    int resolution_divisor() const { return photos_.divisor(); }
+    /// Whether the device had no room for the mean that the run was to end with.
+    bool mean_left_out() const { return mean_left_out_; }
+
+    // All of these drain.
+    /// As a file holds it: the mean where the run has come to it, the smoothing filter worked in.
+    SplatModel model();
+    /// A picture of model(), RGB not clamped.
+    ImageF render(const Camera& camera);
+    /// The exposure of each training photo by the view's name; empty where it is off.
+    std::map<std::string, ColourMap> exposures();
+    /// The camera of a view of the data set as training has it now.
+    const Camera& camera(std::size_t view) const { return photos_.camera(static_cast<int>(view)); }
+    /// How far cameras have come; nothing where they are not refined.
+    std::optional<CameraMoves> camera_moves() const;
+    /// The state that a checkpoint holds, the model included.
+    State state();
+    void restore(const State& state);
+
+    const TrainCounters& counters() const { return totals_.counters; }
+    const std::vector<PassTotal>& pass_totals() const { return totals_.passes; }
+    std::uint64_t timed_iterations() const { return totals_.timed_iterations; }
+    const std::vector<Probe>& probes() const { return probe_.results(); }
+    /// What stopped the growth, see MemoryBudget.
+    std::uint32_t stopped_by_memory() const { return memory_.stopped_by_memory(); }
+    std::uint32_t stopped_by_intersections() const { return memory_.stopped_by_intersections(); }
+    /// What plan_memory() asks for what the trainer holds now.
+    MemoryDemand memory_demand() const { return memory_.demand(held()); }
+    /// The peak that the plans for all it held so far come to; Device::peak_bytes measures it.
+    std::uint64_t planned_bytes() const { return memory_.planned_bytes(held()); }
+
+  private:
+    int degree_at(int iteration) const;
+    glm::vec3 background_for(int iteration) const;
+    StepInput input_for(int iteration, int view, int last) const;
+    void run_step();
+    void run_batch();
+    void refine_cameras(const std::vector<StepInput>& views,
+                        const std::vector<StepOutcome>& outcomes);
+    void place_cameras();
+    void finish(const StepOutcome& outcome);
+    std::optional<DensityResult> control_density();
+    DensityResult run_round(int iteration);
+    void open_step();
+    void follow_first();
+    gpu::DensifyArgs round_args(int iteration) const;
+    void reorder();
+    void set_resolution(int iteration);
+    void update_smoothing();
+    void probe_degree();
+    void average();
+    HeldMemory held() const;
+
+    Device* device_;
+    OneRank alone_;
+    RankGroup ranks_;
+    TrainOptions options_;
+    Schedule schedule_;
+    glm::vec3 background_;
+    double extent_;  // of the scene
+    MemoryBudget memory_;
+    GpuSplats splats_;
+    TrainingPhotos photos_;
+    ViewOrder order_;
+    Optimizer optimizer_;
+    DensityControl density_;
+    std::unique_ptr<DensityStrategy> strategy_;
+    std::optional<MortonOrder> morton_;  // options.morton_order
+    IterateAverage average_;
+    bool mean_left_out_ = false;
+    std::optional<TrainedSmoothing> smoothing_;  // options.antialias
+    DegreeProbe probe_;
+    RunTotals totals_;
+    int iteration_ = 0;
+    int opened_ = 0;      // the iteration after which density control and probes had their turn
+    int controlled_ = 0;  // and that after which density control had
+    std::optional<DensityResult> round_;       // of it, to be told
+    std::optional<GradientTree> tree_;         // steps_by_views()
+    std::optional<CameraRefinement> cameras_;  // options.refine_cameras
+    TrainingStep step_;  // last: it waits for the device before anything that it uses goes
+};
+
+}  // namespace darb
