@@ -5,8 +5,9 @@
 
 The arrows are the lines "PART -> PART PART ..." of the block fenced as ```arrows. A part is a
 folder; a file belongs to the longest part that holds it, and may always include its own part. The
-words in angle brackets are outside libraries that only the parts naming them may include. An arrow
-that no include uses is a violation, too.
+words in angle brackets are outside libraries that only the parts naming them may include. A target
+may also be a folder of parts, which stands for all of them. An arrow that no include uses is a
+violation, too.
 """
 
 import os
@@ -31,7 +32,8 @@ def read_arrows(path):
     libraries = {t for targets in arrows.values() for t in targets if t.startswith("<")}
     for part, targets in arrows.items():
         for target in targets - libraries - arrows.keys():
-            sys.exit(f"{path}: {part} -> {target}: no such part")
+            if not any(other.startswith(target + "/") for other in arrows):
+                sys.exit(f"{path}: {part} -> {target}: no such part")
     return arrows, libraries
 
 
@@ -39,6 +41,11 @@ def part_of(path, arrows):
     """The longest part whose folder holds path, or None."""
     fitting = [part for part in arrows if path.startswith(part + "/")]
     return max(fitting, key=len, default=None)
+
+
+def named(part, targets):
+    """Those of the targets that name the part, itself or as one of a folder."""
+    return {target for target in targets if part == target or (part or "").startswith(target + "/")}
 
 
 def source_files(root, arrows):
@@ -80,8 +87,9 @@ def violations(root, file, arrows, libraries, used):
             yield line, f'"{included}" is neither beside this file nor under the root'
             continue
         target = part_of(target_file, arrows)
-        used.add((part, target))
-        if target != part and target not in arrows[part]:
+        allowed = named(target, arrows[part])
+        used.update((part, name) for name in allowed)
+        if target != part and not allowed:
             yield line, f"{part} may not include {target_file}"
 
 

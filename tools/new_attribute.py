@@ -21,12 +21,12 @@ MOST_FILES = 8
 # file, text, with the attribute
 CHANGES = [
     ("shaders/shared/attribute_list.h", "#define ATTRIBUTES 7", "#define ATTRIBUTE_GLOW 7\n#define ATTRIBUTES 8"),
-    ("engine/scene/splat_attributes.h", "    kShape = ATTRIBUTE_SHAPE,\n",
+    ("engine/scene/splat_model.h", "    kShape = ATTRIBUTE_SHAPE,\n",
      "    kShape = ATTRIBUTE_SHAPE,\n    kGlow = ATTRIBUTE_GLOW,\n"),
-    ("engine/scene/splat_attributes.h", "    std::vector<T> sh_rest; ",
+    ("engine/scene/splat_model.h", "    std::vector<T> sh_rest; ",
      "    std::vector<T> glow;       // [N]\n    std::vector<T> sh_rest; "),
-    ("engine/scene/splat_attributes.h", "&Arrays::shape};", "&Arrays::shape, &Arrays::glow};"),
-    ("engine/scene/splat_attributes.h", "true, true, STEP_PLAIN, nullptr},\n",
+    ("engine/scene/splat_model.h", "&Arrays::shape};", "&Arrays::shape, &Arrays::glow};"),
+    ("engine/scene/splat_model.h", "true, true, STEP_PLAIN, nullptr},\n",
      "true, true, STEP_PLAIN, nullptr},\n    {\"glow\", \"glow\", 7, 1, false, false, true, STEP_PLAIN, nullptr},\n"),
     ("shaders/forward/project.comp", "layout(set = 0, binding = FRAME_BINDING, scalar) writeonly buffer SplatShape {",
      "layout(set = 0, binding = 1 + ATTRIBUTE_GLOW, scalar) readonly buffer Glow { float glow[]; };\n"
@@ -45,7 +45,7 @@ CHANGES = [
     ("engine/reference/projection.cpp", "Vec3<T> colour(T(0.5));", "Vec3<T> colour(T(0.5) + splats.glow[index]);"),
     ("engine/reference/projection.cpp", "        out.sh_dc[index * 3 + c] = basis[0] * d_colour;\n",
      "        out.sh_dc[index * 3 + c] = basis[0] * d_colour;\n        out.glow[index] += d_colour;\n"),
-    ("trainer/optimizer.cpp", "    step.rate[kShRest] = now.sh_rest;\n",
+    ("trainer/step/optimizer.cpp", "    step.rate[kShRest] = now.sh_rest;\n",
      "    step.rate[kShRest] = now.sh_rest;\n    step.rate[kGlow] = now.sh_dc;\n"),
 ]
 

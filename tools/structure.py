@@ -38,7 +38,7 @@ CHANGES = {
 def source_files(root):
     listed = subprocess.run(["git", "-C", root, "ls-files", *FOLDERS], capture_output=True, text=True, check=True)
     return [name for name in listed.stdout.splitlines()
-            if name.endswith((".cpp", ".h", ".comp", ".glsl", ".txt")) and not name.startswith("tools/make_scene")]
+            if name.endswith((".cpp", ".h", ".comp", ".glsl", ".txt")) and not name.startswith("tools/lab/make_scene")]
 
 
 def tags(root, files):

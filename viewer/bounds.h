@@ -5,7 +5,6 @@
 
 #include "engine/scene/splat_model.h"
 #include "engine/scene/subject.h"
-#include "engine/scene/upright.h"
 
 namespace darb {
 

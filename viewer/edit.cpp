@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 
 namespace darb {

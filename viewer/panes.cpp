@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 

@@ -5,7 +5,6 @@
 #include <functional>
 
 #include "engine/core/error.h"
-#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_file.h"
 
 namespace darb {

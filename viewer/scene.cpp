@@ -9,7 +9,6 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/point_cloud_ply.h"
-#include "engine/data/point_splats.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/importance.h"
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <unordered_map>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/core/on_threads.h"
 #include "engine/scene/edit_splats.h"
 #include "viewer/view_camera.h"

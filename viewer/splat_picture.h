@@ -10,8 +10,7 @@
 #include "engine/core/image.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
-#include "engine/render/frame_exchange.h"
-#include "engine/render/upsample.h"
+#include "engine/render/renderer.h"
 #include "viewer/bounds.h"
 #include "viewer/display.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/plan/effect_plan.h"
 
 namespace darb {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/render/upsample.h"
+#include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"
 
 namespace darb {

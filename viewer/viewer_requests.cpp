@@ -11,7 +11,6 @@
 #include "engine/publish/device_clusters.h"
 #include "engine/publish/web_page.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_file.h"
 #include "viewer/controls.h"
 #include "viewer/viewer.h"

@@ -2,7 +2,9 @@
 // that a PLY file stores, for comparison with any other implementation.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <span>
 #include <vector>
 
 #include "engine/gpu/device.h"
@@ -23,5 +25,13 @@ std::vector<std::filesystem::path> dump_files(const std::filesystem::path& folde
 /// The same in float64 from the reference.
 void dump_from_reference(const SplatModel& model, const Camera& camera,
                          const std::filesystem::path& folder);
+
+// NumPy's .npy files, version 1.0: an array of float32 or float64, little-endian, C order.
+
+/// values.size() is the product of shape. Throws Error as write_file_atomic does.
+void write_npy(const std::filesystem::path& path, const std::vector<size_t>& shape,
+               std::span<const float> values);
+void write_npy(const std::filesystem::path& path, const std::vector<size_t>& shape,
+               std::span<const double> values);
 
 }  // namespace darb::check

@@ -3,8 +3,13 @@
 // go on in another way, is one of its kinds below.
 #pragma once
 
+#include <cstdio>
+#include <cstdlib>
+#include <fmt/format.h>
+#include <new>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 
 namespace darb {
@@ -36,5 +41,57 @@ struct DeviceLost : Error {
 /// The hint of what finds bytes that no writer of a format can have meant.
 inline constexpr const char* kCopyAgain =
     "The file is damaged or cut off: export or copy it again.";
+
+// Contracts: DARB_CHECK aborts on a bug and prints the expression with the values involved.
+// Bad input is no bug: that throws Error (engine/core/error.h).
+
+[[noreturn]] inline void check_failed(const char* file, int line, const char* expression,
+                                      const std::string& values) {
+    std::fprintf(stderr, "%s:%d: check failed: %s%s%s\n", file, line, expression,
+                 values.empty() ? "" : ": ", values.c_str());
+    std::abort();
+}
+
+inline std::string check_values() {
+    return {};
+}
+template <class... Values>
+std::string check_values(fmt::format_string<Values...> format, Values&&... values) {
+    return fmt::format(format, std::forward<Values>(values)...);
+}
+
+}  // namespace darb
+
+/// DARB_CHECK(i < n, "i = {}, n = {}", i, n): the format and its values are optional.
+#define DARB_CHECK(expression, ...)                                  \
+    do {                                                             \
+        if (!(expression)) [[unlikely]]                              \
+            ::darb::check_failed(__FILE__, __LINE__, #expression,    \
+                                 ::darb::check_values(__VA_ARGS__)); \
+    } while (false)
+
+// What a program was at when the system refused it memory or a thread.
+
+namespace darb {
+
+/// Returns work(). Where that runs out of memory it throws NoRoom, where it cannot start a thread
+/// Error, either naming `what`, a file or a part of the work; other exceptions stay as they are.
+template <class Work>
+decltype(auto) while_doing(const std::string& what, Work&& work) {
+    constexpr const char* kLess =
+        "Close other programs, or give it less: fewer or smaller photos "
+        "(-r), fewer splats.";
+    try {
+        return work();
+    } catch (const std::bad_alloc&) {
+        throw NoRoom(what, "no memory is left", kLess);
+    } catch (const std::length_error&) {  // more than any memory has
+        throw NoRoom(what, "no memory has room for so much", kLess);
+    } catch (const std::system_error& e) {
+        if (e.code() != std::errc::resource_unavailable_try_again) throw;
+        throw Error(what, "no thread can be started: " + e.code().message(),
+                    "The limits of this system are reached: close other programs.");
+    }
+}
 
 }  // namespace darb

@@ -1,18 +1,15 @@
 #include "engine/core/files.h"
 
-#include "engine/core/file_parts.h"
-
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <limits>
 #include <new>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <utility>
 
 #include "engine/core/error.h"

@@ -30,4 +30,11 @@ void check_is_file(const std::filesystem::path& path);
 void write_file_atomic(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomic(const std::filesystem::path& path, std::string_view text);
 
+// A file that is written from where its parts lie, without one copy of all of them.
+
+using FileParts = std::span<const std::span<const std::byte>>;
+
+/// As write_file_atomic of the parts in a row.
+void write_file_atomic(const std::filesystem::path& path, FileParts parts);
+
 }  // namespace darb

@@ -1,14 +1,20 @@
 #include "engine/data/image_io.h"
 
-#include <fmt/format.h>
-#include <stb/stb_image_write.h>
-
 #include <algorithm>
+#include <array>
+#include <csetjmp>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <fmt/format.h>
+#include <optional>
+#include <png.h>
+#include <stb/stb_image_write.h>
+#include <string_view>
 #include <vector>
 
 #include "engine/core/error.h"
 #include "engine/core/files.h"
-#include "engine/data/exif.h"
 #include "engine/data/photo_decoder.h"
 
 namespace darb {
@@ -165,6 +171,500 @@ std::string picture_name(const std::string& view_name, std::set<std::string>& us
     std::string name = stem;
     for (int n = 2; !used.insert(name).second; ++n) name = fmt::format("{}_{}", stem, n);
     return name + ".png";
+}
+
+}  // namespace darb
+
+// JPEG by libjpeg-turbo, with its accurate settings. What its warnings call corrupt data is an
+// error here: the pixels behind it would be made up.
+
+// After cstdio, which it needs.
+#include <jpeglib.h>
+// After jpeglib.h.
+#include <jerror.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "engine/core/error.h"
+#include "engine/data/photo_decoder.h"
+
+namespace darb {
+
+namespace {
+
+// Progressive files have about ten scans; each costs a walk over the whole photo, however few its
+// bytes.
+constexpr int kMostScans = 100;
+
+/// libjpeg's state, and what ended it. Nothing that longjmp leaves has a destructor.
+struct JpegReader {
+    jpeg_decompress_struct state{};
+    jpeg_error_mgr errors{};
+    jpeg_progress_mgr progress{};
+    std::jmp_buf failed{};
+    std::array<char, JMSG_LENGTH_MAX> reason{};
+    bool in_data = false;  // the head is read
+
+    explicit JpegReader(std::span<const std::byte> file);
+    ~JpegReader() { jpeg_destroy_decompress(&state); }
+    JpegReader(const JpegReader&) = delete;
+    JpegReader& operator=(const JpegReader&) = delete;
+};
+
+JpegReader& reader_of(j_common_ptr state) {
+    return *static_cast<JpegReader*>(state->client_data);
+}
+
+[[noreturn]] void fail_jpeg(j_common_ptr state) {
+    JpegReader& reader = reader_of(state);
+    (*state->err->format_message)(state, reader.reason.data());
+    std::longjmp(reader.failed, 1);
+}
+
+bool is_harmless(int warning) {
+    // Bytes between segments, versions and marks of applications, and the numbers in a scan's head
+    // that mean nothing in a sequential file.
+    return warning == JWRN_EXTRANEOUS_DATA || warning == JWRN_ADOBE_XFORM ||
+           warning == JWRN_JFIF_MAJOR || warning == JWRN_NOT_SEQUENTIAL ||
+           warning == JWRN_BOGUS_ICC;
+}
+
+void take_message(j_common_ptr state, int level) {
+    if (level >= 0 || is_harmless(state->err->msg_code)) return;
+    JpegReader& reader = reader_of(state);
+    // Where all pixels are there before it, a missing end mark is harmless as well.
+    if (state->err->msg_code == JWRN_JPEG_EOF && reader.in_data &&
+        !jpeg_has_multiple_scans(&reader.state))
+        return;
+    fail_jpeg(state);
+}
+
+void limit_scans(j_common_ptr state) {
+    JpegReader& reader = reader_of(state);
+    if (reader.state.input_scan_number <= kMostScans) return;
+    fmt::format_to_n(reader.reason.data(), reader.reason.size() - 1, "more than {} scans",
+                     kMostScans);
+    std::longjmp(reader.failed, 1);
+}
+
+JpegReader::JpegReader(std::span<const std::byte> file) {
+    state.err = jpeg_std_error(&errors);
+    errors.error_exit = fail_jpeg;
+    errors.emit_message = take_message;
+    state.client_data = this;
+    progress.progress_monitor = limit_scans;
+    if (setjmp(failed) != 0) return;  // out of memory; the next call fails as well
+    jpeg_create_decompress(&state);
+    state.progress = &progress;
+    jpeg_mem_src(&state, reinterpret_cast<const unsigned char*>(file.data()),
+                 static_cast<unsigned long>(file.size()));
+}
+
+/// Runs `work`; false where libjpeg ends it. Its locals are plain: longjmp runs no destructor.
+template <class Work>
+bool run_jpeg(JpegReader& reader, const Work& work) {
+    if (setjmp(reader.failed) != 0) return false;
+    work();
+    return true;
+}
+
+bool read_head(JpegReader& reader) {
+    return run_jpeg(reader, [&] { jpeg_read_header(&reader.state, TRUE); });
+}
+
+int channels_of(const JpegReader& reader, const std::string& where) {
+    const jpeg_decompress_struct& s = reader.state;
+    if (s.arith_code || s.data_precision != 8)
+        throw Error(where,
+                    fmt::format("is a JPEG of {} bits{}: only 8 bits with Huffman codes are read",
+                                s.data_precision, s.arith_code ? " with arithmetic coding" : ""),
+                    kReplacePhoto);
+    if (s.jpeg_color_space == JCS_GRAYSCALE) return 1;
+    if (s.jpeg_color_space == JCS_UNKNOWN)
+        throw Error(where,
+                    fmt::format("is a JPEG of {} channels: 1, 3 and 4 are known", s.num_components),
+                    kReplacePhoto);
+    return 3;
+}
+
+/// A block of 8 x 8 px needs a bit of a file at least, its brightness'.
+std::uint64_t least_jpeg_bytes(std::uint64_t width, std::uint64_t height) {
+    return (width + 7) / 8 * ((height + 7) / 8) / 8;
+}
+
+PhotoHead checked_head(const JpegReader& reader, std::uint64_t bytes, const std::string& where) {
+    const std::uint64_t width = reader.state.image_width, height = reader.state.image_height;
+    PhotoHead head;
+    head.channels = channels_of(reader, where);
+    check_photo_claim(static_cast<std::int64_t>(width), static_cast<std::int64_t>(height),
+                      least_jpeg_bytes(width, height), bytes, where);
+    head.width = static_cast<int>(width);
+    head.height = static_cast<int>(height);
+    return head;
+}
+
+[[noreturn]] void refuse_jpeg(const JpegReader& reader, const std::string& where) {
+    std::string place = "in its head";
+    if (reader.in_data) {
+        const jpeg_decompress_struct& s = reader.state;
+        const unsigned row =
+            s.output_scanline > 0
+                ? s.output_scanline
+                : std::min(s.input_iMCU_row * unsigned(s.max_v_samp_factor) * DCTSIZE,
+                           s.image_height - 1);
+        place = fmt::format("at row {} of {}", row, s.image_height);
+        if (s.input_scan_number > 1) place += fmt::format(" of scan {}", s.input_scan_number);
+    }
+    throw Error(where, fmt::format("cannot be decoded: {}, {}", reader.reason.data(), place),
+                kReplacePhoto);
+}
+
+std::uint8_t product(unsigned a, unsigned b) {  // of parts of 255, rounded
+    const unsigned t = a * b + 128;
+    return static_cast<std::uint8_t>((t + (t >> 8)) >> 8);
+}
+
+/// Adobe's programs store inks as what they leave of white.
+void inks_to_rgb(const std::uint8_t* inks, std::uint8_t* rgb, std::size_t count, bool inverted) {
+    for (std::size_t i = 0; i < count; ++i, inks += 4, rgb += 3)
+        for (std::size_t c = 0; c < 3; ++c)
+            rgb[c] = inverted ? product(inks[c], inks[3]) : product(255u - inks[c], 255u - inks[3]);
+}
+
+}  // namespace
+
+bool is_jpeg(std::span<const std::byte> file) {
+    return file.size() >= 3 && file[0] == std::byte{0xff} && file[1] == std::byte{0xd8} &&
+           file[2] == std::byte{0xff};
+}
+
+PhotoHead jpeg_head(std::span<const std::byte> head, std::uint64_t bytes,
+                    const std::string& where) {
+    JpegReader reader(head);
+    if (read_head(reader)) return checked_head(reader, bytes, where);
+    if (head.size() < bytes) return {.cut = true};
+    refuse_jpeg(reader, where);
+}
+
+ImageU8 decode_jpeg(std::span<const std::byte> file, const std::string& where) {
+    JpegReader reader(file);
+    if (!read_head(reader)) refuse_jpeg(reader, where);
+    const PhotoHead head = checked_head(reader, file.size(), where);
+    jpeg_decompress_struct& s = reader.state;
+    const bool inks = s.num_components == 4;
+    s.out_color_space = inks ? JCS_CMYK : head.channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
+    s.dct_method = JDCT_ISLOW;
+    s.do_fancy_upsampling = TRUE;
+    s.do_block_smoothing = FALSE;  // which makes up what a progressive file leaves out
+    reader.in_data = true;
+    ImageU8 image(head.width, head.height, head.channels);
+    std::vector<std::uint8_t> ink_row(inks ? std::size_t{4} * head.width : 0);
+    const std::size_t stride = static_cast<std::size_t>(head.width) * head.channels;
+    const auto decode = [&] {
+        jpeg_start_decompress(&s);
+        while (s.output_scanline < s.output_height) {
+            std::uint8_t* row = &image.data[s.output_scanline * stride];
+            std::uint8_t* into = inks ? ink_row.data() : row;
+            jpeg_read_scanlines(&s, &into, 1);
+            if (inks) inks_to_rgb(into, row, s.output_width, s.saw_Adobe_marker != FALSE);
+        }
+        jpeg_finish_decompress(&s);
+    };
+    if (!run_jpeg(reader, decode)) refuse_jpeg(reader, where);
+    return image;
+}
+
+// PNG by libpng. Pixels are taken as they are stored: no gamma, no colour profile. Every chunk's
+// checksum counts.
+
+namespace {
+
+struct PngReader {
+    png_structp png = nullptr;
+    png_infop info = nullptr;
+    std::span<const std::byte> file;
+    std::size_t at = 0;
+    std::uint32_t row = 0;  // that is read
+    bool cut = false;       // the bytes ended
+    std::array<char, 200> reason{};
+
+    explicit PngReader(std::span<const std::byte> file_);
+    ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+    PngReader(const PngReader&) = delete;
+    PngReader& operator=(const PngReader&) = delete;
+};
+
+[[noreturn]] void fail_png(png_structp png, png_const_charp message) {
+    auto& reader = *static_cast<PngReader*>(png_get_error_ptr(png));
+    std::strncpy(reader.reason.data(), message, reader.reason.size() - 1);
+    png_longjmp(png, 1);
+}
+
+/// Of what libpng would go on with, that is an error which changes pixels.
+void take_warning(png_structp png, png_const_charp message) {
+    const std::string_view text(message);
+    const bool pixels = text.starts_with("IDAT") || text.starts_with("tRNS");
+    if (pixels && text != "IDAT: Too much image data") fail_png(png, message);
+}
+
+void read_png_bytes(png_structp png, png_bytep to, std::size_t count) {
+    auto& reader = *static_cast<PngReader*>(png_get_io_ptr(png));
+    if (count > reader.file.size() - reader.at) {
+        reader.cut = true;
+        png_error(png, "the file ends here");
+    }
+    std::memcpy(to, reader.file.data() + reader.at, count);
+    reader.at += count;
+}
+
+/// Runs `work`; false where libpng ends it. Its locals are plain: longjmp runs no destructor.
+template <class Work>
+bool run_png(PngReader& reader, const Work& work) {
+    if (!reader.png || !reader.info) {
+        std::strncpy(reader.reason.data(), "out of memory", reader.reason.size() - 1);
+        return false;
+    }
+    if (setjmp(png_jmpbuf(reader.png)) != 0) return false;
+    work();
+    return true;
+}
+
+PngReader::PngReader(std::span<const std::byte> file_) : file(file_) {
+    png = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, fail_png, take_warning);
+    if (!png) return;
+    info = png_create_info_struct(png);
+    png_set_read_fn(png, this, read_png_bytes);
+    run_png(*this, [this] {
+        png_set_user_limits(png, kMostPhotoSide, kMostPhotoSide);
+        // Chunks that say nothing about the pixels are checked and passed over, never unpacked.
+        png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+        png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
+    });
+}
+
+[[noreturn]] void refuse_png(const PngReader& reader, const std::string& where) {
+    const std::string place = reader.row == 0 ? fmt::format("at byte {}", reader.at)
+                                              : fmt::format("at row {}", reader.row);
+    throw Error(where, fmt::format("cannot be decoded: {}, {}", reader.reason.data(), place),
+                kReplacePhoto);
+}
+
+bool read_head(PngReader& reader) {
+    return run_png(reader, [&] { png_read_info(reader.png, reader.info); });
+}
+
+/// Deflate packs at most 1,032 bytes in one; a row begins with its filter's byte.
+std::uint64_t least_png_bytes(std::uint64_t height, std::uint64_t row_bytes) {
+    return (row_bytes + 1) * height / 1032;
+}
+
+PhotoHead checked_head(const PngReader& reader, std::uint64_t bytes, const std::string& where) {
+    const png_uint_32 width = png_get_image_width(reader.png, reader.info);
+    const png_uint_32 height = png_get_image_height(reader.png, reader.info);
+    check_photo_claim(width, height,
+                      least_png_bytes(height, png_get_rowbytes(reader.png, reader.info)), bytes,
+                      where);
+    const int type = png_get_color_type(reader.png, reader.info);
+    const bool alpha = (type & PNG_COLOR_MASK_ALPHA) != 0 ||
+                       png_get_valid(reader.png, reader.info, PNG_INFO_tRNS) != 0;
+    PhotoHead head;
+    head.width = static_cast<int>(width);
+    head.height = static_cast<int>(height);
+    head.channels = ((type & PNG_COLOR_MASK_COLOR) != 0 ? 3 : 1) + (alpha ? 1 : 0);
+    return head;
+}
+
+void decode_rows(PngReader& reader, png_bytep to, std::size_t stride, int height,
+                 const std::string& where) {
+    const int passes =
+        png_get_interlace_type(reader.png, reader.info) == PNG_INTERLACE_ADAM7 ? 7 : 1;
+    const auto decode = [&] {
+        for (int pass = 0; pass < passes; ++pass)
+            for (reader.row = 0; reader.row < static_cast<std::uint32_t>(height); ++reader.row)
+                png_read_row(reader.png, to + reader.row * stride, nullptr);
+        reader.row = 0;
+        png_read_end(reader.png, nullptr);
+    };
+    if (!run_png(reader, decode)) refuse_png(reader, where);
+}
+
+}  // namespace
+
+bool is_png(std::span<const std::byte> file) {
+    return file.size() >= 8 &&
+           png_sig_cmp(reinterpret_cast<png_const_bytep>(file.data()), 0, 8) == 0;
+}
+
+PhotoHead png_head(std::span<const std::byte> head, std::uint64_t bytes, const std::string& where) {
+    PngReader reader(head);
+    if (read_head(reader)) return checked_head(reader, bytes, where);
+    if (reader.cut && head.size() < bytes) return {.cut = true};
+    refuse_png(reader, where);
+}
+
+ImageU8 decode_png(std::span<const std::byte> file, const std::string& where) {
+    PngReader reader(file);
+    if (!read_head(reader)) refuse_png(reader, where);
+    const PhotoHead head = checked_head(reader, file.size(), where);
+    const int channels = head.channels == 2 ? 4 : head.channels;
+    const auto prepare = [&] {
+        png_set_expand(reader.png);  // palettes, 1 to 4 bits, a transparent colour
+        png_set_strip_16(reader.png);
+        if (head.channels == 2) png_set_gray_to_rgb(reader.png);
+        png_set_interlace_handling(reader.png);
+        png_read_update_info(reader.png, reader.info);
+    };
+    if (!run_png(reader, prepare)) refuse_png(reader, where);
+    ImageU8 image(head.width, head.height, channels);
+    const std::size_t stride = static_cast<std::size_t>(head.width) * channels;
+    DARB_CHECK(png_get_rowbytes(reader.png, reader.info) == stride, "{} channels", channels);
+    decode_rows(reader, image.data.data(), stride, head.height, where);
+    return image;
+}
+
+GreyU16 decode_png16(std::span<const std::byte> file, const std::string& where,
+                     const std::string& hint) {
+    PngReader reader(file);
+    if (!read_head(reader)) refuse_png(reader, where);
+    const PhotoHead head = checked_head(reader, file.size(), where);
+    const int depth = png_get_bit_depth(reader.png, reader.info);
+    if (depth != 16 || head.channels != 1)
+        throw Error(where, fmt::format("has {} bits and {} channels", depth, head.channels), hint);
+    const auto prepare = [&] {
+        png_set_swap(reader.png);  // to little-endian
+        png_set_interlace_handling(reader.png);
+        png_read_update_info(reader.png, reader.info);
+    };
+    if (!run_png(reader, prepare)) refuse_png(reader, where);
+    GreyU16 image{head.width, head.height, {}};
+    image.data.resize(static_cast<std::size_t>(head.width) * head.height);
+    decode_rows(reader, reinterpret_cast<png_bytep>(image.data.data()),
+                static_cast<std::size_t>(head.width) * 2, head.height, where);
+    return image;
+}
+
+namespace {
+
+using Bytes = std::span<const std::byte>;
+
+std::uint32_t read_uint(Bytes bytes, std::size_t at, std::size_t size, bool little) {
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+        const std::size_t from = little ? at + size - 1 - i : at + i;
+        value = (value << 8) | std::to_integer<std::uint32_t>(bytes[from]);
+    }
+    return value;
+}
+
+struct Entry {
+    std::uint32_t type = 0, count = 0;
+    std::size_t value = 0;  // where it stands, or where the place of a longer one stands
+};
+
+/// tiff: from the byte order mark on. A directory is a count and 12-byte entries: tag, type, count,
+/// value. Nothing where it has no such tag.
+std::optional<Entry> find_entry(Bytes tiff, std::size_t directory, std::uint32_t tag, bool little) {
+    constexpr std::uint32_t kEntryBytes = 12;
+    if (directory > tiff.size() || tiff.size() - directory < 2) return {};
+    const std::size_t count = read_uint(tiff, directory, 2, little);
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t entry = directory + 2 + i * kEntryBytes;
+        if (tiff.size() < entry + kEntryBytes) return {};
+        if (read_uint(tiff, entry, 2, little) == tag)
+            return Entry{read_uint(tiff, entry + 2, 2, little),
+                         read_uint(tiff, entry + 4, 4, little), entry + 8};
+    }
+    return {};
+}
+
+/// Whether it is one, and its byte order.
+bool is_tiff(Bytes tiff, bool& little) {
+    if (tiff.size() < 8) return false;
+    little = tiff[0] == std::byte{'I'};
+    return read_uint(tiff, 0, 2, true) == (little ? 0x4949u : 0x4d4du) &&
+           read_uint(tiff, 2, 2, little) == 42;
+}
+
+int tiff_orientation(Bytes tiff) {
+    constexpr std::uint32_t kOrientationTag = 0x0112, kShort = 3;
+    bool little = false;
+    if (!is_tiff(tiff, little)) return 1;
+    const auto entry = find_entry(tiff, read_uint(tiff, 4, 4, little), kOrientationTag, little);
+    if (!entry || entry->type != kShort) return 1;
+    const std::uint32_t value = read_uint(tiff, entry->value, 2, little);
+    return value >= 1 && value <= 8 ? static_cast<int>(value) : 1;
+}
+
+int tiff_focal_35mm(Bytes tiff) {
+    constexpr std::uint32_t kExifTag = 0x8769, kFocalLength35mm = 0xa405, kShort = 3;
+    bool little = false;
+    if (!is_tiff(tiff, little)) return 0;
+    const auto exif = find_entry(tiff, read_uint(tiff, 4, 4, little), kExifTag, little);
+    if (!exif) return 0;
+    const auto focal =
+        find_entry(tiff, read_uint(tiff, exif->value, 4, little), kFocalLength35mm, little);
+    if (!focal || focal->type != kShort) return 0;
+    return static_cast<int>(read_uint(tiff, focal->value, 2, little));
+}
+
+std::string tiff_time(Bytes tiff) {
+    constexpr std::uint32_t kExifTag = 0x8769, kTimeTag = 0x9003, kAscii = 2;
+    constexpr std::size_t kLength = 19;
+    bool little = false;
+    if (!is_tiff(tiff, little)) return {};
+    const auto exif = find_entry(tiff, read_uint(tiff, 4, 4, little), kExifTag, little);
+    if (!exif) return {};
+    const auto time = find_entry(tiff, read_uint(tiff, exif->value, 4, little), kTimeTag, little);
+    if (!time || time->type != kAscii || time->count < kLength) return {};
+    const std::size_t at = read_uint(tiff, time->value, 4, little);
+    if (at > tiff.size() || tiff.size() - at < kLength) return {};
+    std::string text;
+    for (std::size_t i = 0; i < kLength; ++i) {
+        const char c = static_cast<char>(tiff[at + i]);
+        const bool mark = i == 4 || i == 7 || i == 10 || i == 13 || i == 16;
+        if (mark ? c != (i == 10 ? ' ' : ':') : c < '0' || c > '9') return {};
+        text += c;
+    }
+    return text;
+}
+
+/// What follows "Exif" in the file; nothing where there is none.
+Bytes exif_of(Bytes file) {
+    constexpr std::uint32_t kStartOfImage = 0xd8, kStartOfScan = 0xda, kApp1 = 0xe1;
+    if (file.size() < 4 || read_uint(file, 0, 2, false) != (0xff00u | kStartOfImage)) return {};
+    for (std::size_t at = 2; at + 4 <= file.size();) {
+        if (file[at] != std::byte{0xff}) return {};
+        const std::uint32_t marker = read_uint(file, at + 1, 1, false);
+        if (marker == 0xff) {  // fill byte
+            ++at;
+            continue;
+        }
+        if (marker == kStartOfScan) return {};
+        const std::size_t length = read_uint(file, at + 2, 2, false);
+        if (length < 2 || file.size() - at - 2 < length) return {};
+        const Bytes segment = file.subspan(at + 4, length - 2);
+        if (marker == kApp1 && segment.size() > 6 &&
+            std::memcmp(segment.data(), "Exif\0\0", 6) == 0)
+            return segment.subspan(6);
+        at += 2 + length;
+    }
+    return {};
+}
+
+}  // namespace
+
+int exif_orientation(Bytes file) {
+    return tiff_orientation(exif_of(file));
+}
+
+int exif_focal_35mm(Bytes file) {
+    return tiff_focal_35mm(exif_of(file));
+}
+
+std::string exif_time(Bytes file) {
+    return tiff_time(exif_of(file));
 }
 
 }  // namespace darb

@@ -4,11 +4,10 @@
 // only. Private to engine/gpu.
 #pragma once
 
-#include <vulkan/vulkan.h>
-
 #include <optional>
 #include <unordered_map>
 #include <vector>
+#include <vulkan/vulkan.h>
 
 namespace darb {
 
@@ -45,5 +44,11 @@ class BarrierTracker {
     VkPipelineStageFlags2 stages_ = 0;  // of all uses so far
     VkAccessFlags2 writes_ = 0;
 };
+
+// The barrier between submissions of whoever recorded them.
+
+/// After it everything that was written before it is visible to what follows.
+VkMemoryBarrier2 full_barrier();
+void record_barrier(VkCommandBuffer commands, const VkMemoryBarrier2& barrier);
 
 }  // namespace darb

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "engine/core/error.h"
+#include "engine/gpu/barriers.h"
 #include "engine/gpu/device_memory.h"
 #include "engine/gpu/device_state.h"
-#include "engine/gpu/full_barrier.h"
 
 namespace darb {
 

@@ -3,19 +3,59 @@
 // faults, tuning) is read by commands and tests and handed down in options.
 #pragma once
 
-#include <vulkan/vulkan.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
+#include <vulkan/vulkan.h>
 
 #include "engine/gpu/faults.h"
 #include "engine/gpu/pipeline_statistics.h"
-#include "engine/gpu/tuning.h"
 
 namespace darb {
+
+struct DeviceInfo;
+
+enum class BackwardBlend {
+    subgroup,  // a subgroup walks a tile's list, reductions over its pixels: blend_backward.comp
+    team,      // the same by a subgroup an area of the tile: blend_backward_team.comp
+    buckets,   // a thread owns an intersection, from checkpoints: blend_backward_buckets.comp
+};
+
+/// In the order of the enum.
+inline constexpr const char* kBackwardBlends[] = {"subgroup", "team", "buckets"};
+
+/// How the scatter pass of the radix sort ranks keys, shaders/sort/radix_scatter_*; in the order of
+/// their names.
+enum class SortScatter { ballot, columns };
+inline constexpr const char* kSortScatters[] = {"ballot", "columns"};
+
+/// How the loss walks a picture: loss/loss.comp, or loss/loss_maps.comp and loss_gradient.comp; in
+/// the order of their names.
+enum class LossWay { strips, tiles };
+inline constexpr const char* kLossWays[] = {"strips", "tiles"};
+
+/// Where training photos lie: where the plan of memory says; on the device; on the host, from where
+/// each is copied for its step. In the order of their names.
+enum class PhotoPlace { automatic, resident, streamed };
+inline constexpr const char* kPhotoPlaces[] = {"auto", "resident", "streamed"};
+
+/// Each a specialization constant or a shader, but for the photos' place.
+struct Tuning {
+    bool scan_by_thread = false;  // Scan::Strategy::team_is_thread
+    SortScatter scatter = SortScatter::ballot;
+    std::uint32_t blend_threads = 0;  // of the forward blend's workgroup, which has a tile
+    std::uint32_t blend_lanes = 0;    // of a subgroup of both blends; 0: the device's own
+    BackwardBlend backward = BackwardBlend::subgroup;
+    LossWay loss = LossWay::strips;
+    bool exp_builtin = false;  // by the driver's own exp where kernels may (kEvaluationOfDevice)
+    PhotoPlace photos = PhotoPlace::automatic;
+    bool operator==(const Tuning&) const = default;
+};
+
+/// What a device begins with: on lavapipe what was measured by hand at each of its vector widths.
+Tuning usual_tuning(const DeviceInfo& info);
 
 /// What `darb devices` prints, and what the choice is made from.
 struct DeviceInfo {

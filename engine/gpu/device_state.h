@@ -1,8 +1,6 @@
 // What Buffer, Pipeline and Commands share of a Device. Private to engine/gpu.
 #pragma once
 
-#include <vulkan/vulkan.h>
-
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -11,13 +9,42 @@
 #include <span>
 #include <string>
 #include <vector>
+#include <vulkan/vulkan.h>
 
 #include "engine/gpu/device.h"
 #include "engine/gpu/faults.h"
-#include "engine/gpu/instance.h"
 #include "engine/gpu/pipeline.h"
 
 namespace darb {
+
+/// Entry points of VK_EXT_debug_utils, null where it is missing.
+struct DebugUtils {
+    PFN_vkSetDebugUtilsObjectNameEXT set_name = nullptr;
+    PFN_vkCmdBeginDebugUtilsLabelEXT begin_label = nullptr;
+    PFN_vkCmdEndDebugUtilsLabelEXT end_label = nullptr;
+};
+
+class Instance {
+  public:
+    /// Throws Error: no driver, validation asked for but not installed, an extension not offered.
+    Instance(bool validation, const std::vector<std::string>& extensions);
+    ~Instance();
+    Instance(const Instance&) = delete;
+    Instance& operator=(const Instance&) = delete;
+
+    VkInstance handle() const { return instance_; }
+    const DebugUtils& debug() const { return debug_; }
+    std::uint64_t message_count() const { return *messages_; }
+    std::vector<VkPhysicalDevice> physical_devices() const;
+
+  private:
+    void load_debug(bool validation);  // and begin to listen to the layers
+
+    VkInstance instance_ = VK_NULL_HANDLE;
+    VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+    DebugUtils debug_;
+    std::unique_ptr<std::atomic<std::uint64_t>> messages_;
+};
 
 class DeviceMemory;
 

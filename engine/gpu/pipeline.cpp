@@ -8,7 +8,6 @@
 #include <set>
 #include <utility>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/gpu/device_state.h"
 #include "engine/gpu/shader_table.h"

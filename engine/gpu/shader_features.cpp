@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/gpu/spirv_reflect.h"
 
 namespace darb {

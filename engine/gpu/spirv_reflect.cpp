@@ -4,7 +4,7 @@
 #include <map>
 #include <unordered_map>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 

@@ -5,7 +5,6 @@
 
 #include <cmath>
 
-#include "engine/kernels/profile_integrals.h"
 #include "engine/kernels/quadrature.h"
 
 namespace darb {

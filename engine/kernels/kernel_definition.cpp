@@ -11,7 +11,6 @@
 #include <optional>
 
 #include "engine/kernels/kernel_coefficients.h"
-#include "engine/kernels/minimax.h"
 
 namespace darb {
 namespace {

@@ -1,13 +1,14 @@
 #include "engine/kernels/kernel_profile.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <fmt/format.h>
 #include <limits>
 #include <numbers>
 
 #include "engine/core/error.h"
+#include "engine/kernels/quadrature.h"
 
 namespace darb {
 namespace {
@@ -98,6 +99,210 @@ const KernelProfile& listed_profile(int kernel) {
             "kernel", fmt::format("{} is the number of none", kernel),
             fmt::format("Kernels are 0 to {}: shaders/shared/kernel_list.h.", KERNEL_ROWS - 1));
     return kRows[static_cast<std::size_t>(kernel)];
+}
+
+// Everything that follows from a kernel's row. The exact footprint, with v = u (1 - s^2):
+//   A(q) = 2 integral_0^sqrt(R^2-q) f(q + z^2) dz = 2 R sqrt(u) integral_0^1 f(R^2 (1 - v)) ds,
+// and f = v^m g(v) with g analytic gives A = 2 R u^(m+1/2) integral (1 - s^2)^m g(v) ds: the
+// integral is analytic in u, so a Chebyshev series holds it to rounding.
+
+namespace {
+
+constexpr int kNodes = 64;        // enough for a pole at q = -1 with support 9
+constexpr double kNoise = 2e-15;  // of the samples: higher terms would spoil the derivative
+constexpr double kStep = 1e-200;  // of the complex-step derivative
+
+double profile_value(const KernelProfile& row, double q) {
+    return row.profile({q, 0}).real();
+}
+
+double footprint_integral(const KernelProfile& row, double u) {
+    double sum = 0;
+    for (const auto [s, weight] : even_quadrature()) {
+        // v is recomputed from the rounded q, so that f and v^m belong to the same point.
+        const double q = row.support * (1 - u * (1 - s * s));
+        const double v = 1 - q / row.support;
+        sum += weight * std::pow(1 - s * s, row.edge_order) * profile_value(row, q) /
+               std::pow(v, row.edge_order);
+    }
+    return sum;
+}
+
+}  // namespace
+
+ChebyshevSeries::ChebyshevSeries(const std::vector<double>& samples)
+    : coefficients_(samples.size()) {
+    const double n = static_cast<double>(samples.size());
+    double largest = 0;
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+        double sum = 0;
+        for (std::size_t j = 0; j < samples.size(); ++j)
+            sum += samples[j] * std::cos(std::numbers::pi * static_cast<double>(k) *
+                                         (static_cast<double>(j) + 0.5) / n);
+        coefficients_[k] = sum * (k == 0 ? 1 : 2) / n;
+        largest = std::max(largest, std::abs(coefficients_[k]));
+    }
+    while (coefficients_.size() > 1 && std::abs(coefficients_.back()) < kNoise * largest)
+        coefficients_.pop_back();
+}
+
+void ChebyshevSeries::evaluate(double u, double& value, double& derivative) const {
+    const double x = 2 * u - 1;
+    double b1 = 0, b2 = 0, d1 = 0, d2 = 0;  // Clenshaw, and its derivative by x
+    for (std::size_t k = coefficients_.size() - 1; k > 0; --k) {
+        const double d0 = 2 * b1 + 2 * x * d1 - d2;
+        const double b0 = coefficients_[k] + 2 * x * b1 - b2;
+        d2 = d1;
+        d1 = d0;
+        b2 = b1;
+        b1 = b0;
+    }
+    value = coefficients_[0] + x * b1 - b2;
+    derivative = 2 * (b1 + x * d1 - d2);
+}
+
+std::complex<double> ChebyshevSeries::value(std::complex<double> u) const {
+    const std::complex<double> x = 2.0 * u - 1.0;
+    std::complex<double> b1 = 0, b2 = 0;
+    for (std::size_t k = coefficients_.size() - 1; k > 0; --k) {
+        const std::complex<double> b0 = coefficients_[k] + 2.0 * x * b1 - b2;
+        b2 = b1;
+        b1 = b0;
+    }
+    return coefficients_[0] + x * b1 - b2;
+}
+
+DerivedKernel::DerivedKernel(const KernelProfile& row) : row_(row) {
+    DARB_CHECK(row.edge_order >= 0 && row.support > 0, "kernel {}", row.name);
+    DARB_CHECK((row.form == KERNEL_FORM_RINGS) == (row.pulses.count > 1), "kernel {}", row.name);
+    const bool compact = std::isfinite(row.support);
+    DARB_CHECK(compact || row.form == KERNEL_FORM_GAUSSIAN || row.form == KERNEL_FORM_EXPONENTIAL ||
+                   row.form == KERNEL_FORM_GES,
+               "kernel {}", row.name);
+    find_pulses();
+    radius_ = compact ? std::sqrt(pulses_.front().end) : kGaussRadius;
+    radial_mass_ = radial_moment(radius_, 2);
+    if (!compact) return;  // a Gaussian is its own footprint
+    psi_ = scale_ = radial_moment(radius_, 4) / radial_mass_ / 3;
+    if (row.form == KERNEL_FORM_RINGS) {
+        const double whole = std::sqrt(row.support);
+        psi_ = radial_moment(whole, 4) / radial_moment(whole, 2) / 3;
+        return;
+    }
+    const double centre = footprint_integral(row, 1);
+    std::vector<double> samples(kNodes);
+    for (int j = 0; j < kNodes; ++j)
+        samples[static_cast<std::size_t>(j)] =
+            footprint_integral(row, (1 + std::cos(std::numbers::pi * (j + 0.5) / kNodes)) / 2) /
+            centre;
+    footprint_ = ChebyshevSeries(samples);
+}
+
+void DerivedKernel::find_pulses() {
+    if (row_.pulses.count == 1) pulses_ = {{0, row_.support}};
+    double from = 0, to = row_.pulses.first_end;
+    for (int pulse = 0; pulse < row_.pulses.count && row_.pulses.count > 1; ++pulse) {
+        double low = from * from, high = to * to;  // of the peak: w rises before it
+        for (int step = 0; step < 80 && pulse > 0; ++step) {
+            const double middle = (low + high) / 2;
+            (slope(Footprint::psi, middle) > 0 ? low : high) = middle;
+        }
+        pulses_.push_back({low, to * to});
+        from = to;
+        to += row_.pulses.period;
+    }
+}
+
+double DerivedKernel::radial_moment(double radius, int power) const {
+    double total = 0, from = 0;
+    for (const Pulse& pulse : pulses_) {  // smooth within each
+        const double to = std::min(radius, std::sqrt(pulse.end));
+        if (to <= from) break;
+        const auto f = [&](double weight, double r) {
+            return weight * std::pow(r, power) * profile_value(row_, r * r);
+        };
+        double sum = 0;
+        if (from == 0)
+            for (const auto [x, weight] : even_quadrature()) sum += f(weight, to * x);
+        else
+            sum = integrate_unit([&](double x) { return f(1, from + (to - from) * x); });
+        total += sum * (to - from);
+        from = to;
+    }
+    return total;
+}
+
+void DerivedKernel::footprint_parts(double q, double& u, double& p, double& dp) const {
+    if (row_.form == KERNEL_FORM_RINGS)
+        throw Error("kernel", fmt::format("{} has no exact footprint", row_.name),
+                    "Kernels of several pulses take the footprint psi.");
+    u = (row_.support - q) / row_.support;
+    footprint_.evaluate(u, p, dp);
+}
+
+double DerivedKernel::value(Footprint footprint, double q) const {
+    if (q >= row_.support) return 0;
+    if (footprint == Footprint::psi || !std::isfinite(row_.support)) return profile_value(row_, q);
+    double u, p, dp;
+    footprint_parts(q, u, p, dp);
+    return std::pow(u, row_.edge_order) * std::sqrt(u) * p;
+}
+
+double DerivedKernel::slope(Footprint footprint, double q) const {
+    if (q >= row_.support) return 0;
+    if (footprint == Footprint::psi || !std::isfinite(row_.support))
+        return row_.profile({q, kStep}).imag() / kStep;
+    double u, p, dp;
+    footprint_parts(q, u, p, dp);
+    if (u <= 0) return 0;
+    const double power = std::pow(u, row_.edge_order) / std::sqrt(u);
+    return -power * ((row_.edge_order + 0.5) * p + u * dp) / row_.support;
+}
+
+double DerivedKernel::reach(Footprint footprint, double opacity, double cutoff) const {
+    if (!(opacity >= cutoff)) return 0;
+    double low = 0, high = 1;
+    for (const Pulse& pulse : pulses_)  // the outermost that shows, and there its falling side
+        if (pulse.peak > 0 && opacity * value(footprint, pulse.peak) >= cutoff) low = pulse.peak;
+    high = std::max(high, low);
+    while (high < row_.support && opacity * value(footprint, high) >= cutoff) high *= 2;
+    high = std::min(high, row_.support);
+    // The answer keeps opacity * value(high) < cutoff; 80 halvings reach neighbouring doubles.
+    for (int step = 0; step < 80; ++step) {
+        const double middle = (low + high) / 2;
+        (opacity * value(footprint, middle) >= cutoff ? low : high) = middle;
+    }
+    return high;
+}
+
+double DerivedKernel::covariance_scale(Footprint footprint) const {
+    return footprint == Footprint::psi ? scale_ : 1;
+}
+
+double DerivedKernel::equal_area_scale(Footprint footprint) const {
+    if (!std::isfinite(row_.support)) return 1;
+    // The area element is pi dq, a Gaussian's integral 2 pi; q = end (1 - s^2) makes half powers at
+    // the edge analytic.
+    const double end = pulses_.front().end;
+    const double integral =
+        integrate_unit([&](double s) { return 2 * end * s * value(footprint, end * (1 - s * s)); });
+    return std::sqrt(2 / (covariance_scale(footprint) * integral));
+}
+
+double DerivedKernel::radius_quantile(double u) const {
+    if (!(u >= 0 && u < 1))
+        throw Error("kernel", fmt::format("{} is no quantile", u), "It is 0 or more, below 1.");
+    const double target = u * radial_mass_;
+    double low = 0, high = radius_, r = radius_ * std::cbrt(u) / 2;
+    // Newton, kept inside the bracket; the density r^2 w is positive inside the ball.
+    for (int step = 0; step < 60 && high - low > 4e-16 * radius_; ++step) {
+        const double excess = radial_moment(r, 2) - target;
+        (excess < 0 ? low : high) = r;
+        const double next = r - excess / (r * r * profile_value(row_, r * r));
+        if (std::abs(next - r) < 1e-15 * radius_) break;
+        r = next > low && next < high ? next : (low + high) / 2;
+    }
+    return r;
 }
 
 }  // namespace darb

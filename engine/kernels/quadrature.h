@@ -1,7 +1,10 @@
 // Gauss-Legendre quadrature of analytic integrands over [0, 1], even ones above all.
 #pragma once
 
+#include <functional>
 #include <span>
+
+#include "engine/kernels/gaussian_equivalent.h"
 
 namespace darb {
 
@@ -26,5 +29,16 @@ double integrate_unit(F f) {
         sum += weight / 2 * (f((1 + x) / 2) + f((1 - x) / 2));
     return sum;
 }
+
+// What a rendered profile alone gives, of kernels with tables and of those in closed form: w(q) on
+// [0, support], the support finite or that of a Gaussian below rounding.
+
+/// relocation_scale of this profile; radius: the square root of its support, or where a Gaussian is
+/// below rounding.
+double relocation_scale_of(const std::function<double(double)>& w, double support, double opacity,
+                           int count);
+/// gaussian_equivalent of a profile with this support, whose covariance is multiplied by `scale`.
+GaussianEquivalent gaussian_equivalent_of(const std::function<double(double)>& w, double support,
+                                          double scale, bool keep_opacity);
 
 }  // namespace darb

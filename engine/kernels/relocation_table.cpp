@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "engine/core/error.h"
-#include "engine/kernels/profile_integrals.h"
 #include "engine/kernels/quadrature.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "shaders/shared/kernel_forms.h"

@@ -1,7 +1,6 @@
 #include "engine/plan/antialias_probe.h"
 
 #include <fmt/format.h>
-
 #include <string>
 
 namespace darb {
@@ -41,6 +40,14 @@ void take_probe(const AntialiasProbe& probe, EffectPlan& plan) {
         return;
     }
     row = {probe.pays(), false, 0, probe.gain_db(), reason};
+}
+
+std::string Trial::advice() const {
+    const std::string measured =
+        fmt::format("{:+.2f} dB on held-out photos for {:+.0f} % of time", gain_db(), 100 * price);
+    return pays() ? fmt::format("{}: train with {}", measured, tried)
+                  : fmt::format("{}: stay with {}; less than {} dB may be chance", measured, usual,
+                                kLeastGain_db);
 }
 
 }  // namespace darb

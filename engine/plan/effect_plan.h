@@ -11,7 +11,7 @@
 
 #include "engine/core/image.h"
 #include "engine/data/dataset.h"
-#include "engine/raster/effects.h"
+#include "engine/raster/forward_options.h"
 #include "engine/scene/splat_model.h"
 #include "shaders/shared/effect_list.h"
 #include "shaders/shared/limits.h"

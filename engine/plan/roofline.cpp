@@ -7,7 +7,7 @@
 #include "engine/gpu/buffer.h"
 #include "engine/gpu/commands.h"
 #include "engine/gpu/pipeline.h"
-#include "engine/scene/splat_attributes.h"
+#include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
 #include "shaders/shared/measure_args.h"
 #include "shaders/shared/render_args.h"

@@ -9,8 +9,8 @@
 
 #include "engine/gpu/buffer_list.h"
 #include "engine/gpu/commands.h"
+#include "engine/gpu/device.h"
 #include "engine/gpu/pipeline.h"
-#include "engine/gpu/tuning.h"
 #include "shaders/shared/radix_args.h"
 
 namespace darb {

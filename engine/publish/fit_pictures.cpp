@@ -10,7 +10,6 @@
 #include "engine/core/text.h"
 #include "engine/data/metrics.h"
 #include "engine/render/renderer.h"
-#include "engine/render/upsample.h"
 #include "engine/scene/merge_splats.h"
 
 namespace darb {

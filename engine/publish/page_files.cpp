@@ -1,6 +1,6 @@
 #include "engine/publish/page_files.h"
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <functional>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/kernels/kernel_profile.h"
 #include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"

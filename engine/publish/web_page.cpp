@@ -18,7 +18,6 @@
 #include "engine/scene/orbit_cameras.h"
 #include "engine/scene/splat_shapes.h"
 #include "engine/scene/subject.h"
-#include "engine/scene/upright.h"
 
 namespace darb {
 

@@ -19,7 +19,6 @@
 #include <string>
 #include <thread>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/ranks/ranks.h"

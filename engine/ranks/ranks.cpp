@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 namespace darb {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cstring>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/core/on_threads.h"
 #include "engine/core/streaming.h"
-#include "engine/scene/splat_attributes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 

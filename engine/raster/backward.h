@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "engine/raster/adam_step.h"
+#include "engine/raster/adam.h"
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/raster/gradient_buffers.h"

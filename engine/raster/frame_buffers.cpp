@@ -8,7 +8,6 @@
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/forward.h"
-#include "engine/raster/frame_limit.h"
 #include "engine/raster/frame_view.h"
 
 namespace darb {

@@ -1,10 +1,13 @@
 // FrameView: what a frame is drawn of, as the passes read it.
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
+#include <string>
 #include <vector>
 
 #include "engine/gpu/buffer.h"
+#include "engine/gpu/device.h"
 #include "engine/scene/camera.h"
 #include "shaders/shared/limits.h"
 #include "shaders/shared/render_args.h"
@@ -29,5 +32,15 @@ Buffer upload_cameras(Device& device, const std::vector<gpu::CameraData>& camera
 
 /// Tiles of an image.
 std::uint32_t image_tiles(int width, int height);
+
+// The size of a frame that a device can render: its picture, three floats a pixel, is one binding.
+
+/// planes: floats a pixel, of the picture or of its gradient.
+std::uint64_t max_frame_pixels(const Device& device, std::uint64_t planes = 3);
+
+/// Throws Error where a frame has more, with a width that fits. camera: whose frame it is,
+/// where that is known.
+void check_frame(const Device& device, int width, int height, const std::string& camera = {},
+                 std::uint64_t planes = 3);
 
 }  // namespace darb

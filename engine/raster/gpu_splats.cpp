@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/scene/splat_shapes.h"
 
 namespace darb {

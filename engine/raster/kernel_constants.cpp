@@ -1,15 +1,16 @@
 #include "engine/raster/kernel_constants.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
+#include <fmt/format.h>
 #include <string>
 #include <utility>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
 #include "engine/kernels/kernel_profile.h"
 #include "engine/kernels/shaped_kernel.h"
+#include "shaders/shared/kernel_probe_args.h"
 
 namespace darb {
 namespace {
@@ -88,6 +89,21 @@ SpecConstants kernel_constants(int kernel, Footprint footprint, int evaluation, 
     for (std::size_t i = 0; i < k.c.size(); ++i)
         constants.emplace("KERNEL_C" + std::to_string(i), static_cast<float>(k.c[i]));
     return for_several_passes(std::move(constants));
+}
+
+std::vector<KernelAnswer> probe_kernel(Device& device, const SpecConstants& constants,
+                                       const std::vector<KernelProbe>& probes, float exponent) {
+    const Pipeline pipeline(device, "kernel_probe", constants);
+    Buffer input(device, "probes", probes.size() * sizeof(KernelProbe));
+    Buffer output(device, "answers", probes.size() * sizeof(KernelAnswer));
+    input.upload(probes);
+    Commands commands(device);
+    commands.begin();
+    const auto count = static_cast<std::uint32_t>(probes.size());
+    commands.dispatch(pipeline, gpu::KernelProbeArgs{count, exponent}, {input, output},
+                      (count + KERNEL_PROBE_GROUP - 1) / KERNEL_PROBE_GROUP);
+    commands.submit_and_wait();
+    return output.download<KernelAnswer>(probes.size());
 }
 
 }  // namespace darb

@@ -1,14 +1,86 @@
 #include "engine/reference/comparison.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <limits>
 
 #include "engine/core/error.h"
 
 namespace darb::reference {
+namespace {
+
+constexpr Tolerance kTable[] = {
+    {"exact", 0, 0, 0, -1, 0, "counts, indices, order, and paths that must agree to the bit"},
+    {"difference", 2e-7, 2e-7, 0, 1 - 1e-12, 1e-6,
+     "double against central differences with h = 1e-5: truncation h^2 f''' / 6 = 1e-8 and "
+     "rounding 1e-15 / h = 1e-10, times a loss of about 100"},
+    {"difference_banded", 2e-6, 2e-6, 0.02, 1 - 1e-6, 1e-4,
+     "as difference, with the real cut-off: a pixel within h of it jumps by the cut-off / 2h"},
+    {"projection_float32", 1e-6, 2e-5, 0, 1 - 1e-9, 1e-5,
+     "about 60 float32 operations with mild cancellation in R and J W R"},
+    {"lens_float32", 4e-6, 1e-4, 0, 1 - 1e-9, 3e-5,
+     "as projection_float32, behind the device's atan (Vulkan allows 4096 ulp) and the lens's "
+     "terms"},
+    {"kernel_float32", 4e-7, 0, 0, 1 - 1e-12, 1e-6,
+     "polynomial 1.3e-7 and its rounding; the error of q comes on top, see the kernel test"},
+    {"image_float32", 2e-5, 2e-5, 0.002, 1 - 1e-8, 1e-5,
+     "sum of up to 1,000 layers in float32; the band is the alpha cut-off (a step of 1/255), the "
+     "edge of the support and the transmittance stop"},
+    {"image_exact_kernel", 2e-6, 0, 0, 1 - 1e-10, 1e-5,
+     "one layer, so only the kernel's own error and that of q, with no cut-off in reach"},
+    {"image_thin_layers", 2e-5, 3e-4, 0, 1 - 1e-7, 3e-4,
+     "10,000 equal layers: 1 - alpha rounds by up to 3e-8, and by the same in every one of them"},
+    {"gradient_float32", 1e-6, 2e-3, 0.005, 1 - 1e-6, 1e-3,
+     "recursion over all layers of a pixel, then sums over pixels that cancel; band as for images"},
+    {"gradient_scaled_float32", 2e-5, 2e-3, 0.005, 1 - 1e-6, 1e-3,
+     "the same for compare_scaled: the sums cancel, so abs is in units of the root mean square"},
+    {"gradient_steep_float32", 2e-4, 1e-2, 0.02, 1 - 1e-5, 1e-3,
+     "as gradient_scaled_float32, where the slope goes like 1/sqrt(1 - q/9) towards the edge: "
+     "1 - q/9 is 1e-5 at the cut-off, and float32 knows it to a percent"},
+    {"gradient_thin_layers", 1.5e-3, 1e-2, 0, 1 - 1e-6, 2e-3,
+     "for compare_scaled; as image_thin_layers, forward and back, where each layer divides: Vulkan "
+     "lets that be off by 2.5 ulp, in each to the same side; and sums over the tile that cancel"},
+    {"gradient_thin_layers_walk", 3e-3, 1e-2, 0.001, 1 - 1e-5, 4e-3,
+     "as gradient_thin_layers, on to the parameters: the shape's sums cancel once more"},
+    {"project_gradient_float32", 5e-5, 1e-4, 0, 1 - 1e-8, 1e-4,
+     "for compare_scaled: one splat's sums through the factor, J W R and the quaternion, in units "
+     "of the splat's own largest entry"},
+    {"difference_float32", 5e-3, 5e-3, 0, 1 - 1e-5, 3e-3,
+     "for compare_scaled: central differences of float32 images, h = 2^-6: truncation h^2 f''' / 6 "
+     "= 4e-5 f''', large for a short quaternion, and rounding 1e-6 / 2h = 3e-5"},
+    {"image_half", 5e-4, 2e-3, 0.01, 1 - 1e-5, 2e-3,
+     "halves rounded the same way on both sides; where float32 lands on the other side of a tie, a "
+     "value moves by 2^-11 of itself"},
+    {"gradient_scaled_half", 2e-3, 1e-2, 0.01, 1 - 1e-4, 1e-2,
+     "for compare_scaled; as image_half, and the device takes the sums of q's factor by moments of "
+     "the rounded factor, which is 2^-11 of them"},
+    {"image_resorted", 2e-5, 2e-5, 0.01, 1 - 1e-4, 1e-2,
+     "as image_float32; the slope of the depth is stored as two halves, so that two splats cross "
+     "up to a pixel off"},
+    {"loss_float32", 1e-6, 1e-5, 0, 1 - 1e-8, 1e-5,
+     "SSIM's variances cancel: 11x11 sums of squares"},
+    {"loss_gradient_float32", 1e-9, 1e-3, 0.001, 1 - 1e-7, 1e-4,
+     "per pixel 1/(3HW); flat windows divide by C2, and sign(x - y) flips where they meet"},
+    {"training_loss_float32", 1e-5, 1e-4, 0, 1 - 1e-9, 1e-4,
+     "means over an image after steps of Adam, which move a parameter without influence by the "
+     "sign "
+     "of rounding"},
+    {"adam_float32", 1e-7, 1e-5, 0, 1 - 1e-9, 1e-5, "two square roots and a division"},
+};
+
+}  // namespace
+
+const Tolerance& tolerance(std::string_view name) {
+    for (const Tolerance& row : kTable) {
+        if (row.name == name) {
+            return row;
+        }
+    }
+    throw Error("tolerance", fmt::format("none is named {}", name),
+                "The names stand in engine/reference/comparison.cpp.");
+}
+
 namespace {
 
 double cosine_of(std::span<const double> a, std::span<const double> b) {

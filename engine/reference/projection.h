@@ -3,11 +3,13 @@
 // approximation of Zwicker et al. 2001), kept as the Cholesky factor of its inverse.
 #pragma once
 
+#include <array>
 #include <string_view>
 
 #include "engine/reference/kernel_table.h"
 #include "engine/reference/splats.h"
 #include "engine/scene/camera.h"
+#include "engine/scene/sh_basis.h"
 
 namespace darb::reference {
 
@@ -84,5 +86,91 @@ void project_backward(const Splats<T>& splats, size_t index, const Camera& camer
                       const RenderSettings& settings, const KernelTable& kernel,
                       const ProjectedPair<T>& projected, SplatGradients<T>& out,
                       CameraGradients<T>* d_camera = nullptr);
+
+// The intermediate terms of a splat's projection, shared by the forward and the backward walk.
+
+template <class T>
+struct RotationTerms {
+    Vec4<T> unit{0};  // w x y z of the normalised quaternion
+    T norm = 0;       // of the parameter
+    Mat3<T> matrix{1};
+
+    T w() const { return unit[0]; }
+    T x() const { return unit[1]; }
+    T y() const { return unit[2]; }
+    T z() const { return unit[3]; }
+};
+
+/// matrix turns splat axes into world axes; q[4] is w x y z.
+template <class T>
+RotationTerms<T> rotation_terms(const T* q);
+
+/// dL/dq from dL/dmatrix, through the normalisation.
+template <class T>
+Vec4<T> rotation_backward(const RotationTerms<T>& terms, const Mat3<T>& d_matrix);
+
+/// x/z and y/z as the Jacobian sees them: clamped to the image and a margin around it.
+template <class T>
+struct RatioTerms {
+    T x = 0, y = 0;                         // clamped
+    bool x_inside = true, y_inside = true;  // false: the derivative of the clamped ratio is zero
+};
+template <class T>
+RatioTerms<T> ratio_terms(const Vec3<T>& mean_camera, const Camera& camera);
+
+/// What the 3D smoothing filter makes of the standard deviations. factor: what the opacity keeps.
+template <class T>
+struct SmoothedScale {
+    Vec3<T> scale{0};  // sqrt(s^2 + f^2), world units
+    Vec3<T> share{1};  // s^2 / (s^2 + f^2) = d ln(scale) / d ln(s)
+    T factor = 1;      // product of s / scale
+};
+template <class T>
+SmoothedScale<T> smoothed_scale(const T* log_scale, T filter);
+
+template <class T>
+struct CovarianceTerms {
+    RatioTerms<T> ratio;
+    Vec3<T> j1{0}, j2{0};  // rows of the Jacobian J, px per world unit
+    Vec3<T> k1{0}, k2{0};  // rows of J W
+    SmoothedScale<T> smooth;
+    Vec3<T> scale{0};      // standard deviations, filter included, world units
+    T root = 1;            // sqrt of the footprint's covariance scale
+    Vec3<T> r1{0}, r2{0};  // rows of M = root J W R diag(scale), px
+    T shrink = 1;          // power of two that brings rows beyond ROW_LIMIT below 2 px
+    T det_sharp = 0;       // |r1 x r2|^2: determinant before the low-pass, px^4 times shrink^4
+    T det = 0;             // of S', px^4 times shrink^4
+};
+
+template <class T>
+T clamped_scale(T log_scale);
+/// World to camera rotation in the scalar T.
+template <class T>
+Mat3<T> view_rotation(const Camera& camera);
+template <class T>
+Vec3<T> mean_in_camera(const T* position, const Camera& camera);
+
+template <class T>
+CovarianceTerms<T> covariance_terms(const Vec3<T>& mean_camera, const RotationTerms<T>& rotation,
+                                    const T* log_scale, T filter, const Camera& camera,
+                                    double low_pass, double covariance_scale);
+
+// Real spherical harmonics of degree 0 to 3 in the order and with the signs of 3DGS: the basis and
+// its derivative with respect to the direction.
+
+template <class T>
+using ShBasis = std::array<T, kMaxShCoefficients>;
+template <class T>
+using ShBasisGradient = std::array<Vec3<T>, kMaxShCoefficients>;
+
+/// basis[k] for k < (degree + 1)^2, 0 beyond; direction is of unit length. Colour before the
+/// clamp is 0.5 + sum over k of basis[k] * coefficient[k].
+template <class T>
+ShBasis<T> sh_basis(int degree, const Vec3<T>& direction);
+
+/// d basis[k] / d direction, of the polynomials in x, y, z as 3DGS writes them. Off the unit sphere
+/// they are one continuation among many: project on the tangent plane before use.
+template <class T>
+ShBasisGradient<T> sh_basis_gradient(int degree, const Vec3<T>& direction);
 
 }  // namespace darb::reference

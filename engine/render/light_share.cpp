@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/render/render_gradients.h"
 #include "engine/scene/edit_splats.h"
 

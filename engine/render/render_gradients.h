@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <glm/glm.hpp>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,13 +16,31 @@
 #include "engine/gpu/commands.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/accuracy.h"
-#include "engine/render/camera_gradient.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/splat_model.h"
 #include "shaders/shared/limits.h"
+#include "shaders/shared/optim_args.h"
 #include "shaders/shared/render_args.h"
 
 namespace darb {
+
+/// Of p_camera = rotation * p_world + translation, whose twelve numbers are each taken freely, and
+/// of focal lengths and principal point; a lens keeps its own terms. A rotation has three degrees
+/// of freedom: what counts is the part along them.
+struct CameraGradient {
+    glm::dmat3 d_rotation{0.0};  // as Camera::rotation: column, then row
+    glm::dvec3 d_translation{0.0};
+    double d_fx = 0, d_fy = 0, d_cx = 0, d_cy = 0;  // 1/px
+};
+
+/// Sums over the splats, as shaders/shared/optim_args.h orders them.
+using CameraTotals = std::array<double, CAMERA_SUMS>;
+CameraGradient camera_gradient(const Camera& camera, const CameraTotals& totals);
+
+/// shares: [N][CAMERA_SHARES]. d_position: [N][3], whose sum is that of the centre,
+/// negative. Added in double in the order of the splats.
+CameraGradient camera_gradient(const Camera& camera, std::span<const float> shares,
+                               std::span<const float> d_position);
 
 struct ViewGradients {
     ImageF image;          // [H][W][3] RGB, not clamped

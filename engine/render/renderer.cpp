@@ -1,10 +1,68 @@
 #include "engine/render/renderer.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "engine/core/error.h"
+#include "engine/primitives/groups.h"
+#include "engine/raster/frame_view.h"
+#include "shaders/shared/render_args.h"
 
 namespace darb {
+
+FrameExchange::FrameExchange(Device& device)
+    : cameras_(device, "cameras", sizeof(gpu::CameraData)),
+      camera_host_(device, "camera of the host", sizeof(gpu::CameraData), Memory::host),
+      status_host_(device, "status result", sizeof(gpu::FrameStatus), Memory::host) {}
+
+void FrameExchange::send(Commands& commands, const gpu::CameraData& camera) {
+    std::memcpy(camera_host_.mapped(), &camera, sizeof camera);
+    commands.copy(camera_host_, cameras_, sizeof camera);
+}
+
+void FrameExchange::fetch(Commands& commands, const Buffer& status) {
+    commands.copy(status, status_host_, sizeof(gpu::FrameStatus));
+}
+
+gpu::FrameStatus FrameExchange::status() const {
+    gpu::FrameStatus result{};
+    std::memcpy(&result, status_host_.mapped(), sizeof result);
+    return result;
+}
+
+Camera resized(const Camera& camera, int width, int height) {
+    const double sx = double(width) / camera.width, sy = double(height) / camera.height;
+    Camera c = camera;
+    c.fx *= sx;
+    c.cx *= sx;
+    c.fy *= sy;
+    c.cy *= sy;
+    c.width = width;
+    c.height = height;
+    return c;
+}
+
+Camera halved(const Camera& camera) {
+    return resized(camera, (camera.width + 1) / 2, (camera.height + 1) / 2);
+}
+
+Upsample::Upsample(Device& device)
+    : device_(&device), pipeline_(device, "upsample", {{"THREADS", SPLAT_GROUP}}) {}
+
+const Buffer& Upsample::record(Commands& commands, const Buffer& image, const Camera& rendered,
+                               const Camera& shown) {
+    const std::uint64_t pixels = std::uint64_t(shown.width) * shown.height;
+    check_frame(*device_, shown.width, shown.height);
+    if (!image_ || image_.bytes() < pixels * 12)
+        image_ = Buffer(*device_, "upsampled image", pixels * 12);
+    const gpu::UpsampleArgs args{
+        static_cast<std::uint32_t>(rendered.width), static_cast<std::uint32_t>(rendered.height),
+        static_cast<std::uint32_t>(shown.width), static_cast<std::uint32_t>(shown.height)};
+    const Groups g = groups_for(pixels);
+    commands.pass("upsample");
+    commands.dispatch(pipeline_, args, {image, image_}, g.x, g.y);
+    return image_;
+}
 
 namespace {
 

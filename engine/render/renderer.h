@@ -4,13 +4,52 @@
 #include <optional>
 
 #include "engine/core/image.h"
+#include "engine/gpu/buffer.h"
+#include "engine/gpu/commands.h"
 #include "engine/plan/accuracy.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
-#include "engine/render/frame_exchange.h"
-#include "engine/render/upsample.h"
+#include "engine/scene/camera.h"
+#include "shaders/shared/render_args.h"
 
 namespace darb {
+
+class FrameExchange {
+  public:
+    explicit FrameExchange(Device& device);
+
+    /// First of a frame; no earlier one may still run. The camera goes to cameras(), at index 0.
+    void send(Commands& commands, const gpu::CameraData& camera);
+    const Buffer& cameras() const { return cameras_; }
+
+    /// Last of a frame: its gpu::FrameStatus, which status() has once the frame was waited for.
+    void fetch(Commands& commands, const Buffer& status);
+    gpu::FrameStatus status() const;
+
+  private:
+    Buffer cameras_, camera_host_, status_host_;
+};
+
+// Upsample: a picture rendered at half the size, interpolated to the size that is shown.
+
+/// The same view at another size.
+Camera resized(const Camera& camera, int width, int height);
+/// With half the pixels each way, rounded up.
+Camera halved(const Camera& camera);
+
+class Upsample {
+  public:
+    explicit Upsample(Device& device);
+    /// Records the pass. image: float [3][H][W] of `rendered`. Returns one of the size of `shown`,
+    /// there until the next call.
+    const Buffer& record(Commands& commands, const Buffer& image, const Camera& rendered,
+                         const Camera& shown);
+
+  private:
+    Device* device_;
+    Pipeline pipeline_;
+    Buffer image_;
+};
 
 class Renderer {
   public:

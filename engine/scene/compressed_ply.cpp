@@ -13,7 +13,7 @@
 #include "engine/core/quantile.h"
 #include "engine/scene/chunk_order.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/ply_comments.h"
+#include "engine/scene/ply.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_format.h"
 #include "engine/scene/splat_shapes.h"

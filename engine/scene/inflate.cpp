@@ -8,7 +8,6 @@
 #include <limits>
 #include <memory>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 
 namespace darb {

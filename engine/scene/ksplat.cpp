@@ -13,7 +13,6 @@
 #include "engine/core/error.h"
 #include "engine/core/text.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/half_float.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_format.h"

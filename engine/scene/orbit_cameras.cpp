@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "engine/core/check.h"
-#include "engine/scene/upright.h"
+#include "engine/core/error.h"
+#include "engine/scene/subject.h"
 
 namespace darb {
 

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 
 #include "engine/scene/infinite_values.h"
@@ -88,6 +89,17 @@ T load_le(std::span<const std::byte> bytes, std::size_t at) {
     T value;
     std::memcpy(&value, bytes.data() + at, sizeof value);
     return value;
+}
+
+// float16 of files, as float32.
+
+/// IEEE 754 binary16.
+inline float half_to_float(std::uint16_t bits) {
+    const int exponent = (bits >> 10) & 31, mantissa = bits & 1023;
+    const double sign = bits & 0x8000 ? -1 : 1;
+    if (exponent == 31) return static_cast<float>(mantissa ? NAN : sign * INFINITY);
+    return static_cast<float>(exponent ? sign * std::ldexp(1024 + mantissa, exponent - 25)
+                                       : sign * std::ldexp(mantissa, -24));
 }
 
 }  // namespace darb

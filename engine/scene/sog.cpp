@@ -1,23 +1,63 @@
 #include "engine/scene/sog.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+#include <functional>
+#include <future>
 #include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+#include <webp/decode.h>
+#include <webp/encode.h>
+#include <zip.h>
 
 #include "engine/core/error.h"
+#include "engine/core/files.h"
 #include "engine/core/json_text.h"
 #include "engine/core/quantile.h"
+#include "engine/core/text.h"
+#include "engine/scene/chunk_order.h"
+#include "engine/scene/cluster_rows.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/quantise.h"
-#include "engine/scene/sog_archive.h"
+#include "engine/scene/splat_file.h"
 #include "engine/scene/splat_format.h"
+#include "engine/scene/splat_shapes.h"
 
 namespace darb {
+
+/// The bytes of a part, by its name in meta.json. Throws Error where there is none.
+using SogPart = std::function<std::vector<std::byte>(const std::string& name)>;
+
+/// zip has to outlive what is returned.
+SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where);
+/// Names with folders are refused.
+SogPart open_sog_folder(const std::filesystem::path& folder);
+
+/// Stored, not compressed again; the same parts give the same bytes.
+std::vector<std::byte> make_sog_zip(
+    const std::vector<std::pair<std::string, std::vector<std::byte>>>& parts,
+    const std::string& where);
+
+struct SogImage {
+    std::size_t width = 0, height = 0;  // px
+    std::vector<std::uint8_t> rgba;     // [H][W][4]
+};
+
+/// Throws Error where the bytes are no WebP, or a picture of more than `most` pixels.
+SogImage decode_webp(std::span<const std::byte> bytes, std::size_t most, const std::string& where);
 
 namespace {
 
@@ -283,6 +323,370 @@ const SplatFormatRow& sog_format() {
                                     .encode = encode_sog,
                                     .keeps = kKeepsRenderMode | kKeepsHarmonics};
     return row;
+}
+
+namespace {
+
+constexpr time_t kZipTime = 315619200;  // 1980-01-02, so that bytes do not depend on the day
+
+struct CloseArchive {
+    void operator()(zip_t* archive) const { zip_discard(archive); }
+};
+struct CloseEntry {
+    void operator()(zip_file_t* entry) const { zip_fclose(entry); }
+};
+
+std::shared_ptr<zip_t> open_archive(std::span<const std::byte> zip, const std::string& where) {
+    zip_error_t error;
+    zip_error_init(&error);
+    zip_source_t* source = zip_source_buffer_create(zip.data(), zip.size(), 0, &error);
+    zip_t* archive = source ? zip_open_from_source(source, ZIP_RDONLY, &error) : nullptr;
+    if (!archive) {
+        const std::string reason = zip_error_strerror(&error);
+        zip_source_free(source);
+        zip_error_fini(&error);
+        throw Error(where, "the zip cannot be opened: " + reason, kCopyAgain);
+    }
+    zip_error_fini(&error);
+    return {archive, CloseArchive{}};
+}
+
+std::vector<std::byte> read_entry(zip_t* archive, const std::string& name, std::size_t zip_bytes,
+                                  const std::string& where) {
+    const std::string place = where + ", entry " + name;
+    zip_stat_t stat;
+    zip_stat_init(&stat);
+    if (zip_stat(archive, name.c_str(), 0, &stat) != 0 || !(stat.valid & ZIP_STAT_SIZE))
+        throw Error(place, "the zip has no such entry", kCopyAgain);
+    check_expansion(zip_bytes, stat.size, place);
+    const std::unique_ptr<zip_file_t, CloseEntry> entry(zip_fopen(archive, name.c_str(), 0));
+    if (!entry)
+        throw Error(place, std::string("cannot be read: ") + zip_strerror(archive), kCopyAgain);
+    std::vector<std::byte> bytes(stat.size);
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+        const zip_int64_t got = zip_fread(entry.get(), bytes.data() + done, bytes.size() - done);
+        if (got <= 0)
+            throw Error(place, fmt::format("ends after {} of {} bytes", done, bytes.size()),
+                        kCopyAgain);
+        done += static_cast<std::size_t>(got);
+    }
+    // The checksum counts where the end is met.
+    std::byte beyond{};
+    if (const zip_int64_t more = zip_fread(entry.get(), &beyond, 1); more != 0)
+        throw Error(place,
+                    more < 0 ? fmt::format("is damaged: {}", zip_file_strerror(entry.get()))
+                             : "is longer than the zip says",
+                    kCopyAgain);
+    return bytes;
+}
+
+/// Of a scene that has to be unpacked first; empty where there is none.
+std::string packed_scene(zip_t* archive) {
+    for (zip_int64_t i = 0; i < zip_get_num_entries(archive, 0); ++i)
+        if (const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0))
+            if (format_to_write(name)) return name;
+    return {};
+}
+
+/// meta.json names files beside it, none in other folders.
+void check_part_name(const std::string& name, const std::string& meta) {
+    if (name.empty() || std::filesystem::path(name).filename() != name || name == "..")
+        throw Error(meta, "names '" + name + "', which is no file of its folder",
+                    "Put all files of the scene into one folder.");
+}
+
+}  // namespace
+
+SogPart open_sog_zip(std::span<const std::byte> zip, const std::string& where) {
+    const std::shared_ptr<zip_t> archive = open_archive(zip, where);
+    if (zip_name_locate(archive.get(), "meta.json", 0) < 0) {
+        const std::string scene = packed_scene(archive.get());
+        throw Error(where,
+                    "is a zip and no SOG scene: it has no meta.json" +
+                        (scene.empty() ? "" : ", and holds " + scene),
+                    scene.empty() ? "Name a splat file." : "Unpack it and name that file.");
+    }
+    return [archive, size = zip.size(), where](const std::string& name) {
+        check_part_name(name, where + ", meta.json");
+        return read_entry(archive.get(), name, size, where);
+    };
+}
+
+SogPart open_sog_folder(const std::filesystem::path& folder) {
+    return [folder](const std::string& name) {
+        check_part_name(name, (folder / "meta.json").string());
+        return read_file(folder / name);
+    };
+}
+
+std::vector<std::byte> make_sog_zip(
+    const std::vector<std::pair<std::string, std::vector<std::byte>>>& parts,
+    const std::string& where) {
+    zip_error_t error;
+    zip_error_init(&error);
+    zip_source_t* const source = zip_source_buffer_create(nullptr, 0, 0, &error);
+    zip_t* const archive = source ? zip_open_from_source(source, ZIP_TRUNCATE, &error) : nullptr;
+    const auto failed = [&](const char* reason) {
+        return Error(where, std::string("the zip cannot be made: ") + reason, "Free memory.");
+    };
+    if (!archive) {
+        zip_source_free(source);
+        throw failed("out of memory");
+    }
+    zip_source_keep(source);
+    for (const auto& [name, bytes] : parts) {
+        zip_source_t* const part = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
+        const zip_int64_t index = part ? zip_file_add(archive, name.c_str(), part, 0) : -1;
+        if (index < 0 ||
+            zip_set_file_compression(archive, static_cast<zip_uint64_t>(index), ZIP_CM_STORE, 0) !=
+                0 ||
+            zip_file_set_mtime(archive, static_cast<zip_uint64_t>(index), kZipTime, 0) != 0) {
+            zip_discard(archive);
+            zip_source_free(source);
+            throw failed("a part cannot be added");
+        }
+    }
+    std::vector<std::byte> file;
+    zip_stat_t stat;
+    zip_stat_init(&stat);
+    if (zip_close(archive) == 0 && zip_source_stat(source, &stat) == 0 &&
+        zip_source_open(source) == 0) {
+        file.resize(stat.size);
+        if (zip_source_read(source, file.data(), file.size()) !=
+            static_cast<zip_int64_t>(file.size()))
+            file.clear();
+        zip_source_close(source);
+    }
+    zip_source_free(source);
+    if (file.empty()) throw failed("its parts do not fit");
+    return file;
+}
+
+SogImage decode_webp(std::span<const std::byte> bytes, std::size_t most, const std::string& where) {
+    const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+    int width = 0, height = 0;
+    if (!WebPGetInfo(data, bytes.size(), &width, &height))
+        throw Error(where, "is no WebP picture", kCopyAgain);
+    SogImage image{static_cast<std::size_t>(width), static_cast<std::size_t>(height), {}};
+    if (image.width * image.height > most)
+        throw Error(
+            where, fmt::format("is {} x {} px; the splats need {} px at most", width, height, most),
+            kCopyAgain);
+    image.rgba.resize(4 * image.width * image.height);
+    if (!WebPDecodeRGBAInto(data, bytes.size(), image.rgba.data(), image.rgba.size(), 4 * width))
+        throw Error(where, "the WebP picture is damaged", kCopyAgain);
+    return image;
+}
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kChunkNeighbours = 256;  // splats that lie close together, for chunk_order
+constexpr std::size_t kRowEntries = 64;        // palette entries a row of pixels
+constexpr std::size_t kPaletteStep = 1024, kMostSteps = 64;
+constexpr int kWebpEffort = 4;            // of 9
+constexpr std::size_t kMostSide = 16383;  // px, of WebP
+
+/// Its pixels are set one by one; those that are not are 0 0 0 255.
+struct Plane {
+    std::string name;
+    SogImage image;
+    std::uint8_t* pixel(std::size_t i) { return &image.rgba[4 * i]; }
+};
+
+Plane plane_of(std::string name, std::size_t width, std::size_t height) {
+    Plane plane{std::move(name), {width, height, {}}};
+    plane.image.rgba.assign(4 * width * height, 0);
+    for (std::size_t i = 3; i < plane.image.rgba.size(); i += 4) plane.image.rgba[i] = 255;
+    return plane;
+}
+
+/// A pixel a splat; sides are multiples of 4.
+Plane plane_for(std::string name, std::size_t splats) {
+    const auto side = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(splats))));
+    const std::size_t width = (side + 3) / 4 * 4;
+    return plane_of(std::move(name), width, ((splats + width - 1) / width + 3) / 4 * 4);
+}
+
+std::vector<std::byte> encode_webp(const SogImage& image, const std::string& where) {
+    WebPConfig config;
+    WebPPicture picture;
+    WebPMemoryWriter writer;
+    WebPMemoryWriterInit(&writer);
+    if (!WebPConfigInit(&config) || !WebPPictureInit(&picture) ||
+        !WebPConfigLosslessPreset(&config, kWebpEffort))
+        throw Error(where, "the WebP library is of another version than its headers",
+                    "Install libwebp again, and build darb anew.");
+    config.exact = 1;  // the colours under an alpha of 0 count
+    picture.use_argb = 1;
+    picture.width = static_cast<int>(image.width);
+    picture.height = static_cast<int>(image.height);
+    picture.writer = WebPMemoryWrite;
+    picture.custom_ptr = &writer;
+    const bool done =
+        WebPPictureImportRGBA(&picture, image.rgba.data(), static_cast<int>(4 * image.width)) &&
+        WebPEncode(&config, &picture);
+    WebPPictureFree(&picture);
+    std::vector<std::byte> bytes(done ? writer.size : 0);
+    if (done) std::memcpy(bytes.data(), writer.mem, writer.size);
+    WebPMemoryWriterClear(&writer);
+    if (!done)
+        throw Error(
+            where,
+            fmt::format("no WebP picture of {} x {} px can be made", image.width, image.height),
+            "Free memory, or write fewer splats.");
+    return bytes;
+}
+
+json numbers(std::span<const float> values) {
+    json list = json::array();
+    for (const float value : values) list.push_back(value);
+    return list;
+}
+
+double folded(double x) {
+    return std::copysign(std::log1p(std::abs(x)), x);
+}
+
+void write_means(const SplatModel& model, json& meta, std::vector<Plane>& planes) {
+    Plane low = plane_for("means_l.webp", model.size()),
+          high = plane_for("means_u.webp", model.size());
+    json mins = json::array(), maxs = json::array();
+    for (int axis = 0; axis < 3; ++axis) {
+        double least = 1e300, most = -1e300;
+        for (std::size_t i = 0; i < model.size(); ++i) {
+            const double value = folded(position_of(model, i)[axis]);
+            least = std::min(least, value);
+            most = std::max(most, value);
+        }
+        mins.push_back(least);
+        maxs.push_back(most);
+        for (std::size_t i = 0; i < model.size(); ++i) {
+            const double unit =
+                most > least ? (folded(position_of(model, i)[axis]) - least) / (most - least) : 0;
+            const auto step = static_cast<std::uint32_t>(std::lround(unit * 65535));
+            low.pixel(i)[axis] = static_cast<std::uint8_t>(step & 255);
+            high.pixel(i)[axis] = static_cast<std::uint8_t>(step >> 8);
+        }
+    }
+    meta["means"] = {{"mins", mins}, {"maxs", maxs}, {"files", {low.name, high.name}}};
+    planes.push_back(std::move(low));
+    planes.push_back(std::move(high));
+}
+
+void write_quats(const SplatModel& model, json& meta, std::vector<Plane>& planes) {
+    Plane plane = plane_for("quats.webp", model.size());
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        const float* q = &model.rotation[4 * i];
+        const SmallestThree three = smallest_three({q[0], q[1], q[2], q[3]});
+        for (std::size_t k = 0; k < 3; ++k)
+            plane.pixel(i)[k] =
+                nearest_byte(255 * (three.others[k] * std::numbers::sqrt2 / 2 + 0.5));
+        plane.pixel(i)[3] = static_cast<std::uint8_t>(252 + three.largest);
+    }
+    meta["quats"] = {{"files", {plane.name}}};
+    planes.push_back(std::move(plane));
+}
+
+/// Three indices a splat into a codebook of their own.
+Plane write_indexed(const char* group, const std::vector<float>& values, json& meta) {
+    Plane plane = plane_for(fmt::format("{}.webp", group), values.size() / 3);
+    const Codebook256 book = codebook_of(values);
+    for (std::size_t i = 0; i < values.size(); ++i)
+        plane.pixel(i / 3)[i % 3] = nearest_entry(book, values[i]);
+    meta[group] = {{"codebook", numbers(book)}, {"files", {plane.name}}};
+    return plane;
+}
+
+void write_scales_and_colours(const SplatModel& model, json& meta, std::vector<Plane>& planes) {
+    std::vector<float> scales = model.log_scale;
+    for (float& value : scales) value = drawn_log_scale(value);
+    planes.push_back(write_indexed("scales", scales, meta));
+    planes.push_back(write_indexed("sh0", model.sh_dc, meta));
+    for (std::size_t i = 0; i < model.size(); ++i)
+        planes.back().pixel(i)[3] = byte_of_logit(model.opacity_logit[i]);
+}
+
+/// As many as PlayCanvas's writers make of so many splats.
+std::size_t palette_size(std::size_t splats) {
+    std::size_t steps = 1;
+    while (2 * steps * kPaletteStep <= splats && steps < kMostSteps) steps *= 2;
+    return std::min(steps * kPaletteStep, splats);
+}
+
+void write_harmonics(const SplatModel& model, const EncodeOptions& options, json& meta,
+                     std::vector<Plane>& planes) {
+    const auto dims = static_cast<std::size_t>(model.rest_count());
+    const AssignRows assign = options.assign_rows ? options.assign_rows : assign_rows;
+    const Clusters clusters =
+        cluster_rows(model.sh_rest, dims, palette_size(model.size()), assign, options.progress);
+    const std::size_t entries = clusters.centres.size() / dims, pixels = dims / 3;
+    const Codebook256 book = codebook_of(clusters.centres);
+    Plane palette = plane_of("shN_centroids.webp", kRowEntries * pixels,
+                             (entries + kRowEntries - 1) / kRowEntries);
+    for (std::size_t i = 0; i < clusters.centres.size(); ++i) {
+        const std::size_t entry = i / dims, c = i % dims;
+        const std::size_t at =
+            entry / kRowEntries * palette.image.width + entry % kRowEntries * pixels + c / 3;
+        palette.pixel(at)[c % 3] = nearest_entry(book, clusters.centres[i]);
+    }
+    Plane labels = plane_for("shN_labels.webp", model.size());
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        labels.pixel(i)[0] = static_cast<std::uint8_t>(clusters.label[i] & 255);
+        labels.pixel(i)[1] = static_cast<std::uint8_t>(clusters.label[i] >> 8);
+    }
+    meta["shN"] = {{"count", entries},
+                   {"bands", model.sh_degree},
+                   {"codebook", numbers(book)},
+                   {"files", {palette.name, labels.name}}};
+    planes.push_back(std::move(palette));
+    planes.push_back(std::move(labels));
+}
+
+}  // namespace
+
+EncodedSplats encode_sog_parts(const SplatModel& scene, const std::string& where,
+                               const EncodeOptions& options) {
+    check_splat_shapes(scene);
+    if (scene.size() == 0)
+        throw Error(where, "SOG has no place for a scene without splats", "Write a PLY.");
+    if (scene.size() > kMostSide * kMostSide / 2)
+        throw Error(
+            where,
+            fmt::format("{} splats are more than a WebP picture has pixels for", scene.size()),
+            "Write fewer splats, or a PLY.");
+    const SplatModel model = pick_splats(scene, chunk_order(scene, kChunkNeighbours));
+    json meta = {{"version", 2},
+                 {"asset", {{"generator", "darb " DARB_VERSION}}},
+                 {"count", model.size()},
+                 {"antialias", model.antialias}};
+    std::vector<Plane> planes;
+    write_means(model, meta, planes);
+    write_quats(model, meta, planes);
+    write_scales_and_colours(model, meta, planes);
+    if (model.sh_degree > 0) write_harmonics(model, options, meta, planes);
+    std::vector<std::future<std::vector<std::byte>>> pictures;
+    for (const Plane& plane : planes)
+        pictures.push_back(std::async(std::launch::async, [&plane, &where] {
+            return encode_webp(plane.image, where + ", " + plane.name);
+        }));
+    EncodedSplats encoded;
+    const std::string text = meta.dump();
+    const auto bytes = std::as_bytes(std::span(text.data(), text.size()));
+    encoded.file.assign(bytes.begin(), bytes.end());
+    for (std::size_t i = 0; i < planes.size(); ++i)
+        encoded.beside.emplace_back(planes[i].name, pictures[i].get());
+    return encoded;
+}
+
+EncodedSplats encode_sog(const SplatModel& model, const std::string& where,
+                         const EncodeOptions& options) {
+    EncodedSplats parts = encode_sog_parts(model, where, options);
+    if (lower(where).ends_with("meta.json")) return parts;
+    parts.beside.emplace(parts.beside.begin(), "meta.json", std::move(parts.file));
+    return {make_sog_zip(parts.beside, where)};
 }
 
 }  // namespace darb

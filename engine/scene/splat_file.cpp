@@ -1,9 +1,8 @@
 #include "engine/scene/splat_file.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
+#include <fmt/format.h>
 #include <new>
 
 #include "engine/core/error.h"
@@ -11,7 +10,6 @@
 #include "engine/core/text.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_format.h"
 
 namespace darb {

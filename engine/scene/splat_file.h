@@ -15,7 +15,7 @@
 
 #include "engine/scene/cluster_rows.h"
 #include "engine/scene/ply_table.h"
-#include "engine/scene/splat_format_list.h"
+#include "engine/scene/splat_format.h"
 #include "engine/scene/splat_model.h"
 #include "engine/scene/stored_units.h"
 
@@ -106,5 +106,15 @@ std::vector<std::byte> encode_splats(SplatFormat format, const SplatModel& model
 /// Each through write_file_atomic, the one at `path` last.
 void write_encoded(const std::filesystem::path& path, const EncodedSplats& encoded);
 void save_splats(const std::filesystem::path& path, SplatFormat format, const SplatModel& model);
+
+// What people call a scene.
+
+/// The output folder of the run that a file OUT/point_cloud/iteration_N/point_cloud.ply is of, by
+/// its name alone, absolute; empty for any other file.
+std::filesystem::path run_of_scene(const std::filesystem::path& file);
+
+/// The name of the run that it is of; else that of its folder, where it is one, or of its file,
+/// with or without the ending. "Scene" where there is no name.
+std::string scene_name(const std::filesystem::path& path, bool with_ending = false);
 
 }  // namespace darb

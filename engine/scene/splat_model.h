@@ -2,15 +2,120 @@
 // C = (sh_degree + 1)^2 coefficients per colour; SH order and sign as in 3DGS.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <string>
 #include <vector>
 
 #include "engine/kernels/kernel_family.h"
-#include "engine/scene/splat_attributes.h"
+#include "engine/scene/infinite_values.h"
+#include "shaders/shared/attribute_list.h"
 
 namespace darb {
+
+enum Attribute {
+    kPosition = ATTRIBUTE_POSITION,
+    kLogScale = ATTRIBUTE_LOG_SCALE,
+    kRotation = ATTRIBUTE_ROTATION,
+    kOpacityLogit = ATTRIBUTE_OPACITY_LOGIT,
+    kShDc = ATTRIBUTE_SH_DC,
+    kShRest = ATTRIBUTE_SH_REST,
+    kShape = ATTRIBUTE_SHAPE,
+    kAttributeCount = ATTRIBUTES
+};
+
+/// Values or gradients of N splats, an array each; T: float, double in the reference.
+template <class T>
+struct SplatArrays {
+    std::vector<T> position;       // [N][3] world
+    std::vector<T> log_scale;      // [N][3] natural log of the standard deviation, world
+    std::vector<T> rotation;       // [N][4] quaternion w x y z, any norm above 1e-6
+    std::vector<T> opacity_logit;  // [N]
+    std::vector<T> sh_dc;          // [N][3]; colour = 0.5 + SH_C0 * dc
+    std::vector<T> sh_rest;        // [N][C-1][3]: coefficient-major, rgb innermost
+    std::vector<T> shape;          // [N] of a kernel with shapes, engine/kernels/shaped_kernel.h
+};
+
+/// The array of an attribute.
+template <class T>
+std::vector<T>& attribute_values(SplatArrays<T>& arrays, int attribute) {
+    using Arrays = SplatArrays<T>;
+    constexpr std::vector<T> Arrays::*members[] = {
+        &Arrays::position, &Arrays::log_scale, &Arrays::rotation, &Arrays::opacity_logit,
+        &Arrays::sh_dc,    &Arrays::sh_rest,   &Arrays::shape};
+    static_assert(std::size(members) == kAttributeCount);
+    return arrays.*members[attribute];
+}
+template <class T>
+const std::vector<T>& attribute_values(const SplatArrays<T>& arrays, int attribute) {
+    return attribute_values(const_cast<SplatArrays<T>&>(arrays), attribute);
+}
+
+struct SplatAttribute {
+    const char* name;           // of buffers and in messages; d_<name> is its gradient
+    const char* file_name;      // of dumps, and of PLY columns: see ply_column
+    int file_place;             // of its columns in a PLY
+    std::uint32_t floats;       // of a splat
+    bool per_coefficient;       // so many for each harmonic above the first; files go by channel
+    bool optional;              // a model may have none: its array is empty, its buffers too
+    bool copied_to_new;         // by density control, before a pass changes it; false: starts at 0
+    int step;                   // STEP_*
+    float (*from_file)(float);  // which infinities mean something; null: none
+};
+
+constexpr std::array<SplatAttribute, kAttributeCount> kSplatAttributes{{
+    {"position", "xyz", 0, 3, false, false, true, STEP_PLAIN, nullptr},
+    {"log_scale", "scale", 4, 3, false, false, true, STEP_SCALE, limit_infinite_log_scale},
+    {"rotation", "rot", 5, 4, false, false, true, STEP_PLAIN, nullptr},
+    {"opacity_logit", "opacity", 3, 1, false, false, true, STEP_OPACITY, limit_infinite_logit},
+    {"sh_dc", "f_dc", 1, 3, false, false, true, STEP_PLAIN, nullptr},
+    {"sh_rest", "f_rest", 2, 3, true, false, true, STEP_REST, nullptr},
+    {"shape", "shape", 6, 1, false, true, true, STEP_PLAIN, nullptr},
+}};
+
+constexpr const char* attribute_name(int attribute) {
+    return kSplatAttributes[static_cast<std::size_t>(attribute)].name;
+}
+
+/// Floats of a splat, of an optional attribute where it is there.
+constexpr std::uint32_t attribute_floats(int attribute, int sh_degree) {
+    const SplatAttribute& row = kSplatAttributes[static_cast<std::size_t>(attribute)];
+    const auto bands = static_cast<std::uint32_t>(sh_degree + 1);
+    return row.per_coefficient ? row.floats * (bands * bands - 1) : row.floats;
+}
+
+/// Of all attributes that no model lacks.
+constexpr std::uint32_t splat_floats(int sh_degree) {
+    std::uint32_t sum = 0;
+    for (int a = 0; a < kAttributeCount; ++a)
+        if (!kSplatAttributes[static_cast<std::size_t>(a)].optional)
+            sum += attribute_floats(a, sh_degree);
+    return sum;
+}
+
+/// The attributes in the order of their PLY columns.
+constexpr std::array<int, kAttributeCount> attributes_in_file_order() {
+    std::array<int, kAttributeCount> order{};
+    for (int a = 0; a < kAttributeCount; ++a)
+        order[static_cast<std::size_t>(kSplatAttributes[static_cast<std::size_t>(a)].file_place)] =
+            a;
+    return order;
+}
+
+/// Where float c of a splat stands among the columns of its attribute in files, which hold
+/// harmonics channel by channel: all red, then green, then blue.
+constexpr std::size_t file_column(int attribute, int sh_degree, std::size_t c) {
+    const SplatAttribute& row = kSplatAttributes[static_cast<std::size_t>(attribute)];
+    if (!row.per_coefficient) return c;
+    const std::size_t coefficients = attribute_floats(attribute, sh_degree) / row.floats;
+    return c % row.floats * coefficients + c / row.floats;
+}
+
+/// The PLY property of a column: x y z; the file name alone where there is one; else name_0 ...
+std::string ply_column(int attribute, std::size_t column);
 
 struct SplatModel : SplatArrays<float> {
     int sh_degree = 0;             // 0..3

@@ -2,11 +2,319 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "engine/core/on_threads.h"
+#include "engine/core/quantile.h"
+#include "engine/data/region.h"
+#include "engine/data/resample.h"
+#include "engine/gpu/commands.h"
+#include "engine/primitives/groups.h"
 
 namespace darb {
+
+namespace {
+
+constexpr size_t kFewPoints = 10;                // too few for a range of depths
+constexpr size_t kLookedAt = 400;                // points of a view
+constexpr double kNearer = 0.7, kFarther = 1.6;  // than the points
+constexpr double kStray = 0.02;         // share of the points at each end that may be wrong
+constexpr double kNearestShare = 0.05;  // of the way to the middle of the region
+constexpr double kGoodAngle = 12, kBelow = 6, kAbove = 12;  // degrees
+constexpr double kLeastShare = 0.05;                        // of what a photo shows, for a source
+constexpr std::uint8_t kOpaque = 128;
+
+ImageF grey_of(const ImageU8& rgba) {
+    ImageF grey(rgba.width, rgba.height, 1);
+    for (size_t i = 0; i < grey.data.size(); ++i) {
+        const std::uint8_t* c = &rgba.data[4 * i];
+        grey.data[i] =
+            c[3] < kOpaque ? -1.0f : (0.299f * c[0] + 0.587f * c[1] + 0.114f * c[2]) / 255.0f;
+    }
+    return grey;
+}
+
+StereoPhoto small_photo(const View& view, const ImageU8& rgba, int longest_side) {
+    StereoPhoto photo;
+    const double scale = std::min(1.0, double(longest_side) / std::max(rgba.width, rgba.height));
+    const int width = std::max(1, static_cast<int>(std::lround(rgba.width * scale))),
+              height = std::max(1, static_cast<int>(std::lround(rgba.height * scale)));
+    photo.camera = view.camera;
+    const double x = double(width) / rgba.width, y = double(height) / rgba.height;
+    photo.camera.width = width;
+    photo.camera.height = height;
+    photo.camera.fx *= x;
+    photo.camera.cx *= x;
+    photo.camera.fy *= y;
+    photo.camera.cy *= y;
+    photo.rgba = box_downscale(rgba, width, height);
+    photo.grey = grey_of(photo.rgba);
+    return photo;
+}
+
+glm::dvec3 to_camera(const Camera& camera, const glm::dvec3& point) {
+    return camera.rotation * point + camera.translation;
+}
+
+bool is_seen(const Camera& camera, const glm::dvec3& point) {
+    const glm::dvec3 p = to_camera(camera, point);
+    if (!(p.z > 0)) return false;
+    const double x = camera.fx * p.x / p.z + camera.cx, y = camera.fy * p.y / p.z + camera.cy;
+    return x >= 0 && y >= 0 && x < camera.width && y < camera.height;
+}
+
+using Points = std::vector<glm::dvec3>;
+
+// By view: the points that the source says it saw, or else those in its frame.
+std::vector<Points> points_of_views(const Dataset& dataset) {
+    const PointCloud& cloud = dataset.points;
+    std::vector<Points> seen(dataset.views.size());
+    for (size_t p = 0; p < cloud.size(); ++p) {
+        const double* at = &cloud.position[3 * p];
+        const glm::dvec3 point(at[0], at[1], at[2]);
+        if (!cloud.seen_begin.empty()) {
+            for (size_t k = cloud.seen_begin[p]; k < cloud.seen_begin[p + 1]; ++k)
+                seen[cloud.seen_by[k]].push_back(point);
+        } else {
+            for (size_t v = 0; v < seen.size(); ++v)
+                if (is_seen(dataset.views[v].camera, point)) seen[v].push_back(point);
+        }
+    }
+    return seen;
+}
+
+void set_range_of_points(const Points& points, StereoPhoto& photo) {
+    std::vector<double> depth;
+    for (const glm::dvec3& p : points) {
+        const double z = to_camera(photo.camera, p).z;
+        if (z > 0) depth.push_back(z);
+    }
+    if (depth.size() < kFewPoints) return;
+    std::sort(depth.begin(), depth.end());
+    photo.near = kNearer * quantile(depth, kStray);
+    photo.far = kFarther * quantile(depth, 1 - kStray);
+}
+
+void set_range_of_region(const Region& region, StereoPhoto& photo) {
+    const double middle = to_camera(photo.camera, region.centre).z;
+    const double half = glm::length(region.half);
+    if (!(middle + half > 0)) return;
+    photo.far = middle + half;
+    photo.near = std::max(middle - half, kNearestShare * photo.far);
+}
+
+// Places in the frame at depths of the range, where there are no points to say what a photo shows.
+Points places_in_frame(const StereoPhoto& photo) {
+    constexpr int kSteps = 6, kDepths = 3;
+    Points places;
+    const Camera& c = photo.camera;
+    for (int j = 0; j < kSteps; ++j)
+        for (int i = 0; i < kSteps; ++i)
+            for (int d = 0; d < kDepths; ++d) {
+                const double share = (d + 0.5) / kDepths;
+                const double z = 1 / (share / photo.near + (1 - share) / photo.far);
+                const double x = (i + 0.5) / kSteps * c.width, y = (j + 0.5) / kSteps * c.height;
+                const glm::dvec3 p(z * (x - c.cx) / c.fx, z * (y - c.cy) / c.fy, z);
+                places.push_back(glm::transpose(c.rotation) * (p - c.translation));
+            }
+    return places;
+}
+
+double worth(const Camera& reference, const Camera& source, const Points& points) {
+    const glm::dvec3 a = reference.centre(), b = source.centre();
+    double sum = 0;
+    const size_t step = points.size() / kLookedAt + 1;
+    for (size_t p = 0; p < points.size(); p += step) {
+        if (!is_seen(source, points[p])) continue;
+        const double cosine =
+            glm::dot(glm::normalize(points[p] - a), glm::normalize(points[p] - b));
+        const double angle = glm::degrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
+        const double apart = (angle - kGoodAngle) / (angle < kGoodAngle ? kBelow : kAbove);
+        sum += std::exp(-0.5 * apart * apart);
+    }
+    return sum * static_cast<double>(step) /
+           static_cast<double>(std::max<size_t>(points.size(), 1));
+}
+
+void choose_sources(std::vector<StereoPhoto>& photos, const std::vector<Points>& shown,
+                    std::uint32_t most) {
+    for (size_t r = 0; r < photos.size(); ++r) {
+        std::vector<std::pair<double, std::uint32_t>> worths;
+        for (size_t s = 0; s < photos.size(); ++s) {
+            if (s == r) continue;
+            const double w = worth(photos[r].camera, photos[s].camera, shown[r]);
+            if (w > kLeastShare) worths.emplace_back(-w, static_cast<std::uint32_t>(s));
+        }
+        std::sort(worths.begin(), worths.end());
+        for (size_t k = 0; k < std::min<size_t>(most, worths.size()); ++k)
+            photos[r].sources.push_back(worths[k].second);
+    }
+}
+
+}  // namespace
+
+std::vector<StereoPhoto> stereo_photos(const Dataset& dataset, const std::vector<ImageU8>& photos,
+                                       const StereoOptions& options) {
+    std::vector<StereoPhoto> chosen;
+    std::vector<Points> shown;
+    const Region region = region_in_view(dataset);
+    std::vector<Points> seen = points_of_views(dataset);
+    for (size_t v = 0; v < dataset.views.size(); ++v) {
+        const View& view = dataset.views[v];
+        if (view.is_test || view.camera.lens.active) continue;
+        StereoPhoto photo = small_photo(view, photos[v], options.longest_side);
+        photo.view = v;
+        set_range_of_points(seen[v], photo);
+        const bool has_points = photo.far > 0;
+        if (!has_points) set_range_of_region(region, photo);
+        if (!(photo.far > photo.near)) continue;
+        shown.push_back(has_points ? std::move(seen[v]) : places_in_frame(photo));
+        chosen.push_back(std::move(photo));
+    }
+    choose_sources(chosen, shown, std::min<std::uint32_t>(options.sources, 8));
+    return chosen;
+}
+
+namespace {
+
+constexpr int kStarts = 12, kSweeps = 4;
+constexpr float kFirstReach = 0.04f;  // of the random changes; half of it in each further sweep
+constexpr double kSteepest = 4;       // tangent of the angle between surface and picture, at most
+
+glm::dmat3 intrinsics(const Camera& c) {
+    return {c.fx, 0, 0, 0, c.fy, 0, c.cx, c.cy, 1};
+}
+
+// A word a pixel: its grey and those right of it, below it, and both, 1 to 255; 0: no photo.
+void add_greys(const ImageF& grey, std::vector<std::uint32_t>& words) {
+    const auto byte = [&](int x, int y) -> std::uint32_t {
+        if (x >= grey.width || y >= grey.height) return 0;
+        const float g = grey.at(x, y, 0);
+        return g < 0 ? 0 : static_cast<std::uint32_t>(std::clamp(std::lround(255 * g), 1L, 255L));
+    };
+    for (int y = 0; y < grey.height; ++y)
+        for (int x = 0; x < grey.width; ++x)
+            words.push_back(byte(x, y) | byte(x + 1, y) << 8 | byte(x, y + 1) << 16 |
+                            byte(x + 1, y + 1) << 24);
+}
+
+// Of the photo and of its sources, one after the other.
+std::vector<std::uint32_t> greys_of(const std::vector<StereoPhoto>& photos, std::size_t reference) {
+    std::vector<std::uint32_t> words;
+    add_greys(photos[reference].grey, words);
+    for (const std::uint32_t s : photos[reference].sources) add_greys(photos[s].grey, words);
+    return words;
+}
+
+gpu::StereoArgs args_of(const StereoPhoto& photo, std::uint32_t seed) {
+    const Camera& c = photo.camera;
+    gpu::StereoArgs args{};
+    args.width = static_cast<std::uint32_t>(c.width);
+    args.height = static_cast<std::uint32_t>(c.height);
+    args.sources = static_cast<std::uint32_t>(photo.sources.size());
+    args.seed = seed;
+    args.farthest = static_cast<float>(1 / photo.far);
+    args.nearest = static_cast<float>(1 / photo.near);
+    args.steepest = static_cast<float>(kSteepest / std::max(c.fx, c.fy));
+    return args;
+}
+
+class PatchMatch {
+  public:
+    explicit PatchMatch(Device& device)
+        : device_(&device),
+          start_(device, "stereo_start", {{"THREADS", SPLAT_GROUP}, {"STARTS", kStarts}}),
+          sweep_(device, "stereo_sweep", {{"THREADS", SPLAT_GROUP}}),
+          commands_(device) {}
+
+    PlaneMap run(const std::vector<StereoPhoto>& photos, std::size_t reference,
+                 std::uint32_t seed) {
+        const StereoPhoto& photo = photos[reference];
+        PlaneMap planes(photo.grey.width, photo.grey.height, 4);
+        if (photo.sources.empty()) {
+            for (std::size_t i = 3; i < planes.data.size(); i += 4) planes.data[i] = STEREO_NO_COST;
+            return planes;
+        }
+        upload(greys_, "stereo greys", greys_of(photos, reference));
+        upload(sources_, "stereo sources", stereo_sources(photos, reference));
+        const std::uint64_t bytes = planes.data.size() * sizeof(float);
+        if (planes_.bytes() != bytes) {
+            planes_ = Buffer();
+            planes_ = Buffer(*device_, "stereo planes", bytes, Memory::device, "stereo");
+        }
+        record(args_of(photo, seed));
+        commands_.submit_and_wait();
+        planes.data = planes_.download<float>(planes.data.size());
+        return planes;
+    }
+
+  private:
+    Device* device_;
+    Pipeline start_, sweep_;
+    Commands commands_;
+    Buffer greys_, sources_, planes_;
+
+    template <class T>
+    void upload(Buffer& buffer, const char* name, const std::vector<T>& values) {
+        const std::uint64_t bytes = values.size() * sizeof(T);
+        if (buffer.bytes() < bytes) {
+            buffer = Buffer();
+            buffer = Buffer(*device_, name, bytes, Memory::device, "stereo");
+        }
+        buffer.upload(values);
+    }
+
+    void record(gpu::StereoArgs args) {
+        const std::uint64_t half = std::uint64_t{(args.width + 1) / 2} * args.height;
+        const Groups all = groups_for(std::uint64_t{args.width} * args.height),
+                     each = groups_for(half);
+        commands_.begin();
+        commands_.pass("stereo start");
+        commands_.dispatch(start_, args, {greys_, sources_, planes_}, all.x, all.y);
+        commands_.pass("stereo sweeps");
+        args.reach = kFirstReach;
+        for (int sweep = 0; sweep < kSweeps; ++sweep) {
+            for (args.colour = 0; args.colour < 2; ++args.colour) {
+                ++args.seed;
+                commands_.dispatch(sweep_, args, {greys_, sources_, planes_}, each.x, each.y);
+            }
+            args.reach /= 2;
+        }
+    }
+};
+
+}  // namespace
+
+std::vector<gpu::StereoSource> stereo_sources(const std::vector<StereoPhoto>& photos,
+                                              std::size_t reference) {
+    const Camera& from = photos[reference].camera;
+    const glm::dmat3 ray = glm::inverse(intrinsics(from));
+    std::vector<gpu::StereoSource> sources;
+    std::size_t first = photos[reference].grey.data.size();
+    for (const std::uint32_t s : photos[reference].sources) {
+        const Camera& to = photos[s].camera;
+        const glm::dmat3 turn = to.rotation * glm::transpose(from.rotation);
+        gpu::StereoSource source{};
+        source.toward = glm::mat3(intrinsics(to) * turn * ray);
+        source.shift = glm::vec3(intrinsics(to) * (to.translation - turn * from.translation));
+        source.width = static_cast<std::uint32_t>(to.width);
+        source.height = static_cast<std::uint32_t>(to.height);
+        source.first = static_cast<std::uint32_t>(first);
+        first += photos[s].grey.data.size();
+        sources.push_back(source);
+    }
+    return sources;
+}
+
+std::vector<PlaneMap> plane_maps(Device& device, const std::vector<StereoPhoto>& photos,
+                                 std::uint64_t seed) {
+    PatchMatch match(device);
+    std::vector<PlaneMap> maps;
+    for (std::size_t r = 0; r < photos.size(); ++r)
+        maps.push_back(match.run(photos, r, static_cast<std::uint32_t>(seed * 1009 + 64 * r)));
+    return maps;
+}
 
 namespace {
 

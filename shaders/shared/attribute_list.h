@@ -1,5 +1,5 @@
 // The attributes of a splat by number: the order of their buffers, moments, gradients and rates, in
-// bindings and in checkpoints. What each is stands in engine/scene/splat_attributes.h.
+// bindings and in checkpoints. What each is stands in engine/scene/splat_model.h.
 #ifndef DARB_ATTRIBUTE_LIST_H
 #define DARB_ATTRIBUTE_LIST_H
 

@@ -1,6 +1,6 @@
 // The list of effects: what a scene may call for beyond plain splats. Each is compiled in, has its
 // buffers and its gradients only when it is on. The rules stand in
-// engine/plan/effect_rules.cpp.
+// engine/plan/effect_plan.cpp.
 #ifndef DARB_EFFECT_LIST_H
 #define DARB_EFFECT_LIST_H
 

@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "trainer/step/checkpoint.h"
 

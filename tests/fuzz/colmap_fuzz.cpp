@@ -6,7 +6,7 @@
 
 #include "engine/core/error.h"
 #include "engine/data/colmap.h"
-#include "engine/data/exif.h"
+#include "engine/data/image_io.h"
 #include "engine/data/lens_model.h"
 #include "engine/data/resample.h"
 

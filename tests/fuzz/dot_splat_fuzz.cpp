@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/scene/dot_splat.h"
 

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <span>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/scene/splat_file.h"
 #include "engine/scene/splat_shapes.h"

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/kernels/kernel_expression.h"
 #include "engine/kernels/kernel_file.h"

@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/colmap.h"
@@ -21,7 +21,7 @@
 #include "engine/kernels/kernel_registry.h"
 #include "engine/scene/inflate.h"
 #include "engine/scene/splat_file.h"
-#include "engine/scene/spz_layout.h"
+#include "engine/scene/spz.h"
 #include "tests/support/ksplat_file.h"
 #include "tests/support/photo_files.h"
 #include "tests/support/test_scene.h"

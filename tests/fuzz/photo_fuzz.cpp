@@ -11,7 +11,6 @@
 #include <span>
 #include <vector>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/data/image_io.h"
 

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <span>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/data/point_cloud_ply.h"
 #include "engine/scene/ply.h"

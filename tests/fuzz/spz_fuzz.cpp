@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <span>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/spz.h"

@@ -12,7 +12,6 @@
 #include "engine/data/image_io.h"
 #include "engine/data/metrics.h"
 #include "engine/data/point_cloud_ply.h"
-#include "engine/data/point_splats.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/gaussian_scene.h"

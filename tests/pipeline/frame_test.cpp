@@ -4,12 +4,12 @@
 #include <cmath>
 #include <numeric>
 
-#include "engine/check/walk_truth.h"
+#include "engine/check/device_walk.h"
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/frame_buffers.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "tests/support/projected_frame.h"
 #include "tests/support/scoped_variants.h"
 #include "tests/support/test_walk.h"

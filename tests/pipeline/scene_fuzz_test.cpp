@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "engine/check/walk_truth.h"
+#include "engine/check/device_walk.h"
 #include "engine/core/rng.h"
 #include "engine/scene/edit_splats.h"
 #include "tests/support/test_walk.h"

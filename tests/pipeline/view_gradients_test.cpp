@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/check/walk_truth.h"
+#include "engine/check/device_walk.h"
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
-#include "engine/raster/adam_update.h"
+#include "engine/raster/adam.h"
 #include "engine/reference/adam.h"
 #include "engine/render/render_gradients.h"
 #include "tests/support/compare_images.h"

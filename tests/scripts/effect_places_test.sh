@@ -8,7 +8,7 @@ failed=0
 # check NAME WORDS OWN: files of the engine, the trainer, the viewer, the command and the shaders
 # that hold one of the words (a regular expression); OWN: shader and rule files of its own.
 check() {
-    local allowed=(shaders/shared/effect_list.h engine/plan/effect_rules.cpp engine/raster/effects.h
+    local allowed=(shaders/shared/effect_list.h engine/plan/effect_plan.cpp engine/raster/forward_options.h
         shaders/effects/constants.glsl)
     read -ra own <<<"$3"
     allowed+=("${own[@]}")
@@ -25,7 +25,7 @@ check() {
 }
 
 check near 'EFFECT_NEAR|near_care|NEAR_CARE' \
-    'shaders/effects/camera_model.glsl engine/plan/effect_rules_near.cpp'
+    'shaders/effects/camera_model.glsl engine/plan/effect_plan.cpp'
 check off_centre 'EFFECT_OFF_CENTRE|off_centre|OFF_CENTRE' \
     'shaders/effects/camera_model.glsl engine/plan/effect_plan.cpp'
 

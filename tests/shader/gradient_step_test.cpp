@@ -2,7 +2,7 @@
 // gradients in buffers with adam_update.comp behind them. For every kernel, each effect that
 // training has and each rule beside Adam.
 #include "engine/core/rng.h"
-#include "engine/raster/adam_update.h"
+#include "engine/raster/adam.h"
 #include "engine/raster/backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"

@@ -6,7 +6,7 @@
 #include "engine/kernels/relocation_table.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
-#include "engine/reference/reference_mcmc.h"
+#include "engine/reference/reference_density_control.h"
 #include "engine/reference/reference_render.h"
 #include "engine/scene/splat_shapes.h"
 #include "shaders/shared/kernel_forms.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/reference/reference_render.h"
-#include "engine/render/camera_gradient.h"
+#include "engine/render/render_gradients.h"
 
 namespace darb::test {
 

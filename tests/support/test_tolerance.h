@@ -1,7 +1,7 @@
 // The table of tolerances, by its short name in tests.
 #pragma once
 
-#include "engine/reference/tolerance.h"
+#include "engine/reference/comparison.h"
 
 namespace darb::test {
 

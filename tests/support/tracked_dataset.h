@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "engine/core/rng.h"
-#include "engine/data/track_observations.h"
+#include "engine/data/track_adjustment.h"
 #include "engine/reference/random_scene.h"
 #include "engine/scene/pose_metric.h"
 

@@ -1,8 +1,8 @@
 // The hard cases trained: the losses of a few steps are those of the whole training loop in double
 // (render, loss, gradients and Adam of the reference), and density control and opacity resets leave
 // everything finite.
+#include "engine/check/device_walk.h"
 #include "engine/check/hard_cases.h"
-#include "engine/check/walk_truth.h"
 #include "engine/reference/adam.h"
 #include "engine/reference/reference_loss.h"
 #include "tests/support/compare_arrays.h"

@@ -12,7 +12,7 @@
 #include "engine/raster/blend_backward.h"
 #include "engine/raster/forward.h"
 #include "engine/raster/frame_buffers.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "engine/raster/gpu_splats.h"
 #include "tests/support/test_device_options.h"
 #include "trainer/step/memory_plan.h"

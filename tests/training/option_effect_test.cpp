@@ -7,7 +7,7 @@
 #include <string>
 
 #include "engine/core/error.h"
-#include "engine/data/track_observations.h"
+#include "engine/data/track_adjustment.h"
 #include "tests/support/measured_depths.h"
 #include "trainer/options/option_table.h"
 #include "trainer/options/strategy.h"

@@ -18,7 +18,6 @@
 #include "engine/core/rng.h"
 #include "engine/data/image_io.h"
 #include "engine/report/html.h"
-#include "engine/report/page.h"
 #include "engine/report/svg_plot.h"
 #include "tests/support/chromium.h"
 

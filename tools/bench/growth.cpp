@@ -1,13 +1,14 @@
 #include "tools/bench/growth.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <limits>
 #include <tuple>
 
 #include "engine/core/error.h"
+#include "engine/report/html.h"
+#include "engine/report/svg_plot.h"
 #include "tools/bench/cases.h"
 #include "tools/bench/scenes.h"
 #include "trainer/step/trainer.h"
@@ -112,6 +113,163 @@ std::vector<GrowthCurve> measure_growth(Device& device, const GrowthPlan& plan,
         curves.push_back(by_pixels);
     }
     return curves;
+}
+
+// The curves of growth.h as text, JSON and a page.
+
+namespace {
+
+using Json = nlohmann::json;
+
+// Of the curve on which the splats, and with them the intersections, vary.
+std::vector<GrowthPoint> points_by_splats(const std::vector<GrowthCurve>& curves,
+                                          const std::string& name) {
+    std::vector<GrowthPoint> points;
+    for (const GrowthCurve& curve : curves)
+        if (curve.name == name && curve.by == "splats")
+            points.insert(points.end(), curve.points.begin(), curve.points.end());
+    return points;
+}
+
+std::string exponent_text(double exponent) {
+    return std::isfinite(exponent) ? fmt::format("{:.2f}", exponent) : "-";
+}
+
+PlotSeries series(const std::string& name, const std::vector<GrowthPoint>& points,
+                  const std::string& by) {
+    PlotSeries s;
+    s.name = fmt::format("{}, exponent {}", name, exponent_text(growth_exponent(points, by)));
+    s.dots = true;
+    for (const GrowthPoint& p : points) {
+        s.points.emplace_back(growth_value(p, by), p.ms.median);
+        s.titles.push_back(fmt::format("{}: {} splats, {} pixels, {} intersections, {:.2f} ms",
+                                       name, format_number(p.splats), format_number(p.pixels),
+                                       format_number(p.intersections), p.ms.median));
+    }
+    return s;
+}
+
+// What stays the same while the splats or the pixels vary, as the page says it.
+std::string held_text(const std::vector<GrowthCurve>& curves, const std::string& name) {
+    std::string text;
+    for (const GrowthCurve& curve : curves) {
+        if (curve.name != name || curve.points.empty()) continue;
+        const GrowthPoint& p = curve.points.back();
+        const bool by_splats = curve.by == "splats";
+        text += fmt::format("{}{} {} where {} vary", text.empty() ? "" : " and ",
+                            format_number(by_splats ? p.pixels : p.splats),
+                            by_splats ? "pixels" : "splats", curve.by);
+    }
+    return text.empty() ? "nothing" : text;
+}
+
+Plot log_plot(const std::string& title, const std::string& x_label) {
+    Plot plot{title, x_label, "ms", {}};
+    plot.log_x = plot.log_y = true;
+    return plot;
+}
+
+// The passes of one curve against what varies.
+Plot pass_plot(const GrowthCurve& curve) {
+    Plot plot = log_plot(fmt::format("Passes, {} by {}", curve.name, curve.by), curve.by);
+    if (curve.points.empty()) return plot;
+    for (const PassFigure& pass : curve.points.back().passes) {
+        PlotSeries s;
+        s.name = pass.name;
+        for (const GrowthPoint& p : curve.points)
+            for (const PassFigure& one : p.passes)
+                if (one.name == pass.name)
+                    s.points.emplace_back(growth_value(p, curve.by), one.ms.median);
+        plot.series.push_back(std::move(s));
+    }
+    return plot;
+}
+
+std::string page_table(const GrowthCurve& curve) {
+    std::string html = fmt::format(
+        "<h2>{} by {}</h2><div class='wide'><table><tr><th>splats</th><th>pixels</th>"
+        "<th>intersections</th><th>ms</th><th>quartiles</th></tr>\n",
+        curve.name, curve.by);
+    for (const GrowthPoint& p : curve.points)
+        html += fmt::format(
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.3f}</td><td>{:.3f} to {:.3f}</td></tr>\n",
+            format_number(p.splats), format_number(p.pixels), format_number(p.intersections),
+            p.ms.median, p.ms.low, p.ms.high);
+    return html + "</table></div>\n";
+}
+
+}  // namespace
+
+std::string growth_table(const std::vector<GrowthCurve>& curves) {
+    std::string text;
+    for (const GrowthCurve& curve : curves) {
+        text += fmt::format("{} by {}: exponent {}, by intersections {}\n", curve.name, curve.by,
+                            exponent_text(growth_exponent(curve.points, curve.by)),
+                            exponent_text(growth_exponent(curve.points, "intersections")));
+        text += fmt::format("{:>12} {:>12} {:>12} {:>12} {:>8}\n", "splats", "pixels",
+                            "intersections", "ms", "+- %");
+        for (const GrowthPoint& p : curve.points)
+            text +=
+                fmt::format("{:>12} {:>12} {:>12} {:>12.3f} {:>8.1f}\n", format_number(p.splats),
+                            format_number(p.pixels), format_number(p.intersections), p.ms.median,
+                            p.ms.median > 0 ? 50 * (p.ms.high - p.ms.low) / p.ms.median : 0.0);
+    }
+    return text;
+}
+
+Json growth_json(const std::vector<GrowthCurve>& curves) {
+    Json all = Json::array();
+    const auto number = [](double v) { return std::isfinite(v) ? Json(v) : Json(); };
+    for (const GrowthCurve& curve : curves) {
+        Json points = Json::array();
+        for (const GrowthPoint& p : curve.points) {
+            Json passes = Json::object();
+            for (const PassFigure& pass : p.passes) passes[pass.name] = pass.ms.median;
+            points.push_back({{"splats", p.splats},
+                              {"pixels", p.pixels},
+                              {"pairs", p.intersections},
+                              {"ms", p.ms.median},
+                              {"quartile_low", p.ms.low},
+                              {"quartile_high", p.ms.high},
+                              {"passes_ms", passes}});
+        }
+        all.push_back(
+            {{"name", curve.name},
+             {"by", curve.by},
+             {"exponent", number(growth_exponent(curve.points, curve.by))},
+             {"exponent_by_pairs", number(growth_exponent(curve.points, "intersections"))},
+             {"points", points}});
+    }
+    return all;
+}
+
+std::string growth_html(const std::vector<GrowthCurve>& curves, const Json& context) {
+    Plot splats = log_plot("By splats", "splats"), pixels = log_plot("By pixels", "pixels"),
+         intersections = log_plot("By splat-tile intersections", "intersections");
+    std::string passes, tables;
+    for (const GrowthCurve& curve : curves) {
+        (curve.by == "splats" ? splats : pixels)
+            .series.push_back(series(curve.name, curve.points, curve.by));
+        passes += svg_plot(pass_plot(curve));
+        tables += page_table(curve);
+    }
+    for (const char* name : {"frame", "iteration"})
+        intersections.series.push_back(
+            series(name, points_by_splats(curves, name), "intersections"));
+    return html_page(
+        "Growth",
+        fmt::format("{}, {}; {} x {}; {}; darb {}", context["device"].get<std::string>(),
+                    context["driver"].get<std::string>(), context["num_cpus"].get<unsigned>(),
+                    context["processor"].get<std::string>(), context["date"].get<std::string>(),
+                    context["commit"].get<std::string>()),
+        "<div class='plots'>" + svg_plot(splats) + svg_plot(pixels) + svg_plot(intersections) +
+            passes + "</div>\n" + tables +
+            "<h2>How to read it</h2><p>Random splats in the unit sphere, seen from outside, degree "
+            "0. A frame has " +
+            held_text(curves, "frame") + "; an iteration (forward, loss, backward, Adam) has " +
+            held_text(curves, "iteration") +
+            ". Time is that of the wall clock, the median; exponents b of ms = a x^b are fitted "
+            "over the largest decade, where fixed costs no longer rule.</p>\n");
 }
 
 }  // namespace darb

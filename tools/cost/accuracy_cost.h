@@ -7,12 +7,30 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/image.h"
 #include "engine/gpu/device.h"
 #include "engine/plan/accuracy.h"
-#include "tools/cost/picture_error.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/splat_model.h"
 #include "tools/cost/views.h"
 
 namespace darb {
+
+struct PictureError {
+    double mse = 0;      // of values in [0, 1]
+    double psnr_db = 0;  // 200 at most
+    double largest = 0;
+    double percentile = 0;  // 99.9 % of the values are at most this far
+};
+
+/// The same pictures in the same order, [H][W][3]; both are clamped to [0, 1] first, as a screen
+/// shows them.
+PictureError picture_error(const std::vector<ImageF>& pictures, const std::vector<ImageF>& truth);
+
+/// The double-precision renderer at the most accurate settings; kernel, footprint and degree are
+/// the model's. by_pixel: splats fully sorted at every pixel, else by the depth of their centres.
+std::vector<ImageF> true_pictures(const SplatModel& model, const std::vector<Camera>& cameras,
+                                  const glm::vec3& background, bool by_pixel);
 
 struct CostPlan {
     int least_repeats = 3, most_repeats = 25;

@@ -1,8 +1,10 @@
 #include "tools/cost/cost_report.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 
-#include <algorithm>
+#include "engine/report/html.h"
+#include "engine/report/svg_plot.h"
 
 namespace darb {
 
@@ -81,6 +83,135 @@ Json cost_json(const CostResult& result) {
             {"truth_seconds", result.truth_seconds},
             {"rows", rows},
             {"answers", cost_answers(result)}};
+}
+
+// The page of `darb cost`: the answers, the fronts, time per pass, and every number in a table.
+
+namespace {
+
+/// Alone, combinations and the front as three series over ms.
+template <class Value>
+std::string scatter(const CostResult& result, const std::string& title, const std::string& unit,
+                    const Value& value, bool CostRow::*front) {
+    Plot plot{title, "ms a frame", unit, {}};
+    plot.log_x = true;
+    plot.series = {{"settings alone", {}, true, false, false, {}},
+                   {"combinations", {}, true, false, false, {}},
+                   {"front", {}, false, true, true, {}}};
+    std::vector<const CostRow*> best;
+    for (const CostRow& row : result.rows) {
+        const bool alone = row.setting >= 0 || &row == result.rows.data();
+        PlotSeries& series = plot.series[alone ? 0 : 1];
+        series.points.emplace_back(row.ms.median, value(row));
+        series.titles.push_back(fmt::format("{}: {:.3f} ms ({:.3f} to {:.3f}), {:.2f} dB", row.name,
+                                            row.ms.median, row.ms.low, row.ms.high, value(row)));
+        if (row.*front) best.push_back(&row);
+    }
+    std::sort(best.begin(), best.end(),
+              [](const CostRow* a, const CostRow* b) { return a->ms.median < b->ms.median; });
+    for (const CostRow* row : best) plot.series[2].points.emplace_back(row->ms.median, value(*row));
+    return svg_plot(plot);
+}
+
+bool is_combination(const CostResult& result, const CostRow& row) {
+    return row.setting < 0 && &row != result.rows.data();
+}
+
+std::string pass_bars(const CostResult& result, bool combinations, const std::string& title,
+                      std::vector<std::string>& names) {
+    BarPlot plot{title, "ms a frame; whiskers: quartiles of the repeats", {}, {}};
+    for (const CostRow& row : result.rows)
+        for (const auto& [name, spread] : row.passes)
+            if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    plot.names = names;
+    for (const CostRow& row : result.rows) {
+        if (is_combination(result, row) != combinations) continue;
+        if (combinations && !row.on_front && row.accuracy != preset_accuracy(kFast) &&
+            row.accuracy != preset_accuracy(kExact))
+            continue;
+        BarPlot::Row bar{row.name, std::vector<double>(names.size(), 0.0), row.ms.low, row.ms.high};
+        for (const auto& [name, spread] : row.passes)
+            bar.parts[static_cast<size_t>(std::find(names.begin(), names.end(), name) -
+                                          names.begin())] = spread.median;
+        plot.rows.push_back(std::move(bar));
+    }
+    return svg_bars(plot);
+}
+
+std::string table(const CostResult& result) {
+    const bool photos = result.rows[0].photo_psnr_db.has_value();
+    std::string html =
+        "<h2>Every measured row</h2><div class='wide'><table><tr><th>setting</th><th>ms a "
+        "frame</th>"
+        "<th>quartiles</th><th>PSNR (dB)</th><th>largest error</th><th>99.9 %</th>"
+        "<th>PSNR, by pixel (dB)</th>";
+    if (photos) html += "<th>photos (dB)</th><th>SSIM</th>";
+    html += "</tr>\n";
+    for (const CostRow& row : result.rows) {
+        const bool same = row.same_as_balanced && &row != result.rows.data();
+        html += fmt::format(
+            "<tr{}><td class='text'>{}{}</td><td>{:.3f}</td><td>{:.3f} to "
+            "{:.3f}</td><td>{:.2f}</td>"
+            "<td>{:.5f}</td><td>{:.5f}</td><td>{:.2f}</td>",
+            row.on_front ? " class='mark'" : "", html_escape(row.name),
+            same ? " (same picture as balanced)" : "", row.ms.median, row.ms.low, row.ms.high,
+            row.error.psnr_db, row.error.largest, row.error.percentile, row.error_by_pixel.psnr_db);
+        if (photos)
+            html +=
+                fmt::format("<td>{:.3f}</td><td>{:.4f}</td>", *row.photo_psnr_db, *row.photo_ssim);
+        html += "</tr>\n";
+    }
+    return html + "</table></div>\n";
+}
+
+std::string notes(const CostResult& result) {
+    return fmt::format(
+        "<h2>How to read it</h2>"
+        "<p>Times: device timestamps, summed over the passes of a frame, mean over {} views; "
+        "median "
+        "and quartiles of {} or more repeats, all rows turn by turn so that drift hits them alike "
+        "({} side by side). Combinations were timed in a second round and divided by what balanced "
+        "had drifted by in it, {:.3f}.</p>"
+        "<p>Errors: against a renderer in double precision with the true kernel profile, alpha "
+        "cut-off 1/1024 and transmittance stop 1e-6, over all {} values of the views' pixels, "
+        "clamped to [0, 1]. Kernel, footprint, colour and depth order of that truth are the "
+        "file's: another footprint or a sort at every pixel shows another picture, not a less "
+        "accurate one. The column by pixel is against the truth with the splats fully sorted at "
+        "every pixel. Bold rows are on the front: nothing measured is faster and closer to the "
+        "truth.</p>"
+        "<p>Combinations: those that the single settings predict to be on the front (times "
+        "multiply, squared errors add). Every point shown is measured.</p>\n",
+        result.view_names.size(), result.repeats, result.group, result.drift,
+        format_number(3.0 * static_cast<double>(result.pixels)));
+}
+
+}  // namespace
+
+std::string cost_html(const CostResult& result, const std::string& title) {
+    std::string answers;
+    for (const std::string& answer : cost_answers(result))
+        answers += "<li>" + html_escape(answer) + "</li>\n";
+    std::string plots = scatter(
+        result, "Time and distance from the truth", "PSNR against the truth (dB)",
+        [](const CostRow& r) { return r.error.psnr_db; }, &CostRow::on_front);
+    if (result.rows[0].photo_psnr_db)
+        plots += scatter(
+            result, "Time and photos", "PSNR against the photos (dB)",
+            [](const CostRow& r) { return *r.photo_psnr_db; }, &CostRow::on_photo_front);
+    std::vector<std::string> names;
+    const std::string alone = pass_bars(result, false, "Each setting alone", names);
+    const std::string together = pass_bars(result, true, "Presets and the front", names);
+    const std::string subtitle =
+        fmt::format("What accuracy costs in time: {} splats, {}, footprint {}; {}, {}",
+                    format_number(static_cast<double>(result.splats)), result.kernel,
+                    result.footprint, result.device, result.driver);
+    return html_page(title, subtitle,
+                     "<h2>In words</h2><ul>" + answers +
+                         "</ul>\n<h2>Accuracy against time</h2>"
+                         "<div class='plots'>" +
+                         plots + "</div>\n<h2>Time per pass</h2>" + html_legend(names) +
+                         "<div class='plots'>" + alone + together + "</div>\n" + table(result) +
+                         notes(result));
 }
 
 }  // namespace darb

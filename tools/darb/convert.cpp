@@ -10,7 +10,6 @@
 #include "engine/core/say.h"
 #include "engine/publish/fit_pictures.h"
 #include "engine/scene/gaussian_scene.h"
-#include "engine/scene/scene_name.h"
 #include "engine/scene/splat_file.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/compare_scenes.h"

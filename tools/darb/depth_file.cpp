@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/check/npy.h"
+#include "engine/check/dump.h"
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/data/image_io.h"

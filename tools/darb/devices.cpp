@@ -8,7 +8,7 @@
 #include "engine/core/say.h"
 #include "engine/gpu/device.h"
 #include "engine/ranks/ranks.h"
-#include "tools/bench/pass_statistics.h"
+#include "tools/bench/bench_step.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/json_output.h"
 #include "tools/darb/outputs.h"

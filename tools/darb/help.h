@@ -10,7 +10,7 @@
 
 namespace darb {
 
-/// Headings that --help leaves to --help-all; trainer/option_table.h has more of them.
+/// Headings that --help leaves to --help-all; trainer/options/option_table.h has more of them.
 namespace help_group {
 inline constexpr const char *kInput = "Photos and output", *kSaving = "Saving and testing",
                             *kAccuracy = "Accuracy", *kDevice = "Device and passes";

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "engine/data/camera_list.h"
-#include "engine/data/point_splats.h"
+#include "engine/data/point_cloud_ply.h"
 
 namespace darb {
 

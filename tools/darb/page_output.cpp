@@ -9,7 +9,7 @@
 #include "engine/core/say.h"
 #include "engine/core/text.h"
 #include "engine/publish/web_page.h"
-#include "engine/scene/scene_name.h"
+#include "engine/scene/splat_file.h"
 #include "tools/darb/open_cameras.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/slow_progress.h"

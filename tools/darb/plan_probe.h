@@ -7,7 +7,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "engine/plan/trial.h"
+#include "engine/plan/antialias_probe.h"
 #include "trainer/options/options.h"
 
 namespace darb {

@@ -13,7 +13,7 @@
 #include "engine/core/quantile.h"
 #include "engine/core/say.h"
 #include "engine/data/image_io.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/accuracy_flags.h"
 #include "tools/darb/command_list.h"

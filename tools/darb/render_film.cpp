@@ -9,7 +9,7 @@
 #include "engine/core/say.h"
 #include "engine/data/camera_list.h"
 #include "engine/data/metrics.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/effect_flags.h"

@@ -10,7 +10,7 @@
 #include "tools/darb/evaluation_flags.h"
 #include "tools/darb/outputs.h"
 #include "tools/darb/tune_flags.h"
-#include "tools/paper/compare_shapes.h"
+#include "tools/paper/compare_stats.h"
 
 namespace darb {
 

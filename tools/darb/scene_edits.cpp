@@ -7,7 +7,6 @@
 #include <cmath>
 #include <vector>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/say.h"
 #include "engine/scene/edit_splats.h"

@@ -12,7 +12,7 @@
 #include "engine/core/text.h"
 #include "engine/data/compare_view.h"
 #include "engine/data/depths.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "engine/render/renderer.h"
 #include "tools/paper/compare_stats.h"
 #include "trainer/run/evaluation.h"

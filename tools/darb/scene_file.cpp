@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 
-#include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/say.h"

@@ -16,7 +16,7 @@
 #include "engine/core/say.h"
 #include "engine/data/run_colmap.h"
 #include "engine/ranks/ranks.h"
-#include "engine/scene/scene_name.h"
+#include "engine/scene/splat_file.h"
 #include "tools/darb/command_list.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/live_view.h"

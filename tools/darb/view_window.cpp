@@ -4,7 +4,7 @@
 
 #include "engine/core/error.h"
 #include "engine/core/say.h"
-#include "engine/scene/scene_name.h"
+#include "engine/scene/splat_file.h"
 #include "tools/darb/device_options.h"
 #include "tools/darb/stop_signals.h"
 #include "tools/darb/view_times.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/kernels/kernel_family.h"
 #include "tools/paper/sim1d_terms.h"

@@ -5,7 +5,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/kernels/quadrature.h"
 #include "engine/reference/parallel.h"

@@ -5,10 +5,27 @@
 #include <string>
 #include <vector>
 
-#include "tools/paper/kernel_fits.h"
 #include "tools/paper/psi_measure.h"
 
 namespace darb {
+
+struct KernelFit {
+    int kernel = 0;
+    std::string form;         // "(1 - t)^2 P4(t)", "2^n P5(f)", ...
+    double error = 0;         // of w, largest; of the Gaussian relative
+    double exact_error = 0;   // of the exact footprint; NaN where there is none
+    std::string source;       // empty for the kernels of the family
+    double source_error = 0;  // of the kernel from what source says
+};
+
+std::vector<KernelFit> fits_of(const std::vector<int>& kernels);
+/// What the exponents of splats do to psi and to the width that is drawn; empty without any such
+/// kernel.
+std::string shapes_table(const std::vector<int>& kernels);
+nlohmann::json shapes_json(const std::vector<int>& kernels);
+std::string fits_table(const std::vector<KernelFit>& fits);
+nlohmann::json fits_json(const std::vector<KernelFit>& fits);
+std::string fits_html(const std::vector<KernelFit>& fits);
 
 std::string psi_table(const std::vector<PsiResult>& results);
 nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOptions& options);
@@ -16,5 +33,22 @@ nlohmann::json psi_json(const std::vector<PsiResult>& results, const PsiGridOpti
 std::string psi_html(const std::vector<PsiResult>& results,
                      const std::vector<const DerivedKernel*>& kernels,
                      const std::vector<KernelFit>& fits, const PsiGridOptions& options);
+
+// The rings that the paper's limits remove: raised cosine and sinc oscillate on beyond their first
+// pulse. What more pulses would do to psi and to where the mass of a splat lies.
+
+struct Rings {
+    int kernel = 0;  // KERNEL_RAISED_COSINE or KERNEL_SINC, the latter as its modulus |sin x / x|
+    int pulses = 1;
+    double radius = 0;  // of the support, standard deviations
+    double psi = 1;
+    double outside = 0;  // share of the 3D integral that lies beyond the first pulse
+};
+
+/// kernel with one pulse or with more; there must be such a row of the family.
+Rings rings_of(int kernel, int pulses);
+
+/// Both kernels with 1, 2 and 3 pulses.
+std::vector<Rings> all_rings();
 
 }  // namespace darb

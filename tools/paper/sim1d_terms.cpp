@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/kernels/kernel_profile.h"
 
 namespace darb {

@@ -13,7 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 
 namespace darb::python {

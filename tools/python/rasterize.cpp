@@ -9,7 +9,7 @@
 
 #include "engine/kernels/kernel_family.h"
 #include "engine/kernels/shaped_kernel.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "tools/python/cameras.h"
 #include "tools/python/kernel.h"
 #include "tools/python/scene.h"

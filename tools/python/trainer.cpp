@@ -6,7 +6,7 @@
 #include <chrono>
 
 #include "engine/plan/tuning_names.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
 #include "tools/python/scene.h"
 #include "tools/python/train_options.h"

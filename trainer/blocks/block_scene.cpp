@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/raster/gpu_splats.h"
 #include "engine/scene/edit_splats.h"
 #include "trainer/growth/initial_model.h"

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <limits>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/edit_splats.h"

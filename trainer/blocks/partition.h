@@ -9,7 +9,7 @@
 
 #include "engine/data/dataset.h"
 #include "engine/gpu/device.h"
-#include "engine/raster/effects.h"
+#include "engine/raster/forward_options.h"
 #include "engine/scene/splat_model.h"
 #include "trainer/options/options.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 #include "engine/kernels/shaped_kernel.h"
 #include "engine/primitives/groups.h"
 #include "engine/primitives/scan.h"

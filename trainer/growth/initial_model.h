@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/data/dataset.h"
-#include "engine/data/point_splats.h"
+#include "engine/data/point_cloud_ply.h"
 #include "engine/gpu/device.h"
 #include "engine/scene/splat_model.h"
 #include "engine/stereo/surface_points.h"

@@ -13,7 +13,6 @@
 #include "engine/core/text.h"
 #include "engine/data/colmap.h"
 #include "engine/data/dataset.h"
-#include "engine/data/exif.h"
 #include "engine/data/image_io.h"
 #include "engine/data/run_colmap.h"
 

@@ -18,7 +18,6 @@
 #include "engine/data/colmap.h"
 #include "engine/data/masks.h"
 #include "engine/data/run_colmap.h"
-#include "engine/data/straight_masks.h"
 #include "engine/data/video.h"
 #include "trainer/job/photo_folder.h"
 #include "trainer/options/presets.h"

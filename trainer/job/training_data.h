@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "engine/data/colmap_progress.h"
 #include "engine/data/dataset.h"
+#include "engine/data/run_colmap.h"
 #include "trainer/job/request.h"
 #include "trainer/run/run_folder.h"
 

@@ -8,7 +8,7 @@
 
 #include "engine/kernels/kernel_family.h"
 #include "engine/plan/accuracy.h"
-#include "engine/raster/effects.h"
+#include "engine/raster/forward_options.h"
 
 #define DARB_STRATEGIES(ROW) \
     ROW(adc)                 \
@@ -17,7 +17,7 @@
 
 namespace darb {
 
-/// How the splats grow in number; see trainer/strategy.h.
+/// How the splats grow in number; see trainer/options/strategy.h.
 enum class Strategy {
 #define DARB_STRATEGY(name) name,
     DARB_STRATEGIES(DARB_STRATEGY)
@@ -123,7 +123,7 @@ struct TrainOptions {
     std::optional<std::uint64_t> max_memory_bytes;  // of device memory: growth stops before it
 
     float noise_lr = 5e5f;  // mcmc: noise on positions, over the rate of positions
-    // The first iterations see smaller photos; see trainer/resolution_ramp.h.
+    // The first iterations see smaller photos; see trainer/step/photos.h.
     bool resolution_ramp = true;
 
     // Share of scene_reach beyond which no scale grows; 0: no limit. A splat that outgrows the

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/core/doing.h"
+#include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/memory.h"
 #include "engine/plan/tuning_names.h"

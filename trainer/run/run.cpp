@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "engine/core/doing.h"
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/memory.h"
@@ -15,7 +14,7 @@
 #include "engine/data/camera_list.h"
 #include "engine/data/run_events.h"
 #include "engine/plan/tuning_names.h"
-#include "engine/raster/frame_limit.h"
+#include "engine/raster/frame_view.h"
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/ply.h"
 #include "trainer/growth/initial_model.h"

@@ -8,7 +8,6 @@
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/report/html.h"
-#include "engine/report/page.h"
 #include "engine/report/svg_plot.h"
 
 namespace darb {

@@ -6,7 +6,6 @@
 #include <map>
 #include <tuple>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/quantile.h"
 #include "engine/data/compare_view.h"

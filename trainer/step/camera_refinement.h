@@ -12,8 +12,7 @@
 
 #include "engine/core/image.h"
 #include "engine/data/dataset.h"
-#include "engine/data/track_observations.h"
-#include "engine/render/camera_gradient.h"
+#include "engine/data/track_adjustment.h"
 #include "engine/render/render_gradients.h"
 #include "engine/scene/pose_metric.h"
 #include "trainer/options/options.h"

@@ -9,9 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "engine/core/doing.h"
 #include "engine/core/error.h"
-#include "engine/core/file_parts.h"
 #include "engine/core/files.h"
 #include "engine/core/json_text.h"
 #include "engine/kernels/kernel_file.h"

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <glm/glm.hpp>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/data/compare_view.h"
 #include "engine/primitives/groups.h"

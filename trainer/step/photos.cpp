@@ -6,7 +6,6 @@
 #include <span>
 #include <utility>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/quantile.h"
 #include "engine/data/depths.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/primitives/groups.h"
 #include "engine/render/render_gradients.h"

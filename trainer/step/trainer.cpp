@@ -5,7 +5,6 @@
 #include <span>
 #include <utility>
 
-#include "engine/core/check.h"
 #include "engine/core/error.h"
 #include "engine/core/rng.h"
 #include "engine/core/scope_guard.h"

@@ -6,7 +6,7 @@
 
 #include "engine/kernels/kernel_registry.h"
 #include "engine/kernels/shaped_kernel.h"
-#include "engine/scene/scene_name.h"
+#include "engine/scene/splat_file.h"
 #include "viewer/panels/panels.h"
 
 namespace darb {

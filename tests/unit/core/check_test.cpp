@@ -1,9 +1,8 @@
 // DARB_CHECK and Error: what a developer and a user read when something is wrong.
-#include "engine/core/check.h"
+#include "engine/core/error.h"
 
 #include <gtest/gtest.h>
 
-#include "engine/core/error.h"
 
 namespace darb {
 namespace {

@@ -1,4 +1,4 @@
-#include "engine/core/doing.h"
+#include "engine/core/error.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

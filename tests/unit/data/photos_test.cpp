@@ -11,7 +11,6 @@
 #include "engine/core/rng.h"
 #include "engine/data/colmap_write.h"
 #include "engine/data/depth_io.h"
-#include "engine/data/exif.h"
 #include "engine/data/image_io.h"
 #include "engine/data/resample.h"
 #include "tests/unit/data/data_files.h"

@@ -1,5 +1,5 @@
 // Masks of photos that colmap straightened, against its lens written out.
-#include "engine/data/straight_masks.h"
+#include "engine/data/masks.h"
 
 #include <cmath>
 

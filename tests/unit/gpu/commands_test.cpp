@@ -7,7 +7,6 @@
 #include "engine/gpu/barriers.h"
 #include "engine/gpu/shader_table.h"
 #include "engine/gpu/spirv_reflect.h"
-#include "engine/gpu/timestamps.h"
 #include "shaders/shared/scan_args.h"
 #include "tests/support/test_device_options.h"
 

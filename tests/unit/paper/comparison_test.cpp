@@ -14,10 +14,7 @@
 #include "engine/core/files.h"
 #include "engine/data/image_io.h"
 #include "engine/kernels/kernel_family.h"
-#include "tools/paper/compare_crops.h"
-#include "tools/paper/compare_means.h"
-#include "tools/paper/compare_pulses.h"
-#include "tools/paper/compare_shapes.h"
+#include "tools/paper/compare_report.h"
 #include "tools/paper/compare_stats.h"
 #include "tools/paper/paper_numbers.h"
 

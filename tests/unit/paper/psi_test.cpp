@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tools/paper/rings.h"
+#include "tools/paper/psi_report.h"
 
 namespace darb {
 namespace {

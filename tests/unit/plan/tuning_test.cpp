@@ -14,7 +14,6 @@
 #include "engine/core/error.h"
 #include "engine/core/files.h"
 #include "engine/core/rng.h"
-#include "engine/plan/form_times.h"
 #include "engine/plan/tuner.h"
 #include "engine/primitives/radix_sort.h"
 #include "tests/support/scoped_variants.h"

@@ -1,4 +1,4 @@
-#include "engine/publish/page_text.h"
+#include "engine/publish/page_document.h"
 
 #include <gtest/gtest.h>
 

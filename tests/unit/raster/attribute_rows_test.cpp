@@ -6,7 +6,7 @@
 
 #include <numeric>
 
-#include "engine/scene/splat_attributes.h"
+#include "engine/scene/splat_model.h"
 
 namespace darb {
 namespace {

@@ -1,5 +1,5 @@
 // Spherical harmonics: orthonormality pins the constants, axes pin order and signs.
-#include "engine/reference/sh.h"
+#include "engine/reference/projection.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,6 @@
 
 #include <limits>
 
-#include "engine/scene/sh_rotation.h"
 #include "shaders/shared/limits.h"
 #include "tests/support/splat_files.h"
 

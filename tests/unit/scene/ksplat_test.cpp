@@ -3,7 +3,6 @@
 
 #include <array>
 
-#include "engine/scene/half_float.h"
 #include "engine/scene/quantise.h"
 #include "engine/scene/splat_file.h"
 #include "tests/support/ksplat_file.h"

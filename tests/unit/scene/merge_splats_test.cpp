@@ -5,7 +5,6 @@
 
 #include "engine/kernels/second_moment.h"
 #include "engine/scene/edit_splats.h"
-#include "engine/scene/splat_moments.h"
 #include "shaders/shared/limits.h"
 #include "tests/support/splat_files.h"
 

@@ -1,5 +1,5 @@
 // Splat PLYs as other programs write them: what is read, and what is said of it.
-#include "engine/scene/ply_dialects.h"
+#include "engine/scene/ply.h"
 
 #include <fmt/format.h>
 

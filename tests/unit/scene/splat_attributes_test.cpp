@@ -1,7 +1,7 @@
 // The table of splat attributes: its rows fit together, files carry every row, and what only
 // carries attributes names none of them, so that the next one is a row, its shader code and its
 // truth.
-#include "engine/scene/splat_attributes.h"
+#include "engine/scene/splat_model.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -113,23 +113,23 @@ TEST(SplatAttributes, what_only_carries_them_names_none) {
                              "engine/scene/splat_model.h",
                              "engine/check/dump.cpp",
                              "engine/check/device_walk.cpp",
-                             "engine/check/walk_truth.cpp",
+                             "engine/check/device_walk.cpp",
                              "engine/raster/gpu_splats.h",
                              "engine/raster/gpu_splats.cpp",
                              "engine/raster/forward.cpp",
                              "engine/raster/backward.h",
                              "engine/raster/backward.cpp",
-                             "engine/raster/adam_step.h",
-                             "engine/raster/adam_step.cpp",
-                             "engine/raster/adam_update.h",
-                             "engine/raster/adam_update.cpp",
+                             "engine/raster/adam.h",
+                             "engine/raster/adam.cpp",
+                             "engine/raster/adam.h",
+                             "engine/raster/adam.cpp",
                              "engine/raster/gradient_buffers.h",
                              "engine/raster/gradient_buffers.cpp",
                              "engine/plan/roofline.cpp",
                              "engine/reference/splats.h",
-                             "trainer/checkpoint.cpp",
-                             "trainer/iterate_average.cpp",
-                             "trainer/memory_plan.cpp",
+                             "trainer/step/checkpoint.cpp",
+                             "trainer/step/iterate_average.cpp",
+                             "trainer/step/memory_plan.cpp",
                              "shaders/optim/adam_update.comp",
                              "shaders/optim/add_gradients.comp",
                              "shaders/densify/gather_attribute.comp"}) {

@@ -2,7 +2,6 @@
 
 #include "engine/scene/edit_splats.h"
 #include "engine/scene/inflate.h"
-#include "engine/scene/spz_layout.h"
 #include "tests/support/splat_files.h"
 
 namespace darb::test {

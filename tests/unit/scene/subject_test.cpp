@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "engine/core/rng.h"
-#include "engine/scene/scene_name.h"
+#include "engine/scene/splat_file.h"
 #include "tests/support/splat_files.h"
 
 namespace darb::test {

@@ -40,10 +40,10 @@ TEST(StrategyTable, a_name_stands_in_its_own_file_and_in_the_table_alone) {
             files_with({"engine", "trainer", "tools", "viewer"}, {"Strategy::" + name}).empty());
         std::vector<std::string> named =
             files_with({"engine", "trainer", "viewer"}, {'"' + name + '"', name + "_row()"});
-        std::erase(named, "trainer/option_rows.cpp");  // whose options say what they are for
-        EXPECT_EQ(named, std::vector<std::string>{"trainer/density/" + name + ".cpp"});
+        std::erase(named, "trainer/options/option_rows.cpp");  // whose options say what they are for
+        EXPECT_EQ(named, std::vector<std::string>{"trainer/growth/" + name + ".cpp"});
         EXPECT_EQ(files_with({"trainer"}, {"ROW(" + name + ")"}),
-                  std::vector<std::string>{"trainer/density/strategy_list.h"});
+                  std::vector<std::string>{"trainer/options/options.h"});
     }
 }
 

@@ -1,0 +1,82 @@
+// What one step of the optimiser takes: Adam's rates of each attribute and what is beside Adam.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <map>
+
+#include "engine/gpu/commands.h"
+#include "engine/gpu/pipeline.h"
+#include "engine/raster/frame_view.h"
+#include "engine/raster/gradient_buffers.h"
+#include "engine/scene/splat_model.h"
+#include "shaders/shared/optim_args.h"
+
+namespace darb {
+
+struct AdamStep {
+    /// Of each attribute, by its number; as adam_step() leaves them, divided by 1 - beta1^t.
+    std::array<float, kAttributeCount> rate{};
+    float inverse_sqrt_correction2 = 1;
+    // Weights of the mean opacity and the mean scale in the loss; of the splats that the frame
+    // shows, or of all.
+    float opacity_weight = 0, scale_weight = 0;
+    // Share of the step's views at which they act on what a view does not show, too.
+    float regularise_unseen = 0;
+    float largest_log_scale = std::numeric_limits<float>::max();  // none grows beyond it
+    float clearance = 0;  // world: splats nearer to the camera fade
+    // Harmonics above the first band make a step in every so many iterations, of the mean gradient
+    // of these; more than 1 takes splats that hold such means.
+    int rest_every = 1;
+    int rest = REST_EACH;  // what that is in this iteration, REST_*
+    /// Others than these are AdamUpdate's alone: the step within the backward pass has them built
+    /// in.
+    double beta1 = 0.9, beta2 = 0.999;
+    double rest_beta1 = 0.9, rest_beta2 = 0.999;  // of the harmonics above the first band
+};
+
+/// rates: plain learning rates; t: the number of this step, from 1.
+AdamStep adam_step(const AdamStep& rates, int t);
+
+/// Throws Error where a rate, weight or limit is no number or negative, or a beta is not below 1.
+void check_step(const AdamStep& step);
+
+class GpuSplats;
+/// Throws Error where splats lack what the step needs: moments, a sum of harmonics' gradients.
+void check_trainable(const GpuSplats& splats, const AdamStep& step);
+
+// AdamUpdate: the step of the optimiser from gradients in buffers, which may be of several views,
+// of other processes or a caller's own. For one view it is the step that Backward::record makes, to
+// rounding: Adam with bias correction (Kingma and Ba 2015), the regularisers, the largest scale,
+// the fading of what stands too near to a camera, and the harmonics' step in every so many
+// iterations.
+
+class AdamUpdate {
+  public:
+    explicit AdamUpdate(Device& device);
+
+    /// splats must have moments, and the gradients must be theirs. status: gpu::FrameStatus of the
+    /// frames; where one overflowed nothing happens. scale: of the gradients, 1 / views for the
+    /// mean of the views' losses. step.clearance is record_fading's. Throws Error for what
+    /// check_step refuses and for gradients of other splats.
+    void record(Commands& commands, GpuSplats& splats, const GradientBuffers& gradients,
+                const Buffer& status, int sh_degree, const AdamStep& step, float scale = 1);
+
+    /// After record(), once for each view of the step: splats nearer to the camera than the
+    /// clearance (world units) fade. Records nothing where that is 0.
+    void record_fading(Commands& commands, GpuSplats& splats, const GradientBuffers& gradients,
+                       const Buffer& status, const FrameView& view, float clearance);
+
+    /// What the views showed, added to sums [N][2] as Backward::gradient_sum() holds them.
+    void record_sums(Commands& commands, const GradientBuffers& gradients, const Buffer& status,
+                     const Buffer& gradient_sum);
+
+  private:
+    const Pipeline& pipeline(int attribute, std::uint32_t floats, int rest);
+
+    Device* device_;
+    std::map<std::array<int, 3>, Pipeline> pipelines_;  // by attribute, floats and REST_*
+    Pipeline fade_, add_views_;
+};
+
+}  // namespace darb

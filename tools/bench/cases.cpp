@@ -1,0 +1,684 @@
+#include "tools/bench/cases.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <glm/glm.hpp>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "engine/core/error.h"
+#include "engine/core/rng.h"
+#include "engine/data/camera_list.h"
+#include "engine/plan/effect_plan.h"
+#include "engine/plan/tuner.h"
+#include "engine/plan/tuning_names.h"
+#include "engine/primitives/radix_sort.h"
+#include "engine/primitives/scan.h"
+#include "engine/raster/forward.h"
+#include "engine/raster/frame_buffers.h"
+#include "engine/raster/gpu_splats.h"
+#include "engine/scene/splat_file.h"
+#include "tools/bench/bench_step.h"
+#include "tools/bench/native_sort.h"
+#include "tools/bench/scenes.h"
+#include "tools/bench/yardstick.h"
+#include "tools/cost/views.h"
+#include "trainer/growth/initial_model.h"
+#include "trainer/options/schedule.h"
+#include "trainer/step/trainer.h"
+
+namespace darb {
+
+namespace {
+
+constexpr std::size_t kOwnViews = 2;   // of the data set, that pictures are timed at
+constexpr int kOwnIterations = 7'000;  // of the run that a step is taken from
+constexpr std::size_t kStepsASample = 10;
+
+BenchResult measure_own_steps(Device& device, const SplatModel& model, Dataset dataset,
+                              const DeviceRates& rates, const BenchOptions& options) {
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    TrainOptions train;
+    train.iterations = kOwnIterations;
+    train.resolution_ramp = false;  // steps of whole photos
+    train.densify_until = 0;        // of the scene as it is
+    train.probe_sh = false;
+    train.sh_degree = model.sh_degree;
+    train.sh_interval = 1;  // all bands are in use after a few steps
+    train.kernel = model.kernel;
+    train.footprint = model.footprint;
+    if (options.plan_training) options.plan_training(dataset, photos, train);
+    train.sh_degree = model.sh_degree;
+    train.probe_sh = false;
+    Trainer trainer(device, dataset, photos, model, train);
+    for (int i = 0; i < model.sh_degree; ++i) trainer.step();
+    const int steps = static_cast<int>(std::min(dataset.views.size(), kStepsASample));
+    BenchResult result = measure_steps(trainer, steps, options.sampling);
+    result.counts.rest_floats = model.rest_count();
+    rate_passes(rates, result);
+    result.note = fmt::format("{} photos, {} splats", dataset.views.size(), model.size());
+    return result;
+}
+
+}  // namespace
+
+std::vector<BenchCase> own_cases(const std::filesystem::path& scene,
+                                 const std::filesystem::path& dataset) {
+    const SplatModel model = load_splats(scene);
+    if (model.size() == 0)
+        throw Error(scene.string(), "holds no splats", "There is nothing to measure.");
+    std::vector<BenchCase> cases;
+    const auto add = [&](const std::string& what, const Camera& camera) {
+        cases.push_back({fmt::format("render/{}/{}x{}", what, camera.width, camera.height), "",
+                         [model, camera](Device& device, const DeviceRates& rates,
+                                         const BenchOptions& options) {
+                             return measure_picture(device, model, camera, rates, options);
+                         }});
+    };
+    if (dataset.empty()) {
+        for (const auto& [w, h] : {std::pair{1280, 720}, {1920, 1080}})
+            add("own", orbit_views(model, 1, w, h).cameras[0]);
+        return cases;
+    }
+    const Dataset photos = load_dataset(dataset);
+    const std::size_t count = std::min(photos.views.size(), kOwnViews);
+    for (std::size_t i = 0; i < count; ++i) {
+        const View& view = photos.views[i * photos.views.size() / count];
+        add("own/" + view.name, view.camera);
+    }
+    cases.push_back(
+        {"train/own", "",
+         [model, photos](Device& device, const DeviceRates& rates, const BenchOptions& options) {
+             return measure_own_steps(device, model, photos, rates, options);
+         }});
+    return cases;
+}
+
+namespace {
+
+constexpr std::size_t kRandomSplats = 100'000;
+const glm::dvec3 kRandomCentre(0, 0, 4), kBikerCentre(-0.06, -1.6, 4);
+
+struct Planned {
+    SplatModel model;
+    Camera camera;
+    EffectPlan plan;
+};
+
+// As darb render draws it.
+Planned planned(const SplatModel& model, const Camera& camera) {
+    Planned p{model, camera, plan_rendering(model, {bench_view(camera, "view")}, {})};
+    apply_plan(p.plan, p.model);
+    return p;
+}
+
+}  // namespace
+
+BenchResult measure_picture(Device& device, const SplatModel& model, const Camera& camera,
+                            const DeviceRates& rates, const BenchOptions& options) {
+    BenchResult result = measure_frames(device, model, camera, rates, options.sampling);
+    const Planned p = planned(model, camera);
+    const BlendFigures blend =
+        measure_blend(device, p.model, {camera}, p.plan.projection(), options.sampling);
+    result.counts = blend.counts;
+    result.contributing = blend.contributing;
+    result.yardsticks = blend.yardsticks;
+    rate_passes(rates, result);
+    return result;
+}
+
+BenchResult measure_frames(Device& device, const SplatModel& model, const Camera& camera,
+                           const DeviceRates& rates, const Sampling& sampling) {
+    const Planned p = planned(model, camera);
+    ForwardOptions options = frame_accuracy({}, p.model).options;
+    options.effects = p.plan.projection();
+    options.effects.antialias = p.model.antialias;
+    options.huge_splat_path = p.plan.huge_splat_path();
+    const GpuSplats splats(device, p.model, false);
+    FrameBuffers buffers(device, options);
+    Forward forward(device, options);
+    Commands commands(device);
+    FrameView view{camera_data(camera, splats.origin()), nullptr, 0, p.model.sh_degree};
+    const Buffer cameras = upload_cameras(device, {view.camera});
+    view.cameras = &cameras;
+    buffers.reserve(splats.count(), splats.count() * 4, camera.width, camera.height);
+    gpu::FrameStatus status{};
+    BenchResult result;
+    take_samples(
+        sampling, 1,
+        [&] {
+            do {
+                commands.begin();
+                forward.record(commands, splats, view, buffers.frame());
+                commands.submit_and_wait();
+                status = buffers.frame().read_status();
+            } while (buffers.make_room(status));
+            return commands.pass_times();
+        },
+        result);
+    result.counts = {static_cast<double>(splats.count()),
+                     static_cast<double>(status.visible),
+                     static_cast<double>(status.intersections),
+                     static_cast<double>(camera.width) * camera.height,
+                     static_cast<double>(p.model.rest_count()),
+                     0};
+    rate_passes(rates, result);
+    return result;
+}
+
+std::vector<BenchCase> render_cases() {
+    std::vector<BenchCase> cases;
+    constexpr int sizes[][2] = {{1280, 720}, {1920, 1080}};
+    const auto add = [&](const std::string& scene, const std::filesystem::path& file, int width,
+                         int height, auto camera_of) {
+        cases.push_back(
+            {fmt::format("render/{}/{}x{}", scene, width, height), file,
+             [=](Device& device, const DeviceRates& rates, const BenchOptions& options) {
+                 const SplatModel model =
+                     file.empty() ? random_scene(kRandomSplats) : load_splats(*options.data / file);
+                 return measure_picture(device, model, camera_of(model, width, height), rates,
+                                        options);
+             }});
+    };
+    const auto random = [](const SplatModel&, int width, int height) {
+        return bench_camera(kRandomCentre, true, width, height);
+    };
+    const auto biker = [](const SplatModel&, int width, int height) {
+        return bench_camera(kBikerCentre, false, width, height);
+    };
+    const auto framed = [](const SplatModel& model, int width, int height) {
+        return orbit_views(model, 1, width, height).cameras[0];
+    };
+    for (const auto& [w, h] : sizes) add("random_100k", "", w, h, random);
+    for (const auto& [w, h] : sizes) add("biker", "splats/biker.compressed.ply", w, h, biker);
+    for (const auto& [w, h] : sizes) add("toy_cat", "splats/toy-cat.compressed.ply", w, h, framed);
+    return cases;
+}
+
+namespace {
+
+std::vector<std::uint32_t> random_words(std::uint32_t count, std::uint32_t bound) {
+    Pcg32 random(3, 4);
+    std::vector<std::uint32_t> words(count);
+    for (std::uint32_t& word : words) word = bound == 0 ? random.next() : random.below(bound);
+    return words;
+}
+
+// The samples of the native work, taken after the device's; same: whether the results are.
+Yardstick yardstick(const std::string& pass, const BenchResult& result, const Sampling& sampling,
+                    bool same, const std::function<double()>& native) {
+    std::vector<double> ms;
+    for (int i = 0; i < std::clamp(sampling.least, 1, 10); ++i) ms.push_back(native());
+    return {pass, result.passes.empty() ? result.ms : result.passes[0].ms, spread_of(ms),
+            "same_result", same ? 1.0 : 0.0};
+}
+
+BenchResult measure_sort(Device& device, std::uint32_t count, const DeviceRates& rates,
+                         const Sampling& sampling) {
+    const std::vector<std::uint32_t> keys = random_words(count, 0);
+    const std::uint64_t bytes = std::uint64_t{count} * 4;
+    Buffer unsorted(device, "unsorted", bytes), size(device, "count", 4);
+    const Buffer key(device, "keys", bytes), value(device, "values", bytes);
+    RadixSort sort(device, count);
+    Commands commands(device);
+    size.upload(std::vector<std::uint32_t>{count});
+    unsorted.upload(keys);
+    BenchResult result;
+    take_samples(
+        sampling, 1,
+        [&] {
+            commands.begin();
+            commands.pass("depth sort");  // the name by which roofline.cpp knows 32-bit keys
+            sort.record(commands, key, value, size, 0, 32, true);
+            commands.submit_and_wait();
+            return commands.pass_times();
+        },
+        result,
+        [&] {  // the keys of the last sample are sorted now
+            commands.begin();
+            commands.copy(unsorted, key, bytes);
+            commands.submit_and_wait();
+        });
+    result.counts.visible = count;
+    rate_passes(rates, result);
+    for (PassFigure& pass : result.passes) pass.name = "radix sort";
+    NativeSort native;
+    std::vector<std::uint32_t> k = keys, v(count);
+    for (std::uint32_t i = 0; i < count; ++i) v[i] = i;
+    native.sort(k, v);
+    const bool same =
+        k == key.download<std::uint32_t>(count) && v == value.download<std::uint32_t>(count);
+    result.yardsticks.push_back(yardstick("radix sort", result, sampling, same, [&] {
+        k = keys;
+        return milliseconds([&] { native.sort(k, v); });
+    }));
+    return result;
+}
+
+BenchResult measure_scan(Device& device, std::uint32_t count, const DeviceRates& rates,
+                         const Sampling& sampling) {
+    const std::vector<std::uint32_t> counts = random_words(count, 100);
+    const std::uint64_t bytes = std::uint64_t{count} * 4;
+    Buffer from(device, "counts", bytes), size(device, "count", 4);
+    const Buffer to(device, "offsets", bytes), total(device, "total", 4);
+    from.upload(counts);
+    size.upload(std::vector<std::uint32_t>{count});
+    Scan scan(device, count);
+    Commands commands(device);
+    BenchResult result;
+    take_samples(
+        sampling, 1,
+        [&] {
+            commands.begin();
+            commands.pass("scan");
+            scan.record(commands, from, to, size, 0, total);
+            commands.submit_and_wait();
+            return commands.pass_times();
+        },
+        result);
+    result.counts.splats = count;
+    rate_passes(rates, result);
+    std::vector<std::uint32_t> offsets;
+    native_scan(counts, offsets);
+    const bool same = offsets == to.download<std::uint32_t>(count);
+    result.yardsticks.push_back(yardstick("scan", result, sampling, same, [&] {
+        return milliseconds([&] { native_scan(counts, offsets); });
+    }));
+    return result;
+}
+
+}  // namespace
+
+std::vector<BenchCase> sort_cases() {
+    std::vector<BenchCase> cases;
+    for (const std::uint32_t millions : {1u, 10u}) {
+        const std::uint32_t count = millions * 1'000'000;
+        cases.push_back({fmt::format("sort/{}M", millions), "",
+                         [=](Device& device, const DeviceRates& rates, const BenchOptions& o) {
+                             return measure_sort(device, count, rates, o.sampling);
+                         }});
+        cases.push_back({fmt::format("scan/{}M", millions), "",
+                         [=](Device& device, const DeviceRates& rates, const BenchOptions& o) {
+                             return measure_scan(device, count, rates, o.sampling);
+                         }});
+    }
+    return cases;
+}
+
+}  // namespace darb
+
+// From starting the command to the first picture on disk: darb render of one view of biker, as a
+// process of its own, with shader caches in a folder of their own.
+
+extern char** environ;
+
+namespace darb {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kStarts = 5;
+
+// Removed with everything in it at the end.
+class ScratchFolder {
+  public:
+    ScratchFolder() {
+        std::string name = (fs::temp_directory_path() / "darb_bench_XXXXXX").string();
+        if (!mkdtemp(name.data()))
+            throw Error(name, std::strerror(errno), "Set TMPDIR to a folder that can be written.");
+        path_ = name;
+    }
+    ~ScratchFolder() {
+        std::error_code ignored;
+        fs::remove_all(path_, ignored);
+    }
+    ScratchFolder(const ScratchFolder&) = delete;
+    ScratchFolder& operator=(const ScratchFolder&) = delete;
+    const fs::path& path() const { return path_; }
+
+  private:
+    fs::path path_;
+};
+
+// The caches of Mesa, of NVIDIA's driver and of darb itself go to `caches`.
+std::vector<std::string> environment(const fs::path& caches) {
+    const std::vector<std::string> names = {"XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR",
+                                            "__GL_SHADER_DISK_CACHE_PATH"};
+    std::vector<std::string> all;
+    for (char** one = environ; *one; ++one) {
+        const std::string text = *one;
+        const std::string name = text.substr(0, text.find('='));
+        if (std::find(names.begin(), names.end(), name) == names.end()) all.push_back(text);
+    }
+    for (const std::string& name : names) all.push_back(name + "=" + caches.string());
+    return all;
+}
+
+std::vector<char*> pointers(std::vector<std::string>& texts) {
+    std::vector<char*> result;
+    for (std::string& text : texts) result.push_back(text.data());
+    result.push_back(nullptr);
+    return result;
+}
+
+void run_process(std::vector<std::string> arguments, std::vector<std::string> variables) {
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    pid_t process = 0;
+    const int failure = posix_spawn(&process, arguments[0].c_str(), &actions, nullptr,
+                                    pointers(arguments).data(), pointers(variables).data());
+    posix_spawn_file_actions_destroy(&actions);
+    int status = 0;
+    if (failure != 0 || waitpid(process, &status, 0) != process || status != 0)
+        throw Error(arguments[0] + " " + arguments[1],
+                    failure != 0 ? std::strerror(failure) : "did not draw its picture",
+                    "Run the command by hand; see what it says above.");
+}
+
+BenchResult measure(const Device& device, const BenchOptions& options, const fs::path& scene,
+                    bool cold) {
+    const ScratchFolder scratch;
+    const View view = bench_view(bench_camera({-0.06, -1.6, 4}, false, 1280, 720), "first.png");
+    const fs::path cameras = scratch.path() / "cameras.json", caches = scratch.path() / "caches",
+                   pictures = scratch.path() / "pictures";
+    write_camera_list(cameras, {view});
+    std::vector<std::string> command = {
+        options.program.string(),
+        "render",
+        scene.string(),
+        "--cameras",
+        cameras.string(),
+        "-o",
+        pictures.string(),
+        "--tune",
+        names_text(tuning_names(device.tuning()))};  // nothing to measure
+    if (!options.device.empty()) {
+        command.push_back("--device");
+        command.push_back(options.device);
+    }
+    Sampling sampling = options.sampling;
+    sampling.least = std::min(sampling.least, kStarts);
+    sampling.seconds = 0;
+    sampling.warm_up = cold ? 0 : 1;
+    BenchResult result;
+    take_samples(
+        sampling, 1,
+        [&] {
+            run_process(command, environment(caches));
+            return std::vector<PassTime>{};
+        },
+        result,
+        [&] {
+            if (cold) fs::remove_all(caches);
+            fs::create_directories(caches);
+            fs::remove_all(pictures);
+        });
+    if (fs::is_empty(pictures)) throw Error(pictures.string(), "holds no picture");
+    result.note = fmt::format("process start to PNG at 1280x720, shader cache {}",
+                              cold ? "empty" : "filled by the start before");
+    return result;
+}
+
+}  // namespace
+
+std::vector<BenchCase> start_cases() {
+    std::vector<BenchCase> cases;
+    const fs::path scene = "splats/biker.compressed.ply";
+    for (const bool cold : {false, true})
+        cases.push_back({fmt::format("start/biker/{}", cold ? "cold" : "warm"), scene,
+                         [=](Device& device, const DeviceRates&, const BenchOptions& options) {
+                             return measure(device, options, *options.data / scene, cold);
+                         }});
+    return cases;
+}
+
+std::vector<BenchCase> bench_cases(bool full) {
+    std::vector<BenchCase> all;
+    for (const auto& some : {render_cases(), train_cases(full), step_cases(), sort_cases(),
+                             tuning_cases(), start_cases()})
+        all.insert(all.end(), some.begin(), some.end());
+    return all;
+}
+
+namespace {
+
+constexpr std::size_t kStepSplats = 100'000;
+constexpr int kStepDegree = 3;
+
+// A sample is a step in each way, one after the other; the case's time is that of both.
+BenchResult measure(Device& device, int width, int height, const BenchOptions& options) {
+    const Camera camera = bench_camera(glm::dvec3(0, 0, 4), true, width, height);
+    BenchStep frame(device, random_scene(kStepSplats, kStepDegree), camera);
+    BenchResult result;
+    take_samples(
+        options.sampling, 1,
+        [&] {
+            std::vector<PassTime> passes;
+            for (const bool apart : {false, true}) {
+                const std::string way = apart ? "apart" : "fused";
+                double sum = 0;
+                for (const PassTime& pass : frame.run(apart)) {
+                    sum += pass.ms;
+                    if (pass.name == "project backward" || pass.name == "adam")
+                        passes.push_back({pass.name + ", " + way, pass.ms});
+                }
+                passes.push_back({"step, " + way, sum});
+            }
+            return passes;
+        },
+        result);
+    result.counts.splats = kStepSplats;
+    result.counts.visible = frame.status().visible;
+    result.counts.intersections = frame.status().intersections;
+    result.counts.pixels = double(width) * height;
+    result.counts.rest_floats = attribute_floats(kShRest, kStepDegree);
+    double fused = 0, apart = 0;
+    for (const PassFigure& pass : result.passes) {
+        if (pass.name == "step, fused") fused = pass.ms.median;
+        if (pass.name == "step, apart") apart = pass.ms.median;
+    }
+    result.note = fmt::format("gradients and optimiser apart take {:+.1f} % of a step",
+                              fused > 0 ? 100 * (apart / fused - 1) : 0.0);
+    return result;
+}
+
+}  // namespace
+
+std::vector<BenchCase> step_cases() {
+    std::vector<BenchCase> cases;
+    for (const glm::ivec2 size : {glm::ivec2(320, 240), glm::ivec2(800, 600)})
+        cases.push_back({fmt::format("step/random_100k/{}x{}", size.x, size.y), "",
+                         [size](Device& device, const DeviceRates&, const BenchOptions& options) {
+                             return measure(device, size.x, size.y, options);
+                         }});
+    return cases;
+}
+
+namespace {
+
+constexpr int kScheduled = 7'000;  // iterations of the run that the steps are taken from
+constexpr int kYardstickViews = 2;
+constexpr int kFilledSide = 1'000;
+constexpr std::size_t kFilledSplats = 1'000'000;
+
+struct TrainCase {
+    const char* dataset;
+    int after;  // iterations with density control before the steps that are timed
+};
+
+std::vector<Camera> some_cameras(const Dataset& dataset, std::size_t most) {
+    std::vector<Camera> cameras;
+    const std::size_t count = std::min(most, dataset.views.size());
+    for (std::size_t i = 0; i < count; ++i)
+        cameras.push_back(dataset.views[i * dataset.views.size() / count].camera);
+    return cameras;
+}
+
+BenchResult measure(Device& device, const TrainCase& one, const DeviceRates& rates,
+                    const BenchOptions& options) {
+    Dataset dataset = load_dataset(*options.data / one.dataset);
+    const std::vector<ImageU8> photos = load_photos(dataset.views);
+    TrainOptions train;
+    train.iterations = kScheduled;
+    train.resolution_ramp = false;  // what is measured are steps of whole photos
+    if (options.plan_training) options.plan_training(dataset, photos, train);
+    train.densify_until = std::min(one.after, Schedule(train).rounds.end);
+    Trainer trainer(device, dataset, photos, initial_model(dataset, train), train);
+    const auto start = std::chrono::steady_clock::now();
+    while (trainer.iteration() < one.after) {
+        trainer.step();
+        if (options.progress && trainer.iteration() % 500 == 0)
+            options.progress(fmt::format("{}: set-up, {} of {} iterations, {} splats", one.dataset,
+                                         trainer.iteration(), one.after, trainer.splat_count()));
+    }
+    trainer.drain();
+    const std::chrono::duration<double> set_up = std::chrono::steady_clock::now() - start;
+    const int views = static_cast<int>(dataset.views.size());
+    BenchResult result = measure_steps(trainer, std::min(views, 10), options.sampling);
+    const SplatModel model = trainer.model();
+    ProjectionEffects effects = train.projection;
+    effects.antialias = train.antialias;
+    const BlendFigures blend = measure_blend(device, model, some_cameras(dataset, kYardstickViews),
+                                             effects, options.sampling);
+    // The steps' own means; evaluated splat-pixels follow the intersections.
+    const double scale = result.counts.intersections / std::max(blend.counts.intersections, 1.0);
+    result.counts.evaluated = scale * blend.counts.evaluated;
+    result.contributing = scale * blend.contributing;
+    result.counts.rest_floats = model.rest_count();
+    result.counts.pixels = blend.counts.pixels;
+    result.yardsticks = blend.yardsticks;
+    rate_passes(rates, result);
+    result.note = fmt::format("{} photos, after {} iterations ({:.1f} s of set-up)", views,
+                              one.after, set_up.count());
+    return result;
+}
+
+// What tools/gpu_model.py estimates. Rates so small that the scene stays as it is.
+BenchResult measure_filled(Device& device, const DeviceRates& rates, const BenchOptions& options) {
+    Dataset dataset;
+    std::vector<ImageU8> photos;
+    Pcg32 random(3, 100);
+    for (const double x : {-0.01, 0.01}) {
+        dataset.views.push_back(
+            bench_view(bench_camera({x, 0, 4}, true, kFilledSide, kFilledSide), ""));
+        photos.emplace_back(kFilledSide, kFilledSide, 4);
+        for (std::uint8_t& value : photos.back().data)
+            value = static_cast<std::uint8_t>(random.below(256));
+    }
+    TrainOptions train;
+    train.iterations = kScheduled;
+    train.resolution_ramp = train.probe_sh = train.alpha = false;
+    train.densify_until = 0;
+    train.sh_interval = 1;
+    train.position_lr_init = train.position_lr_final = 1e-9f;
+    train.scale_lr = train.rotation_lr = train.opacity_lr = train.sh_dc_lr = 1e-9f;
+    Trainer trainer(device, dataset, photos, filled_scene(kFilledSplats), train);
+    for (int i = 0; i < train.sh_degree; ++i) trainer.step();  // then all bands are in use
+    BenchResult result = measure_steps(trainer, 2, options.sampling);
+    result.counts.rest_floats = attribute_floats(kShRest, train.sh_degree);
+    result.counts.pixels = double(kFilledSide) * kFilledSide;
+    rate_passes(rates, result);
+    return result;
+}
+
+}  // namespace
+
+BenchResult measure_steps(Trainer& trainer, int steps_a_sample, const Sampling& sampling) {
+    BenchResult result;
+    double visible = 0, intersections = 0, finished = 0;
+    trainer.on_result = [&](const IterationResult& one) {
+        visible += one.visible;
+        intersections += one.intersections;
+        finished += 1;
+    };
+    take_samples(
+        sampling, steps_a_sample,
+        [&] {
+            const std::vector<PassTotal> before = trainer.pass_totals();
+            for (int step = 0; step < steps_a_sample; ++step) trainer.step();
+            trainer.drain();
+            std::vector<PassTime> passes;
+            for (const PassTotal& pass : trainer.pass_totals()) {
+                const auto known =
+                    std::find_if(before.begin(), before.end(),
+                                 [&](const PassTotal& p) { return p.name == pass.name; });
+                passes.push_back({pass.name, pass.ms - (known == before.end() ? 0 : known->ms)});
+            }
+            return passes;
+        },
+        result);
+    trainer.on_result = {};
+    result.counts.splats = trainer.splat_count();
+    result.counts.visible = visible / std::max(finished, 1.0);
+    result.counts.intersections = intersections / std::max(finished, 1.0);
+    return result;
+}
+
+std::vector<BenchCase> train_cases(bool full) {
+    std::vector<BenchCase> cases;
+    for (const TrainCase& one :
+         {TrainCase{"sceaux_castle_200_tiny", 0}, TrainCase{"sceaux_castle_800", 0},
+          TrainCase{"fox_800", full ? kScheduled : 1'000}}) {
+        std::string name = fmt::format("train/{}", one.dataset);
+        if (one.after > 0) name += fmt::format("/after_{}", one.after);
+        cases.push_back(
+            {name, one.dataset,
+             [one](Device& device, const DeviceRates& rates, const BenchOptions& options) {
+                 return measure(device, one, rates, options);
+             }});
+    }
+    cases.push_back({"train/filled_1M/1000x1000", "", measure_filled});
+    return cases;
+}
+
+namespace {
+
+// Every choice of one group on the tuner's scene, a row each; the case's own figures are those of
+// the one that runs on this device.
+BenchResult measure_choices(Device& device, const std::string& name, const Sampling& sampling) {
+    const std::vector<TuningGroup> groups = tuning_groups(device.info());
+    const auto group = std::find_if(groups.begin(), groups.end(),
+                                    [&](const TuningGroup& g) { return g.name == name; });
+    const Tuning before = device.tuning();
+    const TuningNames usual = tuning_names(before);
+    BenchResult result;
+    std::vector<PassFigure> rows;
+    for (const std::string& choice : group->choices) {
+        device.set_tuning(with_names(before, {{name, choice}}));
+        TuningFrame frame(device);
+        BenchResult one;
+        take_samples(
+            sampling, 1,
+            [&] {
+                return std::vector<PassTime>{{name + "=" + choice, frame.run({*group})[0]}};
+            },
+            one);
+        rows.push_back(one.passes.at(0));
+        if (choice == usual.at(name)) result = one;
+    }
+    device.set_tuning(before);
+    result.passes = std::move(rows);
+    result.note = fmt::format("{}={} runs on this device; rows are {}", name, usual.at(name),
+                              fmt::join(group->passes, " + "));
+    return result;
+}
+
+}  // namespace
+
+std::vector<BenchCase> tuning_cases() {
+    std::vector<BenchCase> cases;
+    for (const char* group : {"scan", "scatter", "blend", "backward"})
+        cases.push_back({fmt::format("tuning/{}", group), "",
+                         [group](Device& device, const DeviceRates&, const BenchOptions& o) {
+                             return measure_choices(device, group, o.sampling);
+                         }});
+    return cases;
+}
+
+}  // namespace darb

@@ -1,0 +1,81 @@
+// make_scene FOLDER [SCALE]: renders the data set that the project ships: a still life seen from 40
+// training and 8 held-out cameras, with a COLMAP model, and 16 views off that path. The same bytes
+// on every run. SCALE 1 to 8 multiplies the photos' sides of 200 x 150 px.
+// make_scene depths FOLDER [SCALE]: the same with the true depths of all views beside the photos.
+// make_scene outdoors FOLDER [SCALE]: photos from near the ground, under clouds.
+// make_scene town FOLDER SIDE SCALE: SIDE x SIDE photos of a town of 16 blocks (town.h).
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+
+#include "tools/lab/make_scene/capture.h"
+#include "tools/lab/make_scene/town.h"
+#include "tools/lab/make_scene/write_scene.h"
+
+namespace {
+
+void make_town(const std::filesystem::path& folder, int side, double scale) {
+    using namespace darb::make_scene;
+    const std::vector<darb::View> views = town_flight(side, scale);
+    write_scene(folder, views, capture_views(town(), views, town_capture(views.size())));
+}
+
+void make_still_life(const std::filesystem::path& folder, int scale, bool outdoors, bool depths) {
+    using namespace darb::make_scene;
+    World world = still_life();
+    Heights heights;
+    if (outdoors) {
+        world.clouds = 1;
+        heights = {8, 6};
+    }
+    const std::vector<darb::View> views = camera_path(scale, heights);
+    write_scene(folder, views, capture_views(world, views));
+    const std::vector<darb::View> away = off_path_views(scale, heights);
+    write_test_views(folder / "off_path", away, take_photos(world, away, views.size()));
+    if (!depths) return;
+    write_depths(folder, views, take_depths(world, views));
+    write_depths(folder / "off_path", away, take_depths(world, away));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    using namespace darb::make_scene;
+    const bool is_town = argc == 5 && std::strcmp(argv[1], "town") == 0;
+    const int side = is_town ? std::atoi(argv[3]) : 2;
+    const double town_scale = is_town ? std::atof(argv[4]) : 1;
+    if (is_town && side >= 2 && side <= 100 && town_scale >= 0.2 && town_scale <= 8) {
+        try {
+            make_town(argv[2], side, town_scale);
+        } catch (const std::exception& error) {
+            std::fprintf(stderr, "error: %s\n", error.what());
+            return 2;
+        }
+        return 0;
+    }
+    const bool outdoors = argc >= 3 && std::strcmp(argv[1], "outdoors") == 0;
+    const bool depths = argc >= 3 && std::strcmp(argv[1], "depths") == 0;
+    if (outdoors || depths) {
+        --argc;
+        ++argv;
+    }
+    const int scale = argc == 3 ? std::atoi(argv[2]) : 1;
+    if (argc < 2 || argc > 3 || argv[1][0] == '-' || scale < 1 || scale > 8) {
+        std::fprintf(
+            stderr,
+            "usage: make_scene FOLDER [SCALE]   (1 to 8: photos of 200 x 150 px times this)\n"
+            "       make_scene depths FOLDER [SCALE]   (with the true depths of the photos)\n"
+            "       make_scene outdoors FOLDER [SCALE]   (from near the ground, under clouds)\n"
+            "       make_scene town FOLDER SIDE SCALE   (SIDE x SIDE photos; SCALE from 0.2)\n");
+        return 2;
+    }
+    try {
+        make_still_life(argv[1], scale, outdoors, depths);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "error: %s\n", error.what());
+        return 2;
+    }
+    return 0;
+}
